@@ -1,0 +1,97 @@
+"""What a user submits: an experiment, or a study of several to be compared.
+
+Whatever is left out of a submitted spec has a default, and the defaults are the paper's. A *resolved* spec is the same
+type with nothing left out: that is what is stored, so that a later change of a default changes no stored experiment.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from schemas.base import Count, Frozen, Label, Real, Seed
+from schemas.plugin import PluginRef, TunableRef
+
+BudgetName = Literal["smoke", "desk", "paper"]
+
+
+class BudgetSpec(Frozen):
+    """How much is computed; a number left out is the preset's.
+
+    `evaluations` count fitness evaluations of one search. A selection in an ensemble of m simulators costs m rollouts
+    an evaluation; a tuning on k samples costs k.
+    """
+
+    preset: BudgetName = "paper"
+    controller_evaluations: Count | None = Field(default=None, description="of the search for the transferred controller")
+    selection_evaluations: Count | None = Field(default=None, description="of the search for the next sample")
+    simulator_evaluations: Count | None = Field(default=None, description="of the search for a simulator")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _accept_a_bare_preset(cls, value: object) -> object:
+        return {"preset": value} if isinstance(value, str) else value
+
+
+class RealitySpec(Frozen):
+    """The reality that the algorithm may ask but not see: an engine and its hidden parameters.
+
+    An engine left out is the experiment's own; a parameter left out is the robot's own, which is the paper's reality
+    (static friction 1.0, dynamic friction 0.8, restitution 0.0).
+    """
+
+    engine: PluginRef | None = None
+    parameters: dict[str, Real] = Field(default_factory=dict)
+
+
+class Settings(Frozen):
+    """What the experiments of a study have in common."""
+
+    iterations: Annotated[Count, Field(le=1_000)] | None = Field(default=None, description="the paper: 10")
+    repetitions: Annotated[Count, Field(le=10_000)] | None = Field(default=None, description="the paper: 40")
+    robot: PluginRef = PluginRef(name="quadruped")
+    engine: PluginRef | None = Field(default=None, description="left out: the robot's own; PyBullet for the quadruped")
+    optimizer: PluginRef = PluginRef(name="steady_state")
+    tunables: tuple[TunableRef, ...] = Field(
+        default=(
+            TunableRef(name="static_friction"),
+            TunableRef(name="dynamic_friction"),
+            TunableRef(name="restitution"),
+        ),
+        min_length=1,
+    )
+    reality: RealitySpec = RealitySpec()
+    budget: BudgetSpec = BudgetSpec()
+    seed: Seed = 0
+
+
+class ExperimentSpec(Settings):
+    """One strategy under one setting, repeated."""
+
+    name: Label | None = None
+    strategy: PluginRef
+
+
+class StudySpec(Settings):
+    """Experiments to be compared: one for each strategy, all else equal.
+
+    `direct` is the baseline, evolution in reality itself; the paper repeats it 100 times where it repeats the
+    strategies 40 times.
+    """
+
+    name: Label | None = None
+    strategies: tuple[PluginRef, ...] = Field(
+        default=(
+            PluginRef(name="simulated_fit"),
+            PluginRef(name="simulated_fit_and_unique"),
+            PluginRef(name="informative"),
+            PluginRef(name="simulated_fit_and_informative"),
+            PluginRef(name="random"),
+            PluginRef(name="known_fit"),
+            PluginRef(name="direct"),
+        ),
+        min_length=1,
+        max_length=100,
+    )
+    direct_repetitions: Annotated[Count, Field(le=10_000)] | None = Field(
+        default=None, description="left out: as many as the strategies have"
+    )

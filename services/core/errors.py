@@ -1,0 +1,80 @@
+"""Everything that gaplab refuses or fails at.
+
+    GaplabError
+    ├── InvalidSpec          what was asked for cannot be done; carries every violation with its place in the spec
+    ├── NotFound             no such study, experiment or plug-in
+    ├── Conflict             not now: the state forbids it
+    ├── StoreUnavailable     the database is unreachable, or its schema is not the one this version needs
+    └── EngineError
+        └── EngineUnavailable    the engine's library is not installed
+
+Physics that blows up is no error: it is a fitness of nan, which never wins.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+
+class GaplabError(Exception):
+    """The root: its message is one readable sentence."""
+
+
+@dataclass(frozen=True)
+class Violation:
+    """One thing wrong with a spec.
+
+    Attributes:
+        pointer: JSON pointer of the offending value within the spec, like `/strategy/options/fit_weight`.
+        value: the offending value as it was given.
+        message: one sentence that says what is wrong.
+        permitted: what would have been right, where that can be listed or phrased.
+        nearest: the permitted name that is most alike, for a misspelt name.
+    """
+
+    pointer: str
+    value: Any
+    message: str
+    permitted: Sequence[str] | str | None = None
+    nearest: str | None = None
+
+    def under(self, prefix: str) -> "Violation":
+        """The same violation of a spec in which this one is found under `prefix`."""
+        return Violation(prefix + self.pointer, self.value, self.message, self.permitted, self.nearest)
+
+
+class InvalidSpec(GaplabError):
+    """A spec that cannot be run, with everything that is wrong with it."""
+
+    def __init__(self, violations: Iterable[Violation]) -> None:
+        self.violations = tuple(violations)
+        super().__init__("; ".join(f"{each.pointer or '/'}: {each.message}" for each in self.violations))
+
+
+class NotFound(GaplabError):
+    """There is nothing of that name or id."""
+
+
+class Conflict(GaplabError):
+    """The present state forbids what was asked."""
+
+
+class StoreUnavailable(GaplabError):
+    """The database cannot be used now."""
+
+
+class EngineError(GaplabError):
+    """An engine cannot do its work."""
+
+
+class EngineUnavailable(EngineError):
+    """The library of an engine is not installed; the message says how to install it."""
+
+
+def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -> Violation:
+    """The violation of naming something that is not there, with the nearest name that is."""
+    nearest = next(iter(get_close_matches(name, permitted, n=1, cutoff=0.5)), None)
+    hint = f" (did you mean {nearest!r}?)" if nearest else ""
+    message = f"there is no {kind} called {name!r}{hint}; there is {', '.join(permitted)}"
+    return Violation(pointer, name, message, tuple(permitted), nearest)

@@ -1,0 +1,118 @@
+"""Plug-ins: one file in a folder is one plug-in, found by being there."""
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from importlib import import_module
+from inspect import getdoc, isabstract
+from pkgutil import iter_modules
+from typing import Any, ClassVar, Generic, TypeVar
+
+from pydantic import ValidationError
+
+from schemas.base import Frozen
+from schemas.plugin import PluginRead, PluginRef
+from services.core.errors import InvalidSpec, Violation, unknown_name
+
+
+class NoOptions(Frozen):
+    """The options of a plug-in that has none."""
+
+
+class Plugin:
+    """What every plug-in is: a class with a name, a docstring and a frozen model of its options.
+
+    Attributes:
+        name: how specs call it; also the name of its file.
+        source: where its idea or its numbers come from.
+        Options: a frozen model in which everything has a default.
+    """
+
+    name: ClassVar[str]
+    source: ClassVar[str] = "gaplab"
+    Options: ClassVar[type[Frozen]] = NoOptions
+
+    def __init__(self, options: Frozen | None = None) -> None:
+        self.options = options if options is not None else self.Options()
+
+    @classmethod
+    def describe(cls) -> PluginRead:
+        """The plug-in as the catalogue lists it."""
+        summary = (getdoc(cls) or "").split("\n\n", maxsplit=1)[0].replace("\n", " ")
+        return PluginRead(
+            name=cls.name,
+            summary=summary,
+            source=cls.source,
+            options=cls.Options.model_json_schema(),
+            details=cls.details(),
+        )
+
+    @classmethod
+    def details(cls) -> dict[str, Any]:
+        """What else a reader of the catalogue should know; plain JSON."""
+        return {}
+
+
+P = TypeVar("P", bound=Plugin)
+
+
+class Registry(Mapping[str, type[P]], Generic[P]):
+    """The plug-ins of one kind, by name, in alphabetical order; every module of `package` is imported at first use."""
+
+    def __init__(self, kind: str, package: str, base: type[P]) -> None:
+        self.kind = kind
+        self._package = package
+        self._base = base
+
+    @cached_property
+    def _plugins(self) -> dict[str, type[P]]:
+        modules = (
+            import_module(f"{self._package}.{info.name}") for info in iter_modules(import_module(self._package).__path__)
+        )
+        found = {
+            each.name: each
+            for module in modules
+            for each in vars(module).values()
+            if isinstance(each, type) and issubclass(each, self._base) and not isabstract(each) and hasattr(each, "name")
+        }
+        return dict(sorted(found.items()))
+
+    def __getitem__(self, name: str) -> type[P]:
+        return self._plugins[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._plugins)
+
+    def __len__(self) -> int:
+        return len(self._plugins)
+
+    def create(self, ref: PluginRef, pointer: str = "") -> P:
+        """The plug-in that a spec names, with its options.
+
+        Args:
+            ref: name and options.
+            pointer: where in the spec it stands, for the error.
+
+        Raises:
+            InvalidSpec: no such name, or options that the plug-in refuses.
+        """
+        if ref.name not in self:
+            raise InvalidSpec([unknown_name(pointer, self.kind, ref.name, list(self))])
+        plugin = self[ref.name]
+        try:
+            return plugin(plugin.Options.model_validate(ref.options))
+        except ValidationError as error:
+            raise InvalidSpec(
+                _option_violation(plugin, dict(each), f"{pointer}/options") for each in error.errors()
+            ) from error
+
+    def describe(self) -> tuple[PluginRead, ...]:
+        """Every plug-in, as the catalogue lists it."""
+        return tuple(plugin.describe() for plugin in self.values())
+
+
+def _option_violation(plugin: type[Plugin], error: dict[str, Any], pointer: str) -> Violation:
+    place = "".join(f"/{part}" for part in error["loc"])
+    if error["type"] == "extra_forbidden":
+        kind = f"option of {plugin.name!r}"
+        return unknown_name(pointer + place, kind, str(error["loc"][-1]), list(plugin.Options.model_fields) or ["none"])
+    return Violation(pointer + place, error["input"], error["msg"])

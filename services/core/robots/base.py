@@ -1,0 +1,40 @@
+"""What a robot is: a world, genomes that move it, and what its movement is worth."""
+
+from abc import abstractmethod
+from typing import Any, ClassVar
+
+from services.core.arrays import FloatArray, Genome
+from services.core.registry import Plugin
+from services.core.types import Space
+from services.core.world import Motion, Trajectory, World
+
+
+class Robot(Plugin):
+    """A morphology with a genome space.
+
+    Attributes:
+        engine: the engine that runs it when a spec names none.
+        unit: of its fitness.
+        world: the robot in reality: its nominal world, whose coefficients are the default hidden truth.
+        space: of its genomes.
+        known: `(g,)`, a hand-designed genome of middling fitness.
+    """
+
+    engine: ClassVar[str]
+    unit: ClassVar[str]
+    world: World
+    space: Space
+    known: Genome
+
+    @abstractmethod
+    def motion(self, genome: Genome) -> Motion:
+        """The controller that the genome `(g,)` describes."""
+
+    @abstractmethod
+    def fitness(self, trajectory: Trajectory) -> FloatArray:
+        """`(...)`: the worth of each trajectory, maximised; nan where the physics failed."""
+
+    @classmethod
+    def details(cls) -> dict[str, Any]:
+        """The robot's default engine, its unit of fitness, and the size of its genome."""
+        return {"engine": cls.engine, "unit": cls.unit, "genes": cls().space.size}

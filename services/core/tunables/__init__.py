@@ -1,0 +1,6 @@
+"""Tunables: one file in this folder is one parameter of the simulator."""
+
+from services.core.registry import Registry
+from services.core.tunables.base import Tunable
+
+tunables: Registry[Tunable] = Registry("tunable", __name__, Tunable)

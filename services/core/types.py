@@ -1,0 +1,188 @@
+"""The values of the algorithm: immutable, self-checking, compared by content."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from numpy.random import Generator
+
+from services.core.arrays import FloatArray, Genome, Genomes, Parameters, frozen
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """A box of real vectors, some of whose coordinates may wrap around.
+
+    Attributes:
+        lower: `(g,)`, the least value of each coordinate.
+        upper: `(g,)`, the greatest; above `lower` in each.
+        periodic: `(g,)` of bool: the coordinate wraps (a phase); else it clips (a width).
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    periodic: FloatArray
+
+    def __post_init__(self) -> None:
+        if not (self.lower.shape == self.upper.shape == self.periodic.shape) or self.lower.ndim != 1:
+            msg = f"lower, upper and periodic are vectors of one length, not {self.lower.shape}, {self.upper.shape}"
+            raise ValueError(msg)
+        if not np.all(self.lower < self.upper):
+            where = int(np.argmin(self.lower < self.upper))
+            msg = f"lower must be below upper: coordinate {where} has {self.lower[where]} and {self.upper[where]}"
+            raise ValueError(msg)
+
+    @classmethod
+    def box(cls, lower: Sequence[float], upper: Sequence[float], periodic: Sequence[bool] | None = None) -> "Space":
+        """A space from plain sequences; nothing is periodic unless said so."""
+        wraps = np.array(periodic if periodic is not None else [False] * len(lower), dtype=bool)
+        wraps.flags.writeable = False
+        return cls(frozen(lower), frozen(upper), wraps)  # type: ignore[arg-type]
+
+    @property
+    def size(self) -> int:
+        """The number of coordinates, g."""
+        return len(self.lower)
+
+    @property
+    def extent(self) -> FloatArray:
+        """`(g,)`: upper minus lower."""
+        return self.upper - self.lower
+
+    def draw(self, count: int, rng: Generator) -> Genomes:
+        """`(count, g)` vectors, uniform over the box."""
+        return self.lower + self.extent * rng.random((count, self.size))
+
+    def contain(self, vectors: FloatArray) -> FloatArray:
+        """The vectors brought back into the box: periodic coordinates wrap, the others clip."""
+        wrapped = self.lower + np.mod(vectors - self.lower, self.extent)
+        clipped = np.minimum(np.maximum(vectors, self.lower), self.upper)
+        return np.where(self.periodic, wrapped, clipped)
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A controller with its fitness in reality; nan if the measurement failed (it counts, and teaches nothing)."""
+
+    genome: Genome
+    fitness: float
+
+
+@dataclass(frozen=True, eq=False)
+class Simulator:
+    """One setting of the tunables, with Σ(f_sim − f_real)² over the samples it was tuned on.
+
+    Attributes:
+        parameters: `(p,)`, in the order of the spec's tunables.
+        squared_error: at least 0; 0 before any sample, inf where the physics failed on one.
+    """
+
+    parameters: FloatArray
+    squared_error: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """All that a strategy may know: the samples so far, and simulators tuned on them, best first.
+
+    Attributes:
+        space: of genomes.
+        known: `(g,)`, the robot's hand-designed genome.
+        samples: in the order in which they were measured.
+        simulators: one, or a diverse ensemble; random ones before the first sample.
+    """
+
+    space: Space
+    known: Genome
+    samples: tuple[Sample, ...]
+    simulators: tuple[Simulator, ...]
+
+    @property
+    def parameters(self) -> Parameters:
+        """`(m, p)` of all simulators."""
+        return np.array([each.parameters for each in self.simulators])
+
+    @property
+    def squared_errors(self) -> FloatArray:
+        """`(m,)` of all simulators."""
+        return np.array([each.squared_error for each in self.simulators])
+
+    @property
+    def learnable(self) -> tuple[Sample, ...]:
+        """The samples whose measurement succeeded."""
+        return tuple(each for each in self.samples if np.isfinite(each.fitness))
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Fitness evaluations of each search; the paper's numbers are the defaults. Source: sections 2 and 3."""
+
+    controller_evaluations: int = 10_000
+    selection_evaluations: int = 10_000
+    simulator_evaluations: int = 2_000
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a step took: rollouts simulated, and how many of them failed (nan)."""
+
+    rollouts: int = 0
+    failures: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Selected:
+    """The strategy chose the genome to try in reality next."""
+
+    iteration: int
+    genome: Genome
+    cost: Cost = field(default_factory=Cost)
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Reality answered: one more sample."""
+
+    iteration: int
+    sample: Sample
+
+
+@dataclass(frozen=True, eq=False)
+class Tuned:
+    """New simulators, best first, fitted to all samples so far; drawn at random in iteration 0."""
+
+    iteration: int
+    simulators: tuple[Simulator, ...]
+    cost: Cost = field(default_factory=Cost)
+
+
+@dataclass(frozen=True, eq=False)
+class Transferred:
+    """A controller evolved in the best simulator, to be looked at in reality.
+
+    Attributes:
+        fitness: of the genome in that simulator.
+    """
+
+    iteration: int
+    genome: Genome
+    fitness: float
+    cost: Cost = field(default_factory=Cost)
+
+
+@dataclass(frozen=True)
+class Probed:
+    """The transferred controller's fitness in reality: looked at, never learned from, never counted.
+
+    Attributes:
+        fitness: nan if the measurement failed.
+        recorded: the larger of it and the best sample's, which is what the curve shows. Source: section 3.
+    """
+
+    iteration: int
+    fitness: float
+    recorded: float
+
+
+Step: TypeAlias = Selected | Measured | Tuned | Transferred | Probed
