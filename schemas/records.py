@@ -1,0 +1,105 @@
+"""What the service shows of its studies, experiments, repetitions, samples and simulators.
+
+Times are UTC. A fitness of null is a physics failure or a failed measurement; JSON has no nan.
+"""
+
+from datetime import datetime
+from enum import StrEnum
+from typing import Any, Generic, TypeVar
+
+from pydantic import Field
+
+from schemas.base import Frozen
+from schemas.lifecycle import State
+
+T = TypeVar("T")
+
+
+class Page(Frozen, Generic[T]):
+    """A part of a list."""
+
+    items: tuple[T, ...]
+    next: str | None = Field(default=None, description="pass it as `cursor` for what follows; null at the end")
+
+
+class Progress(Frozen):
+    """How far it is, and what is left."""
+
+    repetitions: int
+    completed: int
+    failed: int
+    iterations: int = Field(description="of all repetitions, number 0 included")
+    iterations_done: int
+    rollouts: int = Field(description="expected in all")
+    rollouts_done: int
+    rollouts_failed: int = Field(description="physics failures (nan) among those done; they never win")
+    seconds_left: float | None = Field(default=None, description="null while unknown, 0 at the end")
+
+
+class ExperimentRead(Frozen):
+    """An experiment with its resolved spec; reality's parameters are null until it has ended."""
+
+    id: str
+    study: str | None = None
+    name: str
+    strategy: str
+    state: State
+    spec: dict[str, Any]
+    progress: Progress
+    reasons: tuple[str, ...] = Field(default=(), description="why repetitions failed, each reason once")
+    created_at: datetime
+    started_at: datetime | None = None
+    ended_at: datetime | None = None
+
+
+class StudyRead(Frozen):
+    """A study; its state is that of its experiments taken together."""
+
+    id: str
+    name: str
+    state: State
+    experiments: tuple[ExperimentRead, ...]
+    progress: Progress
+    created_at: datetime
+
+
+class RepetitionRead(Frozen):
+    """One run of the whole algorithm with one stream of random numbers."""
+
+    number: int
+    state: State
+    iterations_done: int
+    rollouts_done: int
+    attempts: int
+    error: str | None = None
+    started_at: datetime | None = None
+    ended_at: datetime | None = None
+
+
+class MeasurementKind(StrEnum):
+    """What a real-world evaluation is for: samples are learned from and counted, probes are only looked at."""
+
+    SAMPLE = "sample"
+    PROBE = "probe"
+
+
+class SampleRead(Frozen):
+    """A real-world evaluation."""
+
+    repetition: int
+    iteration: int
+    kind: MeasurementKind
+    genome: tuple[float, ...]
+    fitness: float | None
+    measured_by: str
+    measured_at: datetime
+
+
+class SimulatorRead(Frozen):
+    """A tuned simulator; rank 0 is the best of its iteration."""
+
+    repetition: int
+    iteration: int
+    rank: int
+    parameters: dict[str, float]
+    squared_error: float | None = Field(description="over the samples so far; null where its physics failed on one")

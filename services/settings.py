@@ -1,0 +1,53 @@
+"""What the environment may say, read once by a main."""
+
+import os
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Where the database and Ray are, and how the service behaves; nothing here changes a number of a result.
+
+    Attributes:
+        database_url: SQLAlchemy URL. `GAPLAB_DATABASE_URL`; `sqlite:///gaplab.db` in the working directory.
+        ray_address: of an existing cluster; None starts Ray on this machine. `GAPLAB_RAY_ADDRESS`.
+        workers: repetitions that run at once; None is one for each core that Ray has. `GAPLAB_WORKERS`.
+        host: that the API binds. `GAPLAB_HOST`; loopback.
+        port: that the API binds. `GAPLAB_PORT`; 8000.
+        url: where the command finds the service. `GAPLAB_URL`; host and port.
+    """
+
+    database_url: str = "sqlite:///gaplab.db"
+    ray_address: str | None = None
+    workers: int | None = None
+    host: str = "127.0.0.1"
+    port: int = 8000
+    url: str = "http://127.0.0.1:8000"
+
+    @classmethod
+    def from_environment(cls) -> "Settings":
+        """The settings that the process was started with.
+
+        Raises:
+            ValueError: a number that is none, with the name of its variable.
+        """
+        get = os.environ.get
+        host, port = get("GAPLAB_HOST", cls.host), _number("GAPLAB_PORT", cls.port)
+        return cls(
+            database_url=get("GAPLAB_DATABASE_URL", cls.database_url),
+            ray_address=get("GAPLAB_RAY_ADDRESS") or None,
+            workers=_number("GAPLAB_WORKERS", None),
+            host=host,
+            port=port or cls.port,
+            url=get("GAPLAB_URL", f"http://{host}:{port}"),
+        )
+
+
+def _number(variable: str, default: int | None) -> int | None:
+    text = os.environ.get(variable)
+    if not text:
+        return default
+    if not text.isdigit() or int(text) < 1:
+        msg = f"{variable} is {text!r}; it must be a whole number of at least 1"
+        raise ValueError(msg)
+    return int(text)
