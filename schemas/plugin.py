@@ -47,7 +47,9 @@ class PluginRead(Frozen):
     options: dict[str, Any] = Field(description="JSON Schema of the plug-in's options, with defaults")
     available: bool = True
     note: str | None = Field(default=None, description="how to install it, if it is not available")
-    details: dict[str, Any] = Field(default_factory=dict, description="bounds and unit of a tunable, engines of a robot")
+    details: dict[str, Any] = Field(
+        default_factory=dict, description="bounds and unit of a tunable, engines of a robot"
+    )
 
 
 class Catalogue(Frozen):

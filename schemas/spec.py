@@ -22,7 +22,9 @@ class BudgetSpec(Frozen):
     """
 
     preset: BudgetName = "paper"
-    controller_evaluations: Count | None = Field(default=None, description="of the search for the transferred controller")
+    controller_evaluations: Count | None = Field(
+        default=None, description="of the search for the transferred controller"
+    )
     selection_evaluations: Count | None = Field(default=None, description="of the search for the next sample")
     simulator_evaluations: Count | None = Field(default=None, description="of the search for a simulator")
 

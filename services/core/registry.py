@@ -66,13 +66,17 @@ class Registry(Mapping[str, type[P]], Generic[P]):
     @cached_property
     def _plugins(self) -> dict[str, type[P]]:
         modules = (
-            import_module(f"{self._package}.{info.name}") for info in iter_modules(import_module(self._package).__path__)
+            import_module(f"{self._package}.{info.name}")
+            for info in iter_modules(import_module(self._package).__path__)
         )
         found = {
             each.name: each
             for module in modules
             for each in vars(module).values()
-            if isinstance(each, type) and issubclass(each, self._base) and not isabstract(each) and hasattr(each, "name")
+            if isinstance(each, type)
+            and issubclass(each, self._base)
+            and not isabstract(each)
+            and hasattr(each, "name")
         }
         return dict(sorted(found.items()))
 

@@ -6,6 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.random import Generator
+from numpy.typing import NDArray
 
 from services.core.arrays import FloatArray, Genome, Genomes, Parameters, frozen
 
@@ -22,7 +23,7 @@ class Space:
 
     lower: FloatArray
     upper: FloatArray
-    periodic: FloatArray
+    periodic: NDArray[np.bool_]
 
     def __post_init__(self) -> None:
         if not (self.lower.shape == self.upper.shape == self.periodic.shape) or self.lower.ndim != 1:
@@ -38,7 +39,7 @@ class Space:
         """A space from plain sequences; nothing is periodic unless said so."""
         wraps = np.array(periodic if periodic is not None else [False] * len(lower), dtype=bool)
         wraps.flags.writeable = False
-        return cls(frozen(lower), frozen(upper), wraps)  # type: ignore[arg-type]
+        return cls(frozen(lower), frozen(upper), wraps)
 
     @property
     def size(self) -> int:
