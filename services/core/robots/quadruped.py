@@ -1,0 +1,120 @@
+"""The paper's robot, rebuilt: four legs of three hinges, each driven by a periodic pulse of two genes."""
+
+import numpy as np
+
+from schemas.base import Frozen
+from services.core.arrays import FloatArray, Genome, frozen
+from services.core.robots.base import Robot
+from services.core.types import Space
+from services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, Trajectory, Vector, World
+
+BODY_M: Vector = (0.30, 0.20, 0.06)
+BODY_KG = 1.5
+THIGH_M, THIGH_KG = 0.10, 0.15
+SHIN_M, SHIN_KG = 0.15, 0.10
+FOOT_M, FOOT_KG = 0.025, 0.05
+LIMB_M = 0.03
+"""Thickness of hip, thigh and shin."""
+
+HIP_KG = 0.05
+MOTOR = Motor(position_gain=0.12, max_torque_nm=4.0)
+AMPLITUDES_RAD = (0.45, 0.30, 0.35)
+"""Of hip yaw, hip roll and knee: a pulse holds the joint at plus this, and at minus this between pulses."""
+
+PERIOD_S = 0.6
+SETTLING_S = 1.0
+"""Not counted: the robot drops to the ground and falls into its gait."""
+
+COUNTED_S = 3.0
+NARROWEST, WIDEST = 0.1, 0.9
+"""Widths of a pulse in periods, at genes 0 and 1."""
+
+LEGS: dict[str, tuple[int, int]] = {
+    "front_left": (1, 1),
+    "front_right": (1, -1),
+    "rear_left": (-1, 1),
+    "rear_right": (-1, -1),
+}
+"""Where each leg is: the signs of x (ahead) and y (to the left)."""
+
+
+class Quadruped(Robot):
+    """Four legs of hip yaw, hip roll and knee: 12 actuators, each with a periodic pulse of phase and width.
+
+    Gene 2i is the phase of actuator i, and gene 2i + 1 the width of its pulse, both in [0, 1]; phases wrap around. The
+    actuators are leg by leg, front left, front right, rear left, rear right; positive is forwards for a yaw, upwards
+    for a roll, outwards for a knee. Fitness is the speed along x, the way the robot faces at the start, m/s. A
+    reconstruction: the paper refers for the details of its robot to a publication that could not be found.
+    """
+
+    name = "quadruped"
+    source = "Paper, section 2 and figure 1; docs/robot.md"
+    engine = "pybullet"
+    unit = "m/s"
+
+    def __init__(self, options: Frozen | None = None) -> None:
+        super().__init__(options)
+        self.world = _world()
+        actuators = len(self.world.actuators)
+        self.space = Space.box([0.0] * 2 * actuators, [1.0] * 2 * actuators, [True, False] * actuators)
+        self.known = _trot()
+
+    def motion(self, genome: Genome) -> Motion:
+        """Each actuator at plus its amplitude during its pulse, at minus it otherwise; in the neutral pose never."""
+        phases, widths = genome[0::2], NARROWEST + (WIDEST - NARROWEST) * genome[1::2]
+        duration_s = SETTLING_S + COUNTED_S
+        edges = np.mod(np.concatenate([phases, phases + widths]), 1.0)
+        cycles = np.arange(np.ceil(duration_s / PERIOD_S))
+        times = np.unique(np.append(0.0, np.add.outer(cycles, edges)))
+        middles = (times + np.append(times[1:], times[-1] + 1e-9)) / 2
+        inside = np.mod(middles[:, None] - phases, 1.0) < widths
+        amplitudes = np.tile(AMPLITUDES_RAD, len(LEGS))
+        return Motion(
+            times_s=frozen(times * PERIOD_S),
+            targets=frozen(np.where(inside, amplitudes, -amplitudes)),
+            observe_s=frozen([SETTLING_S, duration_s]),
+        )
+
+    def fitness(self, trajectory: Trajectory) -> FloatArray:
+        """`(...)`: metres along x from the first observation to the last, over the time between them."""
+        ahead = trajectory.positions_m[..., 0]
+        return np.asarray((ahead[..., -1] - ahead[..., 0]) / (trajectory.times_s[-1] - trajectory.times_s[0]))
+
+
+def _world() -> World:
+    """The robot in reality. Source: its material, the paper's section 2; all else docs/robot.md."""
+    bodies = [Body("trunk", BODY_KG, Box(BODY_M))]
+    joints: list[Joint] = []
+    for leg, (ahead, left) in LEGS.items():
+        limbs, hinges = _leg(leg, ahead, left)
+        bodies += limbs
+        joints += hinges
+    return World(
+        bodies=tuple(bodies),
+        joints=tuple(joints),
+        material=Material(static_friction=1.0, dynamic_friction=0.8, restitution=0.0),
+        start_height_m=SHIN_M + FOOT_M,
+    )
+
+
+def _leg(name: str, ahead: int, left: int) -> tuple[list[Body], list[Joint]]:
+    """A leg on a corner of the trunk: a thigh held level to the side, a shin hanging from it, a ball as its foot."""
+    hip, thigh, shin = f"{name}_hip", f"{name}_thigh", f"{name}_shin"
+    corner = (ahead * BODY_M[0] / 2, left * BODY_M[1] / 2, 0.0)
+    bodies = [
+        Body(hip, HIP_KG, Box((LIMB_M, LIMB_M, LIMB_M)), collides=False),
+        Body(thigh, THIGH_KG, Box((LIMB_M, THIGH_M, LIMB_M)), (0.0, left * THIGH_M / 2, 0.0), collides=False),
+        Body(shin, SHIN_KG + FOOT_KG, Sphere(FOOT_M), (0.0, 0.0, -SHIN_M)),
+    ]
+    joints = [
+        Joint(f"{name}_yaw", "trunk", hip, corner, (0.0, 0.0, -float(left)), MOTOR),
+        Joint(f"{name}_roll", hip, thigh, (0.0, 0.0, 0.0), (float(left), 0.0, 0.0), MOTOR),
+        Joint(f"{name}_knee", thigh, shin, (0.0, left * THIGH_M, 0.0), (float(left), 0.0, 0.0), MOTOR),
+    ]
+    return bodies, joints
+
+
+def _trot() -> Genome:
+    """Diagonal legs together, the pairs half a period apart; a leg is lifted while it swings forwards."""
+    lead = {"front_left": 0.0, "rear_right": 0.0, "front_right": 0.5, "rear_left": 0.5}
+    return frozen([gene for leg in LEGS for gene in (lead[leg], 0.5, lead[leg], 0.5, lead[leg], 0.5)])

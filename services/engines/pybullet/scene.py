@@ -1,0 +1,172 @@
+"""A World as bodies in a Bullet server of its own, built once and put back to its start before each rollout."""
+
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+
+from services.core.arrays import FloatArray
+from services.core.world import Body, Box, Joint, Material, Shape, Vector, World
+
+UNTURNED = (0.0, 0.0, 0.0, 1.0)
+BASE = -1
+"""Bullet's index of the base; the links count from 0, and link i hangs on joint i."""
+
+
+class Scene:
+    """One world in one server, with its state at time 0 kept.
+
+    Source: the PyBullet Quickstart Guide. `restoreState` puts back positions, speeds and contacts, but not what
+    `changeDynamics` set nor the motors: `start` applies the material again, and a rollout commands every motor.
+
+    Attributes:
+        client: the server; every call names it, so that scenes do not disturb each other.
+        robot: Bullet's number of the body made from `world`.
+        colliding: the links that touch the ground, by Bullet's index.
+    """
+
+    def __init__(self, bullet: ModuleType, world: World) -> None:
+        self.bullet = bullet
+        self.world = world
+        self.client: int = bullet.connect(bullet.DIRECT)
+        self._set_up_physics()
+        tree = _tree(world)
+        self.robot = self._create_robot(tree)
+        self.colliding = tuple(index for index, body in enumerate(tree.bodies, start=BASE) if body.collides)
+        self.actuators = tuple(tree.joints.index(joint) for joint in world.actuators)
+        self._from_center_of_mass = [-each for each in tree.bodies[0].center_m]
+        self._finish_robot(tree)
+        self._initial: int = bullet.saveState(physicsClientId=self.client)
+
+    def start(self, material: Material, friction: float) -> None:
+        """Back to time 0, with a material whose contacts have this coefficient of friction."""
+        self.bullet.restoreState(self._initial, physicsClientId=self.client)
+        bounce, client = material.restitution, self.client
+        for link in self.colliding:
+            self.bullet.changeDynamics(self.robot, link, restitution=bounce, physicsClientId=client)
+            self.set_friction(link, friction)
+
+    def set_friction(self, link: int, friction: float) -> None:
+        """The coefficient of the link's contacts from the next step on."""
+        self.bullet.changeDynamics(self.robot, link, lateralFriction=friction, physicsClientId=self.client)
+
+    def command(self, actuator: int, target: float) -> None:
+        """A new target for a motor, rad."""
+        motor = self.world.actuators[actuator].motor
+        assert motor is not None
+        self.bullet.setJointMotorControl2(
+            self.robot,
+            self.actuators[actuator],
+            self.bullet.POSITION_CONTROL,
+            targetPosition=target,
+            force=motor.max_torque_nm,
+            positionGain=motor.position_gain,
+            velocityGain=1.0,
+            maxVelocity=motor.max_speed_rad_s,
+            physicsClientId=self.client,
+        )
+
+    def step(self, count: int) -> None:
+        """Go on by so many time steps."""
+        advance, client = self.bullet.stepSimulation, self.client
+        for _ in range(count):
+            advance(physicsClientId=client)
+
+    def pose(self) -> FloatArray:
+        """`(7,)`: position and quaternion of the base's frame."""
+        position, turn = self.bullet.getBasePositionAndOrientation(self.robot, physicsClientId=self.client)
+        origin, turn = self.bullet.multiplyTransforms(position, turn, self._from_center_of_mass, UNTURNED)
+        return np.array([*origin, *turn])
+
+    def close(self) -> None:
+        """Give the server up."""
+        self.bullet.disconnect(physicsClientId=self.client)
+
+    def _set_up_physics(self) -> None:
+        bullet, client = self.bullet, self.client
+        bullet.setPhysicsEngineParameter(
+            fixedTimeStep=self.world.time_step_s,
+            numSolverIterations=self.world.solver_iterations,
+            numSubSteps=0,
+            deterministicOverlappingPairs=1,
+            physicsClientId=client,
+        )
+        bullet.setGravity(0, 0, -self.world.gravity_m_s2, physicsClientId=client)
+        plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
+        self.ground: int = bullet.createMultiBody(0, plane, physicsClientId=client)
+        # Bullet multiplies the coefficients of the two bodies in contact: with 1 here, the robot's are the contact's.
+        bullet.changeDynamics(self.ground, BASE, lateralFriction=1.0, restitution=1.0, physicsClientId=client)
+
+    def _create_robot(self, tree: "_Tree") -> int:
+        base, *links = tree.bodies
+        robot: int = self.bullet.createMultiBody(
+            baseMass=base.mass_kg,
+            baseCollisionShapeIndex=self._create_shape(base),
+            basePosition=(0.0, 0.0, self.world.start_height_m),
+            baseInertialFramePosition=base.center_m,
+            linkMasses=[link.mass_kg for link in links],
+            linkCollisionShapeIndices=[self._create_shape(link) for link in links],
+            linkVisualShapeIndices=[-1] * len(links),
+            linkPositions=[joint.origin_m for joint in tree.joints],
+            linkOrientations=[UNTURNED] * len(links),
+            linkInertialFramePositions=[link.center_m for link in links],
+            linkInertialFrameOrientations=[UNTURNED] * len(links),
+            linkParentIndices=tree.parents,
+            linkJointTypes=[self.bullet.JOINT_REVOLUTE] * len(links),
+            linkJointAxis=[joint.axis for joint in tree.joints],
+            physicsClientId=self.client,
+        )
+        return robot
+
+    def _create_shape(self, body: Body) -> int:
+        if not body.collides:
+            return -1
+        shape, options = body.shape, {"collisionFramePosition": body.center_m, "physicsClientId": self.client}
+        if isinstance(shape, Box):
+            half = [edge / 2 for edge in shape.size_m]
+            return int(self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, **options))
+        return int(self.bullet.createCollisionShape(self.bullet.GEOM_SPHERE, radius=shape.radius_m, **options))
+
+    def _finish_robot(self, tree: "_Tree") -> None:
+        """Inertia from each body's shape, no damping, and hinges that are free unless they have a motor."""
+        bullet = self.bullet
+        for index, body in enumerate(tree.bodies, start=BASE):
+            bullet.changeDynamics(
+                self.robot,
+                index,
+                localInertiaDiagonal=_inertia(body.shape, body.mass_kg),
+                linearDamping=0.0,
+                angularDamping=0.0,
+                physicsClientId=self.client,
+            )
+        for index in range(len(tree.joints)):
+            mode = bullet.VELOCITY_CONTROL
+            bullet.setJointMotorControl2(self.robot, index, mode, force=0.0, physicsClientId=self.client)
+
+
+@dataclass(frozen=True)
+class _Tree:
+    """Bodies in Bullet's order: the base, then the child of each joint; `parents` count from 1, the base is 0."""
+
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    parents: tuple[int, ...]
+
+
+def _tree(world: World) -> _Tree:
+    by_name = {body.name: body for body in world.bodies}
+    names = [world.bodies[0].name, *(joint.child for joint in world.joints)]
+    return _Tree(
+        bodies=tuple(by_name[name] for name in names),
+        joints=world.joints,
+        parents=tuple(names.index(joint.parent) for joint in world.joints),
+    )
+
+
+def _inertia(shape: Shape, mass_kg: float) -> Vector:
+    """The principal moments of inertia of a solid of even density, kg·m²."""
+    if isinstance(shape, Box):
+        x, y, z = (float(np.square(edge)) for edge in shape.size_m)
+        return mass_kg / 12 * (y + z), mass_kg / 12 * (x + z), mass_kg / 12 * (x + y)
+    moment = 0.4 * mass_kg * shape.radius_m**2
+    return moment, moment, moment
