@@ -163,7 +163,7 @@ class Transferred:
     """A controller evolved in the best simulator, to be looked at in reality.
 
     Attributes:
-        fitness: of the genome in that simulator.
+        fitness: of the genome in that simulator; nan if the physics failed for every controller tried.
     """
 
     iteration: int

@@ -1,0 +1,49 @@
+"""Recorded fitness of many repetitions -> the points of a curve."""
+
+import numpy as np
+from scipy import stats
+
+from schemas.curves import CurvePoint
+from services.core.arrays import FloatArray
+
+CONFIDENCE = 0.95
+
+
+def curve_points(recorded: FloatArray) -> tuple[CurvePoint, ...]:
+    """One point for each number of real-world evaluations, from 0 on.
+
+    Args:
+        recorded: `(r, k)`: row = repetition, column = real-world evaluations; nan where a repetition has not got there
+            or every measurement of it failed. Such a value counts in no statistic.
+    """
+    return tuple(curve_point(evaluations, column) for evaluations, column in enumerate(recorded.T))
+
+
+def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
+    """Mean, sample standard deviation and the 95 % interval of the mean by Student's t, over the finite values.
+
+    Args:
+        evaluations: number of real-world evaluations.
+        values: `(r,)` by repetition.
+    """
+    there = values[np.isfinite(values)]
+    n = len(there)
+    mean = float(there.mean()) if n else None
+    sd = float(there.std(ddof=1)) if n > 1 else None
+    lower, upper = _interval(mean, sd, n)
+    return CurvePoint(
+        evaluations=evaluations,
+        n=n,
+        mean=mean,
+        sd=sd,
+        lower=lower,
+        upper=upper,
+        values=tuple(float(value) if np.isfinite(value) else None for value in values),
+    )
+
+
+def _interval(mean: float | None, sd: float | None, n: int) -> tuple[float | None, float | None]:
+    if mean is None or sd is None:
+        return None, None
+    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * sd / n**0.5
+    return mean - half, mean + half

@@ -1,0 +1,194 @@
+"""The algorithm of the paper's Fig. 2: select a sample, measure it, tune simulators, transfer a controller, look at it.
+
+A repetition is a generator of steps. Each step follows from the steps before it and from random streams with an
+address, so the stored steps are the whole checkpoint: `repetition(setting, log)` goes on after any log as if it had
+never stopped.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+
+from services.core.arrays import Genome, Parameters
+from services.core.counted import Counted
+from services.core.optimizers.base import Optimizer, maximise
+from services.core.ports import Reality, Simulate
+from services.core.strategies.base import Score, Search, Strategy
+from services.core.streams import stream
+from services.core.tuning import draw_simulators, tune
+from services.core.types import (
+    Belief,
+    Budget,
+    Cost,
+    Measured,
+    Probed,
+    Sample,
+    Selected,
+    Simulator,
+    Space,
+    Step,
+    Transferred,
+    Tuned,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """Everything that one repetition depends on.
+
+    Attributes:
+        simulate: fitness in simulation.
+        reality: fitness in reality; called once for each sample and each probe.
+        strategy: selects the samples.
+        optimizer: searches for controllers and simulators.
+        genomes: the space of controllers.
+        parameters: the space of simulators.
+        known: `(g,)`, the hand-designed genome.
+        budget: evaluations of each search.
+        iterations: real-world evaluations to spend; 0 for the direct baseline.
+        seed: of the experiment.
+        repetition: its number.
+    """
+
+    simulate: Simulate
+    reality: Reality
+    strategy: Strategy
+    optimizer: Optimizer
+    genomes: Space
+    parameters: Space
+    known: Genome
+    budget: Budget
+    iterations: int
+    seed: int
+    repetition: int
+
+    def stream(self, iteration: int, phase: str) -> Generator:
+        """The random stream of one phase of one iteration."""
+        return stream(self.seed, self.strategy.name, self.repetition, iteration, phase)
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """What the steps so far add up to.
+
+    Attributes:
+        last: the latest step; None at the very start.
+        samples: measured so far.
+        simulators: of the latest tuning, best first.
+    """
+
+    last: Step | None = None
+    samples: tuple[Sample, ...] = ()
+    simulators: tuple[Simulator, ...] = ()
+
+    def after(self, step: Step) -> "History":
+        """The history with one more step."""
+        match step:
+            case Measured(sample=sample):
+                return replace(self, last=step, samples=(*self.samples, sample))
+            case Tuned(simulators=simulators):
+                return replace(self, last=step, simulators=simulators)
+        return replace(self, last=step)
+
+
+def repetition(setting: Setting, log: Iterable[Step] = ()) -> Iterator[Step]:
+    """The steps that follow the log, to the end of the repetition; each is computed when it is asked for."""
+    history = History()
+    for step in log:
+        history = history.after(step)
+    while (following := next_step(setting, history)) is not None:
+        yield following
+        history = history.after(following)
+
+
+def next_step(setting: Setting, history: History) -> Step | None:  # noqa: PLR0911 - a return for each kind of step
+    """The one step that follows; None at the end."""
+    match history.last:
+        case None:
+            return _draw(setting)
+        case Tuned(iteration=iteration):
+            return _transfer(setting, history, iteration)
+        case Transferred(iteration=iteration, genome=genome):
+            return _probe(setting, history, iteration, genome)
+        case Probed(iteration=iteration) if iteration < setting.iterations:
+            return _select(setting, history, iteration + 1)
+        case Selected(iteration=iteration, genome=genome):
+            return Measured(iteration, Sample(genome, setting.reality(genome)))
+        case Measured(iteration=iteration):
+            return _tune(setting, history, iteration)
+    return None
+
+
+def _draw(setting: Setting) -> Tuned:
+    """Randomly configured simulators: iteration 0 tunes nothing."""
+    return Tuned(0, draw_simulators(setting.parameters, setting.strategy.ensemble, setting.stream(0, "tune")))
+
+
+def _select(setting: Setting, history: History, iteration: int) -> Selected:
+    belief = Belief(setting.genomes, setting.known, history.samples, history.simulators)
+    simulate = Counted(setting.simulate)
+    search = _search(setting, simulate, belief.parameters, setting.stream(iteration, "search"))
+    genome = setting.strategy.select(belief, search, setting.stream(iteration, "select"))
+    return Selected(iteration, genome, simulate.cost)
+
+
+def _search(setting: Setting, simulate: Simulate, parameters: Parameters, rng: Generator) -> Search:
+    def search(score: Score) -> Genome:
+        found = maximise(
+            setting.optimizer,
+            setting.genomes,
+            lambda genomes: score(genomes, simulate(genomes, parameters)),
+            setting.budget.selection_evaluations,
+            rng,
+        )
+        best: Genome = found.genomes[0]
+        return best
+
+    return search
+
+
+def _tune(setting: Setting, history: History, iteration: int) -> Tuned:
+    """New simulators fitted to every sample that was measured; random ones while none was."""
+    ensemble = setting.strategy.ensemble
+    rng = setting.stream(iteration, "tune")
+    samples = tuple(each for each in history.samples if np.isfinite(each.fitness))
+    if not samples:
+        return Tuned(iteration, draw_simulators(setting.parameters, ensemble, rng))
+    optimizer = setting.optimizer.diverse(ensemble) if ensemble > 1 else setting.optimizer
+    simulate = Counted(setting.simulate)
+    evaluations = setting.budget.simulator_evaluations
+    found = tune(simulate, samples, setting.parameters, optimizer, evaluations, rng)
+    return Tuned(iteration, found[:ensemble], simulate.cost)
+
+
+def _transfer(setting: Setting, history: History, iteration: int) -> Transferred:
+    """A controller evolved in the best simulator."""
+    simulate = Counted(setting.simulate)
+    best = history.simulators[0].parameters[None, :]
+    found = maximise(
+        setting.optimizer,
+        setting.genomes,
+        lambda genomes: simulate(genomes, best)[:, 0],
+        setting.budget.controller_evaluations,
+        setting.stream(iteration, "transfer"),
+    )
+    fitness = float(found.fitness[0]) if np.isfinite(found.fitness[0]) else float("nan")
+    return Transferred(iteration, found.genomes[0], fitness, simulate.cost)
+
+
+def _probe(setting: Setting, history: History, iteration: int, genome: Genome) -> Probed:
+    fitness = setting.reality(genome)
+    return Probed(iteration, fitness, recorded_fitness(fitness, history.samples))
+
+
+def recorded_fitness(probe: float, samples: Iterable[Sample]) -> float:
+    """The larger of the probe's fitness and the best sample's; nan if every measurement failed.
+
+    It can fall from one iteration to the next; only its floor, the best sample so far, cannot.
+
+    Source: paper, section 3.
+    """
+    measured = [value for value in (probe, *(each.fitness for each in samples)) if np.isfinite(value)]
+    return max(measured, default=float("nan"))

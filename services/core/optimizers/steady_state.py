@@ -1,0 +1,114 @@
+"""The paper's evolutionary algorithm: one newcomer at a time, and one member leaves for it."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.random import Generator
+from pydantic import Field
+
+from schemas.base import Frozen
+from services.core.arrays import FloatArray, Genome, Genomes
+from services.core.optimizers.base import Optimizer, Population
+from services.core.optimizers.replacement import Replacement, least_fit, less_fit_of_most_similar
+
+REPLACEMENTS: dict[str, Replacement] = {
+    "least_fit": least_fit,
+    "less_fit_of_most_similar": less_fit_of_most_similar,
+}
+
+
+class SteadyStateOptions(Frozen):
+    """What the paper leaves open of its evolutionary algorithm; its reference [10], which says it, could not be found.
+
+    The defaults are gaplab's.
+    """
+
+    population: Annotated[int, Field(strict=True, ge=2, le=10_000)] = Field(
+        default=20, description="members; as many as the paper's diverse simulators"
+    )
+    tournament: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(
+        default=3, description="members drawn for each parent, of which the fittest becomes it"
+    )
+    crossover: Annotated[float, Field(strict=True, ge=0, le=1)] = Field(
+        default=0.5, description="probability that a newcomer has two parents; each gene is then either one's"
+    )
+    mutation: Annotated[float, Field(strict=True, gt=0, le=1)] | None = Field(
+        default=None, description="probability of each gene to mutate; left out: 2 over the number of genes"
+    )
+    mutation_scale: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+        default=0.3, description="greatest standard deviation of a mutation, as a share of the gene's extent"
+    )
+    finest_scale: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+        default=0.003, description="least such deviation: each newcomer draws its own between the two, log-uniformly"
+    )
+    replacement: Literal["least_fit", "less_fit_of_most_similar"] = Field(
+        default="least_fit", description="who leaves; tuning an ensemble of simulators always takes the second"
+    )
+
+
+class SteadyState(Optimizer):
+    """Steady-state evolution: a newcomer is evaluated and added, then the replacement rule drops a member.
+
+    The first population is drawn uniformly and told whole. Mutation is Gaussian; periodic genes wrap, others clip; at
+    least one gene mutates, so no evaluation is spent on a copy.
+    """
+
+    name = "steady_state"
+    source = "Paper, section 2; operators are gaplab's"
+    Options = SteadyStateOptions
+    options: SteadyStateOptions
+
+    @property
+    def least_evaluations(self) -> int:
+        """One population."""
+        return self.options.population
+
+    def ask(self, state: Population, rng: Generator) -> Genomes:
+        """The members still missing from the first population, drawn uniformly; then one newcomer at a time."""
+        missing = self.options.population - state.size
+        if missing > 0:
+            return state.space.draw(missing, rng)
+        return self._mutate(state, self._recombine(state, rng), rng)[None, :]
+
+    def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> Population:
+        """The population with each newcomer added in turn, and a member dropped for each beyond its size."""
+        replacement = REPLACEMENTS[self.options.replacement]
+        for genome, value in zip(genomes, fitness, strict=True):
+            state = _added(state, genome, value)
+            if state.size > self.options.population:
+                state = _dropped(state, replacement(state))
+        return state
+
+    def diverse(self, size: int) -> "SteadyState":
+        """This evolution with `size` members, where the less fit of the most similar pair leaves."""
+        changed = {"population": size, "replacement": "less_fit_of_most_similar"}
+        return SteadyState(self.options.model_copy(update=changed))
+
+    def _recombine(self, state: Population, rng: Generator) -> Genome:
+        first = self._parent(state, rng)
+        if rng.random() >= self.options.crossover:
+            return first
+        return np.where(rng.random(len(first)) < 0.5, first, self._parent(state, rng))
+
+    def _parent(self, state: Population, rng: Generator) -> Genome:
+        drawn = rng.integers(state.size, size=self.options.tournament)
+        parent: Genome = state.genomes[drawn[state.fitness[drawn].argmax()]]
+        return parent
+
+    def _mutate(self, state: Population, genome: Genome, rng: Generator) -> Genome:
+        size = len(genome)
+        mutates = rng.random(size) < (self.options.mutation or min(1.0, 2.0 / size))
+        mutates[rng.integers(size)] = True
+        finest, greatest = self.options.finest_scale, self.options.mutation_scale
+        scale = finest * (greatest / finest) ** rng.random()
+        return state.space.contain(genome + mutates * (scale * state.space.extent * rng.standard_normal(size)))
+
+
+def _added(state: Population, genome: Genome, fitness: float) -> Population:
+    return Population(state.space, np.vstack([state.genomes, genome]), np.append(state.fitness, fitness))
+
+
+def _dropped(state: Population, index: int) -> Population:
+    """The state without a member; the others keep their order, so age stays readable from it."""
+    keep = np.arange(state.size) != index
+    return Population(state.space, state.genomes[keep], state.fitness[keep])

@@ -1,0 +1,74 @@
+"""The paper's formulas for the worth of a controller as the next sample, and nothing else.
+
+All take the fitness of n controllers in m simulators, `(n, m)`, and give `(n,)`; a nan among a controller's fitnesses
+makes its score nan, which never wins.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from services.core.arrays import Fitnesses, FloatArray, Genomes
+from services.core.types import Sample
+
+NEAREST = 1e-6
+"""The least distance between a controller and a sample: at 0 the paper's 1/d is infinite."""
+
+
+def weighted_mean(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
+    """The expected fitness: mean over simulators, weighted by how well they fit. Source: paper, section 2.
+
+    Args:
+        fitnesses: `(n, m)`.
+        weights: `(m,)`, non-negative, summing to 1.
+    """
+    return fitnesses @ weights
+
+
+def weighted_deviation(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
+    """The disagreement: standard deviation over simulators, weighted by how well they fit.
+
+    Source: paper, section 2, *Informative*.
+    """
+    deviations = fitnesses - weighted_mean(fitnesses, weights)[:, None]
+    return np.sqrt(deviations**2 @ weights)
+
+
+def uniqueness_penalty(genomes: Genomes, fitness: FloatArray, samples: Sequence[Sample]) -> FloatArray:
+    """1/(100 N) Σ 1/d(x, y) over the N samples y; 0 before the first sample.
+
+    d is the Euclidean distance over genome and fitness together: the controller's fitness is the simulated one, the
+    sample's the real one.
+
+    Source: paper, section 2, *Simulated fit and unique*.
+
+    Args:
+        genomes: `(n, g)`.
+        fitness: `(n,)` in the simulator.
+        samples: whose measurement succeeded.
+    """
+    if not samples:
+        return np.zeros(len(genomes))
+    points = np.column_stack([genomes, fitness])
+    others = np.array([np.append(each.genome, each.fitness) for each in samples])
+    distances = np.linalg.norm(points[:, None, :] - others[None, :, :], axis=2)
+    penalty: FloatArray = (1.0 / np.maximum(distances, NEAREST)).mean(axis=1) / 100.0
+    return penalty
+
+
+def simulator_weights(squared_errors: FloatArray, floor: float) -> FloatArray:
+    """`(m,)` weights of simulators, summing to 1: their fitness 1/Σe², with a floor under Σe².
+
+    The paper's weights are the fitnesses themselves; without the floor one near-perfect simulator takes all the weight
+    and there is no disagreement left. Before any sample all errors are 0 and the weights equal, as they are when every
+    simulator fails.
+
+    Source: paper, section 2, *Informative*; the floor is gaplab's.
+
+    Args:
+        squared_errors: `(m,)`, inf where the physics failed.
+        floor: above 0, in the unit of fitness squared.
+    """
+    weights = 1.0 / np.maximum(squared_errors, floor)
+    total = weights.sum()
+    return weights / total if total > 0 else np.full(len(weights), 1.0 / len(weights))

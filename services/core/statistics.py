@@ -1,0 +1,115 @@
+"""The paper's t-tests between experiments, and what a careful reader would ask for beside them.
+
+The paper pools the recorded fitnesses of several counts of real-world evaluations into one sample ("combining the data
+for more than two real-world evaluations"). Values of one repetition at several counts are not independent, so a pooled
+p is smaller than it should be: it is given because the paper gives it, and is safe only at one count.
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+from scipy import stats
+
+from schemas.curves import Comparison, Test
+from services.core.arrays import FloatArray
+
+
+def compare(first: FloatArray, second: FloatArray) -> tuple[Test, Test, Test]:
+    """Student's t (the paper's), Welch's t and Mann-Whitney between two groups, two-sided.
+
+    A test is undefined, and its numbers None, where a group has fewer than two values or neither varies.
+
+    Args:
+        first: `(n,)`, nan counts for nothing.
+        second: `(m,)`, likewise.
+    """
+    first, second = finite(first), finite(second)
+    if min(len(first), len(second)) < 2 or np.ptp(np.concatenate([first, second])) == 0:
+        undefined = Test(statistic=None, p=None)
+        return undefined, undefined, undefined
+    if np.ptp(first) == 0 and np.ptp(second) == 0:
+        undefined = Test(statistic=None, p=None)
+        return undefined, undefined, _test(stats.mannwhitneyu(first, second))
+    student = stats.ttest_ind(first, second)
+    welch = stats.ttest_ind(first, second, equal_var=False)
+    return _test(student, student.df), _test(welch, welch.df), _test(stats.mannwhitneyu(first, second))
+
+
+def effect_size(first: FloatArray, second: FloatArray) -> float | None:
+    """Cohen's d: the difference of the means over the pooled standard deviation; None where that is 0 or unknown."""
+    first, second = finite(first), finite(second)
+    freedom = len(first) + len(second) - 2
+    if min(len(first), len(second)) < 2:
+        return None
+    spread = ((len(first) - 1) * first.var(ddof=1) + (len(second) - 1) * second.var(ddof=1)) / freedom
+    return float((first.mean() - second.mean()) / spread**0.5) if spread > 0 else None
+
+
+def holm(p_values: Sequence[float | None]) -> tuple[float | None, ...]:
+    """Holm's step-down correction over a family of tests; an undefined test is not of the family.
+
+    Source: Holm 1979, A simple sequentially rejective multiple test procedure.
+    """
+    defined = sorted((p, index) for index, p in enumerate(p_values) if p is not None)
+    corrected: list[float | None] = [None] * len(p_values)
+    running = 0.0
+    for rank, (p, index) in enumerate(defined):
+        running = max(running, min(1.0, p * (len(defined) - rank)))
+        corrected[index] = running
+    return tuple(corrected)
+
+
+def compare_all(
+    recorded: dict[str, FloatArray], direct: frozenset[str], from_evaluations: int, to_evaluations: int
+) -> tuple[Comparison, ...]:
+    """Every pair of experiments, pooled over a range of counts; Holm's correction is over all pairs, test by test.
+
+    Args:
+        recorded: `(r, k)` recorded fitness by experiment, in the order of the answer.
+        direct: the experiments whose only column, at 0, counts at any number of real-world evaluations.
+        from_evaluations: the first count that is pooled.
+        to_evaluations: the last.
+    """
+    pooled = {
+        name: finite(values[:, :1] if name in direct else values[:, from_evaluations : to_evaluations + 1])
+        for name, values in recorded.items()
+    }
+    pairs = list(combinations(pooled, 2))
+    families = [corrected(family) for family in zip(*(compare(pooled[a], pooled[b]) for a, b in pairs), strict=True)]
+    return tuple(
+        Comparison(
+            first=first,
+            second=second,
+            from_evaluations=from_evaluations,
+            to_evaluations=to_evaluations,
+            n_first=len(pooled[first]),
+            n_second=len(pooled[second]),
+            difference=_difference(pooled[first], pooled[second]),
+            effect_size=effect_size(pooled[first], pooled[second]),
+            student=student,
+            welch=welch,
+            mann_whitney=mann_whitney,
+        )
+        for (first, second), student, welch, mann_whitney in zip(pairs, *families, strict=True)
+    )
+
+
+def corrected(family: Sequence[Test]) -> tuple[Test, ...]:
+    """The tests of a family with Holm's corrected p beside each."""
+    p_values = holm([test.p for test in family])
+    return tuple(test.model_copy(update={"p_holm": p}) for test, p in zip(family, p_values, strict=True))
+
+
+def finite(values: FloatArray) -> FloatArray:
+    """The finite values in a row, as one vector."""
+    return values[np.isfinite(values)]
+
+
+def _difference(first: FloatArray, second: FloatArray) -> float | None:
+    return float(first.mean() - second.mean()) if len(first) and len(second) else None
+
+
+def _test(result: object, freedom: float | None = None) -> Test:
+    statistic, p = float(result.statistic), float(result.pvalue)  # type: ignore[attr-defined] # scipy has no stubs
+    return Test(statistic=statistic, p=p, degrees_of_freedom=None if freedom is None else float(freedom))

@@ -1,0 +1,66 @@
+"""What a strategy is: given what is believed, which controller to try in reality next."""
+
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Annotated, Any, ClassVar, Protocol, TypeAlias
+
+from numpy.random import Generator
+from pydantic import Field
+
+from schemas.base import Frozen
+from services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
+from services.core.registry import Plugin
+from services.core.types import Belief
+
+Score: TypeAlias = Callable[[Genomes, Fitnesses], FloatArray]
+"""`(n, g)` genomes and their `(n, m)` fitnesses in the believed simulators -> `(n,)`, maximised."""
+
+
+class Search(Protocol):
+    """A search over controllers, with the budget of a selection."""
+
+    def __call__(self, score: Score) -> Genome:
+        """The genome `(g,)` with the highest score that was found."""
+        ...
+
+
+class Strategy(Plugin):
+    """Selects the samples: the controllers whose evaluation in reality guides simulator tuning.
+
+    Attributes:
+        in_reality: the experiment is the direct baseline, which evolves in reality and takes no samples.
+    """
+
+    in_reality: ClassVar[bool] = False
+
+    @property
+    def ensemble(self) -> int:
+        """How many simulators it wants tuned: one, or a diverse ensemble of many."""
+        return 1
+
+    @abstractmethod
+    def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:
+        """The genome `(g,)` to try in reality next.
+
+        Args:
+            belief: the samples so far, and simulators tuned on them.
+            search: finds the controller that maximises a score; a strategy that needs none does not call it.
+            rng: the strategy's own randomness; the search has another.
+        """
+
+    @classmethod
+    def details(cls) -> dict[str, Any]:
+        """How many simulators it tunes, and whether it is the baseline."""
+        return {"simulators": cls().ensemble, "baseline": cls.in_reality}
+
+
+class EnsembleOptions(Frozen):
+    """Options of the strategies that weigh a diverse ensemble of simulators."""
+
+    simulators: Annotated[int, Field(strict=True, ge=2, le=1_000)] = Field(
+        default=20, description="size of the diverse ensemble; the paper: 20"
+    )
+    least_error: Annotated[float, Field(strict=True, gt=0, le=1e6)] = Field(
+        default=0.03,
+        description="in the unit of fitness: simulators whose error is below this weigh alike (a floor under Σe²)",
+    )

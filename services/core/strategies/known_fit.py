@@ -1,0 +1,36 @@
+"""Try variations of what is known to work."""
+
+from typing import Annotated
+
+from numpy.random import Generator
+from pydantic import Field
+
+from schemas.base import Frozen
+from services.core.arrays import Genome
+from services.core.strategies.base import Search, Strategy
+from services.core.types import Belief
+
+
+class KnownFitOptions(Frozen):
+    """How far the variations go."""
+
+    spread: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+        default=0.25, description="each gene gets a uniform number from 0 to this added, as a share of its extent"
+    )
+
+
+class KnownFit(Strategy):
+    """The robot's hand-designed controller with a uniform random number added to each gene.
+
+    Like *random*, it needs no loop; but its samples are of middling fitness, where most random ones are unfit.
+    """
+
+    name = "known_fit"
+    source = "Paper, section 2, Known Fit"
+    Options = KnownFitOptions
+    options: KnownFitOptions
+
+    def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
+        """The known genome plus U[0, spread] on each gene; phases wrap, widths clip."""
+        space = belief.space
+        return space.contain(belief.known + self.options.spread * space.extent * rng.random(space.size))
