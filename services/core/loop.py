@@ -21,7 +21,6 @@ from services.core.tuning import draw_simulators, tune
 from services.core.types import (
     Belief,
     Budget,
-    Cost,
     Measured,
     Probed,
     Sample,
