@@ -89,8 +89,8 @@ class Registry(Mapping[str, type[P]], Generic[P]):
     def __len__(self) -> int:
         return len(self._plugins)
 
-    def create(self, ref: PluginRef, pointer: str = "") -> P:
-        """The plug-in that a spec names, with its options.
+    def check(self, ref: PluginRef, pointer: str = "") -> tuple[type[P], Frozen]:
+        """The plug-in that a spec names, and its options completed; nothing is constructed.
 
         Args:
             ref: name and options.
@@ -103,11 +103,16 @@ class Registry(Mapping[str, type[P]], Generic[P]):
             raise InvalidSpec([unknown_name(pointer, self.kind, ref.name, list(self))])
         plugin = self[ref.name]
         try:
-            return plugin(plugin.Options.model_validate(ref.options))
+            return plugin, plugin.Options.model_validate(ref.options)
         except ValidationError as error:
             raise InvalidSpec(
                 _option_violation(plugin, dict(each), f"{pointer}/options") for each in error.errors()
             ) from error
+
+    def create(self, ref: PluginRef, pointer: str = "") -> P:
+        """The plug-in that a spec names, with its options; raises as `check` does."""
+        plugin, options = self.check(ref, pointer)
+        return plugin(options)
 
     def describe(self) -> tuple[PluginRead, ...]:
         """Every plug-in, as the catalogue lists it."""

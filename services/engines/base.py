@@ -28,8 +28,9 @@ class Engine(Plugin):
     install: ClassVar[str] = ""
     honours: ClassVar[frozenset[str]]
 
+    @classmethod
     @abstractmethod
-    def runs(self, world: World) -> bool:
+    def runs(cls, world: World) -> bool:
         """Whether the engine can simulate such a world at all."""
 
     @abstractmethod

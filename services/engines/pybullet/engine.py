@@ -18,8 +18,11 @@ from services.engines.pybullet.stick_slip import StickSlip
 WARM_SCENES = 4
 """Worlds that differ in more than their material are kept warm up to this number; the longest unused one goes."""
 
-FARTHEST_M = 1_000.0
-"""A base farther than this from where it started was thrown there by numbers, not by physics: the rollout failed."""
+FARTHEST_M = 100.0
+"""A base that is farther than this from where it started was thrown there by numbers, not by physics: it failed."""
+
+DEEPEST_M = 1.0
+"""So was one that is deeper than this in the ground."""
 
 
 class PyBullet(Engine):
@@ -58,7 +61,8 @@ class PyBullet(Engine):
         self._bullet = import_module("pybullet")
         self._scenes: OrderedDict[World, Scene] = OrderedDict()
 
-    def runs(self, world: World) -> bool:
+    @classmethod
+    def runs(cls, world: World) -> bool:
         """Any world with bodies."""
         return bool(world.bodies)
 
@@ -70,7 +74,7 @@ class PyBullet(Engine):
             poses = _roll(scene, world.material, motion)
         except self._bullet.error:
             poses = np.full((len(motion.observe_s), 7), np.nan)
-        if not np.all(np.abs(poses[:, :3]) < FARTHEST_M):
+        if not _plausible(poses[:, :3]):
             poses = np.full_like(poses, np.nan)
             self._scenes.pop(bare).close()  # Bullet drops bodies that it loses sight of: such a scene is spoilt
         return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
@@ -86,6 +90,10 @@ class PyBullet(Engine):
         while len(self._scenes) > WARM_SCENES:
             self._scenes.popitem(last=False)[1].close()
         return scene
+
+
+def _plausible(positions_m: FloatArray) -> bool:
+    return bool(np.all(np.abs(positions_m) < FARTHEST_M) and np.all(positions_m[:, 2] > -DEEPEST_M))
 
 
 def _roll(scene: Scene, material: Material, motion: Motion) -> FloatArray:

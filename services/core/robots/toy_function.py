@@ -1,0 +1,35 @@
+"""The paper's toy: a function of one number in the place of a robot."""
+
+import numpy as np
+
+from services.core.arrays import FloatArray, Genome, frozen
+from services.core.robots.base import Robot
+from services.core.types import Space
+from services.core.world import Material, Motion, Trajectory, World
+
+
+class ToyFunction(Robot):
+    """A function of one gene with a hill and a peak: simulator tuning that can be watched, and runs in seconds.
+
+    Its world has no bodies, only a material, whose three coefficients shape the function. Its fitness is the speed.
+    """
+
+    name = "toy_function"
+    source = "Paper, section 2, Fig. 3; the function itself is gaplab's"
+    engine = "analytic"
+    unit = "m/s"
+    world = World(material=Material(static_friction=1.0, dynamic_friction=0.8, restitution=0.0))
+    space = Space.box([0.0], [1.0])
+    known = frozen([0.3])
+
+    _start = frozen([0.0])
+    _end = frozen([0.0, 1.0])
+
+    def motion(self, genome: Genome) -> Motion:
+        """The gene as the only target, for one second."""
+        return Motion(times_s=self._start, targets=genome[None, :], observe_s=self._end)
+
+    def fitness(self, trajectory: Trajectory) -> FloatArray:
+        """`(...)`: the distance along x over the time, in m/s."""
+        distance_m = trajectory.positions_m[..., -1, 0] - trajectory.positions_m[..., 0, 0]
+        return np.asarray(distance_m / (trajectory.times_s[-1] - trajectory.times_s[0]))

@@ -1,0 +1,56 @@
+"""A closed form in the place of physics: on it the whole of gaplab runs in seconds."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from services.core.arrays import FloatArray
+from services.core.world import Motion, Trajectory, World
+from services.engines.base import Engine
+
+
+class Analytic(Engine):
+    """Worlds without bodies: the base glides along x at a speed that is a function of one target and the material.
+
+    The speed has a broad hill, a narrow peak and ripples, whose places and heights the three coefficients move: a
+    search in a wrong simulator climbs the wrong slope, and most controllers say little about where the peak is.
+    """
+
+    name = "analytic"
+    source = "Paper, section 2, Fig. 3 shows such a function; this one is gaplab's"
+    honours = frozenset({"material.static_friction", "material.dynamic_friction", "material.restitution"})
+
+    @classmethod
+    def runs(cls, world: World) -> bool:
+        """Worlds without bodies."""
+        return not world.bodies
+
+    def rollout(self, world: World, motion: Motion) -> Trajectory:
+        """The glide of one motion in one world."""
+        glides = self.rollouts([world], [motion])
+        return Trajectory(motion.observe_s, glides.positions_m[0, 0], glides.orientations[0, 0])
+
+    def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion]) -> Trajectory:
+        """All glides at once."""
+        materials = [each.material for each in worlds]
+        coefficients = np.array([(each.static_friction, each.dynamic_friction, each.restitution) for each in materials])
+        targets = np.array([motion.targets[0, 0] for motion in motions])
+        times_s = motions[0].observe_s
+        positions_m = np.zeros((len(motions), len(worlds), len(times_s), 3))
+        positions_m[..., 0] = speed(targets[:, None], *coefficients.T)[..., None] * times_s
+        upright = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*positions_m.shape[:3], 4))
+        return Trajectory(times_s, positions_m, upright)
+
+
+def speed(
+    target: FloatArray, static_friction: FloatArray, dynamic_friction: FloatArray, restitution: FloatArray
+) -> FloatArray:
+    """The speed in m/s at a target in [0, 1] under the three coefficients; all broadcast against each other."""
+    hill = 0.5 * _bump((target - 0.9 + 0.5 * dynamic_friction) / 0.3)
+    peak = (0.5 - 0.4 * restitution) * _bump((target - 0.2 - 0.4 * static_friction) / 0.1)
+    ripple = 0.1 * np.sin(2 * np.pi * (4.0 * target + 1.5 * dynamic_friction - 2.0 * restitution))
+    return np.asarray(0.1 + hill + peak + ripple)
+
+
+def _bump(distance: FloatArray) -> FloatArray:
+    return np.asarray(np.exp(-(distance**2)))

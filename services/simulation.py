@@ -1,0 +1,139 @@
+"""Assembly: robot, world, tunables and engine become a Simulate; a hidden world becomes a Reality."""
+
+from collections.abc import Sequence
+from functools import cache, lru_cache
+
+import numpy as np
+
+from schemas.plugin import PluginRef
+from schemas.spec import ExperimentSpec
+from services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters
+from services.core.loop import Setting
+from services.core.optimizers import optimizers
+from services.core.ports import Simulate
+from services.core.robots import robots
+from services.core.robots.base import Robot
+from services.core.strategies import strategies
+from services.core.tunables import tunables
+from services.core.tunables.base import Tunable
+from services.core.types import Budget, Space
+from services.core.world import World
+from services.engines import engines
+from services.engines.base import Engine
+
+WORLDS_KEPT = 4096
+
+
+class Simulation:
+    """A Simulate: rollouts of one robot on one engine, in worlds edited by tunables."""
+
+    def __init__(self, robot: Robot, engine: Engine, edits: Sequence[Tunable]) -> None:
+        self._robot = robot
+        self._engine = engine
+        self._edits = tuple(edits)
+        self._world = lru_cache(maxsize=WORLDS_KEPT)(self._edited)
+
+    def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
+        """`(n, g)` genomes × `(m, p)` parameters -> `(n, m)` fitnesses; nan where the physics failed."""
+        worlds = [self._world(tuple(row)) for row in parameters.tolist()]
+        motions = [self._robot.motion(genome) for genome in genomes]
+        return self._robot.fitness(self._engine.rollouts(worlds, motions))
+
+    def _edited(self, values: tuple[float, ...]) -> World:
+        world = self._robot.world
+        for tunable, value in zip(self._edits, values, strict=True):
+            world = tunable.edit(world, value)
+        return world
+
+
+class HiddenReality:
+    """A Reality that is a simulation with hidden parameters.
+
+    Args:
+        simulate: the engine and robot of reality.
+        parameters: `(p,)`, the truth.
+    """
+
+    def __init__(self, simulate: Simulate, parameters: FloatArray) -> None:
+        self._simulate = simulate
+        self._parameters = parameters[None, :]
+
+    def __call__(self, genome: Genome) -> float:
+        """The fitness of the genome `(g,)` in reality; nan if the physics failed."""
+        return float(self._simulate(genome[None, :], self._parameters)[0, 0])
+
+
+class EvolutionInReality:
+    """A Simulate whose every simulator is reality: what the direct baseline evolves in."""
+
+    def __init__(self, simulate: Simulate, parameters: FloatArray) -> None:
+        self._simulate = simulate
+        self._parameters = parameters[None, :]
+
+    def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
+        """`(n, g)` genomes × `(m, p)` parameters that do not matter -> `(n, m)` fitnesses in reality."""
+        return np.repeat(self._simulate(genomes, self._parameters), len(parameters), axis=1)
+
+
+def setting(spec: ExperimentSpec, repetition: int) -> Setting:
+    """Everything that one repetition of a resolved spec depends on.
+
+    Args:
+        spec: as `services.resolution` completes it.
+        repetition: its number, from 0.
+    """
+    robot = robots.create(spec.robot)
+    strategy = strategies.create(spec.strategy)
+    edits = [tunables[ref.name]() for ref in spec.tunables]
+    truth, real = reality_of(spec, robot)
+    simulate: Simulate = Simulation(robot, engine_of(spec.engine), edits)
+    if strategy.in_reality:
+        simulate = EvolutionInReality(real, truth)
+    return Setting(
+        simulate=simulate,
+        reality=HiddenReality(real, truth),
+        strategy=strategy,
+        optimizer=optimizers.create(spec.optimizer),
+        genomes=robot.space,
+        parameters=Space.box(
+            [_bound(ref.lower) for ref in spec.tunables], [_bound(ref.upper) for ref in spec.tunables]
+        ),
+        known=robot.known,
+        budget=budget(spec),
+        iterations=0 if strategy.in_reality else spec.iterations or 0,
+        seed=spec.seed,
+        repetition=repetition,
+    )
+
+
+def reality_of(spec: ExperimentSpec, robot: Robot) -> tuple[FloatArray, Simulation]:
+    """The hidden parameters of a resolved spec, and the simulation that they belong in."""
+    edits = [tunables[name]() for name in spec.reality.parameters]
+    truth = np.array(list(spec.reality.parameters.values()))
+    return truth, Simulation(robot, engine_of(spec.reality.engine), edits)
+
+
+def engine_of(ref: PluginRef | None) -> Engine:
+    """The engine of a resolved spec: one instance in this process for equal options, warm from use to use."""
+    if ref is None:
+        msg = "the spec is not resolved: it names no engine"
+        raise ValueError(msg)
+    return _warm_engine(ref.model_dump_json())
+
+
+@cache
+def _warm_engine(ref: str) -> Engine:
+    return engines.create(PluginRef.model_validate_json(ref))
+
+
+def budget(spec: ExperimentSpec) -> Budget:
+    """The numbers of a resolved budget."""
+    numbers = spec.budget.model_dump(exclude={"preset"}, exclude_none=True)
+    return Budget(**numbers)
+
+
+def _bound(value: float | None) -> float:
+    if value is None:
+        msg = "the spec is not resolved: a tunable has no bounds"
+        raise ValueError(msg)
+    return value
