@@ -1,0 +1,37 @@
+"""How the lines of a figure are told apart: by colour, by dash and by marker, any one of which is enough.
+
+Source: the palette is Okabe and Ito 2008, "Color Universal Design", which people with every kind of colour vision can
+tell apart, without its yellow, which is too light for a line on white.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Dash = Literal["solid", "dashed", "dotted", "dashdot", "long", "longdot"]
+Marker = Literal["circle", "square", "triangle", "diamond", "inverted", "cross"]
+
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+DASHES: tuple[Dash, ...] = ("solid", "dashed", "dashdot", "long", "dotted", "longdot")
+MARKERS: tuple[Marker, ...] = ("circle", "square", "triangle", "diamond", "inverted", "cross")
+INK = "#222222"
+
+
+@dataclass(frozen=True)
+class Style:
+    """The look of one line."""
+
+    color: str
+    dash: Dash
+    marker: Marker
+
+
+def style_of(position: int) -> Style:
+    """The style of the line at this position of its figure; the first 36 differ from one another."""
+    turn, index = divmod(position, len(COLORS))
+    return Style(COLORS[index], DASHES[(index + turn) % len(DASHES)], MARKERS[(index + turn) % len(MARKERS)])
+
+
+def tint(color: str, opacity: float) -> str:
+    """A colour like `#0072B2` as CSS with an opacity."""
+    red, green, blue = (int(color[at : at + 2], 16) for at in (1, 3, 5))
+    return f"rgba({red}, {green}, {blue}, {opacity})"
