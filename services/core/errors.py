@@ -11,8 +11,8 @@
 Physics that blows up is no error: it is a fitness of nan, which never wins.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any
 
@@ -39,9 +39,11 @@ class Violation:
     permitted: Sequence[str] | str | None = None
     nearest: str | None = None
 
-    def under(self, prefix: str) -> "Violation":
-        """The same violation of a spec in which this one is found under `prefix`."""
-        return Violation(prefix + self.pointer, self.value, self.message, self.permitted, self.nearest)
+    def moved(self, prefix: str, to: str) -> "Violation":
+        """The same violation where what stood at `prefix` stands elsewhere."""
+        if not self.pointer.startswith(prefix):
+            return self
+        return replace(self, pointer=to + self.pointer.removeprefix(prefix))
 
 
 class InvalidSpec(GaplabError):
@@ -78,3 +80,20 @@ def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -
     hint = f" (did you mean {nearest!r}?)" if nearest else ""
     message = f"there is no {kind} called {name!r}{hint}; there is {', '.join(permitted)}"
     return Violation(pointer, name, message, tuple(permitted), nearest)
+
+
+def gather(*checks: Callable[[], Any]) -> tuple[Any, ...]:
+    """What each check gives, in order; if any refuses, everything that all of them find wrong.
+
+    Raises:
+        InvalidSpec: with the violations of every check, each once.
+    """
+    results, violations = [], []
+    for check in checks:
+        try:
+            results.append(check())
+        except InvalidSpec as error:
+            violations += [each for each in error.violations if each not in violations]
+    if violations:
+        raise InvalidSpec(violations)
+    return tuple(results)

@@ -28,9 +28,11 @@ class Strategy(Plugin):
     """Selects the samples: the controllers whose evaluation in reality guides simulator tuning.
 
     Attributes:
+        searches: its selection spends a search's budget.
         in_reality: the experiment is the direct baseline, which evolves in reality and takes no samples.
     """
 
+    searches: ClassVar[bool] = True
     in_reality: ClassVar[bool] = False
 
     @property

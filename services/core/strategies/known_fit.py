@@ -27,6 +27,7 @@ class KnownFit(Strategy):
 
     name = "known_fit"
     source = "Paper, section 2, Known Fit"
+    searches = False
     Options = KnownFitOptions
     options: KnownFitOptions
 

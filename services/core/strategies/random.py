@@ -16,6 +16,7 @@ class Random(Strategy):
 
     name = "random"
     source = "Paper, section 2, Random"
+    searches = False
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
         """A genome, uniform over its space."""
