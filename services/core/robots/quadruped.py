@@ -17,15 +17,15 @@ LIMB_M = 0.03
 """Thickness of hip, thigh and shin."""
 
 HIP_KG = 0.05
-MOTOR = Motor(position_gain=0.12, max_torque_nm=4.0)
-AMPLITUDES_RAD = (0.45, 0.30, 0.35)
+MOTOR = Motor(position_gain=0.08, max_torque_nm=8.0)
+AMPLITUDES_RAD = (0.63, 0.42, 0.49)
 """Of hip yaw, hip roll and knee: a pulse holds the joint at plus this, and at minus this between pulses."""
 
-PERIOD_S = 0.6
+PERIOD_S = 0.5
 SETTLING_S = 1.0
 """Not counted: the robot drops to the ground and falls into its gait."""
 
-COUNTED_S = 3.0
+COUNTED_S = 2.0
 NARROWEST, WIDEST = 0.1, 0.9
 """Widths of a pulse in periods, at genes 0 and 1."""
 
@@ -76,9 +76,9 @@ class Quadruped(Robot):
         )
 
     def fitness(self, trajectory: Trajectory) -> FloatArray:
-        """`(...)`: metres along x from the first observation to the last, over the time between them."""
-        ahead = trajectory.positions_m[..., 0]
-        return np.asarray((ahead[..., -1] - ahead[..., 0]) / (trajectory.times_s[-1] - trajectory.times_s[0]))
+        """`(...)`: metres over ground, as the crow flies, from the first observation to the last, over the time between."""
+        travelled = trajectory.positions_m[..., -1, :2] - trajectory.positions_m[..., 0, :2]
+        return np.asarray(np.linalg.norm(travelled, axis=-1) / (trajectory.times_s[-1] - trajectory.times_s[0]))
 
 
 def _world() -> World:

@@ -1,0 +1,205 @@
+"""What every engine promises, asked of each one that is installed, with each robot that it runs."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from services.core.arrays import FloatArray
+from services.core.robots import robots
+from services.core.robots.base import Robot
+from services.core.tunables import tunables
+from services.core.world import Body, Box, Material, Motion, Sphere, Trajectory, World
+from services.engines import engines
+from services.engines.base import Engine
+
+
+class Pair(NamedTuple):
+    engine: Engine
+    robot: Robot
+
+    def roll(self, world: World | None = None) -> FloatArray:
+        return flat(self.engine.rollout(world or self.robot.world, self.robot.motion(self.robot.known)))
+
+
+def flat(trajectory: Trajectory) -> FloatArray:
+    return np.concatenate([trajectory.positions_m.ravel(), trajectory.orientations.ravel()])
+
+
+def runnable() -> list[tuple[str, str]]:
+    installed = {name: engine() for name, engine in engines.items() if engine.available()}
+    worlds = {name: robot().world for name, robot in robots.items()}
+    return [(name, robot) for name, engine in installed.items() for robot in worlds if engine.runs(worlds[robot])]
+
+
+PAIRS = runnable()
+WITH_BODIES = [(engine, robot) for engine, robot in PAIRS if robots[robot]().world.bodies]
+
+
+@pytest.fixture(params=PAIRS, ids="-".join)
+def pair(request: pytest.FixtureRequest) -> Pair:
+    engine, robot = request.param
+    return Pair(engines[engine](), robots[robot]())
+
+
+@pytest.fixture(params=WITH_BODIES, ids="-".join)
+def embodied(request: pytest.FixtureRequest) -> Pair:
+    engine, robot = request.param
+    return Pair(engines[engine](), robots[robot]())
+
+
+def each_body(world: World, change: Callable[[Body], Body]) -> World:
+    return replace(world, bodies=tuple(change(body) for body in world.bodies))
+
+
+def each_motor(world: World, **changes: float) -> World:
+    joints = (replace(joint, motor=joint.motor and replace(joint.motor, **changes)) for joint in world.joints)
+    return replace(world, joints=tuple(joints))
+
+
+def larger(body: Body) -> Body:
+    if isinstance(body.shape, Sphere):
+        return replace(body, shape=Sphere(1.1 * body.shape.radius_m))
+    x, y, z = body.shape.size_m
+    return replace(body, shape=Box((1.1 * x, 1.1 * y, 1.1 * z)))
+
+
+EDITS: dict[str, Callable[[World], World]] = {
+    "material.static_friction": lambda world: replace(world, material=replace(world.material, static_friction=1.3)),
+    "material.dynamic_friction": lambda world: replace(world, material=replace(world.material, dynamic_friction=0.4)),
+    "material.restitution": lambda world: replace(world, material=replace(world.material, restitution=0.5)),
+    "body.mass_kg": lambda world: each_body(world, lambda body: replace(body, mass_kg=1.5 * body.mass_kg)),
+    "body.shape": lambda world: each_body(world, larger),
+    "motor.position_gain": lambda world: each_motor(world, position_gain=0.02),
+    "motor.max_torque_nm": lambda world: each_motor(world, max_torque_nm=0.3),
+    "motor.max_speed_rad_s": lambda world: each_motor(world, max_speed_rad_s=0.5),
+    "start_height_m": lambda world: replace(world, start_height_m=world.start_height_m + 0.05),
+    "gravity_m_s2": lambda world: replace(world, gravity_m_s2=1.62),
+    "time_step_s": lambda world: replace(world, time_step_s=1 / 100),
+    "solver_iterations": lambda world: replace(world, solver_iterations=5),
+}
+
+
+def test_a_rollout_is_bit_equal_on_repeat(pair: Pair) -> None:
+    assert np.array_equal(pair.roll(), pair.roll())
+
+
+def test_a_rollout_is_bit_equal_whatever_the_engine_ran_before(pair: Pair) -> None:
+    expected = pair.roll()
+
+    for edit in EDITS.values():
+        pair.roll(edit(pair.robot.world))
+
+    assert np.array_equal(pair.roll(), expected)
+
+
+def test_engines_in_one_process_do_not_disturb_each_other(pair: Pair) -> None:
+    expected = pair.roll()
+    other = Pair(type(pair.engine)(), pair.robot)
+
+    other.roll(replace(pair.robot.world, material=Material(0.3, 0.1, 0.5)))
+
+    assert np.array_equal(pair.roll(), expected)
+    assert np.array_equal(other.roll(), expected)
+
+
+SCRIPT = """
+from services.core.robots import robots
+from services.engines import engines
+engine, robot = engines[{engine!r}](), robots[{robot!r}]()
+trajectory = engine.rollout(robot.world, robot.motion(robot.known))
+print("bits:" + trajectory.positions_m.tobytes().hex())
+"""
+
+
+def test_a_rollout_is_bit_equal_in_a_fresh_process(pair: Pair) -> None:
+    script = SCRIPT.format(engine=pair.engine.name, robot=pair.robot.name)
+    for edit in EDITS.values():
+        pair.roll(edit(pair.robot.world))
+
+    fresh = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+
+    here = pair.engine.rollout(pair.robot.world, pair.robot.motion(pair.robot.known)).positions_m
+    assert fresh.split("bits:")[1].split()[0] == here.tobytes().hex()
+
+
+def test_every_honoured_field_changes_a_trajectory(pair: Pair) -> None:
+    expected = pair.roll()
+
+    ignored = [field for field in pair.engine.honours if np.array_equal(pair.roll(edited(pair, field)), expected)]
+
+    assert ignored == []
+
+
+def edited(pair: Pair, field: str) -> World:
+    """The world with the field changed: by the tunable that edits it, else by the table above."""
+    if field in EDITS:
+        return EDITS[field](pair.robot.world)
+    tunable = next(each for each in tunables.values() if each.field == field)()
+    return tunable.edit(pair.robot.world, 0.5 * (tunable.lower + tunable.upper))
+
+
+def test_a_tunable_of_a_field_that_is_not_honoured_changes_nothing(pair: Pair) -> None:
+    expected = pair.roll()
+
+    for tunable in (each() for each in tunables.values() if each.field not in pair.engine.honours):
+        for value in (tunable.lower, tunable.upper):
+            assert np.array_equal(pair.roll(tunable.edit(pair.robot.world, value)), expected), tunable.name
+
+
+def test_a_trajectory_has_a_pose_for_each_observation(pair: Pair) -> None:
+    motion = pair.robot.motion(pair.robot.known)
+
+    trajectory = pair.engine.rollout(pair.robot.world, motion)
+
+    count = len(motion.observe_s)
+    assert np.array_equal(trajectory.times_s, motion.observe_s)
+    assert trajectory.positions_m.shape == (count, 3)
+    assert trajectory.orientations.shape == (count, 4)
+    assert np.isfinite(pair.robot.fitness(trajectory))
+
+
+def test_many_rollouts_at_once_equal_as_many_single_ones(pair: Pair) -> None:
+    motion, world = pair.robot.motion(pair.robot.known), pair.robot.world
+    worlds = [world, replace(world, material=Material(0.7, 0.3, 0.2))]
+
+    together = pair.engine.rollouts(worlds, [motion, motion])
+
+    apart = [pair.engine.rollout(each, motion).positions_m for each in worlds]
+    assert np.array_equal(together.positions_m, np.array([apart, apart]))
+
+
+def test_a_robot_left_alone_stands_still_at_the_height_of_its_legs(embodied: Pair) -> None:
+    actuators = len(embodied.robot.world.actuators)
+    alone = Motion(np.zeros(1), np.zeros((1, actuators)), np.array([1.0, 2.0]))
+
+    trajectory = embodied.engine.rollout(embodied.robot.world, alone)
+
+    early, late = trajectory.positions_m
+    assert late[2] == pytest.approx(embodied.robot.world.start_height_m, abs=0.02)
+    assert np.linalg.norm(late - early) < 0.01
+    assert abs(trajectory.orientations[-1, 3]) > np.cos(np.radians(5) / 2)
+
+
+@pytest.mark.parametrize("gravity_m_s2", [-1e4, 1e9, 1e300])
+def test_physics_that_blows_up_is_nan_and_harms_no_later_rollout(embodied: Pair, gravity_m_s2: float) -> None:
+    expected = embodied.roll()
+
+    blown_up = embodied.roll(replace(embodied.robot.world, gravity_m_s2=gravity_m_s2))
+
+    assert np.all(np.isnan(blown_up))
+    assert np.array_equal(embodied.roll(), expected)
+
+
+def test_targets_that_are_no_numbers_give_nan_and_harm_no_later_rollout(embodied: Pair) -> None:
+    expected = embodied.roll()
+    motion = embodied.robot.motion(embodied.robot.known)
+
+    lost = embodied.engine.rollout(embodied.robot.world, replace(motion, targets=np.full_like(motion.targets, np.nan)))
+
+    assert np.all(np.isnan(flat(lost)))
+    assert np.array_equal(embodied.roll(), expected)

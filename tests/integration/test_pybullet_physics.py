@@ -1,0 +1,153 @@
+"""PyBullet against the textbook: what its coefficients are said to be is what they do."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from types import ModuleType
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from services.core.arrays import FloatArray
+from services.core.world import Body, Box, Joint, Material, Motion, Sphere, World
+from services.engines.pybullet import PyBullet
+from services.engines.pybullet.scene import Scene
+from services.engines.pybullet.stick_slip import StickSlip
+
+pybullet: ModuleType = pytest.importorskip("pybullet")
+
+G = 9.81
+STEP_S = 1 / 120
+BALL = World(bodies=(Body("ball", 1.0, Sphere(0.05)),), start_height_m=1.05)
+CORNERS = {"a": (0.3, 0.3, 0.0), "b": (0.3, -0.3, 0.0), "c": (-0.3, 0.3, 0.0), "d": (-0.3, -0.3, 0.0)}
+SLEDGE = World(
+    bodies=(
+        Body("board", 1.6, Box((0.6, 0.6, 0.02)), collides=False),
+        *(Body(name, 0.1, Sphere(0.02)) for name in CORNERS),
+    ),
+    joints=tuple(Joint(f"hinge_{name}", "board", name, where, (0.0, 0.0, 1.0)) for name, where in CORNERS.items()),
+    start_height_m=0.02,
+)
+WEIGHT_N = 2.0 * G
+
+
+class Sledge(NamedTuple):
+    """A board on four balls that cannot roll, at rest on the ground, to be pushed about."""
+
+    scene: Scene
+    advance: StickSlip
+
+    def speed(self) -> float:
+        linear, _ = pybullet.getBaseVelocity(self.scene.robot, physicsClientId=self.scene.client)
+        return float(np.hypot(linear[0], linear[1]))
+
+    def throw(self, x: float, y: float) -> None:
+        pybullet.resetBaseVelocity(self.scene.robot, [x, y, 0], [0, 0, 0], physicsClientId=self.scene.client)
+
+    def pull(self, force_n: float) -> None:
+        """One step under a horizontal force in the plane of contact, so that it does not tip."""
+        place = (float(self.scene.pose()[0]), 0.0, 0.0)
+        pybullet.applyExternalForce(
+            self.scene.robot, -1, [force_n, 0, 0], place, pybullet.WORLD_FRAME, physicsClientId=self.scene.client
+        )
+        self.advance.step(1)
+
+
+@pytest.fixture
+def sledge(request: pytest.FixtureRequest) -> Iterator[Sledge]:
+    material: Material = request.param
+    scene = Scene(pybullet, SLEDGE)
+    scene.start(material, max(material.static_friction, material.dynamic_friction))
+    advance = StickSlip(scene, material)
+    advance.step(30)
+    yield Sledge(scene, advance)
+    scene.close()
+
+
+FRICTIONS = [Material(1.0, 0.8), Material(1.2, 0.3), Material(0.5, 0.1)]
+
+
+@pytest.mark.parametrize("sledge", FRICTIONS, indirect=True)
+@pytest.mark.parametrize("direction", [(1.0, 0.0), (np.sqrt(0.5), np.sqrt(0.5))])
+def test_a_sliding_sledge_is_slowed_by_the_dynamic_friction_in_any_direction(
+    sledge: Sledge, direction: tuple[float, float]
+) -> None:
+    sledge.throw(3 * direction[0], 3 * direction[1])
+    sledge.advance.step(2)  # the first step of the slide is still under static friction
+    before = sledge.speed()
+
+    sledge.advance.step(20)
+
+    friction = sledge.advance._material.dynamic_friction
+    assert (before - sledge.speed()) / (20 * STEP_S) == pytest.approx(friction * G, rel=0.05)
+
+
+@pytest.mark.parametrize("sledge", FRICTIONS, indirect=True)
+def test_a_sledge_at_rest_breaks_loose_at_the_static_friction(sledge: Sledge) -> None:
+    shares = np.linspace(0.8, 1.2, 240) * sledge.advance._material.static_friction
+
+    loose = next(share for share in shares if not sledge.pull(share * WEIGHT_N) and sledge.speed() > 0.02)
+
+    # the feet do not share the force evenly: the first to slide takes the others along, up to a tenth too early
+    assert 0.89 * sledge.advance._material.static_friction < loose < 1.01 * sledge.advance._material.static_friction
+
+
+@pytest.mark.parametrize("sledge", FRICTIONS, indirect=True)
+def test_a_sledge_that_slid_to_rest_sticks_again(sledge: Sledge) -> None:
+    material = sledge.advance._material
+    sledge.throw(0.2, 0.0)
+    sledge.advance.step(60)
+    assert sledge.speed() < 0.01
+
+    between = (material.static_friction + material.dynamic_friction) / 2
+    for _ in range(30):
+        sledge.pull(between * WEIGHT_N)
+
+    assert sledge.speed() < 0.01
+
+
+@pytest.mark.parametrize("sledge", FRICTIONS, indirect=True)
+def test_a_sledge_broken_loose_accelerates_against_the_dynamic_friction(sledge: Sledge) -> None:
+    material = sledge.advance._material
+    pull = 1.05 * material.static_friction
+    for _ in range(3):
+        sledge.pull(pull * WEIGHT_N)
+    before = sledge.speed()
+
+    for _ in range(20):
+        sledge.pull(pull * WEIGHT_N)
+
+    expected = (pull - material.dynamic_friction) * G
+    assert (sledge.speed() - before) / (20 * STEP_S) == pytest.approx(expected, rel=0.1)
+
+
+def fall(material: Material) -> tuple[FloatArray, FloatArray]:
+    """Times and heights of a ball's lowest point, dropped from 1 m."""
+    times = np.arange(0, 1.2, STEP_S)
+    still = Motion(np.zeros(1), np.zeros((1, 0)), times)
+    return times, PyBullet().rollout(replace(BALL, material=material), still).positions_m[:, 2] - 0.05
+
+
+def test_a_dropped_ball_falls_freely() -> None:
+    times, heights = fall(Material())
+
+    falling = times < 0.4
+    # Bullet adds speed before it moves, which is ahead of the parabola by half a step's worth of speed
+    expected = 1 - 0.5 * G * times * (times + STEP_S)
+    assert heights[falling] == pytest.approx(expected[falling], abs=1e-6)
+
+
+@pytest.mark.parametrize("restitution", [0.3, 0.6, 0.85])
+def test_a_dropped_ball_bounces_with_the_restitution(restitution: float) -> None:
+    _, heights = fall(Material(restitution=restitution))
+
+    landed = int(np.argmax(heights < 0.02))
+    rebound = np.sqrt(heights[landed:].max() / 1.0)
+    assert rebound == pytest.approx(restitution, rel=0.08)  # within the speed that one step adds
+
+
+def test_a_ball_without_restitution_stays_down() -> None:
+    _, heights = fall(Material(restitution=0.0))
+
+    landed = int(np.argmax(heights < 0.02))
+    assert heights[landed:].max() < 0.02
