@@ -76,7 +76,7 @@ class Quadruped(Robot):
         )
 
     def fitness(self, trajectory: Trajectory) -> FloatArray:
-        """`(...)`: the distance from where the first observation saw it to where the last did, over the time between."""
+        """`(...)`: from where the first observation saw it to where the last did, over the time between them."""
         travelled = trajectory.positions_m[..., -1, :2] - trajectory.positions_m[..., 0, :2]
         return np.asarray(np.linalg.norm(travelled, axis=-1) / (trajectory.times_s[-1] - trajectory.times_s[0]))
 
