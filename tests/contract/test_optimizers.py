@@ -1,0 +1,134 @@
+"""What every optimizer promises, the day its file is there."""
+
+import numpy as np
+import pytest
+
+from services.core.optimizers import optimizers
+from services.core.optimizers.base import maximise
+from services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
+from services.core.types import Space
+
+SPACE = Space.box([0.0, -2.0, 0.0], [1.0, 2.0, 5.0], [True, False, False])
+SUMMIT = np.array([0.9, 0.5, 4.0])
+
+
+class Hill:
+    """A concave fitness with its summit inside the box; it remembers how it was asked."""
+
+    def __init__(self, transform=lambda fitness: fitness):
+        self.transform = transform
+        self.asked = []
+
+    def __call__(self, genomes):
+        self.asked.append(genomes.copy())
+        return self.transform(-(((genomes - SUMMIT) / SPACE.extent) ** 2).sum(axis=1))
+
+
+def search(name, evaluate, evaluations=300, seed=3):
+    return maximise(optimizers[name](), SPACE, evaluate, evaluations, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("name", sorted(optimizers))
+class TestEveryOptimizer:
+    @pytest.mark.parametrize("evaluations", [1, 19, 20, 21, 57, 300])
+    def test_spends_exactly_its_budget(self, name, evaluations):
+        hill = Hill()
+
+        search(name, hill, evaluations)
+
+        assert sum(map(len, hill.asked)) == evaluations
+
+    def test_asks_only_within_the_box(self, name):
+        hill = Hill()
+
+        search(name, hill)
+
+        asked = np.vstack(hill.asked)
+        assert np.all((asked >= SPACE.lower) & (asked <= SPACE.upper))
+
+    def test_climbs_the_hill(self, name):
+        found = search(name, Hill(), 2000)
+
+        np.testing.assert_allclose(found.genomes[0], SUMMIT, atol=0.02 * SPACE.extent.max())
+
+    def test_returns_its_members_best_first_with_their_own_fitness(self, name):
+        found = search(name, Hill())
+
+        np.testing.assert_array_equal(found.fitness, np.sort(found.fitness)[::-1])
+        np.testing.assert_allclose(found.fitness, Hill()(found.genomes))
+
+    def test_never_loses_the_best_it_was_told(self, name):
+        hill = Hill()
+
+        found = search(name, hill)
+
+        assert found.fitness[0] == Hill()(np.vstack(hill.asked)).max()
+
+    def test_repeats_itself_for_the_same_stream(self, name):
+        np.testing.assert_array_equal(search(name, Hill()).genomes, search(name, Hill()).genomes)
+
+    def test_compares_by_rank_alone(self, name):
+        plain = search(name, Hill())
+        transformed = search(name, Hill(lambda fitness: np.exp(3 * fitness) - 7))
+
+        np.testing.assert_array_equal(plain.genomes, transformed.genomes)
+
+    def test_nan_never_wins(self, name):
+        found = search(name, Hill(lambda fitness: np.where(fitness > -0.05, np.nan, fitness)), 500)
+
+        assert np.isfinite(found.fitness[0])
+        assert found.fitness[0] <= -0.05
+
+    def test_goes_on_where_everything_fails(self, name):
+        found = search(name, Hill(lambda fitness: np.full_like(fitness, np.nan)))
+
+        assert np.all(np.isneginf(found.fitness))
+
+    def test_leaves_the_state_it_was_given_as_it_was(self, name):
+        optimizer, rng = optimizers[name](), np.random.default_rng(0)
+        state = optimizer.init(SPACE)
+        state = optimizer.tell(state, *(lambda genomes: (genomes, Hill()(genomes)))(optimizer.ask(state, rng)))
+        before = state.genomes.copy(), state.fitness.copy()
+
+        genomes = optimizer.ask(state, rng)
+        optimizer.tell(state, genomes, np.full(len(genomes), 1e9))
+
+        np.testing.assert_array_equal(state.genomes, before[0])
+        np.testing.assert_array_equal(state.fitness, before[1])
+
+    def test_keeps_as_many_diverse_members_as_it_is_asked_to(self, name):
+        found = maximise(optimizers[name]().diverse(9), SPACE, Hill(), 200, np.random.default_rng(0))
+
+        assert found.size == 9
+        assert len(np.unique(found.genomes, axis=0)) == 9
+
+
+def test_the_papers_evolution_adds_one_newcomer_at_a_time():
+    hill = Hill()
+
+    search("steady_state", hill, 60)
+
+    assert [len(each) for each in hill.asked] == [20] + [1] * 40
+
+
+def test_a_newcomer_always_differs_from_every_member():
+    optimizer, rng = SteadyState(SteadyStateOptions(mutation=0.001)), np.random.default_rng(0)
+    state = optimizer.init(SPACE)
+    genomes = optimizer.ask(state, rng)
+    state = optimizer.tell(state, genomes, Hill()(genomes))
+
+    newcomers = [optimizer.ask(state, rng)[0] for _ in range(100)]
+
+    assert not any(np.any(np.all(state.genomes == newcomer, axis=1)) for newcomer in newcomers)
+
+
+def test_members_are_of_two_parents_gene_by_gene():
+    optimizer = SteadyState(SteadyStateOptions(crossover=1.0, mutation_scale=1e-9, finest_scale=1e-9))
+    rng = np.random.default_rng(0)
+    state = optimizer.init(SPACE)
+    genomes = optimizer.ask(state, rng)
+    state = optimizer.tell(state, genomes, Hill()(genomes))
+
+    newcomer = optimizer.ask(state, rng)[0]
+
+    assert all(np.any(np.isclose(state.genomes[:, gene], newcomer[gene])) for gene in range(SPACE.size))

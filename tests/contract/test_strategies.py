@@ -1,0 +1,140 @@
+"""What every strategy promises, the day its file is there."""
+
+import numpy as np
+import pytest
+
+from schemas.plugin import PluginRef
+from services.core.scoring import uniqueness_penalty
+from services.core.strategies import strategies
+from services.core.types import Belief, Sample, Simulator, Space
+from tests.fakes import TRUTH, paraboloid
+
+SPACE = Space.box([0.0, 0.0], [1.0, 1.0], [True, False])
+PAPER = [
+    "informative",
+    "known_fit",
+    "random",
+    "simulated_fit",
+    "simulated_fit_and_informative",
+    "simulated_fit_and_unique",
+]
+
+
+def belief(strategy, samples=()):
+    rng = np.random.default_rng(5)
+    simulators = tuple(Simulator(row, 0.1) for row in rng.random((strategy.ensemble, 2)))
+    return Belief(SPACE, np.array([0.2, 0.9]), tuple(samples), simulators)
+
+
+class GridSearch:
+    """A search that looks at every point of a grid."""
+
+    def __init__(self, believed):
+        self.believed = believed
+        self.calls = 0
+
+    def __call__(self, score):
+        self.calls += 1
+        axis = np.linspace(0, 1, 41)
+        grid = np.array(np.meshgrid(axis, axis)).reshape(2, -1).T
+        return grid[int(np.argmax(score(grid, paraboloid(grid, self.believed.parameters))))]
+
+
+def select(name, samples=(), seed=0, options=None):
+    strategy = strategies.create(PluginRef(name=name, options=options or {}))
+    believed = belief(strategy, samples)
+    return strategy.select(believed, GridSearch(believed), np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("name", sorted(strategies))
+class TestEveryStrategy:
+    def test_selects_a_genome_of_the_space(self, name):
+        genome = select(name)
+
+        assert genome.shape == (2,)
+        assert np.all((genome >= SPACE.lower) & (genome <= SPACE.upper))
+
+    def test_selects_the_same_from_the_same(self, name):
+        np.testing.assert_array_equal(select(name), select(name))
+
+    def test_copes_with_samples_measured_and_failed(self, name):
+        samples = [Sample(np.array([0.5, 0.5]), 0.8), Sample(np.array([0.1, 0.5]), float("nan"))]
+
+        assert np.isfinite(select(name, samples)).all()
+
+    def test_says_truly_whether_it_searches(self, name):
+        strategy = strategies[name]()
+        search = GridSearch(belief(strategy))
+
+        strategy.select(belief(strategy), search, np.random.default_rng(0))
+
+        assert bool(search.calls) == strategy.searches
+
+    def test_describes_itself_for_the_catalogue(self, name):
+        described = strategies[name].describe()
+
+        assert described.name == name
+        assert described.summary.endswith(".")
+        assert "Paper" in described.source
+
+
+def test_the_papers_six_strategies_and_the_baseline_are_there():
+    assert {*PAPER, "direct"} <= set(strategies)
+    assert [name for name in strategies if strategies[name].in_reality] == ["direct"]
+
+
+def test_simulated_fit_selects_the_summit_of_its_simulator():
+    simulator = belief(strategies["simulated_fit"]()).parameters[0]
+
+    np.testing.assert_allclose(select("simulated_fit"), simulator, atol=0.02)
+
+
+def test_uniqueness_moves_the_selection_away_from_a_sample_on_the_summit():
+    summit = select("simulated_fit")
+    sample = Sample(summit, 1.0)
+
+    moved = select("simulated_fit_and_unique", [sample])
+
+    assert np.linalg.norm(moved - summit) > 0.02
+    assert uniqueness_penalty(moved[None], np.array([1.0]), [sample])[0] < 0.5
+
+
+def test_informative_selects_where_the_simulators_disagree_most():
+    genome = select("informative", options={"simulators": 3})
+
+    parameters = belief(strategies.create(PluginRef(name="informative", options={"simulators": 3}))).parameters
+    everywhere = paraboloid(np.random.default_rng(1).random((500, 2)), parameters).std(axis=1)
+    assert paraboloid(genome[None], parameters).std() >= everywhere.max()
+
+
+def test_the_weights_of_the_mixture_lead_from_fit_to_informative():
+    name = "simulated_fit_and_informative"
+    only_fit = select(name, options={"simulators": 3, "informative_weight": 0.0})
+    only_informative = select(name, options={"simulators": 3, "fit_weight": 0.0})
+
+    np.testing.assert_array_equal(only_informative, select("informative", options={"simulators": 3}))
+    parameters = belief(strategies.create(PluginRef(name=name, options={"simulators": 3}))).parameters
+    np.testing.assert_allclose(only_fit, parameters.mean(axis=0), atol=0.02)
+
+
+def test_random_selections_are_uniform():
+    drawn = np.array([select("random", seed=seed) for seed in range(400)])
+
+    np.testing.assert_allclose(drawn.mean(axis=0), [0.5, 0.5], atol=0.05)
+
+
+def test_known_fit_adds_up_to_a_quarter_to_each_gene_wraps_phases_and_clips_widths():
+    drawn = np.array([select("known_fit", seed=seed) for seed in range(200)])
+
+    added = np.mod(drawn[:, 0] - 0.2, 1.0)
+    assert added.min() >= 0.0
+    assert 0.2 < added.max() <= 0.25
+    assert drawn[:, 1].min() >= 0.9
+    assert drawn[:, 1].max() == 1.0
+
+
+def test_truth_is_not_among_what_a_strategy_is_given():
+    believed = belief(strategies["informative"]())
+
+    assert set(vars(believed)) == {"space", "known", "samples", "simulators"}
+    assert not any(np.array_equal(each.parameters, TRUTH) for each in believed.simulators)

@@ -1,0 +1,76 @@
+"""Stand-ins of a few lines: simulations that are formulas, and settings that run in milliseconds."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from schemas.plugin import PluginRef
+from services.core.loop import Setting
+from services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
+from services.core.strategies import strategies
+from services.core.types import Budget, Space
+
+TRUTH = np.array([0.7, 0.2])
+
+
+def paraboloid(genomes, parameters):
+    """`(n, 2)` × `(m, 2)` -> `(n, m)`: a hill whose summit is where the parameters say; in reality, at TRUTH."""
+    return 1.0 - ((genomes[:, None, :] - parameters[None, :, :]) ** 2).sum(axis=2)
+
+
+class Recorder:
+    """A Simulate that remembers the shape of every call."""
+
+    def __init__(self, simulate=paraboloid):
+        self.simulate = simulate
+        self.calls = []
+
+    def __call__(self, genomes, parameters):
+        self.calls.append((len(genomes), len(parameters)))
+        return self.simulate(genomes, parameters)
+
+    @property
+    def rollouts(self):
+        return sum(n * m for n, m in self.calls)
+
+
+class CountedReality:
+    """A Reality at TRUTH that counts how often it was asked."""
+
+    def __init__(self, fitness=lambda genome: float(paraboloid(genome[None], TRUTH[None])[0, 0])):
+        self.fitness = fitness
+        self.asked = 0
+
+    def __call__(self, genome):
+        self.asked += 1
+        return self.fitness(genome)
+
+
+def small_setting(strategy="simulated_fit", options=None, **changes):
+    """A repetition of three iterations on the paraboloid, with a population of 5."""
+    chosen = strategies.create(PluginRef(name=strategy, options=options or {}))
+    setting = Setting(
+        simulate=paraboloid,
+        reality=CountedReality(),
+        strategy=chosen,
+        optimizer=SteadyState(SteadyStateOptions(population=5)),
+        genomes=Space.box([0.0, 0.0], [1.0, 1.0], [True, False]),
+        parameters=Space.box([0.0, 0.0], [1.0, 1.0]),
+        known=np.array([0.5, 0.5]),
+        budget=Budget(controller_evaluations=40, selection_evaluations=30, simulator_evaluations=50),
+        iterations=3,
+        seed=11,
+        repetition=4,
+    )
+    return replace(setting, **changes)
+
+
+def flat(step):
+    """Everything in a step as plain numbers and names, so that steps compare by content to the last bit."""
+    if isinstance(step, np.ndarray):
+        return step.tobytes()
+    if isinstance(step, tuple):
+        return tuple(flat(each) for each in step)
+    if hasattr(step, "__dataclass_fields__"):
+        return type(step).__name__, *(flat(getattr(step, name)) for name in step.__dataclass_fields__)
+    return np.float64(step).tobytes() if isinstance(step, float) else step

@@ -1,0 +1,43 @@
+"""Curves: the numbers that the figure shows."""
+
+import numpy as np
+import pytest
+
+from services.core.curves import curve_point, curve_points
+
+RECORDED = np.array([[0.9, 1.2], [0.8, 1.4], [1.0, np.nan]])
+
+
+def test_a_point_has_mean_deviation_and_students_interval():
+    point = curve_point(1, np.array([1.0, 2.0, 3.0, 4.0]))
+
+    sd = (5 / 3) ** 0.5
+    half = 3.182446305 * sd / 2  # t of 97.5 % with 3 degrees of freedom, from a table
+    assert (point.evaluations, point.n, point.mean) == (1, 4, 2.5)
+    assert point.sd == pytest.approx(sd)
+    assert (point.lower, point.upper) == pytest.approx((2.5 - half, 2.5 + half))
+
+
+def test_there_is_a_point_for_every_number_of_evaluations_from_none_on():
+    assert [each.evaluations for each in curve_points(RECORDED)] == [0, 1]
+
+
+def test_what_is_missing_counts_in_no_statistic_and_stays_visible_by_repetition():
+    _, second = curve_points(RECORDED)
+
+    assert second.n == 2
+    assert second.mean == pytest.approx(1.3)
+    assert second.values == (1.2, 1.4, None)
+
+
+def test_one_value_has_a_mean_and_no_spread_and_none_has_nothing():
+    one, none = curve_points(np.array([[1.0, np.nan]]))
+
+    assert (one.mean, one.sd, one.lower) == (1.0, None, None)
+    assert (none.n, none.mean, none.values) == (0, None, (None,))
+
+
+def test_a_curve_may_fall():
+    means = [each.mean for each in curve_points(np.array([[1.0, 0.5], [1.0, 0.7]]))]
+
+    assert means[1] < means[0]

@@ -1,0 +1,157 @@
+"""The algorithm of Fig. 2."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from services.core.loop import History, next_step, recorded_fitness, repetition
+from services.core.strategies import strategies
+from services.core.types import Budget, Measured, Probed, Sample, Selected, Transferred, Tuned
+from tests.fakes import CountedReality, Recorder, flat, paraboloid, small_setting
+
+PHASES = (Selected, Measured, Tuned, Transferred, Probed)
+
+
+def test_iteration_0_tunes_nothing_and_the_others_run_through_every_phase():
+    steps = list(repetition(small_setting()))
+
+    assert [type(step) for step in steps] == [Tuned, Transferred, Probed, *PHASES * 3]
+    assert [step.iteration for step in steps] == [0] * 3 + [1] * 5 + [2] * 5 + [3] * 5
+
+
+@pytest.mark.parametrize("strategy", sorted(strategies))
+def test_a_resumed_repetition_equals_an_uninterrupted_one_wherever_it_stopped(strategy):
+    setting = small_setting(strategy)
+    whole = [flat(step) for step in repetition(setting)]
+
+    for stopped_after in range(len(whole) + 1):
+        log = list(repetition(setting))[:stopped_after]
+        rest = repetition(small_setting(strategy), log)
+        assert [flat(step) for step in (*log, *rest)] == whole
+
+
+def test_reality_is_asked_once_for_each_sample_and_each_probe():
+    reality = CountedReality()
+
+    list(repetition(small_setting(reality=reality)))
+
+    assert reality.asked == 3 + 4
+
+
+def test_a_resumed_repetition_does_not_measure_again_what_is_in_the_log():
+    log = list(repetition(small_setting()))[:5]
+    reality = CountedReality()
+
+    list(repetition(small_setting(reality=reality), log))
+
+    assert isinstance(log[-1], Measured)
+    assert reality.asked == 2 + 3
+
+
+@pytest.mark.parametrize(
+    ("strategy", "options", "expected"),
+    [
+        # transfers 4 × 40, selections 3 × 30, tunings 50 × (1 + 2 + 3)
+        ("simulated_fit", {}, 160 + 90 + 300),
+        ("simulated_fit_and_unique", {}, 160 + 90 + 300),
+        ("informative", {"simulators": 4}, 160 + 90 * 4 + 300),
+        ("simulated_fit_and_informative", {"simulators": 4}, 160 + 90 * 4 + 300),
+        ("random", {}, 160 + 300),
+        ("known_fit", {}, 160 + 300),
+    ],
+)
+def test_budgets_are_honoured_to_the_rollout_and_reported_in_the_steps(strategy, options, expected):
+    simulate = Recorder()
+
+    steps = list(repetition(small_setting(strategy, options, simulate=simulate)))
+
+    assert simulate.rollouts == expected
+    assert sum(step.cost.rollouts for step in steps if hasattr(step, "cost")) == expected
+
+
+def test_a_budget_that_the_population_does_not_divide_is_honoured_too():
+    simulate = Recorder()
+    budget = Budget(controller_evaluations=7, selection_evaluations=6, simulator_evaluations=9)
+
+    list(repetition(small_setting(simulate=simulate, budget=budget, iterations=1)))
+
+    assert simulate.rollouts == 7 + 6 + 9 + 7
+
+
+def test_fit_strategies_close_the_gap():
+    steps = list(repetition(small_setting(budget=Budget(400, 400, 400))))
+
+    start, *_, end = (step.recorded for step in steps if isinstance(step, Probed))
+    assert end > 0.999
+    assert start < 0.95
+
+
+def test_the_recorded_fitness_is_the_larger_of_probe_and_best_sample():
+    samples = [Sample(np.zeros(1), 0.4), Sample(np.zeros(1), 0.9), Sample(np.zeros(1), float("nan"))]
+
+    assert recorded_fitness(0.5, samples) == 0.9
+    assert recorded_fitness(1.5, samples) == 1.5
+    assert recorded_fitness(float("nan"), samples) == 0.9
+    assert np.isnan(recorded_fitness(float("nan"), []))
+
+
+def test_a_measurement_that_failed_counts_but_teaches_nothing():
+    reality = CountedReality(lambda genome: float("nan"))
+
+    steps = list(repetition(small_setting(reality=reality)))
+
+    assert reality.asked == 7
+    assert all(np.isnan(step.recorded) for step in steps if isinstance(step, Probed))
+    assert all(step.simulators[0].squared_error == 0.0 for step in steps if isinstance(step, Tuned))
+
+
+def test_physics_that_fails_everywhere_is_counted_and_ends_in_no_fitness():
+    def broken(genomes, parameters):
+        return np.full((len(genomes), len(parameters)), np.nan)
+
+    steps = list(repetition(small_setting(simulate=broken)))
+
+    transfers = [step for step in steps if isinstance(step, Transferred)]
+    assert all(np.isnan(step.fitness) for step in transfers)
+    assert all(step.cost.failures == step.cost.rollouts > 0 for step in transfers)
+
+
+def test_a_controller_whose_physics_fails_never_wins():
+    def broken_on_the_left(genomes, parameters):
+        return np.where(genomes[:, :1] < 0.8, np.nan, paraboloid(genomes, parameters))
+
+    steps = list(repetition(small_setting(simulate=broken_on_the_left)))
+
+    assert all(step.genome[0] >= 0.8 for step in steps if isinstance(step, Selected | Transferred))
+
+
+def test_repetitions_strategies_and_seeds_draw_different_simulators():
+    settings = [small_setting(), small_setting(repetition=5), small_setting(seed=12), small_setting("random")]
+
+    drawn = {flat(next_step(setting, History())) for setting in settings}
+
+    assert len(drawn) == len(settings)
+
+
+def test_an_ensemble_strategy_keeps_as_many_simulators_as_it_asks_for():
+    steps = list(repetition(small_setting("informative", {"simulators": 7})))
+
+    assert {len(step.simulators) for step in steps if isinstance(step, Tuned)} == {7}
+
+
+def test_the_population_of_a_fit_strategy_yields_its_one_best_simulator():
+    steps = list(repetition(small_setting("simulated_fit")))
+
+    assert {len(step.simulators) for step in steps if isinstance(step, Tuned)} == {1}
+
+
+def test_the_transfer_evolves_in_the_best_simulator():
+    best = np.array([0.3, 0.6])
+    setting = small_setting(budget=Budget(500, 10, 10))
+    step = Tuned(1, tuple(replace(each) for each in next_step(setting, History()).simulators))
+    step = replace(step, simulators=(replace(step.simulators[0], parameters=best),))
+
+    transferred = next_step(setting, History().after(step))
+
+    np.testing.assert_allclose(transferred.genome, best, atol=0.01)

@@ -1,0 +1,75 @@
+"""The paper's formulas against values computed by hand."""
+
+import numpy as np
+import pytest
+
+from services.core.scoring import simulator_weights, uniqueness_penalty, weighted_deviation, weighted_mean
+from services.core.types import Sample
+
+FITNESSES = np.array([[1.0, 3.0], [2.0, 2.0]])
+WEIGHTS = np.array([0.75, 0.25])
+
+
+def test_the_weighted_mean_counts_accurate_simulators_more():
+    np.testing.assert_allclose(weighted_mean(FITNESSES, WEIGHTS), [1.5, 2.0])
+
+
+def test_the_weighted_deviation_is_the_disagreement_of_the_simulators():
+    # mean 1.5: 0.75 (1 - 1.5)^2 + 0.25 (3 - 1.5)^2 = 0.75
+    np.testing.assert_allclose(weighted_deviation(FITNESSES, WEIGHTS), [0.75**0.5, 0.0])
+
+
+def test_the_penalty_is_the_mean_inverse_distance_over_a_hundred():
+    samples = [Sample(np.array([0.0, 0.0]), 0.0), Sample(np.array([0.0, 3.0]), 4.0)]
+
+    penalty = uniqueness_penalty(np.array([[0.0, 3.0]]), np.array([4.0]), samples[:1])
+    of_two = uniqueness_penalty(np.array([[3.0, 3.0]]), np.array([4.0]), samples)
+
+    assert penalty == pytest.approx(1 / 5 / 100)
+    assert of_two == pytest.approx((1 / 34**0.5 + 1 / 3) / 2 / 100)
+
+
+def test_the_distance_is_over_genome_and_fitness_together():
+    sample = [Sample(np.array([0.5]), 1.0)]
+
+    penalty = uniqueness_penalty(np.array([[0.5]]), np.array([3.0]), sample)
+
+    assert penalty == pytest.approx(1 / 2 / 100)
+
+
+def test_before_the_first_sample_there_is_no_penalty():
+    np.testing.assert_array_equal(uniqueness_penalty(np.zeros((3, 2)), np.zeros(3), []), np.zeros(3))
+
+
+def test_a_controller_on_top_of_a_sample_has_a_large_but_finite_penalty():
+    penalty = uniqueness_penalty(np.array([[0.5]]), np.array([1.0]), [Sample(np.array([0.5]), 1.0)])
+
+    assert np.isfinite(penalty).all()
+    assert penalty[0] > 1_000
+
+
+def test_weights_are_the_simulators_fitnesses_normalised():
+    # fitness 1/0.1 = 10 and 1/0.4 = 2.5
+    np.testing.assert_allclose(simulator_weights(np.array([0.1, 0.4]), floor=1e-9), [0.8, 0.2])
+
+
+def test_weights_are_equal_before_any_sample():
+    np.testing.assert_allclose(simulator_weights(np.zeros(4), floor=1e-6), np.full(4, 0.25))
+
+
+def test_a_perfect_simulator_takes_the_weight_that_the_floor_allows():
+    weights = simulator_weights(np.array([0.0, 0.03]), floor=0.01)
+
+    np.testing.assert_allclose(weights, [0.75, 0.25])
+
+
+def test_a_failed_simulator_weighs_nothing_and_if_all_fail_they_weigh_alike():
+    np.testing.assert_allclose(simulator_weights(np.array([0.5, np.inf]), floor=0.01), [1.0, 0.0])
+    np.testing.assert_allclose(simulator_weights(np.array([np.inf, np.inf]), floor=0.01), [0.5, 0.5])
+
+
+def test_a_failed_rollout_makes_the_score_nan():
+    failed = np.array([[1.0, np.nan]])
+
+    assert np.isnan(weighted_mean(failed, WEIGHTS)).all()
+    assert np.isnan(weighted_deviation(failed, WEIGHTS)).all()

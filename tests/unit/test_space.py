@@ -1,0 +1,46 @@
+"""Boxes of real vectors."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from services.core.types import Space
+
+SPACE = Space.box([0.0, -1.0], [1.0, 3.0], [True, False])
+
+
+def test_periodic_coordinates_wrap_and_others_clip():
+    contained = SPACE.contain(np.array([[1.25, 9.0], [-0.25, -9.0], [0.5, 2.0]]))
+
+    np.testing.assert_allclose(contained, [[0.25, 3.0], [0.75, -1.0], [0.5, 2.0]])
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=2))
+def test_whatever_is_contained_lies_in_the_box(vector):
+    contained = SPACE.contain(np.array(vector))
+
+    assert np.all(contained >= SPACE.lower)
+    assert np.all(contained <= SPACE.upper)
+
+
+def test_drawn_vectors_fill_the_box_evenly():
+    drawn = SPACE.draw(4000, np.random.default_rng(0))
+
+    np.testing.assert_allclose(drawn.mean(axis=0), [0.5, 1.0], atol=0.05)
+    np.testing.assert_allclose(drawn.std(axis=0), SPACE.extent / 12**0.5, rtol=0.05)
+
+
+def test_reversed_bounds_are_refused_with_their_place_and_values():
+    with pytest.raises(ValueError, match=r"coordinate 1 has 5\.0 and 2\.0"):
+        Space.box([0.0, 5.0], [1.0, 2.0])
+
+
+def test_vectors_of_different_lengths_are_refused():
+    with pytest.raises(ValueError, match="one length"):
+        Space.box([0.0], [1.0, 2.0])
+
+
+def test_a_space_cannot_be_changed():
+    with pytest.raises(ValueError, match="read-only"):
+        SPACE.lower[0] = 5.0

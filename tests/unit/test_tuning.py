@@ -1,0 +1,80 @@
+"""Simulator tuning."""
+
+import numpy as np
+import pytest
+
+from services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
+from services.core.tuning import draw_simulators, simulator_fitness, squared_errors, tune
+from services.core.types import Sample, Space
+from tests.fakes import TRUTH, Recorder, paraboloid
+
+SPACE = Space.box([0.0, 0.0], [1.0, 1.0])
+GENOMES = np.array([[0.1, 0.9], [0.8, 0.3], [0.4, 0.4]])
+SAMPLES = [Sample(genome, float(paraboloid(genome[None], TRUTH[None])[0, 0])) for genome in GENOMES]
+
+
+def test_squared_errors_are_summed_over_samples():
+    fitnesses = np.array([[1.0, 2.0], [3.0, 5.0]])
+
+    np.testing.assert_allclose(squared_errors(fitnesses, np.array([1.5, 3.0])), [0.25, 4.25])
+
+
+def test_the_fitness_of_a_simulator_is_one_over_its_squared_error():
+    np.testing.assert_allclose(simulator_fitness(np.array([0.25, 4.0, np.inf])), [4.0, 0.25, 0.0])
+    assert simulator_fitness(np.array([0.0]))[0] == np.inf
+
+
+def test_a_simulator_that_fails_on_a_sample_has_an_infinite_error():
+    assert squared_errors(np.array([[1.0, np.nan], [1.0, 1.0]]), np.array([1.0, 1.0])).tolist() == [0.0, np.inf]
+
+
+def test_tuning_finds_the_parameters_of_reality():
+    best, *_ = tune(paraboloid, SAMPLES, SPACE, SteadyState(), 1000, np.random.default_rng(1))
+
+    np.testing.assert_allclose(best.parameters, TRUTH, atol=0.01)
+
+
+def test_tuning_spends_its_budget_exactly_and_evaluates_each_simulator_on_every_sample():
+    simulate = Recorder()
+
+    tune(simulate, SAMPLES, SPACE, SteadyState(), 100, np.random.default_rng(1))
+
+    assert simulate.rollouts == 100 * len(SAMPLES)
+    assert {n for n, _ in simulate.calls} == {len(SAMPLES)}
+
+
+def test_simulators_come_best_first_with_their_own_error():
+    simulators = tune(paraboloid, SAMPLES, SPACE, SteadyState(), 100, np.random.default_rng(1))
+
+    errors = [each.squared_error for each in simulators]
+    measured = np.array([each.fitness for each in SAMPLES])
+    again = squared_errors(paraboloid(GENOMES, np.array([each.parameters for each in simulators])), measured)
+    assert errors == sorted(errors)
+    np.testing.assert_array_equal(again, errors)
+
+
+def test_a_diverse_ensemble_stays_farther_apart_than_a_converged_population():
+    def spread(optimizer):
+        found = tune(paraboloid, SAMPLES, SPACE, optimizer, 500, np.random.default_rng(1))
+        return np.array([each.parameters for each in found]).std(axis=0).mean()
+
+    population = SteadyState(SteadyStateOptions(population=10))
+
+    assert spread(population.diverse(10)) > 10 * spread(population)
+
+
+def test_failing_physics_never_wins():
+    def half_broken(genomes, parameters):
+        return np.where(parameters[None, :, 0] < 0.5, np.nan, paraboloid(genomes, parameters))
+
+    best, *_ = tune(half_broken, SAMPLES, SPACE, SteadyState(), 300, np.random.default_rng(1))
+
+    assert best.parameters[0] >= 0.5
+
+
+@pytest.mark.parametrize("count", [1, 20])
+def test_simulators_drawn_before_any_sample_have_no_error(count):
+    drawn = draw_simulators(SPACE, count, np.random.default_rng(0))
+
+    assert len(drawn) == count
+    assert all(each.squared_error == 0.0 for each in drawn)
