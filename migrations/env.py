@@ -1,0 +1,29 @@
+"""Alembic's entry: compares and migrates the tables of `services.store.models`."""
+
+from alembic import context
+from sqlalchemy import Connection
+
+from services.settings import Settings
+from services.store.engine import WRITES, open_engine
+from services.store.models import Base
+
+
+def migrate(connection: Connection) -> None:
+    """Run the migrations on the connection; batch mode rebuilds the tables that SQLite cannot alter."""
+    context.configure(connection=connection, target_metadata=Base.metadata, render_as_batch=True)
+    with context.begin_transaction():
+        context.run_migrations()
+
+
+def migrate_the_environments_database() -> None:
+    """For Alembic's own command."""
+    engine = open_engine(Settings.from_environment().database_url, enforce_foreign_keys=False)
+    with engine.execution_options(**{WRITES: True}).begin() as connection:
+        migrate(connection)
+    engine.dispose()
+
+
+if (given := context.config.attributes.get("connection")) is not None:
+    migrate(given)
+else:
+    migrate_the_environments_database()

@@ -1,0 +1,115 @@
+"""Running repetitions: claim them, record their steps, end them. For supervisors; each function is one transaction.
+
+A claim is a lease. Its holder sends a heartbeat every 5 to 10 seconds, and is taken for lost after 30. Every write
+carries the claim and is refused once the lease has gone on to another, or the experiment was cancelled: False, or
+absence from `heartbeat`'s answer, tells the holder to drop the repetition.
+
+All of them raise StoreUnavailable while the database cannot be used; each may then be tried again.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import timedelta
+
+from services.core.types import Step
+from services.store.lease import Claim as Claim
+from services.store.repository import leases, steps
+from services.store.session import Store
+
+STALE_AFTER_S = 30.0
+
+
+@dataclass(frozen=True)
+class TimedStep:
+    """A step, and the seconds of work that it took."""
+
+    step: Step
+    seconds: float
+
+
+def claim(store: Store, owner: str, limit: int) -> tuple[Claim, ...]:
+    """Up to `limit` queued repetitions for the owner to run, of the oldest experiments first, each with its log."""
+    return store.write(lambda session: leases.claim(session, owner, limit))
+
+
+def heartbeat(store: Store, claims: Iterable[Claim]) -> tuple[Claim, ...]:
+    """Those of the claims that still hold; they hold on from now."""
+    held = tuple(claims)
+    return store.write(lambda session: leases.heartbeat(session, held)) if held else ()
+
+
+def record(store: Store, claim: Claim, step: Step, *, seconds: float = 0.0) -> bool:
+    """Append a step to the repetition's log.
+
+    A step that is there already stays as it is, so that a second delivery changes nothing and is True too.
+
+    Args:
+        store: of the claim.
+        claim: as it was given out; its own log need not be up to date.
+        step: the next one.
+        seconds: of work that it took.
+
+    Returns:
+        Whether the claim still holds; if not, nothing was written.
+
+    Raises:
+        Conflict: the step is not the next one: some before it are missing.
+    """
+    return bool(record_all(store, [(claim, (TimedStep(step, seconds),))]))
+
+
+def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[TimedStep]]]) -> tuple[Claim, ...]:
+    """Append steps to the logs of many repetitions in one transaction, each as `record` does.
+
+    Returns:
+        The claims that still hold; of the others nothing was written.
+
+    Raises:
+        Conflict: as `record`; then nothing at all was written.
+    """
+    delivered = [(claim, tuple(timed)) for claim, timed in deliveries]
+    return store.write(
+        lambda session: tuple(
+            claim
+            for claim, timed in delivered
+            if all(
+                steps.record(session, claim, each.step, seconds=each.seconds, measured_by=_measured_by(claim))
+                for each in timed
+            )
+        )
+    )
+
+
+def complete(store: Store, claim: Claim) -> bool:
+    """The repetition is COMPLETED, and with its last one the experiment; False if the claim holds no more.
+
+    Raises:
+        Conflict: some of its iterations are missing.
+    """
+    return store.write(lambda session: leases.complete(session, claim))
+
+
+def fail(store: Store, claim: Claim, reason: str) -> bool:
+    """The repetition is FAILED; the others go on. False if the claim holds no more.
+
+    The experiment is FAILED once all of its repetitions are.
+    """
+    return store.write(lambda session: leases.fail(session, claim, reason))
+
+
+def release(store: Store, claim: Claim, reason: str) -> bool:
+    """The worker was lost: the repetition is QUEUED again, to go on from its log. False if the claim holds no more.
+
+    One that loses its worker five times without a step in between is FAILED: it is what kills them.
+    """
+    return store.write(lambda session: leases.release(session, claim, reason))
+
+
+def requeue_lost(store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:
+    """QUEUE again, as `release` does, repetitions whose holder was not heard of for so long; how many there were."""
+    return store.write(lambda session: leases.requeue_lost(session, timedelta(seconds=stale_after_s)))
+
+
+def _measured_by(claim: Claim) -> str:
+    engine = claim.spec.reality.engine
+    return engine.name if engine else "unknown"

@@ -1,0 +1,176 @@
+"""Experiments and studies: submit, look at, cancel. Each function is one transaction.
+
+All of them raise StoreUnavailable while the database cannot be used.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+from schemas.lifecycle import State
+from schemas.records import ExperimentRead, MeasurementKind, Page, RepetitionRead, SampleRead, SimulatorRead, StudyRead
+from schemas.spec import ExperimentSpec, StudySpec
+from services.resolution import expected_rollouts, is_direct, resolve_experiment, resolve_study
+from services.store.repository import experiments, reads, results
+from services.store.repository.experiments import Extent
+from services.store.session import Store
+
+R = TypeVar("R")
+
+
+def submit_experiment(store: Store, spec: ExperimentSpec) -> ExperimentRead:
+    """Store the resolved experiment, its repetitions QUEUED.
+
+    Raises:
+        InvalidSpec: with everything that is wrong with it.
+    """
+    resolved = resolve_experiment(spec)
+    with store.transaction() as session:
+        row = experiments.insert_experiment(session, resolved, _extent(resolved))
+        return reads.read_experiments(session, [row])[0]
+
+
+def submit_study(store: Store, spec: StudySpec) -> StudyRead:
+    """Store the study and an experiment for each of its strategies.
+
+    Raises:
+        InvalidSpec: with everything that is wrong with it.
+    """
+    resolved = resolve_study(spec)
+    with store.transaction() as session:
+        study = experiments.insert_study(session, spec.name or "study")
+        for position, each in enumerate(resolved):
+            experiments.insert_experiment(session, each, _extent(each), study=study, position=position)
+        return reads.read_studies(session, [study])[0]
+
+
+def read_experiment(store: Store, experiment_id: str) -> ExperimentRead:
+    """The experiment with its progress.
+
+    Raises:
+        NotFound: no such experiment.
+    """
+    with store.reading() as session:
+        row = experiments.get_experiment(session, experiment_id)
+        return reads.read_experiments(session, [row])[0]
+
+
+def list_experiments(
+    store: Store,
+    *,
+    limit: int = 50,
+    cursor: str | None = None,
+    study: str | None = None,
+    state: State | None = None,
+    strategy: str | None = None,
+) -> Page[ExperimentRead]:
+    """A page of experiments, newest first; what is submitted meanwhile shifts no later page.
+
+    Raises:
+        InvalidSpec: a cursor that no page gave.
+    """
+    with store.reading() as session:
+        rows = experiments.page_of_experiments(
+            session, limit=limit + 1, cursor=cursor, study=study, state=state, strategy=strategy
+        )
+        shown = reads.read_experiments(session, rows[:limit])
+    return Page(items=shown, next=_next(rows, limit, experiments.cursor_of))
+
+
+def read_study(store: Store, study_id: str) -> StudyRead:
+    """The study with its experiments and their progress.
+
+    Raises:
+        NotFound: no such study.
+    """
+    with store.reading() as session:
+        row = experiments.get_study(session, study_id)
+        return reads.read_studies(session, [row])[0]
+
+
+def list_studies(store: Store, *, limit: int = 50, cursor: str | None = None) -> Page[StudyRead]:
+    """A page of studies, newest first.
+
+    Raises:
+        InvalidSpec: a cursor that no page gave.
+    """
+    with store.reading() as session:
+        rows = experiments.page_of_studies(session, limit=limit + 1, cursor=cursor)
+        shown = reads.read_studies(session, rows[:limit])
+    return Page(items=shown, next=_next(rows, limit, experiments.cursor_of))
+
+
+def list_repetitions(store: Store, experiment_id: str) -> tuple[RepetitionRead, ...]:
+    """The repetitions of an experiment, by number.
+
+    Raises:
+        NotFound: no such experiment.
+    """
+    with store.reading() as session:
+        experiments.get_experiment(session, experiment_id)
+        return tuple(map(reads.read_repetition, experiments.repetitions_of(session, experiment_id)))
+
+
+def list_samples(
+    store: Store,
+    experiment_id: str,
+    *,
+    repetition: int | None = None,
+    kind: MeasurementKind | None = None,
+    limit: int = 1000,
+    cursor: str | None = None,
+) -> Page[SampleRead]:
+    """A page of real-world evaluations, samples and probes, by repetition and in the order of the log.
+
+    Raises:
+        NotFound: no such experiment.
+        InvalidSpec: a cursor that no page gave.
+    """
+    with store.reading() as session:
+        experiments.get_experiment(session, experiment_id)
+        rows = results.page_of_samples(
+            session, experiment_id, repetition=repetition, kind=kind, limit=limit + 1, cursor=cursor
+        )
+    return Page(items=rows[:limit], next=_next(rows, limit, results.cursor_of))
+
+
+def list_simulators(
+    store: Store,
+    experiment_id: str,
+    *,
+    repetition: int | None = None,
+    iteration: int | None = None,
+    limit: int = 1000,
+    cursor: str | None = None,
+) -> Page[SimulatorRead]:
+    """A page of tuned simulators, by repetition, iteration and rank.
+
+    Raises:
+        NotFound: no such experiment.
+        InvalidSpec: a cursor that no page gave.
+    """
+    with store.reading() as session:
+        row = experiments.get_experiment(session, experiment_id)
+        rows = results.page_of_simulators(
+            session, row, repetition=repetition, iteration=iteration, limit=limit + 1, cursor=cursor
+        )
+    return Page(items=rows[:limit], next=_next(rows, limit, results.cursor_of))
+
+
+def cancel_experiment(store: Store, experiment_id: str) -> ExperimentRead:
+    """Call the experiment off; what is stored stays, and a running repetition is refused at its next write.
+
+    Raises:
+        NotFound: no such experiment.
+        Conflict: it has ended.
+    """
+    return store.write(lambda session: reads.read_experiments(session, [experiments.cancel(session, experiment_id)])[0])
+
+
+def _extent(spec: ExperimentSpec) -> Extent:
+    samples = 0 if is_direct(spec) else spec.iterations or 0
+    return Extent(iterations=samples + 1, rollouts=expected_rollouts(spec))
+
+
+def _next(rows: Sequence[R], limit: int, cursor_of: Callable[[R], str]) -> str | None:
+    """The cursor of the page that follows; `rows` has one more than the page if there is one."""
+    return cursor_of(rows[limit - 1]) if len(rows) > limit else None

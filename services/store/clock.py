@@ -1,0 +1,48 @@
+"""Time in the database: UTC, to the microsecond's place, by the database's own clock."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import DateTime, Dialect
+from sqlalchemy.ext.compiler import compiles
+from sqlalchemy.sql.functions import FunctionElement
+from sqlalchemy.types import TypeDecorator
+
+
+class UtcDateTime(TypeDecorator[datetime]):
+    """A moment in UTC; aware in Python on every database, though SQLite itself knows no time zones."""
+
+    impl = DateTime(timezone=True)
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002  # the base's signature
+        """Refuse a moment without a time zone: nobody could say when it was."""
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            msg = f"a moment needs its time zone: {value!r} has none"
+            raise ValueError(msg)
+        return value.astimezone(UTC)
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002  # the base's signature
+        """Say that it is UTC."""
+        if value is None:
+            return None
+        return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
+
+
+class now(FunctionElement[datetime]):  # noqa: N801  # reads as the SQL function that it is
+    """The database's clock: all hosts of a service agree on it, which leases need."""
+
+    type = UtcDateTime()
+    inherit_cache = True
+
+
+@compiles(now, "sqlite")
+def _now_of_sqlite(element: now, compiler: Any, **options: Any) -> str:  # noqa: ANN401, ARG001  # SQLAlchemy's hook
+    return "(strftime('%Y-%m-%d %H:%M:%f', 'now') || '000')"
+
+
+@compiles(now, "postgresql")
+def _now_of_postgres(element: now, compiler: Any, **options: Any) -> str:  # noqa: ANN401, ARG001  # SQLAlchemy's hook
+    return "clock_timestamp()"

@@ -1,0 +1,46 @@
+"""Opaque cursors: the key of the last row of a page, as a client carries it to the next."""
+
+import json
+from base64 import urlsafe_b64decode, urlsafe_b64encode
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import ColumnElement, Tuple, literal, tuple_
+from sqlalchemy.orm import InstrumentedAttribute
+
+from services.core.errors import InvalidSpec, Violation
+
+Column = InstrumentedAttribute[Any] | ColumnElement[Any]
+
+_LONGEST = 200
+
+
+def encode(*key: str | int | datetime) -> str:
+    """The cursor of a key."""
+    plain = [part.isoformat() if isinstance(part, datetime) else part for part in key]
+    return urlsafe_b64encode(json.dumps(plain).encode()).decode().rstrip("=")
+
+
+def decode(cursor: str, columns: Sequence[Column]) -> Tuple:
+    """The key of a cursor, to be compared with the columns that it was encoded from.
+
+    Raises:
+        InvalidSpec: no answer of ours had this cursor; its pointer is `cursor`.
+    """
+    try:
+        parts = json.loads(urlsafe_b64decode(cursor[:_LONGEST] + "=" * (-len(cursor) % 4)))
+        return tuple_(*(_part(part, column) for part, column in zip(parts, columns, strict=True)))
+    except (ValueError, TypeError, OverflowError) as error:
+        message = "this is no cursor that the service gave out; leave it out to start anew"
+        raise InvalidSpec([Violation("cursor", cursor, message)]) from error
+
+
+def _part(part: object, column: Column) -> ColumnElement[Any]:
+    kind = column.type.python_type
+    value = datetime.fromisoformat(str(part)).astimezone(UTC) if kind is datetime else part
+    if type(value) is not kind:
+        raise TypeError(part)
+    if (isinstance(value, int) and abs(value) >= 2**31) or (isinstance(value, str) and not value.isalnum()):
+        raise ValueError(part)
+    return literal(value, column.type)

@@ -1,0 +1,73 @@
+"""How a database is opened: one place for the settings that durability and locking rest on."""
+
+import sqlite3
+from typing import Any
+
+from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
+from sqlalchemy.exc import ArgumentError
+
+from services.core.errors import StoreUnavailable
+
+WRITES = "gaplab_writes"
+"""Execution option of a connection whose transactions will write."""
+
+PATIENCE_S = 30
+"""How long a transaction waits for another's lock."""
+
+_WAL_IS_SOUND = (3, 51, 3)
+"""Before this, SQLite's write-ahead log can be corrupted when it is reset. Source: https://sqlite.org/wal.html."""
+
+
+def open_engine(url: str, *, enforce_foreign_keys: bool = True) -> Engine:
+    """The engine of a SQLite or Postgres URL; nothing is connected yet.
+
+    Args:
+        url: SQLAlchemy URL; Postgres without a driver gets psycopg 3.
+        enforce_foreign_keys: in SQLite; a migration that rebuilds tables must not.
+
+    Raises:
+        StoreUnavailable: no such kind of database.
+    """
+    parsed = _parse(url)
+    if parsed.get_backend_name() == "postgresql":
+        return create_engine(parsed, pool_pre_ping=True, pool_size=10, max_overflow=20)
+    engine = create_engine(parsed, pool_pre_ping=True, connect_args={"timeout": PATIENCE_S})
+    _prepare_sqlite(engine, enforce_foreign_keys=enforce_foreign_keys)
+    return engine
+
+
+def _parse(url: str) -> URL:
+    try:
+        parsed = make_url(url)
+    except ArgumentError as error:
+        msg = (
+            "the database URL is not one of SQLAlchemy; it looks like sqlite:///gaplab.db or postgresql://user@host/db"
+        )
+        raise StoreUnavailable(msg) from error
+    if parsed.drivername in {"postgres", "postgresql"}:
+        return parsed.set(drivername="postgresql+psycopg")
+    if parsed.get_backend_name() not in {"sqlite", "postgresql"}:
+        msg = f"the database is {parsed.get_backend_name()!r}; it may be sqlite or postgresql"
+        raise StoreUnavailable(msg)
+    return parsed
+
+
+def _prepare_sqlite(engine: Engine, *, enforce_foreign_keys: bool) -> None:
+    """Durable and honest about locks.
+
+    The driver's own BEGIN comes too late and is deferred: a read that turns into a write would then fail at once,
+    whatever the patience. So it is told to begin nothing, and a transaction that will write begins IMMEDIATE.
+    """
+    journal = "WAL" if sqlite3.sqlite_version_info >= _WAL_IS_SOUND else "DELETE"
+
+    @event.listens_for(engine, "connect")
+    def configure(connection: Any, record: object) -> None:  # noqa: ANN401, ARG001  # SQLAlchemy's hook
+        connection.isolation_level = None
+        connection.execute(f"PRAGMA journal_mode={journal}")
+        connection.execute("PRAGMA synchronous=FULL")
+        connection.execute(f"PRAGMA foreign_keys={'ON' if enforce_foreign_keys else 'OFF'}")
+
+    @event.listens_for(engine, "begin")
+    def begin(connection: Connection) -> None:
+        writes = connection.get_execution_options().get(WRITES)
+        connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")

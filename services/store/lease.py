@@ -1,0 +1,27 @@
+"""A repetition in the hands of one supervisor."""
+
+from dataclasses import dataclass
+
+from schemas.spec import ExperimentSpec
+from services.core.types import Step
+
+
+@dataclass(frozen=True)
+class Claim:
+    """The right to go on with a repetition, until its epoch is over.
+
+    Attributes:
+        repetition_id: in the store.
+        epoch: of the lease; a write that carries an old one is refused.
+        experiment_id: whose repetition it is.
+        number: of the repetition within its experiment, from 0.
+        spec: resolved.
+        log: the steps recorded so far, from which to go on.
+    """
+
+    repetition_id: int
+    epoch: int
+    experiment_id: str
+    number: int
+    spec: ExperimentSpec
+    log: tuple[Step, ...] = ()

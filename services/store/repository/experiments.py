@@ -1,0 +1,211 @@
+"""Experiments and studies: inserted, found, listed, cancelled."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from secrets import choice
+from typing import TypeVar
+
+from sqlalchemy import insert, select, tuple_, update
+from sqlalchemy.orm import Session
+
+from schemas.lifecycle import State
+from schemas.spec import ExperimentSpec
+from services.core.errors import Conflict, NotFound
+from services.store.clock import now
+from services.store.cursor import decode, encode
+from services.store.models import ExperimentRow, RepetitionRow, StudyRow
+
+_LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
+_OPEN = (State.QUEUED, State.RUNNING)
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much one repetition is.
+
+    Attributes:
+        iterations: number 0 included.
+        rollouts: as expected.
+    """
+
+    iterations: int
+    rollouts: int
+
+
+def new_id() -> str:
+    """A short random name, without letters that look alike; a trillion of them, so that two never meet."""
+    return "".join(choice(_LETTERS) for _ in range(10))
+
+
+def insert_study(session: Session, name: str) -> StudyRow:
+    """A study without experiments yet."""
+    study = StudyRow(id=new_id(), name=name, created_at=_moment(session))
+    session.add(study)
+    session.flush()
+    return study
+
+
+def insert_experiment(
+    session: Session, spec: ExperimentSpec, extent: Extent, *, study: StudyRow | None = None, position: int = 0
+) -> ExperimentRow:
+    """An experiment with its repetitions, all QUEUED.
+
+    Args:
+        session: of a transaction that writes.
+        spec: resolved.
+        extent: of each of its repetitions.
+        study: that it belongs to.
+        position: within the study.
+    """
+    experiment = ExperimentRow(
+        id=new_id(),
+        study_id=study.id if study else None,
+        position=position,
+        name=spec.name or spec.strategy.name,
+        strategy=spec.strategy.name,
+        spec=spec.model_dump(mode="json"),
+        iterations=extent.iterations,
+        rollouts=extent.rollouts,
+        created_at=study.created_at if study else _moment(session),
+    )
+    session.add(experiment)
+    session.flush()
+    numbers = range(spec.repetitions or 0)
+    session.execute(insert(RepetitionRow), [{"experiment_id": experiment.id, "number": each} for each in numbers])
+    return experiment
+
+
+def get_experiment(session: Session, experiment_id: str) -> ExperimentRow:
+    """The experiment of that id.
+
+    Raises:
+        NotFound: there is none.
+    """
+    if (found := session.get(ExperimentRow, _plain(experiment_id))) is None:
+        msg = f"there is no experiment {experiment_id!r}"
+        raise NotFound(msg)
+    return found
+
+
+def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow, ...]:
+    """The experiments of these ids, in their order.
+
+    Raises:
+        NotFound: there is none of one of them.
+    """
+    named = ExperimentRow.id.in_([_plain(each) for each in ids])
+    found = {row.id: row for row in session.scalars(select(ExperimentRow).where(named))}
+    if missing := [each for each in ids if each not in found]:
+        msg = f"there is no experiment {', '.join(map(repr, missing))}"
+        raise NotFound(msg)
+    return tuple(found[each] for each in ids)
+
+
+def get_study(session: Session, study_id: str) -> StudyRow:
+    """The study of that id.
+
+    Raises:
+        NotFound: there is none.
+    """
+    if (found := session.get(StudyRow, _plain(study_id))) is None:
+        msg = f"there is no study {study_id!r}"
+        raise NotFound(msg)
+    return found
+
+
+def experiments_of(session: Session, studies: Sequence[str]) -> tuple[ExperimentRow, ...]:
+    """The experiments of these studies, in the order in which each study has them."""
+    row = ExperimentRow
+    return tuple(session.scalars(select(row).where(row.study_id.in_(studies)).order_by(row.study_id, row.position)))
+
+
+def open_studies(session: Session, studies: Sequence[str]) -> frozenset[str]:
+    """Those of these studies in which an experiment has not ended."""
+    row = ExperimentRow
+    found = session.scalars(select(row.study_id).where(row.study_id.in_(studies), row.state.in_(_OPEN)).distinct())
+    return frozenset(each for each in found if each is not None)
+
+
+def page_of_experiments(
+    session: Session, *, limit: int, cursor: str | None, study: str | None, state: State | None, strategy: str | None
+) -> tuple[ExperimentRow, ...]:
+    """Up to `limit` experiments, newest first.
+
+    Raises:
+        InvalidSpec: a cursor that is none.
+    """
+    row = ExperimentRow
+    key = (row.created_at, row.position, row.id)
+    query = select(row).order_by(*(each.desc() for each in key)).limit(limit)
+    wanted = {row.study_id: _plain(study), row.state: state, row.strategy: _plain(strategy)}
+    query = query.where(*(column == value for column, value in wanted.items() if value is not None))
+    if cursor is not None:
+        query = query.where(tuple_(*key) < decode(cursor, key))
+    return tuple(session.scalars(query))
+
+
+def page_of_studies(session: Session, *, limit: int, cursor: str | None) -> tuple[StudyRow, ...]:
+    """Up to `limit` studies, newest first.
+
+    Raises:
+        InvalidSpec: a cursor that is none.
+    """
+    key = (StudyRow.created_at, StudyRow.id)
+    query = select(StudyRow).order_by(*(each.desc() for each in key)).limit(limit)
+    if cursor is not None:
+        query = query.where(tuple_(*key) < decode(cursor, key))
+    return tuple(session.scalars(query))
+
+
+def cursor_of(row: ExperimentRow | StudyRow) -> str:
+    """The cursor of the page that follows the row."""
+    position = (row.position,) if isinstance(row, ExperimentRow) else ()
+    return encode(row.created_at, *position, row.id)
+
+
+def repetitions_of(session: Session, experiment_id: str) -> tuple[RepetitionRow, ...]:
+    """The repetitions of an experiment, by number."""
+    row = RepetitionRow
+    return tuple(session.scalars(select(row).where(row.experiment_id == experiment_id).order_by(row.number)))
+
+
+def cancel(session: Session, experiment_id: str) -> ExperimentRow:
+    """The experiment called off: its queued repetitions never start, and its running ones cannot write any more.
+
+    Raises:
+        NotFound: no such experiment.
+        Conflict: it has ended.
+    """
+    lock(session, [experiment_id])
+    experiment = get_experiment(session, experiment_id)
+    if experiment.state.ended:
+        msg = f"experiment {experiment_id!r} has ended: it is {experiment.state}, nothing is left to cancel"
+        raise Conflict(msg)
+    ended = {"state": State.CANCELLED, "ended_at": now()}
+    row = RepetitionRow
+    session.execute(update(row).where(row.experiment_id == experiment_id, row.state.in_(_OPEN)).values(ended))
+    session.execute(update(ExperimentRow).where(ExperimentRow.id == experiment_id).values(ended))
+    session.refresh(experiment)
+    return experiment
+
+
+def lock(session: Session, experiments: Sequence[str]) -> None:
+    """Keep other transactions from moving these experiments between states until this one ends.
+
+    Whoever moves repetitions of an experiment between states locks the experiment first, in the order of ids.
+    """
+    row = ExperimentRow
+    session.execute(select(row.id).where(row.id.in_(experiments)).order_by(row.id).with_for_update())
+
+
+T = TypeVar("T", str, str | None)
+
+
+def _plain(text: T) -> T:
+    """The text without the NULs that Postgres would refuse, so that it is a name like any other that is not there."""
+    return text.replace("\0", "\N{REPLACEMENT CHARACTER}") if text else text
+
+
+def _moment(session: Session) -> datetime:
+    return session.execute(select(now())).scalar_one()

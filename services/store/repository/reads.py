@@ -1,0 +1,94 @@
+"""Experiments, studies and repetitions as they are shown: rows, their progress, and nothing that is secret yet."""
+
+from collections.abc import Collection, Sequence
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from schemas.lifecycle import State
+from schemas.records import ExperimentRead, RepetitionRead, StudyRead
+from services.store.models import ExperimentRow, RepetitionRow, StudyRow
+from services.store.repository.experiments import experiments_of, open_studies
+from services.store.repository.progress import Tally, reasons, tallies
+
+
+def read_experiments(session: Session, rows: Sequence[ExperimentRow]) -> tuple[ExperimentRead, ...]:
+    """The experiments as they are shown, with their progress.
+
+    Reality's parameters are null until the experiment has ended, and with it all others of its study: they share one
+    reality, and what one of them shows is known of all.
+    """
+    ids = [row.id for row in rows]
+    progress, failed = tallies(session, ids), reasons(session, ids)
+    secret = open_studies(session, [row.study_id for row in rows if row.study_id])
+    return tuple(
+        _experiment(
+            row,
+            progress.get(row.id, Tally()),
+            failed.get(row.id, ()),
+            secret=not row.state.ended or row.study_id in secret,
+        )
+        for row in rows
+    )
+
+
+def read_studies(session: Session, rows: Sequence[StudyRow]) -> tuple[StudyRead, ...]:
+    """The studies as they are shown, with their experiments."""
+    experiments = experiments_of(session, [row.id for row in rows])
+    shown = read_experiments(session, experiments)
+    progress = tallies(session, [row.id for row in experiments])
+    return tuple(_study(row, [each for each in shown if each.study == row.id], progress) for row in rows)
+
+
+def read_repetition(row: RepetitionRow) -> RepetitionRead:
+    """The repetition as it is shown."""
+    return RepetitionRead(
+        number=row.number,
+        state=row.state,
+        iterations_done=row.iterations_done,
+        rollouts_done=row.rollouts_done,
+        attempts=row.attempts,
+        error=row.error,
+        started_at=row.started_at,
+        ended_at=row.ended_at,
+    )
+
+
+def state_of(states: Collection[State]) -> State:
+    """The state of experiments taken together: once all have ended, COMPLETED if one is, else FAILED if one is."""
+    if all(each.ended for each in states):
+        ends = (State.COMPLETED, State.FAILED, State.CANCELLED)
+        return next((end for end in ends if end in states), State.COMPLETED)
+    return State.QUEUED if all(each is State.QUEUED for each in states) else State.RUNNING
+
+
+def _experiment(row: ExperimentRow, tally: Tally, failed: tuple[str, ...], *, secret: bool) -> ExperimentRead:
+    return ExperimentRead(
+        id=row.id,
+        study=row.study_id,
+        name=row.name,
+        strategy=row.strategy,
+        state=row.state,
+        spec=_without_truth(row.spec) if secret else row.spec,
+        progress=tally.progress(),
+        reasons=failed,
+        created_at=row.created_at,
+        started_at=row.started_at,
+        ended_at=row.ended_at,
+    )
+
+
+def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: dict[str, Tally]) -> StudyRead:
+    return StudyRead(
+        id=row.id,
+        name=row.name,
+        state=state_of([each.state for each in experiments]),
+        experiments=tuple(experiments),
+        progress=sum((progress[each.id] for each in experiments), Tally()).progress(),
+        created_at=row.created_at,
+    )
+
+
+def _without_truth(spec: dict[str, Any]) -> dict[str, Any]:
+    reality = spec["reality"]
+    return spec | {"reality": reality | {"parameters": dict.fromkeys(reality["parameters"])}}

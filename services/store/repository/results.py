@@ -1,0 +1,106 @@
+"""Samples, simulators and recorded fitnesses, as they are shown."""
+
+from collections.abc import Iterator, Sequence
+
+from sqlalchemy import case, select, tuple_
+from sqlalchemy.orm import Session
+
+from schemas.records import MeasurementKind, SampleRead, SimulatorRead
+from services.store.cursor import decode, encode
+from services.store.models import ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
+
+_TURN = case((MeasurementRow.kind == MeasurementKind.SAMPLE, 0), else_=1)
+"""Within an iteration the sample comes before the probe."""
+
+
+def page_of_samples(
+    session: Session,
+    experiment: str,
+    *,
+    repetition: int | None,
+    kind: MeasurementKind | None,
+    limit: int,
+    cursor: str | None,
+) -> tuple[SampleRead, ...]:
+    """Up to `limit` real-world evaluations of an experiment, by repetition and in the order of the log.
+
+    Raises:
+        InvalidSpec: a cursor that is none.
+    """
+    row = MeasurementRow
+    key = (RepetitionRow.number, row.iteration, _TURN)
+    query = (
+        select(RepetitionRow.number, row.iteration, row.kind, row.genome, row.fitness, row.measured_by, row.measured_at)
+        .join(RepetitionRow, RepetitionRow.id == row.repetition_id)
+        .where(RepetitionRow.experiment_id == experiment)
+        .order_by(*key)
+        .limit(limit)
+    )
+    wanted = {RepetitionRow.number: repetition, row.kind: kind}
+    query = query.where(*(column == value for column, value in wanted.items() if value is not None))
+    if cursor is not None:
+        query = query.where(tuple_(*key) > decode(cursor, key))
+    names = tuple(SampleRead.model_fields)
+    return tuple(SampleRead(**dict(zip(names, each, strict=True))) for each in session.execute(query))
+
+
+def page_of_simulators(
+    session: Session,
+    experiment: ExperimentRow,
+    *,
+    repetition: int | None,
+    iteration: int | None,
+    limit: int,
+    cursor: str | None,
+) -> tuple[SimulatorRead, ...]:
+    """Up to `limit` tuned simulators of an experiment, by repetition, iteration and rank.
+
+    Raises:
+        InvalidSpec: a cursor that is none.
+    """
+    row = SimulatorRow
+    key = (RepetitionRow.number, row.iteration, row.rank)
+    query = (
+        select(*key, row.parameters, row.squared_error)
+        .join(RepetitionRow, RepetitionRow.id == row.repetition_id)
+        .where(RepetitionRow.experiment_id == experiment.id)
+        .order_by(*key)
+        .limit(limit)
+    )
+    wanted = {RepetitionRow.number: repetition, row.iteration: iteration}
+    query = query.where(*(column == value for column, value in wanted.items() if value is not None))
+    if cursor is not None:
+        query = query.where(tuple_(*key) > decode(cursor, key))
+    names = [each["name"] for each in experiment.spec["tunables"]]
+    return tuple(
+        SimulatorRead(
+            repetition=number,
+            iteration=each,
+            rank=rank,
+            parameters=dict(zip(names, parameters, strict=True)),
+            squared_error=error,
+        )
+        for number, each, rank, parameters, error in session.execute(query)
+    )
+
+
+def cursor_of(row: SampleRead | SimulatorRead) -> str:
+    """The cursor of the page that follows the row."""
+    if isinstance(row, SimulatorRead):
+        return encode(row.repetition, row.iteration, row.rank)
+    return encode(row.repetition, row.iteration, 0 if row.kind is MeasurementKind.SAMPLE else 1)
+
+
+def recorded(session: Session, experiments: Sequence[str]) -> Iterator[tuple[str, int, int, float]]:
+    """Experiment, repetition, iteration and recorded fitness, for every iteration that is there."""
+    row = IterationRow
+    found = session.execute(
+        select(RepetitionRow.experiment_id, RepetitionRow.number, row.number, row.recorded_fitness)
+        .join(RepetitionRow, RepetitionRow.id == row.repetition_id)
+        .where(RepetitionRow.experiment_id.in_(experiments), row.recorded_fitness.is_not(None))
+    )
+    return (
+        (experiment, repetition, iteration, value)
+        for experiment, repetition, iteration, value in found
+        if value is not None
+    )

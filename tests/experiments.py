@@ -1,0 +1,61 @@
+"""Specs and logs for the tests that have a store, and short ways to run them."""
+
+from collections.abc import Iterator
+from math import inf, isnan, nan
+
+import numpy as np
+
+from schemas.spec import ExperimentSpec
+from services import execution
+from services.core.arrays import frozen
+from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
+from services.execution import Claim
+from services.store.session import Store
+
+AWKWARD = (0.1 + 0.2, 1e-320, -1.7976931348623157e308, 2.0**-1074, 1 / 3, 5e-324, -0.0, 123456789.12345679)
+"""Numbers that a careless store changes."""
+
+
+def toy(**changes: object) -> ExperimentSpec:
+    """A small experiment on the toy function; resolved, its repetitions have two iterations beside number 0."""
+    small = {
+        "strategy": "simulated_fit",
+        "robot": "toy_function",
+        "iterations": 2,
+        "repetitions": 3,
+        "tunables": ["static_friction", "dynamic_friction"],
+        "budget": "smoke",
+    }
+    return ExperimentSpec.model_validate(small | changes)
+
+
+def some_log(iterations: int = 2, recorded: float = 1.0) -> Iterator[Step]:
+    """A log with every kind of step and awkward number: failed measurements, hopeless simulators."""
+    for iteration in range(iterations + 1):
+        if iteration:
+            yield Selected(iteration, frozen(AWKWARD), Cost(30, 1))
+            yield Measured(iteration, Sample(frozen(AWKWARD), nan if iteration == 1 else 1 / 3))
+        simulators = (Simulator(frozen([0.1, 1 / 3]), 1e-300), Simulator(frozen([1.5, 0.0]), inf))
+        yield Tuned(iteration, simulators, Cost(60, 2) if iteration else Cost())
+        yield Transferred(iteration, frozen(AWKWARD[::-1]), nan if iteration == 2 else 2 / 3, Cost(60, 3))
+        yield Probed(iteration, nan if iteration == 1 else recorded, recorded + iteration)
+
+
+def run(store: Store, claim: Claim, log: Iterator[Step] | None = None) -> None:
+    """Record a whole repetition and complete it."""
+    for step in log if log is not None else some_log():
+        assert execution.record(store, claim, step, seconds=0.5)
+    assert execution.complete(store, claim)
+
+
+def same(first: object, second: object) -> bool:
+    """Whether two steps, or tuples of them, are equal to the bit; nan equals nan."""
+    if isinstance(first, np.ndarray) and isinstance(second, np.ndarray):
+        return first.dtype == second.dtype and bool(np.array_equal(first, second, equal_nan=True))
+    if isinstance(first, float) and isinstance(second, float):
+        return first == second or (isnan(first) and isnan(second))
+    if isinstance(first, tuple) and isinstance(second, tuple):
+        return len(first) == len(second) and all(map(same, first, second))
+    if type(first) is type(second) and hasattr(first, "__dataclass_fields__"):
+        return all(same(getattr(first, name), getattr(second, name)) for name in first.__dataclass_fields__)
+    return first == second

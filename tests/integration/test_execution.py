@@ -1,0 +1,297 @@
+"""Leases and the log: what supervisors rely on, on both databases."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from schemas.lifecycle import State
+from services import execution, experiments
+from services.core.errors import Conflict
+from services.core.types import Cost
+from services.store.repository.leases import MAX_LOSSES
+from tests.experiments import run, same, some_log, toy
+
+
+def test_a_claim_has_the_resolved_spec_and_no_log_at_first(store):
+    submitted = experiments.submit_experiment(store, toy(reality={"parameters": {"static_friction": 0.9}}))
+
+    (claim,) = execution.claim(store, "me", 1)
+
+    assert (claim.experiment_id, claim.number, claim.epoch, claim.log) == (submitted.id, 0, 1, ())
+    assert claim.spec.engine is not None
+    assert claim.spec.reality.parameters == {"static_friction": 0.9, "dynamic_friction": 0.8}
+
+
+def test_the_oldest_experiment_is_claimed_first_and_its_repetitions_in_order(store):
+    first = experiments.submit_experiment(store, toy())
+    second = experiments.submit_experiment(store, toy())
+
+    claims = (*execution.claim(store, "me", 2), *execution.claim(store, "me", 9))
+
+    assert [(each.experiment_id, each.number) for each in claims] == [(first.id, n) for n in range(3)] + [
+        (second.id, n) for n in range(3)
+    ]
+    assert execution.claim(store, "me", 9) == ()
+
+
+def test_the_first_claim_starts_the_experiment(store):
+    started = experiments.submit_experiment(store, toy())
+    waiting = experiments.submit_experiment(store, toy())
+
+    execution.claim(store, "me", 1)
+
+    assert experiments.read_experiment(store, started.id).state is State.RUNNING
+    assert experiments.read_experiment(store, started.id).started_at is not None
+    assert experiments.read_experiment(store, waiting.id).state is State.QUEUED
+
+
+def test_claims_of_many_owners_never_overlap(store):
+    for _ in range(3):
+        experiments.submit_experiment(store, toy(repetitions=20))
+
+    def claim_all(owner):
+        claimed = []
+        while claims := execution.claim(store, owner, 3):
+            claimed += [each.repetition_id for each in claims]
+        return claimed
+
+    with ThreadPoolExecutor(4) as pool:
+        claimed = [each for claims in pool.map(claim_all, "abcd") for each in claims]
+
+    assert len(claimed) == len(set(claimed)) == 60
+
+
+def test_the_log_that_is_read_is_the_log_that_was_written(store):
+    experiments.submit_experiment(store, toy())
+    (claim,) = execution.claim(store, "me", 1)
+    for count, step in enumerate(some_log()):
+        assert execution.record(store, claim, step)
+
+        assert execution.release(store, claim, "killed")
+        (claim,) = execution.claim(store, "me", 1)
+
+        assert same(claim.log, tuple(some_log())[: count + 1])
+
+
+def test_a_step_that_is_delivered_twice_is_stored_once(store):
+    submitted = experiments.submit_experiment(store, toy())
+    (claim,) = execution.claim(store, "me", 1)
+
+    for step in some_log():
+        assert execution.record(store, claim, step, seconds=1.0)
+        assert execution.record(store, claim, step, seconds=1.0)
+    for step in some_log():
+        assert execution.record(store, claim, step, seconds=1.0)
+
+    execution.release(store, claim, "killed")
+    assert same(execution.claim(store, "me", 1)[0].log, tuple(some_log()))
+    assert experiments.read_experiment(store, submitted.id).progress.rollouts_done == 3 * 60 + 2 * 90
+
+
+def test_a_step_that_would_leave_a_hole_is_refused(store):
+    experiments.submit_experiment(store, toy())
+    (claim,) = execution.claim(store, "me", 1)
+    first, _, third, *_ = some_log()
+    execution.record(store, claim, first)
+
+    with pytest.raises(Conflict, match="the log has 1 steps"):
+        execution.record(store, claim, third)
+
+    execution.release(store, claim, "killed")
+    assert len(execution.claim(store, "me", 1)[0].log) == 1
+
+
+def test_a_holder_who_wakes_up_late_cannot_write(store):
+    submitted = experiments.submit_experiment(store, toy(repetitions=1))
+    (late,) = execution.claim(store, "late", 1)
+    assert execution.requeue_lost(store, stale_after_s=0) == 1
+    (present,) = execution.claim(store, "present", 1)
+    first, second, *_ = some_log()
+    execution.record(store, present, first)
+
+    refused = (
+        execution.record(store, late, first),
+        execution.record(store, late, second),
+        execution.complete(store, late),
+        execution.fail(store, late, "x"),
+        execution.release(store, late, "x"),
+    )
+
+    assert refused == (False,) * 5
+    assert execution.heartbeat(store, [late, present]) == (present,)
+    assert experiments.read_experiment(store, submitted.id).state is State.RUNNING
+    assert execution.record(store, present, second)
+
+
+def test_a_heartbeat_keeps_a_claim(store):
+    experiments.submit_experiment(store, toy(repetitions=2))
+    claims = execution.claim(store, "me", 2)
+
+    held = execution.heartbeat(store, claims)
+
+    assert held == claims
+    assert execution.heartbeat(store, []) == ()
+    assert execution.requeue_lost(store, stale_after_s=30) == 0
+
+
+def test_a_repetition_that_was_lost_is_queued_again_and_goes_on_from_its_log(store):
+    submitted = experiments.submit_experiment(store, toy(repetitions=1))
+    (claim,) = execution.claim(store, "killed", 1)
+    first, *_ = some_log()
+    execution.record(store, claim, first)
+
+    assert execution.requeue_lost(store, stale_after_s=0) == 1
+
+    (lost,) = experiments.list_repetitions(store, submitted.id)
+    (again,) = execution.claim(store, "me", 1)
+    assert (lost.state, lost.attempts) == (State.QUEUED, 1)
+    assert "not heard of" in lost.error
+    assert (again.epoch, len(again.log)) == (2, 1)
+    assert experiments.read_experiment(store, submitted.id).state is State.RUNNING
+
+
+def test_a_repetition_that_kills_its_workers_is_failed_in_the_end(store):
+    submitted = experiments.submit_experiment(store, toy(repetitions=1))
+
+    for _ in range(MAX_LOSSES):
+        (claim,) = execution.claim(store, "me", 1)
+        execution.release(store, claim, "its worker ran out of memory\0\udcff")
+
+    found = experiments.read_experiment(store, submitted.id)
+    assert execution.claim(store, "me", 1) == ()
+    assert found.state is State.FAILED
+    assert found.ended_at is not None
+    assert found.reasons == (
+        f"lost {MAX_LOSSES} times without a step in between; the last time its worker ran out of memory??",
+    )
+
+
+def test_a_repetition_that_gets_on_may_be_lost_any_number_of_times(store):
+    experiments.submit_experiment(store, toy(repetitions=1))
+
+    for step in some_log():
+        (claim,) = execution.claim(store, "me", 1)
+        execution.record(store, claim, step)
+        execution.release(store, claim, "killed")
+
+    (claim,) = execution.claim(store, "me", 1)
+    assert execution.complete(store, claim)
+
+
+def test_the_experiment_is_completed_with_its_last_repetition(store):
+    submitted = experiments.submit_experiment(store, toy(repetitions=3))
+    claims = execution.claim(store, "me", 3)
+    states = []
+
+    run(store, claims[0])
+    states.append(experiments.read_experiment(store, submitted.id).state)
+    execution.fail(store, claims[1], "the code raised")
+    states.append(experiments.read_experiment(store, submitted.id).state)
+    run(store, claims[2])
+
+    found = experiments.read_experiment(store, submitted.id)
+    assert [*states, found.state] == [State.RUNNING, State.RUNNING, State.COMPLETED]
+    assert (found.progress.completed, found.progress.failed, found.reasons) == (2, 1, ("the code raised",))
+    assert found.ended_at >= found.started_at >= found.created_at
+
+
+def test_an_experiment_fails_when_all_of_its_repetitions_do_and_says_each_reason_once(store):
+    submitted = experiments.submit_experiment(store, toy(repetitions=3))
+
+    for claim, reason in zip(execution.claim(store, "me", 3), ("zero division", "a key", "zero division"), strict=True):
+        assert execution.fail(store, claim, reason)
+
+    found = experiments.read_experiment(store, submitted.id)
+    assert found.state is State.FAILED
+    assert found.reasons == ("zero division", "a key")
+
+
+def test_repetitions_that_end_at_once_end_their_experiment(store):
+    submitted = experiments.submit_experiment(store, toy(repetitions=8))
+    claims = execution.claim(store, "me", 8)
+    for claim in claims:
+        for step in some_log():
+            execution.record(store, claim, step)
+
+    with ThreadPoolExecutor(8) as pool:
+        ended = list(pool.map(lambda claim: execution.complete(store, claim), claims))
+
+    assert all(ended)
+    assert experiments.read_experiment(store, submitted.id).state is State.COMPLETED
+
+
+def test_a_repetition_with_iterations_missing_is_not_completed(store):
+    submitted = experiments.submit_experiment(store, toy(repetitions=1))
+    (claim,) = execution.claim(store, "me", 1)
+    for step in some_log(iterations=1):
+        execution.record(store, claim, step)
+
+    with pytest.raises(Conflict, match="1 iterations are missing"):
+        execution.complete(store, claim)
+
+    assert experiments.read_experiment(store, submitted.id).state is State.RUNNING
+
+
+def test_a_cancelled_experiment_refuses_its_running_repetitions_and_keeps_what_is_stored(store):
+    submitted = experiments.submit_experiment(store, toy())
+    (claim,) = execution.claim(store, "me", 1)
+    first, second, *_ = some_log()
+    execution.record(store, claim, first)
+
+    experiments.cancel_experiment(store, submitted.id)
+
+    assert not execution.record(store, claim, second)
+    assert not execution.complete(store, claim)
+    assert not execution.release(store, claim, "cancelled")
+    assert execution.heartbeat(store, [claim]) == ()
+    assert execution.claim(store, "me", 9) == ()
+    assert {each.state for each in experiments.list_repetitions(store, submitted.id)} == {State.CANCELLED}
+    assert len(experiments.list_simulators(store, submitted.id).items) == 2
+
+
+def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(store):
+    ids = [experiments.submit_experiment(store, toy(repetitions=1)).id for _ in range(10)]
+    claims = execution.claim(store, "me", 10)
+
+    def cancel(experiment):
+        try:
+            experiments.cancel_experiment(store, experiment)
+        except Conflict:
+            return "ended before"
+        return "cancelled"
+
+    with ThreadPoolExecutor(4) as pool:
+        failed = [pool.submit(execution.fail, store, each, "x") for each in claims]
+        cancelled = [pool.submit(cancel, each) for each in ids]
+
+    assert [each.result() for each in failed] == [each.result() == "ended before" for each in cancelled]
+    assert all(experiments.read_experiment(store, each).state.ended for each in ids)
+
+
+def test_progress_counts_what_the_steps_took(store):
+    submitted = experiments.submit_experiment(store, toy())
+    waiting = submitted.progress
+    first, second, _ = execution.claim(store, "me", 3)
+    run(store, first)
+    for step in list(some_log())[:4]:
+        execution.record(store, second, step, seconds=0.5)
+
+    progress = experiments.read_experiment(store, submitted.id).progress
+
+    spent = Cost(3 * 60 + 2 * 90, 3 * 3 + 2 * 3)
+    assert (waiting.iterations_done, waiting.rollouts_done, waiting.seconds_left) == (0, 0, None)
+    assert (progress.repetitions, progress.completed, progress.failed) == (3, 1, 0)
+    assert (progress.iterations, progress.iterations_done) == (9, 4)
+    assert (progress.rollouts_done, progress.rollouts_failed) == (spent.rollouts + 90, spent.failures + 4)
+    expected = progress.rollouts // 3
+    pace = (13 + 4) * 0.5 / progress.rollouts_done
+    assert progress.seconds_left == pytest.approx((2 * expected - 90) * pace / 2)
+
+
+def test_nothing_is_left_to_do_at_the_end(store):
+    submitted = experiments.submit_experiment(store, toy(repetitions=1))
+    (claim,) = execution.claim(store, "me", 1)
+
+    run(store, claim)
+
+    assert experiments.read_experiment(store, submitted.id).progress.seconds_left == 0

@@ -1,0 +1,109 @@
+"""The schema's history, on both databases."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from alembic import command
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection, inspect
+
+import migrations
+from services.core.errors import StoreUnavailable
+from services.store.engine import WRITES, open_engine
+from services.store.models import REVISION, Base
+from services.store.session import Store
+
+
+def tables(connection: Connection) -> set[str]:
+    return set(inspect(connection).get_table_names()) - {"alembic_version"}
+
+
+def test_the_store_needs_the_head_of_the_migrations():
+    script = ScriptDirectory.from_config(migrations.configuration())
+
+    heads = script.get_heads()
+
+    assert heads == [REVISION]
+
+
+def test_the_schema_goes_up_and_down_and_up(database_url):
+    engine = open_engine(database_url, enforce_foreign_keys=False).execution_options(**{WRITES: True})
+    found = []
+
+    for move, revision in ((command.upgrade, "head"), (command.downgrade, "base"), (command.upgrade, "head")):
+        with engine.begin() as connection:
+            move(migrations.configuration(connection), revision)
+            found.append(tables(connection))
+    engine.dispose()
+
+    assert found == [set(Base.metadata.tables), set(), set(Base.metadata.tables)]
+
+
+def test_the_migrations_make_what_the_models_say(store_url):
+    engine = open_engine(store_url)
+
+    with engine.connect() as connection:
+        context = MigrationContext.configure(connection, opts={"compare_type": True})
+        differences = compare_metadata(context, Base.metadata)
+    engine.dispose()
+
+    assert differences == []
+
+
+def test_every_constraint_has_the_name_that_the_models_give_it(store_url):
+    engine = open_engine(store_url)
+
+    with engine.connect() as connection:
+        found = {
+            (table, each["name"])
+            for table in tables(connection)
+            for each in inspect(connection).get_check_constraints(table)
+        }
+    engine.dispose()
+
+    assert found == {
+        ("experiment", "ck_experiment_state"),
+        ("repetition", "ck_repetition_state"),
+        ("measurement", "ck_measurement_kind"),
+    }
+
+
+def test_upgrading_at_head_changes_nothing(store_url):
+    migrations.upgrade(store_url)
+
+    store = Store(store_url)
+    store.check()
+    store.dispose()
+
+
+def test_two_processes_that_upgrade_at_once_wait_for_each_other(database_url):
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(migrations.upgrade, [database_url] * 2))
+
+    store = Store(database_url)
+    store.check()
+    store.dispose()
+
+
+def test_a_store_whose_schema_is_missing_is_unavailable_and_says_what_to_do(database_url):
+    store = Store(database_url)
+
+    with pytest.raises(StoreUnavailable, match="python -m migrations"):
+        store.check()
+
+    store.dispose()
+
+
+def test_a_store_at_another_revision_is_unavailable(store_url):
+    engine = open_engine(store_url).execution_options(**{WRITES: True})
+    with engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE alembic_version SET version_num = 'future'")
+    engine.dispose()
+    store = Store(store_url)
+
+    with pytest.raises(StoreUnavailable, match="at revision future"):
+        store.check()
+
+    store.dispose()
