@@ -1,0 +1,1 @@
+"""Ray: a supervisor that claims repetitions, and the task that runs one. Start with `supervisor`."""

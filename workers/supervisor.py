@@ -1,0 +1,186 @@
+"""The supervisor: claims repetitions, gives each to a Ray task, and is the only one who writes their steps.
+
+It keeps nothing that it could not lose: killed at any moment and started again, it goes on from the stored steps.
+"""
+
+import logging
+import os
+import socket
+from dataclasses import dataclass, field
+from secrets import token_hex
+from threading import Event
+from time import monotonic
+
+import ray
+from ray import ObjectRefGenerator
+from ray.exceptions import RayError, RayTaskError
+
+from services import execution
+from services.core.errors import StoreUnavailable
+from services.execution import Claim, TimedStep
+from services.store.session import Store
+from workers import repetition
+
+HEARTBEAT_S = 5.0
+"""Between heartbeats; a lease is lost after 30 s without one."""
+
+WAIT_S = 0.2
+"""How long the supervisor waits for something to happen before it looks for new work."""
+
+RETRY_S = 1.0
+"""How long it waits for a database that cannot be used now."""
+
+log = logging.getLogger("gaplab.supervisor")
+
+
+@dataclass(eq=False)
+class Run:
+    """A claimed repetition on its way.
+
+    Attributes:
+        claim: the right to it.
+        stream: batches of steps, as the task computes them.
+        received: steps that are not yet stored.
+        ended: the task is over; nothing more will be received.
+        failed: why its code raised.
+        lost: why its worker is gone.
+    """
+
+    claim: Claim
+    stream: ObjectRefGenerator
+    received: list[TimedStep] = field(default_factory=list)
+    ended: bool = False
+    failed: str | None = None
+    lost: str | None = None
+
+    def receive(self) -> None:
+        """Take what the stream has ready: a batch, its end, or why there will be no end."""
+        try:
+            self.received += ray.get(next(self.stream))
+        except StopIteration:
+            self.ended = True
+        except RayTaskError as error:
+            self.failed = f"{type(error.cause).__name__}: {error.cause}"
+        except RayError as error:
+            self.lost = f"the worker was lost: {type(error).__name__}"
+
+    @property
+    def over(self) -> bool:
+        """Whether the stream has nothing more to give."""
+        return self.ended or self.failed is not None or self.lost is not None
+
+    @property
+    def name(self) -> str:
+        """The experiment and the number, for the log."""
+        return f"{self.claim.experiment_id}/{self.claim.number}"
+
+
+class Supervisor:
+    """Runs whatever is queued in the store.
+
+    Args:
+        store: the database.
+        capacity: repetitions to have at Ray at once.
+    """
+
+    def __init__(self, store: Store, capacity: int) -> None:
+        self._store = store
+        self._capacity = capacity
+        self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
+        self._runs: list[Run] = []
+        self._beat = -HEARTBEAT_S
+
+    def serve(self, stop: Event) -> None:
+        """Work until told to stop; then give the unfinished repetitions back to whoever comes next."""
+        while not stop.is_set():
+            try:
+                self.step()
+            except StoreUnavailable as error:
+                log.warning("waiting: %s", error)
+                stop.wait(RETRY_S)
+        self._hand_back()
+
+    def step(self) -> None:
+        """One round: heartbeat, claim, receive, store.
+
+        Raises:
+            StoreUnavailable: nothing is lost by it; what was received is stored in a later round.
+        """
+        self._heartbeat()
+        self._claim()
+        self._receive()
+        self._store_received()
+        self._end()
+
+    @property
+    def idle(self) -> bool:
+        """Whether nothing is running."""
+        return not self._runs
+
+    def _heartbeat(self) -> None:
+        if monotonic() - self._beat < HEARTBEAT_S:
+            return
+        held = execution.heartbeat(self._store, [run.claim for run in self._runs])
+        self._drop_all_but(held)
+        requeued = execution.requeue_lost(self._store)
+        if requeued:
+            log.warning("%d repetitions whose supervisor was lost are queued again", requeued)
+        self._beat = monotonic()
+
+    def _claim(self) -> None:
+        free = self._capacity - len(self._runs)
+        if free <= 0:
+            return
+        for claim in execution.claim(self._store, self._owner, free):
+            stream = repetition.run.remote(claim.spec, claim.number, claim.log)
+            self._runs.append(Run(claim, stream))
+            log.info("%s: on from step %d", self._runs[-1].name, len(claim.log))
+
+    def _receive(self) -> None:
+        streams = {run.stream: run for run in self._runs if not run.over}
+        if not streams:
+            Event().wait(WAIT_S)
+            return
+        ready, _ = ray.wait(list(streams), num_returns=len(streams), timeout=0)
+        if not ready:
+            ready, _ = ray.wait(list(streams), num_returns=1, timeout=WAIT_S)
+        for stream in ready:
+            streams[stream].receive()
+
+    def _store_received(self) -> None:
+        filled = [run for run in self._runs if run.received]
+        if not filled:
+            return
+        held = execution.record_all(self._store, [(run.claim, run.received) for run in filled])
+        for run in filled:
+            run.received = []
+        self._drop_all_but([*held, *(run.claim for run in self._runs if run not in filled)])
+
+    def _end(self) -> None:
+        for run in [each for each in self._runs if each.over]:
+            if run.failed is not None:
+                execution.fail(self._store, run.claim, run.failed)
+                log.error("%s: failed: %s", run.name, run.failed)
+            elif run.lost is not None:
+                execution.release(self._store, run.claim, run.lost)
+                log.warning("%s: queued again: %s", run.name, run.lost)
+            else:
+                execution.complete(self._store, run.claim)
+                log.info("%s: completed", run.name)
+            self._runs.remove(run)
+
+    def _drop_all_but(self, held: list[Claim] | tuple[Claim, ...]) -> None:
+        """Stop the runs whose claim holds no more: cancelled, or taken over."""
+        keys = {(claim.repetition_id, claim.epoch) for claim in held}
+        for run in [each for each in self._runs if (each.claim.repetition_id, each.claim.epoch) not in keys]:
+            ray.cancel(run.stream, force=True)
+            self._runs.remove(run)
+            log.info("%s: dropped, it is no longer ours", run.name)
+
+    def _hand_back(self) -> None:
+        for run in self._runs:
+            try:
+                execution.release(self._store, run.claim, "the supervisor was stopped")
+            except StoreUnavailable as error:
+                log.warning("%s: its lease will run out: %s", run.name, error)
+        self._runs = []
