@@ -1,0 +1,204 @@
+"""A client of the service in Python: what the `gaplab` command is made of.
+
+with Client("http://127.0.0.1:8000") as gaplab:
+    study = gaplab.submit({"robot": "toy_function", "budget": "smoke"})
+    for study in gaplab.watch(study.id):
+        print(study.progress.rollouts_done)
+    curves = gaplab.curves([study.id])
+"""
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from types import TracebackType
+from typing import Any, Literal, Self, TypeVar
+from urllib.parse import quote
+
+import httpx2
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from schemas.curves import Comparison, Curve
+from schemas.plugin import Catalogue
+from schemas.problems import Problem
+from schemas.records import ExperimentRead, Page, RepetitionRead, StudyRead
+from schemas.spec import ExperimentSpec, StudySpec
+
+T = TypeVar("T")
+
+Spec = ExperimentSpec | StudySpec | Mapping[str, Any]
+FigureFormat = Literal["html", "svg"]
+
+
+class ServiceError(Exception):
+    """The service refused or failed; `problem` is its answer, and the message is the problem's detail."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        super().__init__(problem.detail)
+
+
+class ServiceUnreachable(Exception):
+    """Nothing answers at the service's address."""
+
+
+class Client:
+    """A connection to a service.
+
+    Args:
+        url: of the service.
+        timeout_s: for which an answer is waited.
+        transport: instead of the network, for tests.
+
+    Every method raises ServiceError with the service's problem, or ServiceUnreachable.
+    """
+
+    def __init__(self, url: str, *, timeout_s: float = 60.0, transport: httpx2.BaseTransport | None = None) -> None:
+        self.url = url
+        self._http = httpx2.Client(base_url=url, timeout=timeout_s, transport=transport)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._http.close()
+
+    def ready(self) -> bool:
+        """Whether the service answers and its database can be used."""
+        try:
+            self._get("/readyz")
+        except (ServiceError, ServiceUnreachable):
+            return False
+        return True
+
+    def submit(self, spec: Spec) -> ExperimentRead | StudyRead:
+        """Queue an experiment if the spec names a `strategy`, else a study; it is checked by the service."""
+        body = spec.model_dump(mode="json", exclude_unset=True) if isinstance(spec, BaseModel) else dict(spec)
+        if "strategy" in body and "strategies" not in body:
+            return self._read(ExperimentRead, self._request("POST", "/experiments", json=body))
+        return self._read(StudyRead, self._request("POST", "/studies", json=body))
+
+    def experiment(self, id: str) -> ExperimentRead:  # noqa: A002 - as the API says
+        """An experiment."""
+        return self._read(ExperimentRead, self._get(f"/experiments/{_part(id)}"))
+
+    def study(self, id: str) -> StudyRead:  # noqa: A002 - as the API says
+        """A study."""
+        return self._read(StudyRead, self._get(f"/studies/{_part(id)}"))
+
+    def find(self, id: str) -> ExperimentRead | StudyRead:  # noqa: A002 - as the API says
+        """The study of this id, or the experiment."""
+        try:
+            return self.study(id)
+        except ServiceError as error:
+            if error.problem.status != httpx2.codes.NOT_FOUND:
+                raise
+        return self.experiment(id)
+
+    def experiments(self, **filters: str | int | None) -> Page[ExperimentRead]:
+        """Experiments, the newest first; filters as in the API: limit, cursor, study, state, strategy."""
+        return self._read(Page[ExperimentRead], self._get("/experiments", **filters))
+
+    def studies(self, *, limit: int = 50, cursor: str | None = None) -> Page[StudyRead]:
+        """Studies, the newest first."""
+        return self._read(Page[StudyRead], self._get("/studies", limit=limit, cursor=cursor))
+
+    def repetitions(self, id: str) -> tuple[RepetitionRead, ...]:  # noqa: A002 - as the API says
+        """The repetitions of an experiment."""
+        return self._read(tuple[RepetitionRead, ...], self._get(f"/experiments/{_part(id)}/repetitions"))
+
+    def cancel(self, id: str) -> ExperimentRead:  # noqa: A002 - as the API says
+        """Call an experiment off."""
+        return self._read(ExperimentRead, self._request("POST", f"/experiments/{_part(id)}/cancel"))
+
+    def watch(self, id: str, *, every_s: float = 1.0, patience_s: float = 60.0) -> Iterator[ExperimentRead | StudyRead]:  # noqa: A002
+        """A study or an experiment again and again, until it has ended; the last one is what it ended as.
+
+        A service that is away for less than `patience_s` is waited for.
+        """
+        current = self.find(id)
+        again = self.study if isinstance(current, StudyRead) else self.experiment
+        yield current
+        heard_at = time.monotonic()
+        while not current.state.ended:
+            time.sleep(every_s)
+            try:
+                current = again(id)
+            except (ServiceError, ServiceUnreachable) as error:
+                if _for_good(error) or time.monotonic() - heard_at > patience_s:
+                    raise
+                continue
+            heard_at = time.monotonic()
+            yield current
+
+    def curves(self, ids: Sequence[str]) -> tuple[Curve, ...]:
+        """The curves of experiments, and of all experiments of studies, in this order."""
+        return self._read(tuple[Curve, ...], self._get("/curves", experiment=self._experiments_of(ids)))
+
+    def curves_csv(self, ids: Sequence[str]) -> str:
+        """The same as CSV."""
+        return self._get("/curves", experiment=self._experiments_of(ids), format="csv").text
+
+    def figure(self, ids: Sequence[str], format: FigureFormat) -> str:  # noqa: A002 - as the API says
+        """The curves of studies and experiments, drawn."""
+        found = [self.find(each) for each in ids]
+        studies = [each.id for each in found if isinstance(each, StudyRead)]
+        experiments = [each.id for each in found if isinstance(each, ExperimentRead)]
+        return self._get("/figures/curves", study=studies, experiment=experiments, format=format).text
+
+    def compare(self, experiments: Sequence[str], first: int, last: int) -> tuple[Comparison, ...]:
+        """Every pair of experiments, at the counts of real-world evaluations from `first` to `last`, pooled."""
+        answer = self._get("/comparisons", experiment=list(experiments), **{"from": first, "to": last})
+        return self._read(tuple[Comparison, ...], answer)
+
+    def catalogue(self) -> Catalogue:
+        """The plug-ins of the service."""
+        return self._read(Catalogue, self._get("/catalogue"))
+
+    def _experiments_of(self, ids: Sequence[str]) -> list[str]:
+        found = [self.find(each) for each in ids]
+        return [one.id for each in found for one in (each.experiments if isinstance(each, StudyRead) else (each,))]
+
+    def _get(self, path: str, **parameters: str | int | Sequence[str] | None) -> httpx2.Response:
+        given = {name: value for name, value in parameters.items() if value is not None}
+        return self._request("GET", path, params=given)
+
+    def _request(
+        self, method: str, path: str, *, params: Mapping[str, Any] | None = None, json: object = None
+    ) -> httpx2.Response:
+        try:
+            answer = self._http.request(method, path, params=params, json=json)
+        except (httpx2.TransportError, httpx2.InvalidURL) as error:
+            msg = f"no service answers at {self.url} ({type(error).__name__}); start one with `gaplab serve`"
+            raise ServiceUnreachable(msg) from error
+        if answer.is_success:
+            return answer
+        raise ServiceError(_problem(answer))
+
+    def _read(self, kind: type[T], answer: httpx2.Response) -> T:
+        try:
+            return TypeAdapter(kind).validate_json(answer.content)
+        except ValidationError as error:
+            msg = f"what answers at {self.url} is no gaplab of this version"
+            raise ServiceUnreachable(msg) from error
+
+
+def _part(id: str) -> str:  # noqa: A002 - as the API says
+    """The id as one part of an address, whatever it is."""
+    return quote(id, safe="").replace(".", "%2E") or "%20"
+
+
+def _for_good(error: Exception) -> bool:
+    return isinstance(error, ServiceError) and error.problem.status < 500
+
+
+def _problem(answer: httpx2.Response) -> Problem:
+    try:
+        return Problem.model_validate_json(answer.content)
+    except ValidationError:
+        detail = f"{answer.url} answers {answer.status_code} and no problem; is it a gaplab?"
+        return Problem(type="about:blank", title="Not understood", status=answer.status_code, detail=detail)

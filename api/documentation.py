@@ -1,0 +1,74 @@
+"""The pages that document the API, served from an installed package: they work where there is no internet."""
+
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.docs import get_redoc_html, get_swagger_ui_html
+from fastapi.responses import HTMLResponse, RedirectResponse
+from fastapi.staticfiles import StaticFiles
+
+from schemas.problems import Problem
+
+ASSETS = "/assets/docs"
+
+
+def install(app: FastAPI) -> None:
+    """Serve /docs and /redoc, lead / to /docs, and describe problems in /openapi.json."""
+    app.mount(ASSETS, StaticFiles(packages=[("fastapi_offline", "static")]), name="docs_assets")
+    app.add_api_route("/", _landing, include_in_schema=False)
+    app.add_api_route("/docs", _docs, include_in_schema=False)
+    app.add_api_route("/redoc", _redoc, include_in_schema=False)
+    _describe_problems(app)
+
+
+def _landing() -> RedirectResponse:
+    return RedirectResponse("docs")
+
+
+def _docs() -> HTMLResponse:
+    return get_swagger_ui_html(
+        openapi_url="openapi.json",
+        title="gaplab",
+        swagger_js_url=f".{ASSETS}/swagger-ui-bundle.js",
+        swagger_css_url=f".{ASSETS}/swagger-ui.css",
+        swagger_favicon_url=f".{ASSETS}/favicon.png",
+        swagger_ui_parameters={"displayRequestDuration": True, "tryItOutEnabled": True},
+    )
+
+
+def _redoc() -> HTMLResponse:
+    return get_redoc_html(
+        openapi_url="openapi.json",
+        title="gaplab",
+        redoc_js_url=f".{ASSETS}/redoc.standalone.js",
+        redoc_favicon_url=f".{ASSETS}/favicon.png",
+        with_google_fonts=False,
+    )
+
+
+def _describe_problems(app: FastAPI) -> None:
+    """Put the problem's schema where the answers refer to it, and drop the framework's own shape of errors."""
+    generate = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            document = generate()
+            schemas = document["components"]["schemas"]
+            problem = Problem.model_json_schema(ref_template="#/components/schemas/{model}", mode="serialization")
+            schemas |= problem.pop("$defs") | {"Problem": problem}
+            _drop_foreign_errors(document)
+        assert app.openapi_schema is not None
+        return app.openapi_schema
+
+    app.openapi = openapi  # type: ignore[method-assign]
+
+
+def _drop_foreign_errors(document: dict[str, Any]) -> None:
+    """The framework promises its own shape of 422 for every parameter; no answer of ours has it."""
+    for foreign in ("HTTPValidationError", "ValidationError"):
+        document["components"]["schemas"].pop(foreign, None)
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            answers = operation["responses"]
+            if "application/json" in answers.get("422", {}).get("content", {}):
+                del answers["422"]

@@ -1,0 +1,43 @@
+"""How the command ends when it cannot do what it was asked: a sentence, and a number for scripts."""
+
+from enum import IntEnum
+
+from api.client import ServiceError, ServiceUnreachable
+
+
+class Exit(IntEnum):
+    """The exit codes of `gaplab`; 2 is a wrong use of the command itself."""
+
+    OK = 0
+    FAILED = 1
+    USAGE = 2
+    UNREACHABLE = 3
+    NOT_FOUND = 4
+    INVALID = 5
+    CONFLICT = 6
+    FILE = 7
+    INTERRUPTED = 130
+
+
+EXPLAINED = """Exit codes: 0 done; 1 the service or what was watched failed; 2 wrong use of the command; 3 no service
+answers; 4 no such id; 5 invalid spec or request; 6 its state forbids it; 7 a file cannot be read or written, or is not
+JSON; 130 interrupted."""
+
+BY_STATUS = {404: Exit.NOT_FOUND, 409: Exit.CONFLICT, 413: Exit.INVALID, 422: Exit.INVALID}
+
+
+class CommandError(Exception):
+    """The command cannot go on; the message is one readable sentence."""
+
+    def __init__(self, message: str, code: Exit) -> None:
+        self.code = code
+        super().__init__(message)
+
+
+def code_of(error: ServiceError | ServiceUnreachable | CommandError) -> Exit:
+    """The exit code that tells a script what happened."""
+    if isinstance(error, CommandError):
+        return error.code
+    if isinstance(error, ServiceUnreachable):
+        return Exit.UNREACHABLE
+    return BY_STATUS.get(error.problem.status, Exit.FAILED)

@@ -1,0 +1,147 @@
+"""Experiments: one strategy under one setting, repeated."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Query, Request, Response
+from pydantic import Field
+
+from api import examples
+from api.dependencies import Id, Paging, StoreDep
+from api.problems import documented
+from schemas.lifecycle import State
+from schemas.records import ExperimentRead, MeasurementKind, Page, RepetitionRead, SampleRead, SimulatorRead
+from schemas.spec import ExperimentSpec
+from services import experiments
+
+router = APIRouter(prefix="/experiments", tags=["experiments"])
+
+Repetition = Annotated[int | None, Field(ge=0, le=1_000_000, description="its number, from 0; left out: all")]
+
+MANY: int = Field(default=1_000, ge=1, le=5_000, description="how many at most")
+
+
+class ExperimentFilter(Paging):
+    """Which experiments are listed."""
+
+    study: Id | None = Field(default=None, description="only of this study")
+    state: State | None = Field(default=None, description="only in this state")
+    strategy: str | None = Field(default=None, max_length=100, pattern=r"^\w+$", description="only of this strategy")
+
+
+class SampleFilter(Paging):
+    """Which real-world evaluations are listed."""
+
+    limit: int = MANY
+    repetition: Repetition = None
+    kind: MeasurementKind | None = Field(default=None, description="samples are learned from, probes only looked at")
+
+
+class SimulatorFilter(Paging):
+    """Which simulators are listed."""
+
+    limit: int = MANY
+    repetition: Repetition = None
+    iteration: int | None = Field(default=None, ge=0, le=1_000_000, description="left out: all")
+
+
+@router.post(
+    "",
+    status_code=202,
+    summary="Submit an experiment",
+    responses={
+        202: examples.shown(examples.EXPERIMENT, "It is queued, and exists at `Location`"),
+        **documented(413, 422),
+    },
+)
+def submit_experiment(
+    spec: Annotated[ExperimentSpec, Body(openapi_examples=examples.EXPERIMENT_SPECS)],
+    store: StoreDep,
+    request: Request,
+    response: Response,
+) -> ExperimentRead:
+    """Queue an experiment. Whatever is left out is the paper's."""
+    experiment = experiments.submit_experiment(store, spec)
+    response.headers["Location"] = str(request.app.url_path_for("read_experiment", id=experiment.id))
+    return experiment
+
+
+@router.get(
+    "",
+    summary="List the experiments",
+    responses={200: examples.shown(examples.page(examples.EXPERIMENT), "The newest first"), **documented(404, 422)},
+)
+def list_experiments(store: StoreDep, which: Annotated[ExperimentFilter, Query()]) -> Page[ExperimentRead]:
+    """The experiments, the newest first."""
+    return experiments.list_experiments(store, **which.model_dump())
+
+
+@router.get(
+    "/{id}",
+    summary="Look at an experiment",
+    responses={200: examples.shown(examples.EXPERIMENT, "State, progress, time left"), **documented(404)},
+)
+def read_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
+    """An experiment with its resolved spec; reality's parameters are null until it has ended."""
+    return experiments.read_experiment(store, id)
+
+
+@router.get(
+    "/{id}/repetitions",
+    summary="List an experiment's repetitions",
+    responses={
+        200: examples.shown([examples.REPETITION], "In the order of their numbers"),
+        **documented(404),
+    },
+)
+def list_repetitions(id: Id, store: StoreDep) -> tuple[RepetitionRead, ...]:  # noqa: A002 - the address says {id}
+    """Every repetition with its state, and why it failed if it did."""
+    return tuple(experiments.list_repetitions(store, id))
+
+
+@router.get(
+    "/{id}/samples",
+    summary="List real-world evaluations",
+    responses={
+        200: examples.shown(examples.page(examples.SAMPLE), "By repetition and iteration"),
+        **documented(404, 422),
+    },
+)
+def list_samples(
+    id: Id,  # noqa: A002 - the address says {id}
+    store: StoreDep,
+    which: Annotated[SampleFilter, Query()],
+) -> Page[SampleRead]:
+    """Every genome that was tried in reality, with its fitness there."""
+    return experiments.list_samples(store, id, **which.model_dump())
+
+
+@router.get(
+    "/{id}/simulators",
+    summary="List tuned simulators",
+    responses={
+        200: examples.shown(examples.page(examples.SIMULATOR), "By repetition, iteration and rank"),
+        **documented(404, 422),
+    },
+)
+def list_simulators(
+    id: Id,  # noqa: A002 - the address says {id}
+    store: StoreDep,
+    which: Annotated[SimulatorFilter, Query()],
+) -> Page[SimulatorRead]:
+    """The simulators that were tuned on the samples, rank 0 the best of its iteration."""
+    return experiments.list_simulators(store, id, **which.model_dump())
+
+
+@router.post(
+    "/{id}/cancel",
+    summary="Cancel an experiment",
+    responses={
+        200: examples.shown(
+            examples.EXPERIMENT.model_copy(update={"state": State.CANCELLED}), "Called off; what is stored stays"
+        ),
+        **documented(404, 409),
+    },
+)
+def cancel_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
+    """Call an experiment off; what is stored stays. One that has ended cannot be."""
+    return experiments.cancel_experiment(store, id)

@@ -1,0 +1,19 @@
+"""Everything that this service can be asked to run."""
+
+from schemas.plugin import Catalogue
+from services.core.optimizers import optimizers
+from services.core.robots import robots
+from services.core.strategies import strategies
+from services.core.tunables import tunables
+from services.engines import engines
+
+
+def catalogue() -> Catalogue:
+    """Every plug-in of every kind, by name."""
+    return Catalogue(
+        strategies=strategies.describe(),
+        robots=robots.describe(),
+        engines=engines.describe(),
+        tunables=tunables.describe(),
+        optimizers=optimizers.describe(),
+    )

@@ -1,0 +1,224 @@
+"""The endpoints, over a store on SQLite and on Postgres: what they answer when asked rightly."""
+
+import csv
+import io
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from itertools import count
+
+import pytest
+from fastapi.testclient import TestClient
+from jsonschema import Draft202012Validator
+
+from api.app import create_app
+from services import execution
+from services.store.session import Store
+from tests.experiments import run, some_log, toy
+
+TOY = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "iterations": 2, "repetitions": 3}
+STUDY = {
+    "name": "a study",
+    "strategies": ["simulated_fit", "random", "direct"],
+    "robot": "toy_function",
+    "budget": "smoke",
+    "iterations": 2,
+    "repetitions": 2,
+}
+
+
+@pytest.fixture
+def api(store: Store) -> Iterator[TestClient]:
+    with TestClient(create_app(store)) as client:
+        yield client
+
+
+@pytest.fixture
+def lite(sqlite_store: Store) -> Iterator[TestClient]:
+    with TestClient(create_app(sqlite_store)) as client:
+        yield client
+
+
+def finish(store: Store) -> None:
+    """Run whatever is queued, each repetition to a different fitness."""
+    numbers = count()
+    while claims := execution.claim(store, "test", limit=10):
+        for claim in claims:
+            iterations = 0 if claim.spec.strategy.name == "direct" else claim.spec.iterations
+            run(store, claim, some_log(iterations, recorded=1 + 0.1 * next(numbers)))
+
+
+def test_a_submitted_experiment_exists_at_its_location_with_every_default_filled_in(api: TestClient):
+    answer = api.post("/experiments", json={"strategy": "simulated_fit", "iterations": 10, "repetitions": 40})
+
+    assert answer.status_code == 202
+    found = api.get(answer.headers["Location"])
+    assert found.json() == answer.json()
+    assert found.json()["state"] == "QUEUED"
+    assert found.json()["spec"]["budget"]["controller_evaluations"] == 10_000
+    assert found.json()["spec"]["robot"]["name"] == "quadruped"
+
+
+def test_an_empty_study_is_the_papers_six_strategies_and_the_direct_baseline(api: TestClient):
+    answer = api.post("/studies", json={})
+
+    assert answer.status_code == 202
+    study = api.get(answer.headers["Location"]).json()
+    assert [each["strategy"] for each in study["experiments"]] == [
+        "simulated_fit",
+        "simulated_fit_and_unique",
+        "informative",
+        "simulated_fit_and_informative",
+        "random",
+        "known_fit",
+        "direct",
+    ]
+    assert study["progress"]["repetitions"] == 7 * 40
+
+
+def test_lists_are_read_page_by_page_each_item_once(api: TestClient):
+    submitted = [api.post("/experiments", json=TOY | {"seed": seed}).json()["id"] for seed in range(5)]
+
+    listed, cursor = [], None
+    while True:
+        page = api.get("/experiments", params={"limit": 2} | ({"cursor": cursor} if cursor else {})).json()
+        listed += [each["id"] for each in page["items"]]
+        if (cursor := page["next"]) is None:
+            break
+
+    assert listed == submitted[::-1]
+
+
+def test_experiments_are_filtered_by_study_state_and_strategy(api: TestClient):
+    study = api.post("/studies", json=STUDY).json()
+    alone = api.post("/experiments", json=TOY).json()
+    api.post(f"/experiments/{alone['id']}/cancel")
+
+    def listed(**which: str) -> set[str]:
+        return {each["id"] for each in api.get("/experiments", params=which).json()["items"]}
+
+    assert listed(study=study["id"]) == {each["id"] for each in study["experiments"]}
+    assert listed(state="CANCELLED") == {alone["id"]}
+    assert listed(strategy="random") == {study["experiments"][1]["id"]}
+    assert [each["id"] for each in api.get("/studies").json()["items"]] == [study["id"]]
+
+
+def test_what_has_run_is_shown_by_repetition_sample_and_simulator(store: Store, api: TestClient):
+    made = api.post("/experiments", json=toy(repetitions=2).model_dump(mode="json")).json()
+    finish(store)
+
+    path = f"/experiments/{made['id']}"
+    done = api.get(path).json()
+    assert (done["state"], done["progress"]["completed"], done["progress"]["seconds_left"]) == ("COMPLETED", 2, 0)
+    assert [each["state"] for each in api.get(f"{path}/repetitions").json()] == ["COMPLETED", "COMPLETED"]
+    samples = api.get(f"{path}/samples", params={"repetition": 1, "kind": "sample"}).json()["items"]
+    assert [(each["iteration"], each["fitness"]) for each in samples] == [(1, None), (2, 1 / 3)]
+    simulators = api.get(f"{path}/simulators", params={"repetition": 0, "iteration": 2}).json()["items"]
+    assert [(each["rank"], each["squared_error"]) for each in simulators] == [(0, 1e-300), (1, None)]
+
+
+def test_realitys_parameters_are_hidden_until_the_end(store: Store, api: TestClient):
+    hidden = {"reality": {"parameters": {"static_friction": 0.77}}, "repetitions": 1}
+    made = api.post("/experiments", json=TOY | hidden)
+    before = made.json()["spec"]["reality"]["parameters"]
+    finish(store)
+    after = api.get(made.headers["Location"]).json()["spec"]["reality"]["parameters"]
+
+    assert set(before.values()) == {None}
+    assert "0.77" not in made.text
+    assert after["static_friction"] == 0.77
+
+
+def test_a_curve_has_mean_sd_n_and_interval_at_every_count(store: Store, api: TestClient):
+    made = api.post("/experiments", json=TOY).json()
+    finish(store)
+
+    curve = api.get(f"/experiments/{made['id']}/curve").json()
+
+    assert [point["evaluations"] for point in curve["points"]] == [0, 1, 2]
+    assert curve["points"][0]["n"] == 3
+    assert math.isclose(curve["points"][0]["mean"], 1.1)
+    assert math.isclose(curve["points"][0]["sd"], 0.1)
+    assert curve["points"][0]["lower"] < 1.1 < curve["points"][0]["upper"]
+
+
+def test_curves_of_a_study_are_those_of_its_experiments(store: Store, api: TestClient):
+    study = api.post("/studies", json=STUDY).json()
+    finish(store)
+
+    ids = [each["id"] for each in study["experiments"]]
+    curves = api.get(f"/studies/{study['id']}/curves").json()
+    assert [each["experiment"] for each in curves] == ids
+    assert [each["direct"] for each in curves] == [False, False, True]
+    assert api.get("/curves", params={"experiment": ids}).json() == curves
+    assert api.get("/curves", params={"experiment": ids[::-1]}).json() == curves[::-1]
+
+
+def test_curves_are_also_comma_separated_values(store: Store, api: TestClient):
+    study = api.post("/studies", json=STUDY).json()
+    finish(store)
+
+    answer = api.get(f"/studies/{study['id']}/curves", params={"format": "csv"})
+
+    assert answer.headers["content-type"].startswith("text/csv")
+    rows = list(csv.DictReader(io.StringIO(answer.text)))
+    assert len(rows) == 2 * 2 * 3 + 2
+    assert all(math.isfinite(float(row["fitness"])) for row in rows)
+
+
+def test_experiments_are_compared_pair_by_pair(store: Store, api: TestClient):
+    study = api.post("/studies", json=STUDY).json()
+    finish(store)
+    ids = [each["id"] for each in study["experiments"]]
+
+    pairs = api.get("/comparisons", params={"experiment": ids, "from": 1, "to": 2}).json()
+
+    assert [(each["first"], each["second"]) for each in pairs] == [
+        (ids[0], ids[1]),
+        (ids[0], ids[2]),
+        (ids[1], ids[2]),
+    ]
+    assert {(each["from_evaluations"], each["to_evaluations"]) for each in pairs} == {(1, 2)}
+    assert pairs[0]["n_first"] == 4
+
+
+def test_a_figure_is_a_page_without_links_to_elsewhere_or_a_file(store: Store, api: TestClient):
+    study = api.post("/studies", json=STUDY).json()
+    finish(store)
+
+    page = api.get("/figures/curves", params={"study": study["id"]})
+    drawing = api.get(
+        "/figures/curves", params={"experiment": [each["id"] for each in study["experiments"]], "format": "svg"}
+    )
+
+    assert page.headers["content-type"].startswith("text/html")
+    assert "<title>a study</title>" in page.text
+    assert "<script src" not in page.text
+    assert drawing.headers["content-type"] == "image/svg+xml"
+    assert ET.fromstring(drawing.text).tag == "{http://www.w3.org/2000/svg}svg"
+
+
+def test_cancelling_keeps_what_is_stored(store: Store, api: TestClient):
+    made = api.post("/experiments", json=TOY).json()
+    run(store, execution.claim(store, "test", limit=1)[0])
+
+    answer = api.post(f"/experiments/{made['id']}/cancel")
+
+    assert answer.json()["state"] == "CANCELLED"
+    assert api.get(f"/experiments/{made['id']}/curve").json()["points"][0]["n"] == 1
+
+
+def test_the_catalogue_lists_every_plug_in_with_the_schema_of_its_options(lite: TestClient):
+    found = lite.get("/catalogue").json()
+
+    assert {each["name"] for each in found["strategies"]} >= {"simulated_fit", "random", "direct"}
+    assert {each["name"] for each in found["robots"]} >= {"quadruped", "toy_function"}
+    assert {each["name"] for each in found["engines"]} >= {"pybullet", "analytic"}
+    for each in (plugin for kind in found.values() for plugin in kind):
+        assert each["summary"]
+        Draft202012Validator.check_schema(each["options"])
+
+
+def test_the_service_says_that_it_lives_and_is_ready(api: TestClient):
+    assert api.get("/livez").json() == {"status": "ok"}
+    assert api.get("/readyz").json() == {"status": "ok"}
