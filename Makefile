@@ -1,0 +1,41 @@
+# Everything runs in .venv, made from constraints.txt at first use. `make` alone lists what there is.
+
+PYTHON ?= python3.11
+BIN := .venv/bin
+
+help:  ## this list
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+
+demo: .venv/installed  ## tune a toy and a quadruped with every strategy, and see the curves
+	$(BIN)/gaplab demo
+
+serve: .venv/installed  ## the service on http://127.0.0.1:8000, with its workers
+	$(BIN)/gaplab serve
+
+test: .venv/installed-dev  ## all tests, on SQLite and on a real Postgres
+	$(BIN)/python -m pytest
+
+lint: .venv/installed-dev  ## style, types and the arrows between the layers
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/python -m pytest tests/unit/test_architecture.py
+
+bench: .venv/installed-dev  ## the table of speeds, as ratios within one run
+	$(BIN)/python -m benchmarks
+
+clean:  ## remove the environment and what tools cached; results stay
+	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+.venv/bin/pip:
+	$(PYTHON) -m venv .venv
+
+.venv/installed: pyproject.toml constraints.txt | .venv/bin/pip
+	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable .
+	touch $@
+
+.venv/installed-dev: .venv/installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+.PHONY: help demo serve test lint bench clean

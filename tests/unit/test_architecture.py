@@ -1,0 +1,86 @@
+"""The arrows between the layers, and the sizes of things, read from the source itself."""
+
+import ast
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+OURS = ("schemas", "services", "workers", "api", "migrations")
+MODULES = sorted(path.relative_to(ROOT) for top in OURS for path in (ROOT / top).rglob("*.py"))
+PHYSICS = {"pybullet", "mujoco", "sapien"}
+
+# code in -> what of ours it may import, and what of others; the first prefix that fits counts
+ARROWS = {
+    "schemas": (("schemas",), {"pydantic", "pydantic_core"}),
+    "services/core": (("schemas", "services.core"), {"numpy", "scipy", "pydantic"}),
+    "services/engines": (("schemas", "services.core", "services.engines"), {"numpy"}),
+    "services/store": (("schemas", "services.core", "services.store"), {"sqlalchemy", "psycopg"}),
+    "services/figures": (("schemas", "services.figures"), {"plotly", "matplotlib"}),
+    "services": (("schemas", "services"), {"numpy"}),
+    "workers": (("schemas", "services", "workers"), {"ray"}),
+    "api": (
+        ("schemas", "services", "api", "migrations"),
+        {"fastapi", "starlette", "uvicorn", "typer", "rich", "httpx2", "pydantic", "fastapi_offline"},
+    ),
+    "migrations": (("services.settings", "services.store", "migrations"), {"alembic", "sqlalchemy"}),
+}
+IMPURE = {"os", "time", "datetime", "random", "threading", "logging", "pickle", "secrets", "uuid", "io", "socket"}
+
+
+def imports(path):
+    """Every module that the file imports, inside functions too."""
+    for node in ast.walk(ast.parse((ROOT / path).read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        if isinstance(node, ast.ImportFrom):
+            yield node.module
+
+
+def rule(path):
+    return next(rule for prefix, rule in ARROWS.items() if path.as_posix().startswith(f"{prefix}/"))
+
+
+def is_under(module, allowed):
+    return any(module == each or module.startswith(f"{each}.") for each in allowed)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=str)
+def test_imports_follow_the_arrows(path):
+    ours, others = rule(path)
+
+    for module in imports(path):
+        top = module.partition(".")[0]
+        if top in OURS:
+            assert is_under(module, ours), f"{path} may not import {module}"
+        elif top not in sys.stdlib_module_names:
+            assert top in others, f"{path} may not import {module}"
+
+
+@pytest.mark.parametrize("path", [each for each in MODULES if each.as_posix().startswith("services/core/")], ids=str)
+def test_the_core_has_no_clock_no_chance_of_its_own_and_no_side_effects(path):
+    assert not {module.partition(".")[0] for module in imports(path)} & IMPURE
+
+
+@pytest.mark.parametrize("path", [each for each in MODULES if not each.as_posix().startswith("workers/")], ids=str)
+def test_only_the_workers_know_ray_and_nobody_imports_physics_at_the_top(path):
+    tops = {module.partition(".")[0] for module in imports(path)}
+
+    assert "ray" not in tops
+    assert not tops & PHYSICS
+
+
+@pytest.mark.parametrize("path", [each for each in MODULES if "versions" not in each.parts], ids=str)
+def test_a_module_stays_under_250_lines_and_a_function_under_40(path):
+    source = (ROOT / path).read_text()
+
+    assert len(source.splitlines()) <= 250
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            assert node.end_lineno - node.body[0].lineno < 40, f"{path}: {node.name}"
+
+
+@pytest.mark.parametrize("path", MODULES, ids=str)
+def test_every_module_says_what_it_is(path):
+    assert ast.get_docstring(ast.parse((ROOT / path).read_text()))
