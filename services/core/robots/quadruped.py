@@ -1,8 +1,11 @@
 """The paper's robot, rebuilt: four legs of three hinges, each driven by a periodic pulse of two genes."""
 
-import numpy as np
+from typing import Annotated
 
-from schemas.base import Frozen
+import numpy as np
+from pydantic import Field
+
+from schemas.base import Frozen, Real
 from services.core.arrays import FloatArray, Genome, frozen
 from services.core.robots.base import Robot
 from services.core.types import Space
@@ -38,6 +41,14 @@ LEGS: dict[str, tuple[int, int]] = {
 """Where each leg is: the signs of x (ahead) and y (to the left)."""
 
 
+class QuadrupedOptions(Frozen):
+    """How long a controller is watched."""
+
+    counted_s: Annotated[Real, Field(gt=0, le=600)] = Field(
+        default=COUNTED_S, description="seconds that count, after the robot has settled; a rollout's cost grows with it"
+    )
+
+
 class Quadruped(Robot):
     """Four legs of hip yaw, hip roll and knee: 12 actuators, each with a periodic pulse of phase and width.
 
@@ -51,6 +62,8 @@ class Quadruped(Robot):
     source = "Paper, section 2 and figure 1; docs/robot.md"
     engine = "pybullet"
     unit = "m/s"
+    Options = QuadrupedOptions
+    options: QuadrupedOptions
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)
@@ -62,7 +75,7 @@ class Quadruped(Robot):
     def motion(self, genome: Genome) -> Motion:
         """Each actuator at plus its amplitude during its pulse, at minus it otherwise; in the neutral pose never."""
         phases, widths = genome[0::2], NARROWEST + (WIDEST - NARROWEST) * genome[1::2]
-        duration_s = SETTLING_S + COUNTED_S
+        duration_s = SETTLING_S + self.options.counted_s
         edges = np.mod(np.concatenate([phases, phases + widths]), 1.0)
         cycles = np.arange(np.ceil(duration_s / PERIOD_S))
         times = np.unique(np.append(0.0, np.add.outer(cycles, edges)))
