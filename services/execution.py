@@ -29,7 +29,7 @@ class TimedStep:
 
 def claim(store: Store, owner: str, limit: int) -> tuple[Claim, ...]:
     """Up to `limit` queued repetitions for the owner to run, of the oldest experiments first, each with its log."""
-    return store.write(lambda session: leases.claim(session, owner, limit))
+    return store.write(lambda session: leases.claim(session, owner, limit)) if limit > 0 else ()
 
 
 def heartbeat(store: Store, claims: Iterable[Claim]) -> tuple[Claim, ...]:

@@ -105,7 +105,7 @@ def _recorded(store: Store, ids: Sequence[str]) -> tuple[tuple[ExperimentRow, ..
     """The experiments, and the recorded fitness of each: `(repetitions, iterations + 1)`, nan where it is not there."""
     with store.reading() as session:
         rows = experiments.get_experiments(session, ids)
-        found = list(results.recorded(session, ids))
+        found = results.recorded(session, ids)
     values = {row.id: np.full((row.spec["repetitions"], row.iterations), np.nan) for row in rows}
     for experiment, repetition, iteration, fitness in found:
         values[experiment][repetition, iteration] = fitness

@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import psycopg
 import pytest
@@ -21,6 +22,15 @@ from services.store.session import Store
 
 _DATABASES = ("sqlite", "postgres")
 _numbers = count()
+
+
+@pytest.fixture(scope="session")
+def folder() -> Iterator[Path]:
+    """Where the databases are: in memory if there is room, for tests do not wait for a disk to be sure."""
+    memory = Path("/dev/shm")
+    roomy = memory.is_dir() and shutil.disk_usage(memory).free > 2**30
+    with TemporaryDirectory(prefix="gaplab-", dir=memory if roomy else None) as found:
+        yield Path(found)
 
 
 class Postgres:
@@ -55,17 +65,17 @@ class Postgres:
 
 
 @pytest.fixture(scope="session")
-def postgres(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Postgres]:
+def postgres(folder: Path) -> Iterator[Postgres]:
     """The server, started once for all tests."""
-    server = Postgres(tmp_path_factory.mktemp("pg"))
+    server = Postgres(folder)
     yield server
     server.stop()
 
 
 @pytest.fixture(scope="session")
-def sqlite_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def sqlite_template(folder: Path) -> Path:
     """A SQLite file at head, migrated once for all tests."""
-    file = tmp_path_factory.mktemp("sqlite") / "template.db"
+    file = folder / "template.db"
     migrations.upgrade(f"sqlite:///{file}")
     return file
 
@@ -80,9 +90,12 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str
 
 
 @pytest.fixture
-def sqlite_url(sqlite_template: Path, tmp_path: Path) -> str:
+def sqlite_url(sqlite_template: Path) -> Iterator[str]:
     """A SQLite database at head."""
-    return f"sqlite:///{shutil.copy(sqlite_template, tmp_path / 'gaplab.db')}"
+    file = sqlite_template.with_name(f"test_{next(_numbers)}.db")
+    shutil.copy(sqlite_template, file)
+    yield f"sqlite:///{file}"
+    file.unlink()
 
 
 @pytest.fixture(params=_DATABASES)
@@ -98,6 +111,13 @@ def store_url(request: pytest.FixtureRequest) -> Iterator[str]:
 def sqlite_store(sqlite_url: str) -> Iterator[Store]:
     """A store at head on SQLite."""
     yield from _opened(sqlite_url)
+
+
+@pytest.fixture
+def postgres_store(postgres: Postgres) -> Iterator[Store]:
+    """A store at head on Postgres."""
+    for url in _postgres_database(postgres, "template"):
+        yield from _opened(url)
 
 
 @pytest.fixture

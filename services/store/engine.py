@@ -14,6 +14,9 @@ WRITES = "gaplab_writes"
 PATIENCE_S = 30
 """How long a transaction waits for another's lock."""
 
+CONNECT_S = 5
+"""How long a Postgres server may take to answer before it is unreachable."""
+
 _WAL_IS_SOUND = (3, 51, 3)
 """Before this, SQLite's write-ahead log can be corrupted when it is reset. Source: https://sqlite.org/wal.html."""
 
@@ -30,7 +33,8 @@ def open_engine(url: str, *, enforce_foreign_keys: bool = True) -> Engine:
     """
     parsed = _parse(url)
     if parsed.get_backend_name() == "postgresql":
-        return create_engine(parsed, pool_pre_ping=True, pool_size=10, max_overflow=20)
+        patience = {"connect_timeout": CONNECT_S}
+        return create_engine(parsed, pool_pre_ping=True, pool_size=10, max_overflow=20, connect_args=patience)
     engine = create_engine(parsed, pool_pre_ping=True, connect_args={"timeout": PATIENCE_S})
     _prepare_sqlite(engine, enforce_foreign_keys=enforce_foreign_keys)
     return engine

@@ -1,6 +1,6 @@
 """A repetition in the hands of one supervisor."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from schemas.spec import ExperimentSpec
 from services.core.types import Step
@@ -8,7 +8,7 @@ from services.core.types import Step
 
 @dataclass(frozen=True)
 class Claim:
-    """The right to go on with a repetition, until its epoch is over.
+    """The right to go on with a repetition, until its epoch is over; equal to another of the same epoch.
 
     Attributes:
         repetition_id: in the store.
@@ -23,5 +23,5 @@ class Claim:
     epoch: int
     experiment_id: str
     number: int
-    spec: ExperimentSpec
-    log: tuple[Step, ...] = ()
+    spec: ExperimentSpec = field(compare=False)
+    log: tuple[Step, ...] = field(default=(), compare=False)

@@ -177,8 +177,9 @@ def cancel(session: Session, experiment_id: str) -> ExperimentRow:
         NotFound: no such experiment.
         Conflict: it has ended.
     """
-    lock(session, [experiment_id])
     experiment = get_experiment(session, experiment_id)
+    lock(session, [experiment_id])
+    session.refresh(experiment)
     if experiment.state.ended:
         msg = f"experiment {experiment_id!r} has ended: it is {experiment.state}, nothing is left to cancel"
         raise Conflict(msg)

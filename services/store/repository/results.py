@@ -1,6 +1,6 @@
 """Samples, simulators and recorded fitnesses, as they are shown."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from sqlalchemy import case, select, tuple_
 from sqlalchemy.orm import Session
@@ -91,16 +91,12 @@ def cursor_of(row: SampleRead | SimulatorRead) -> str:
     return encode(row.repetition, row.iteration, 0 if row.kind is MeasurementKind.SAMPLE else 1)
 
 
-def recorded(session: Session, experiments: Sequence[str]) -> Iterator[tuple[str, int, int, float]]:
-    """Experiment, repetition, iteration and recorded fitness, for every iteration that is there."""
+def recorded(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str, int, int, float | None]]:
+    """Experiment, repetition, iteration and recorded fitness, for every iteration that has one."""
     row = IterationRow
-    found = session.execute(
+    query = (
         select(RepetitionRow.experiment_id, RepetitionRow.number, row.number, row.recorded_fitness)
         .join(RepetitionRow, RepetitionRow.id == row.repetition_id)
         .where(RepetitionRow.experiment_id.in_(experiments), row.recorded_fitness.is_not(None))
     )
-    return (
-        (experiment, repetition, iteration, value)
-        for experiment, repetition, iteration, value in found
-        if value is not None
-    )
+    return session.execute(query).all()

@@ -1,0 +1,286 @@
+"""Submitting, looking at and cancelling experiments and studies, on both databases."""
+
+from datetime import UTC
+
+import pytest
+from sqlalchemy import event
+
+from schemas.lifecycle import State
+from schemas.records import MeasurementKind
+from schemas.spec import StudySpec
+from services import execution, experiments
+from services.core.errors import Conflict, InvalidSpec, NotFound
+from services.resolution import expected_rollouts, resolve_experiment
+from tests.experiments import AWKWARD, run, some_log, toy
+
+SECRET = 0.987654321
+
+
+def small_study(**changes):
+    common = toy().model_dump(exclude={"strategy", "name"})
+    return StudySpec.model_validate(common | {"repetitions": 1, "reality": {"parameters": {}}} | changes)
+
+
+def finish_all(store):
+    for claim in execution.claim(store, "me", 99):
+        run(store, claim, some_log(iterations=0 if claim.spec.strategy.name == "direct" else 2))
+
+
+def every_page(list_page, **filters):
+    items, cursor, pages = [], None, 0
+    while cursor is not None or not pages:
+        page = list_page(cursor=cursor, **filters)
+        items, cursor, pages = [*items, *page.items], page.next, pages + 1
+    return items, pages
+
+
+def test_a_submitted_experiment_is_stored_resolved_and_queued(store):
+    submitted = experiments.submit_experiment(store, toy(name="mine"))
+
+    found = experiments.read_experiment(store, submitted.id)
+
+    resolved = resolve_experiment(toy(name="mine"))
+    assert found == submitted
+    assert (found.name, found.strategy, found.state, found.study) == ("mine", "simulated_fit", State.QUEUED, None)
+    assert found.spec["budget"] == resolved.budget.model_dump(mode="json")
+    assert found.created_at.tzinfo is UTC
+    assert (found.progress.repetitions, found.progress.iterations) == (3, 9)
+    assert found.progress.rollouts == 3 * expected_rollouts(resolved)
+
+
+def test_an_experiment_without_a_name_has_that_of_its_strategy(store):
+    submitted = experiments.submit_experiment(store, toy())
+
+    assert submitted.name == "simulated_fit"
+
+
+def test_an_invalid_spec_stores_nothing(store):
+    with pytest.raises(InvalidSpec):
+        experiments.submit_study(store, small_study(strategies=["random", "no_such"]))
+
+    assert experiments.list_studies(store).items == ()
+    assert experiments.list_experiments(store).items == ()
+
+
+def test_a_study_has_an_experiment_for_each_strategy_in_its_order(store):
+    submitted = experiments.submit_study(store, small_study(name="all", direct_repetitions=4))
+
+    found = experiments.read_study(store, submitted.id)
+
+    assert found == submitted
+    assert (found.name, found.state) == ("all", State.QUEUED)
+    assert [each.strategy for each in found.experiments] == [each.name for each in StudySpec().strategies]
+    assert {each.study for each in found.experiments} == {found.id}
+    assert [each.progress.repetitions for each in found.experiments] == [1] * 6 + [4]
+    assert found.progress.iterations == 6 * 3 + 4 * 1
+    assert found.progress.rollouts == sum(each.progress.rollouts for each in found.experiments)
+
+
+def test_the_state_of_a_study_is_that_of_its_experiments_together(store):
+    study = experiments.submit_study(store, small_study(strategies=["simulated_fit", "direct"])).id
+    states = []
+
+    (first,) = execution.claim(store, "me", 1)
+    states.append(experiments.read_study(store, study).state)
+    execution.fail(store, first, "x")
+    states.append(experiments.read_study(store, study).state)
+    finish_all(store)
+    states.append(experiments.read_study(store, study).state)
+
+    assert states == [State.RUNNING, State.RUNNING, State.COMPLETED]
+
+
+@pytest.mark.parametrize("look", [experiments.read_experiment, experiments.cancel_experiment, experiments.read_study])
+@pytest.mark.parametrize("name", ["no-such", "", "nul\0", "ü" * 1000, "'; DROP TABLE study; --"])
+def test_an_unknown_id_is_not_found_and_the_message_names_it(store, look, name):
+    with pytest.raises(NotFound) as caught:
+        look(store, name)
+
+    assert repr(name) in str(caught.value)
+
+
+@pytest.mark.parametrize("look", [experiments.list_repetitions, experiments.list_samples, experiments.list_simulators])
+def test_the_results_of_an_unknown_experiment_are_not_found(store, look):
+    with pytest.raises(NotFound, match="no-such"):
+        look(store, "no-such")
+
+
+def test_pages_have_every_experiment_once_newest_first_whatever_is_submitted_meanwhile(store):
+    study = experiments.submit_study(store, small_study())
+    alone = experiments.submit_experiment(store, toy())
+
+    first = experiments.list_experiments(store, limit=3)
+    experiments.submit_experiment(store, toy())
+    second = experiments.list_experiments(store, limit=3, cursor=first.next)
+    third = experiments.list_experiments(store, limit=3, cursor=second.next)
+
+    listed = [each.id for page in (first, second, third) for each in page.items]
+    assert listed == [alone.id, *(each.id for each in reversed(study.experiments))]
+    assert third.next is None
+
+
+def test_pages_of_studies_have_every_study_once_newest_first(store):
+    submitted = [experiments.submit_study(store, small_study(name=str(number))) for number in range(5)]
+
+    found, pages = every_page(lambda **page: experiments.list_studies(store, limit=2, **page))
+
+    assert found == submitted[::-1]
+    assert pages == 3
+
+
+def test_a_list_is_filtered_by_study_state_and_strategy(store):
+    study = experiments.submit_study(store, small_study())
+    alone = experiments.submit_experiment(store, toy())
+    experiments.cancel_experiment(store, alone.id)
+
+    def found(**filters):
+        return {each.id for each in experiments.list_experiments(store, **filters).items}
+
+    assert found(study=study.id) == {each.id for each in study.experiments}
+    assert found(state=State.CANCELLED) == {alone.id}
+    assert found(strategy="simulated_fit") == {alone.id, study.experiments[0].id}
+    assert found(strategy="simulated_fit", study=study.id) == {study.experiments[0].id}
+    assert found(strategy="no\0such") == found(study="no-such") == set()
+
+
+@pytest.mark.parametrize("cursor", ["", "x", "ü", "W10", "WzEsMiwzXQ", "WyIyMDI2LTAxLTAxIiwgMSwgMV0", "W" * 100_000])
+@pytest.mark.parametrize("listed", ["experiments", "studies", "samples", "simulators"])
+def test_a_cursor_that_no_page_gave_is_refused(store, listed, cursor):
+    experiment = experiments.submit_experiment(store, toy()).id
+    pages = {
+        "experiments": lambda: experiments.list_experiments(store, cursor=cursor),
+        "studies": lambda: experiments.list_studies(store, cursor=cursor),
+        "samples": lambda: experiments.list_samples(store, experiment, cursor=cursor + "a"),
+        "simulators": lambda: experiments.list_simulators(store, experiment, cursor=cursor + "a"),
+    }
+
+    with pytest.raises(InvalidSpec) as caught:
+        pages[listed]()
+
+    assert [each.pointer for each in caught.value.violations] == ["cursor"]
+
+
+def test_a_list_takes_as_many_queries_for_many_as_for_one(store):
+    counted = []
+    event.listen(store._engine, "before_cursor_execute", lambda *details: counted.append(details[2]))
+
+    def queries():
+        counted.clear()
+        experiments.list_studies(store)
+        experiments.list_experiments(store)
+        return len(counted)
+
+    experiments.submit_study(store, small_study(strategies=["simulated_fit"]))
+    one = queries()
+    for _ in range(5):
+        experiments.submit_study(store, small_study())
+
+    assert queries() == one
+
+
+def test_samples_and_probes_are_rows_in_the_order_of_the_log(store):
+    experiment = experiments.submit_experiment(store, toy()).id
+    for claim in execution.claim(store, "me", 2):
+        run(store, claim)
+
+    page = experiments.list_samples(store, experiment)
+
+    sample, probe = MeasurementKind.SAMPLE, MeasurementKind.PROBE
+    kinds = [(0, probe), (1, sample), (1, probe), (2, sample), (2, probe)]
+    assert [(each.repetition, each.iteration, each.kind) for each in page.items] == [
+        (repetition, *each) for repetition in range(2) for each in kinds
+    ]
+    assert [each.fitness for each in page.items[:5]] == [1.0, None, None, 1 / 3, 1.0]
+    assert page.items[1].genome == AWKWARD
+    assert page.items[0].genome == AWKWARD[::-1]
+    assert {each.measured_by for each in page.items} == {"analytic"}
+    assert page.next is None
+
+
+def test_samples_and_simulators_are_filtered_and_paged(store):
+    experiment = experiments.submit_experiment(store, toy()).id
+    for claim in execution.claim(store, "me", 3):
+        run(store, claim)
+
+    samples, pages = every_page(
+        lambda **page: experiments.list_samples(store, experiment, kind=MeasurementKind.SAMPLE, limit=4, **page)
+    )
+    every, _ = every_page(lambda **page: experiments.list_samples(store, experiment, limit=4, **page))
+    of_one = experiments.list_samples(store, experiment, repetition=1).items
+    simulators, _ = every_page(lambda **page: experiments.list_simulators(store, experiment, limit=4, **page))
+    of_iteration = experiments.list_simulators(store, experiment, repetition=2, iteration=1).items
+
+    assert (len(samples), pages) == (6, 2)
+    assert tuple(every) == experiments.list_samples(store, experiment).items
+    assert [each for each in every if each.repetition == 1] == list(of_one)
+    assert [(each.repetition, each.iteration, each.rank) for each in simulators] == [
+        (repetition, iteration, rank) for repetition in range(3) for iteration in range(3) for rank in range(2)
+    ]
+    assert [each.squared_error for each in of_iteration] == [1e-300, None]
+    assert of_iteration[0].parameters == {"static_friction": 0.1, "dynamic_friction": 1 / 3}
+
+
+def test_realitys_parameters_are_shown_only_after_the_end(store):
+    spec = toy(repetitions=1, reality={"parameters": {"static_friction": SECRET}})
+    experiment = experiments.submit_experiment(store, spec).id
+    before = experiments.read_experiment(store, experiment)
+    (claim,) = execution.claim(store, "me", 1)
+    while_running = experiments.list_experiments(store).items[0]
+
+    run(store, claim)
+
+    after = experiments.read_experiment(store, experiment)
+    for found in (before, while_running):
+        assert found.spec["reality"]["parameters"] == {"static_friction": None, "dynamic_friction": None}
+        assert str(SECRET) not in found.model_dump_json()
+    assert after.spec["reality"]["parameters"] == {"static_friction": SECRET, "dynamic_friction": 0.8}
+
+
+def test_realitys_parameters_are_hidden_while_any_experiment_of_the_study_can_learn_them(store):
+    spec = small_study(strategies=["random", "simulated_fit"], reality={"parameters": {"static_friction": SECRET}})
+    study = experiments.submit_study(store, spec)
+    first, second = study.experiments
+
+    experiments.cancel_experiment(store, first.id)
+    meanwhile = experiments.read_study(store, study.id)
+    experiments.cancel_experiment(store, second.id)
+
+    assert str(SECRET) not in study.model_dump_json() + meanwhile.model_dump_json()
+    assert str(SECRET) not in experiments.list_experiments(store, state=State.QUEUED).model_dump_json()
+    assert experiments.read_experiment(store, first.id).spec["reality"]["parameters"]["static_friction"] == SECRET
+
+
+def test_a_queued_experiment_can_be_cancelled_once(store):
+    experiment = experiments.submit_experiment(store, toy()).id
+
+    cancelled = experiments.cancel_experiment(store, experiment)
+
+    assert (cancelled.state, cancelled.started_at) == (State.CANCELLED, None)
+    assert cancelled.ended_at is not None
+    assert cancelled.progress.seconds_left == 0
+    assert cancelled == experiments.read_experiment(store, experiment)
+    with pytest.raises(Conflict, match="CANCELLED"):
+        experiments.cancel_experiment(store, experiment)
+
+
+def test_what_has_ended_cannot_be_cancelled(store):
+    experiment = experiments.submit_experiment(store, toy()).id
+    finish_all(store)
+
+    with pytest.raises(Conflict, match="COMPLETED"):
+        experiments.cancel_experiment(store, experiment)
+
+
+def test_repetitions_tell_how_far_they_are(store):
+    experiment = experiments.submit_experiment(store, toy()).id
+    first, second = execution.claim(store, "me", 2)
+    run(store, first)
+    execution.fail(store, second, "the code raised")
+
+    found = experiments.list_repetitions(store, experiment)
+
+    assert [each.number for each in found] == [0, 1, 2]
+    assert [each.state for each in found] == [State.COMPLETED, State.FAILED, State.QUEUED]
+    assert [each.iterations_done for each in found] == [3, 0, 0]
+    assert [each.attempts for each in found] == [1, 1, 0]
+    assert [each.error for each in found] == [None, "the code raised", None]

@@ -1,0 +1,247 @@
+"""What the store promises about transactions and trouble."""
+
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from threading import Barrier
+
+import psycopg
+import pytest
+from sqlalchemy import event, text
+
+import migrations
+from services import execution, experiments
+from services.core.errors import StoreUnavailable
+from services.store.repository.experiments import lock
+from services.store.session import Store
+from tests.experiments import same, some_log, toy
+
+
+class Killed(Exception):
+    """Stands for the end of the process."""
+
+
+def log_of(store):
+    """The log of the only repetition, and a new claim of it."""
+    execution.requeue_lost(store, stale_after_s=0)
+    (claim,) = execution.claim(store, "again", 1)
+    return claim
+
+
+@pytest.mark.parametrize("steps", range(1, 6))
+def test_a_kill_between_any_two_statements_leaves_nothing_half_written(store, steps):
+    experiments.submit_experiment(store, toy(repetitions=1))
+    (claim,) = execution.claim(store, "me", 1)
+    log = list(some_log())[: steps + 3]
+    for step in log[:-1]:
+        execution.record(store, claim, step)
+    outcomes = []
+
+    for count in range(5):
+        with KilledAtStatement(store, count) as killed:
+            outcomes.append(record_or_die(store, claim, log[-1]))
+        if not killed:
+            break
+        claim = log_of(store)
+        assert same(claim.log, tuple(log[:-1]))
+
+    assert outcomes[0] == "killed"
+    assert outcomes[-1] == "recorded"
+    assert same(log_of(store).log, tuple(log))
+
+
+class KilledAtStatement:
+    """Raises at the statement of that number, and says whether it did."""
+
+    def __init__(self, store, number):
+        self.engine, self.left, self.hits = store._engine, number, []
+
+    def __enter__(self):
+        event.listen(self.engine, "before_cursor_execute", self.strike)
+        return self.hits
+
+    def __exit__(self, *error):
+        event.remove(self.engine, "before_cursor_execute", self.strike)
+
+    def strike(self, connection, cursor, statement, *rest):
+        if statement.startswith(("BEGIN", "SELECT 1")):
+            return
+        if self.left == 0:
+            self.hits.append(statement)
+            raise Killed
+        self.left -= 1
+
+
+def record_or_die(store, claim, step):
+    try:
+        execution.record(store, claim, step)
+    except Killed:
+        return "killed"
+    return "recorded"
+
+
+CHILD = """
+import sys
+from services import execution
+from services.store.session import Store
+from tests.experiments import some_log
+store = Store(sys.argv[1])
+(claim,) = execution.claim(store, "child", 1)
+for count, step in enumerate(some_log(30), start=1):
+    execution.record(store, claim, step)
+    print(count, flush=True)
+"""
+
+
+def test_what_was_acknowledged_survives_kill_9(sqlite_url, sqlite_store):
+    experiments.submit_experiment(sqlite_store, toy(repetitions=1, iterations=30))
+    root = Path(__file__).parents[2]
+
+    with subprocess.Popen([sys.executable, "-c", CHILD, sqlite_url], stdout=subprocess.PIPE, cwd=root) as child:
+        acknowledged = [int(child.stdout.readline()) for _ in range(20)][-1]
+        child.kill()
+
+    log = log_of(sqlite_store).log
+    assert len(log) >= acknowledged
+    assert same(log, tuple(some_log(30))[: len(log)])
+
+
+def test_a_commit_whose_answer_was_lost_is_delivered_again_without_harm(store):
+    experiments.submit_experiment(store, toy(repetitions=1))
+    (claim,) = execution.claim(store, "me", 1)
+    first, *_ = some_log()
+
+    def lose_the_answer(session):
+        raise Killed
+
+    event.listen(store._writer, "after_commit", lose_the_answer)
+    with pytest.raises(Killed):
+        execution.record(store, claim, first)
+    event.remove(store._writer, "after_commit", lose_the_answer)
+
+    assert execution.record(store, claim, first)
+    assert same(log_of(store).log, (first,))
+
+
+def test_writers_wait_for_each_other(store):
+    experiment = experiments.submit_experiment(store, toy()).id
+
+    def rename(number):
+        with store.transaction() as session:
+            session.execute(text("SELECT name FROM experiment"))
+            session.execute(text("UPDATE experiment SET position = position + 1 WHERE id = :id"), {"id": experiment})
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(rename, range(24)))
+
+    with store.reading() as session:
+        assert session.scalar(text("SELECT position FROM experiment")) == 24
+
+
+def test_a_read_sees_one_moment(postgres_store):
+    with postgres_store.reading() as session:
+        before = session.scalar(text("SELECT count(*) FROM experiment"))
+        experiments.submit_experiment(postgres_store, toy())
+        after = session.scalar(text("SELECT count(*) FROM experiment"))
+
+    assert before == after == 0
+
+
+def test_a_deadlock_is_tried_again(postgres_store):
+    ids = [experiments.submit_experiment(postgres_store, toy()).id for _ in range(2)]
+    together, attempts = Barrier(2), []
+
+    def lock_both(order):
+        def work(session):
+            first_time = order not in attempts
+            attempts.append(order)
+            lock(session, [order[0]])
+            if first_time:
+                together.wait(timeout=10)
+            lock(session, [order[1]])
+            return order
+
+        return postgres_store.write(work)
+
+    orders = [tuple(ids), tuple(reversed(ids))]
+    with ThreadPoolExecutor(2) as pool:
+        done = list(pool.map(lock_both, orders))
+
+    assert done == orders
+    assert len(attempts) == 3
+
+
+def test_the_store_recovers_from_lost_connections(postgres_store):
+    experiments.submit_experiment(postgres_store, toy())
+    url = postgres_store._engine.url.set(drivername="postgresql").render_as_string(hide_password=False)
+
+    with psycopg.connect(url, autocommit=True) as connection:
+        connection.execute("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> pg_backend_pid()")
+
+    assert len(experiments.list_experiments(postgres_store).items) == 1
+
+
+def test_a_connection_lost_in_the_midst_is_unavailability(postgres_store):
+    with pytest.raises(StoreUnavailable, match="cannot be used now"), postgres_store.transaction() as session:
+        session.execute(text("SELECT pg_terminate_backend(pg_backend_pid())"))
+
+
+def test_an_unreachable_database_is_unavailable_and_recovers_by_itself(tmp_path):
+    folder = tmp_path / "not-yet"
+    url = f"sqlite:///{folder / 'gaplab.db'}"
+    store = Store(url)
+
+    with pytest.raises(StoreUnavailable, match="cannot be used now"):
+        experiments.submit_experiment(store, toy())
+    folder.mkdir()
+    migrations.upgrade(url)
+
+    assert experiments.submit_experiment(store, toy()).id
+    store.dispose()
+
+
+@pytest.mark.parametrize("use", [Store.check, experiments.list_studies, lambda store: execution.claim(store, "me", 1)])
+def test_an_unreachable_server_is_unavailable_and_the_message_has_no_password(use):
+    store = Store("postgresql://me:secret@127.0.0.1:1/none")
+
+    with pytest.raises(StoreUnavailable) as caught:
+        use(store)
+
+    assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize("use", [Store.check, experiments.list_studies, lambda store: execution.claim(store, "me", 1)])
+def test_a_database_without_the_schema_is_unavailable(database_url, use):
+    store = Store(database_url)
+
+    with pytest.raises(StoreUnavailable):
+        use(store)
+
+    store.dispose()
+
+
+def test_a_file_that_is_no_database_is_unavailable(tmp_path):
+    file = tmp_path / "gaplab.db"
+    file.write_text("no database " * 1000)
+    store = Store(f"sqlite:///{file}")
+
+    with pytest.raises(StoreUnavailable):
+        store.check()
+
+    store.dispose()
+
+
+@pytest.mark.parametrize("url", ["nonsense", "mysql://me@host/db", ""])
+def test_a_url_of_no_known_database_is_refused(url):
+    with pytest.raises(StoreUnavailable):
+        Store(url)
+
+
+def test_sqlite_is_set_to_lose_nothing(sqlite_store):
+    with sqlite_store.reading() as session:
+        found = {
+            name: session.scalar(text(f"PRAGMA {name}")) for name in ("synchronous", "foreign_keys", "busy_timeout")
+        }
+
+    assert found == {"synchronous": 2, "foreign_keys": 1, "busy_timeout": 30_000}
