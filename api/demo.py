@@ -1,0 +1,184 @@
+"""The main job on small budgets, through the real service: what `gaplab demo` and `make demo` run.
+
+It starts the service on a free port of this machine, with a database in a folder, and submits two studies over HTTP:
+the toy function at the paper's protocol, then the walking quadruped. Killed and run again in the same folder, it goes
+on where it was; run again after it has finished, it starts anew beside the old results.
+"""
+
+import json
+import signal
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+
+from api import display
+from api.client import Client, ServiceError
+from api.exits import CommandError, Exit
+from api.findings import findings
+from api.launch import end, start
+from api.watch import follow
+from schemas.lifecycle import State
+from schemas.records import StudyRead
+
+SPECS = Path(__file__).parent.parent / "examples"
+STUDIES = ("toy", "quadruped")
+START_WITHIN_S = 120.0
+
+
+def run(folder: Path, console: Console) -> None:
+    """Run both studies, and say where everything is.
+
+    Args:
+        folder: gets the database, the figures and the service's log; made if it is not there.
+        console: to show progress and results on.
+
+    Raises:
+        CommandError: the service does not start, a study fails, or a person interrupts.
+    """
+    specs = {name: _spec(name) for name in STUDIES}
+    folder.mkdir(parents=True, exist_ok=True)
+    began = time.monotonic()
+    try:
+        with _interruptible(), _service(folder, console) as client:
+            for name, spec in specs.items():
+                _run_study(name, spec, client, folder, console)
+    except KeyboardInterrupt:
+        msg = f"interrupted; all that was measured is kept, and `gaplab demo --folder {folder}` goes on with it"
+        raise CommandError(msg, Exit.INTERRUPTED) from None
+    (folder / "demo.json").unlink()
+    _say_where(folder, console, time.monotonic() - began)
+
+
+def _run_study(name: str, spec: dict[str, object], client: Client, folder: Path, console: Console) -> None:
+    study = _resumed(name, spec, client, folder)
+    if study:
+        console.print(f"\n[bold]{name}[/]: going on with study {study.id} of an earlier run")
+    else:
+        study = study_of(client.submit(spec))
+        _remember(folder, name, spec, study.id)
+        console.print(f"\n[bold]{name}[/]: POST /studies → 202, study {study.id}")
+    ended = follow(client.watch(study.id, every_s=0.5), console)
+    if ended.state is not State.COMPLETED:
+        reasons = {reason for each in study_of(ended).experiments for reason in each.reasons}
+        msg = f"the study {name} ended as {ended.state}: {'; '.join(sorted(reasons)) or 'called off'}"
+        raise CommandError(msg, Exit.FAILED)
+    console.print(f"{name}: {display.numbers(ended.progress)}")
+    _show(name, study_of(ended), client, folder, console)
+
+
+def study_of(found: object) -> StudyRead:
+    """What is known to be a study, as one."""
+    assert isinstance(found, StudyRead)
+    return found
+
+
+def _show(name: str, study: StudyRead, client: Client, folder: Path, console: Console) -> None:
+    curves = client.curves([study.id])
+    console.print(f"\nRecorded fitness in reality ({curves[0].unit}), mean ± SD over repetitions")
+    console.print(display.curves(curves), *display.baselines(curves))
+    for line in findings(client, curves):
+        console.print(escape(line))
+    for kind in ("html", "svg"):
+        (folder / f"{name}.{kind}").write_text(client.figure([study.id], kind), "utf-8")
+    console.print(f"Figure: {escape(str(folder / name))}.html and .svg")
+
+
+def _say_where(folder: Path, console: Console, seconds: float) -> None:
+    minutes, rest = divmod(round(seconds), 60)
+    console.print(f"\nDone in {minutes} min {rest} s; the service has ended. Everything is in {folder}/: look at")
+    for name in STUDIES:
+        console.print(f"  {escape(str(folder / name))}.html", style="bold")
+    console.print("Start the service on the same database, and ask it anything:")
+    console.print(f"  GAPLAB_DATABASE_URL={_database(folder)} gaplab serve", style="bold")
+    console.print("  gaplab list; gaplab curve ID; http://127.0.0.1:8000/docs", style="bold")
+
+
+@contextmanager
+def _service(folder: Path, console: Console) -> Iterator[Client]:
+    """The real service as a process of its own, ended in order at the end."""
+    port, log = _free_port(), folder / "service.log"
+    environment = {"GAPLAB_DATABASE_URL": _database(folder), "GAPLAB_PORT": str(port), "GAPLAB_HOST": "127.0.0.1"}
+    with log.open("ab") as output:
+        process = start("api.cli", "serve", environment=environment, log=output)
+        try:
+            with Client(f"http://127.0.0.1:{port}") as client:
+                deadline = time.monotonic() + START_WITHIN_S
+                while not client.ready():
+                    if process.poll() is not None or time.monotonic() > deadline:
+                        msg = f"the service does not start: {_last_line(log)} ({log} says more)"
+                        raise CommandError(msg, Exit.FAILED)
+                    time.sleep(0.2)
+                console.print(f"Service: {client.url}, database {_database(folder)}, log {log}", highlight=False)
+                yield client
+        finally:
+            end(process)
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let SIGTERM end the demo as Ctrl-C does: in order."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _spec(name: str) -> dict[str, object]:
+    path = SPECS / f"{name}.json"
+    if not path.is_file():
+        msg = f"{path} is not there; the demo runs from a clone of the repository"
+        raise CommandError(msg, Exit.FILE)
+    spec: dict[str, object] = json.loads(path.read_text("utf-8"))
+    return spec
+
+
+def _remembered(folder: Path) -> dict[str, dict[str, object]]:
+    notes = folder / "demo.json"
+    try:
+        found: dict[str, dict[str, object]] = json.loads(notes.read_text("utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found
+
+
+def _remember(folder: Path, name: str, spec: dict[str, object], id: str) -> None:  # noqa: A002 - as the API says
+    notes = _remembered(folder) | {name: {"study": id, "spec": spec}}
+    (folder / "demo.json").write_text(json.dumps(notes), "utf-8")
+
+
+def _resumed(name: str, spec: dict[str, object], client: Client, folder: Path) -> StudyRead | None:
+    """The study that an earlier run in this folder submitted with the same spec, unless it failed or is gone."""
+    note = _remembered(folder).get(name, {})
+    if note.get("spec") != spec:
+        return None
+    try:
+        study = client.study(str(note["study"]))
+    except ServiceError:
+        return None
+    return study if study.state not in {State.FAILED, State.CANCELLED} else None
+
+
+def _database(folder: Path) -> str:
+    return f"sqlite:///{folder / 'gaplab.db'}"
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+    return port
+
+
+def _last_line(log: Path) -> str:
+    lines = log.read_text("utf-8", "replace").strip().splitlines()
+    return lines[-1] if lines else "it says nothing"
