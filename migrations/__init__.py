@@ -4,8 +4,11 @@ from pathlib import Path
 
 from alembic import command
 from alembic.config import Config
+from alembic.util import CommandError
 from sqlalchemy import Connection, text
 
+from services.core.errors import StoreUnavailable
+from services.store import troubles
 from services.store.engine import WRITES, open_engine
 
 _LOCK = 0x6761706C6162
@@ -25,14 +28,17 @@ def upgrade(url: str) -> None:
     At head it changes nothing.
 
     Raises:
-        SQLAlchemyError: the database is unreachable, or its data stand in the way; nothing was changed.
-        StoreUnavailable: no such kind of database.
+        StoreUnavailable: no such kind of database, unreachable, or at a revision of a later version; nothing was
+            changed.
     """
     engine = open_engine(url, enforce_foreign_keys=False)
     try:
-        with engine.execution_options(**{WRITES: True}).begin() as connection:
+        with troubles.named(), engine.execution_options(**{WRITES: True}).begin() as connection:
             if connection.dialect.name == "postgresql":
                 connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
             command.upgrade(configuration(connection), "head")
+    except CommandError as error:
+        msg = f"the database cannot be migrated by this version: {error}"
+        raise StoreUnavailable(msg) from error
     finally:
         engine.dispose()

@@ -1,7 +1,19 @@
 """`python -m migrations`: bring the database of `GAPLAB_DATABASE_URL` to the revision that this version needs."""
 
+import sys
+
 from migrations import upgrade
+from services.core.errors import StoreUnavailable
 from services.settings import Settings
 
+
+def main() -> None:
+    """Migrate; where that cannot be, say why in one sentence and exit with 1."""
+    try:
+        upgrade(Settings.from_environment().database_url)
+    except StoreUnavailable as error:
+        sys.exit(str(error))
+
+
 if __name__ == "__main__":
-    upgrade(Settings.from_environment().database_url)
+    main()

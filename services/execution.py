@@ -105,6 +105,14 @@ def release(store: Store, claim: Claim, reason: str) -> bool:
     return store.write(lambda session: leases.release(session, claim, reason))
 
 
+def hand_back(store: Store, claim: Claim) -> bool:
+    """The holder stops in good order: the repetition is QUEUED again, as if it had not been claimed, but for its log.
+
+    False if the claim holds no more.
+    """
+    return store.write(lambda session: leases.hand_back(session, claim))
+
+
 def requeue_lost(store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:
     """QUEUE again, as `release` does, repetitions whose holder was not heard of for so long; how many there were."""
     return store.write(lambda session: leases.requeue_lost(session, timedelta(seconds=stale_after_s)))

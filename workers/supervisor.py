@@ -180,7 +180,7 @@ class Supervisor:
     def _hand_back(self) -> None:
         for run in self._runs:
             try:
-                execution.release(self._store, run.claim, "the supervisor was stopped")
+                execution.hand_back(self._store, run.claim)
             except StoreUnavailable as error:
                 log.warning("%s: its lease will run out: %s", run.name, error)
         self._runs = []

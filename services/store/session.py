@@ -1,4 +1,4 @@
-"""The store: transactions on one database, and the one place where its troubles become `StoreUnavailable`."""
+"""The store: transactions on one database."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -6,21 +6,15 @@ from contextlib import contextmanager
 from typing import TypeVar
 
 from sqlalchemy import text
-from sqlalchemy.exc import DatabaseError, DBAPIError, InterfaceError, OperationalError
-from sqlalchemy.exc import TimeoutError as PoolExhausted
+from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session, sessionmaker
 
 from services.core.errors import StoreUnavailable
+from services.store import troubles
 from services.store.engine import WRITES, open_engine
 from services.store.models import REVISION
 
 T = TypeVar("T")
-
-_CLASHES = {"40001", "40P01"}
-"""Postgres gave up one of two transactions for the other: serialization failure, deadlock."""
-
-_NO_SCHEMA = {"42P01", "42703"}
-"""Postgres knows no such table, or no such column."""
 
 _TRIES = 5
 
@@ -44,7 +38,7 @@ class Store:
         Raises:
             StoreUnavailable: the database cannot be used now.
         """
-        with _troubles_named(), self._writer.begin() as session:
+        with troubles.named(), self._writer.begin() as session:
             yield session
 
     @contextmanager
@@ -54,7 +48,7 @@ class Store:
         Raises:
             StoreUnavailable: the database cannot be used now.
         """
-        with _troubles_named(), self._reader.begin() as session:
+        with troubles.named(), self._reader.begin() as session:
             yield session
 
     def write(self, work: Callable[[Session], T]) -> T:
@@ -63,16 +57,17 @@ class Store:
         Raises:
             StoreUnavailable: the database cannot be used now.
         """
-        for attempt in range(_TRIES):
+        for attempt in range(1, _TRIES):
             try:
                 with self._writer.begin() as session:
                     return work(session)
             except DBAPIError as error:
-                if _sqlstate(error) not in _CLASHES or attempt == _TRIES - 1:
-                    with _troubles_named():
+                if not troubles.is_clash(error):
+                    with troubles.named():
                         raise
             time.sleep(0.01 * 2**attempt)
-        raise AssertionError
+        with self.transaction() as session:
+            return work(session)
 
     def check(self) -> None:
         """Do nothing if the database is there and its schema is the one this version needs.
@@ -90,28 +85,3 @@ class Store:
     def dispose(self) -> None:
         """Close the idle connections; the store may be used again."""
         self._engine.dispose()
-
-
-@contextmanager
-def _troubles_named() -> Iterator[None]:
-    try:
-        yield
-    except PoolExhausted as error:
-        msg = "all connections to the database are in use"
-        raise StoreUnavailable(msg) from error
-    except DBAPIError as error:
-        if _sqlstate(error) in _NO_SCHEMA or "no such table: alembic_version" in str(error.orig):
-            msg = "the database has not the schema of this version: run `python -m migrations`"
-            raise StoreUnavailable(msg) from error
-        if isinstance(error, OperationalError | InterfaceError) or type(error) is DatabaseError:
-            msg = f"the database cannot be used now: {_first_line(error)}"
-            raise StoreUnavailable(msg) from error
-        raise
-
-
-def _sqlstate(error: DBAPIError) -> str | None:
-    return getattr(error.orig, "sqlstate", None)
-
-
-def _first_line(error: DBAPIError) -> str:
-    return (str(error.orig).splitlines() or [type(error.orig).__name__])[0]

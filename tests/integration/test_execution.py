@@ -178,6 +178,18 @@ def test_a_repetition_that_gets_on_may_be_lost_any_number_of_times(store):
     assert execution.complete(store, claim)
 
 
+def test_a_repetition_may_be_handed_back_any_number_of_times(store):
+    experiment = experiments.submit_experiment(store, toy(repetitions=1)).id
+
+    for _ in range(MAX_LOSSES + 1):
+        (claim,) = execution.claim(store, "me", 1)
+        assert execution.hand_back(store, claim)
+
+    (found,) = experiments.list_repetitions(store, experiment)
+    assert (found.state, found.attempts, found.error) == (State.QUEUED, 0, None)
+    assert not execution.hand_back(store, claim)
+
+
 def test_the_experiment_is_completed_with_its_last_repetition(store):
     submitted = experiments.submit_experiment(store, toy(repetitions=3))
     claims = execution.claim(store, "me", 3)

@@ -1,6 +1,10 @@
 """The schema's history, on both databases."""
 
+import os
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 from alembic import command
@@ -85,6 +89,36 @@ def test_two_processes_that_upgrade_at_once_wait_for_each_other(database_url):
     store = Store(database_url)
     store.check()
     store.dispose()
+
+
+def test_a_database_of_a_later_version_is_left_as_it_is(store_url):
+    engine = open_engine(store_url).execution_options(**{WRITES: True})
+    with engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE alembic_version SET version_num = 'future'")
+
+    with pytest.raises(StoreUnavailable, match="future"):
+        migrations.upgrade(store_url)
+
+    with engine.connect() as connection:
+        assert tables(connection) == set(Base.metadata.tables)
+    engine.dispose()
+
+
+@pytest.mark.parametrize("place", ["sqlite:////no/such/folder/gaplab.db", "postgresql://me:secret@127.0.0.1:1/none"])
+def test_migrating_an_unreachable_database_is_refused_in_one_sentence(place):
+    run = subprocess.run(
+        [sys.executable, "-m", "migrations"],
+        env=os.environ | {"GAPLAB_DATABASE_URL": place},
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+    assert run.returncode == 1
+    assert run.stderr.startswith("the database cannot be used now")
+    assert run.stderr.count("\n") == 1
+    assert "secret" not in run.stderr
 
 
 def test_a_store_whose_schema_is_missing_is_unavailable_and_says_what_to_do(database_url):

@@ -29,6 +29,8 @@ _OPEN = (State.QUEUED, State.RUNNING)
 def claim(session: Session, owner: str, limit: int) -> tuple[Claim, ...]:
     """Up to `limit` queued repetitions, of the oldest experiments first; RUNNING from now on, and the owner's."""
     experiments = _oldest_with_queued(session, limit)
+    if not experiments:
+        return ()
     lock(session, experiments)
     row = RepetitionRow
     queued = (
@@ -98,6 +100,14 @@ def release(session: Session, claim: Claim, reason: str) -> bool:
     """The repetition QUEUED again, for its worker was lost; False if the claim holds no more."""
     lock(session, [claim.experiment_id])
     return bool(_give_back(session, mine(claim), [claim.experiment_id], _plain(reason)))
+
+
+def hand_back(session: Session, claim: Claim) -> bool:
+    """The repetition QUEUED again as if it had not been claimed; False if the claim holds no more."""
+    lock(session, [claim.experiment_id])
+    row = RepetitionRow
+    values = {"state": State.QUEUED, "owner": None, "attempts": row.attempts - 1}
+    return session.execute(update(row).where(mine(claim)).values(values).returning(row.id)).first() is not None
 
 
 def requeue_lost(session: Session, stale_after: timedelta) -> int:
