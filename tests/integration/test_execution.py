@@ -7,7 +7,9 @@ import pytest
 from schemas.lifecycle import State
 from services import execution, experiments
 from services.core.errors import Conflict
+from services.core.loop import repetition
 from services.core.types import Cost
+from services.simulation import setting
 from services.store.repository.leases import MAX_LOSSES
 from tests.experiments import run, same, some_log, toy
 
@@ -307,3 +309,30 @@ def test_nothing_is_left_to_do_at_the_end(store):
     run(store, claim)
 
     assert experiments.read_experiment(store, submitted.id).progress.seconds_left == 0
+
+
+@pytest.mark.parametrize("strategy", ["simulated_fit_and_informative", "known_fit", "direct"])
+def test_a_repetition_killed_after_every_step_ends_as_one_that_never_stopped(store, strategy):
+    experiments.submit_experiment(store, toy(strategy=strategy, repetitions=1))
+    claim, steps = execution.claim(store, "me", 1)[0], []
+
+    while (step := next(repetition(setting(claim.spec, claim.number), claim.log), None)) is not None:
+        steps.append(step)
+        assert execution.record(store, claim, step)
+        execution.release(store, claim, "killed")
+        (claim,) = execution.claim(store, "me", 1)
+
+    assert execution.complete(store, claim)
+    assert same(tuple(repetition(setting(claim.spec, claim.number))), claim.log)
+    assert same(tuple(steps), claim.log)
+
+
+def test_the_expected_rollouts_are_those_that_a_repetition_takes(store):
+    for strategy in ("simulated_fit_and_informative", "known_fit", "direct"):
+        experiments.submit_experiment(store, toy(strategy=strategy, repetitions=1))
+    for claim in execution.claim(store, "me", 3):
+        run(store, claim, repetition(setting(claim.spec, claim.number)))
+
+    found = experiments.list_experiments(store).items
+
+    assert [each.progress.rollouts_done for each in found] == [each.progress.rollouts for each in found]

@@ -24,7 +24,10 @@ ARROWS = {
         ("schemas", "services", "api", "migrations"),
         {"fastapi", "starlette", "uvicorn", "typer", "rich", "httpx2", "pydantic", "fastapi_offline"},
     ),
-    "migrations": (("services.core.errors", "services.settings", "services.store", "migrations"), {"alembic", "sqlalchemy"}),
+    "migrations": (
+        ("services.core.errors", "services.settings", "services.store", "migrations"),
+        {"alembic", "sqlalchemy"},
+    ),
 }
 IMPURE = {"os", "time", "datetime", "random", "threading", "logging", "pickle", "secrets", "uuid", "io", "socket"}
 
