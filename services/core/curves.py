@@ -1,5 +1,7 @@
 """Recorded fitness of many repetitions -> the points of a curve."""
 
+from functools import lru_cache
+
 import numpy as np
 from scipy import stats
 
@@ -45,5 +47,11 @@ def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
 def _interval(mean: float | None, sd: float | None, n: int) -> tuple[float | None, float | None]:
     if mean is None or sd is None:
         return None, None
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * sd / n**0.5
+    half = _quantile(n - 1) * sd / n**0.5
     return mean - half, mean + half
+
+
+@lru_cache(maxsize=1024)
+def _quantile(degrees_of_freedom: int) -> float:
+    """Of Student's t, for the interval on both sides; kept, for it takes longer than all else in a curve."""
+    return float(stats.t.ppf(0.5 + CONFIDENCE / 2, degrees_of_freedom))
