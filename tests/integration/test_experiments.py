@@ -54,6 +54,14 @@ def test_an_experiment_without_a_name_has_that_of_its_strategy(store):
     assert submitted.name == "simulated_fit"
 
 
+def test_a_name_may_have_any_character(store):
+    experiment = experiments.submit_experiment(store, toy(name="nul\0 ü 漢 🤖"))
+    study = experiments.submit_study(store, small_study(name="'\0'"))
+
+    assert experiments.read_experiment(store, experiment.id).name == "nul\ufffd ü 漢 🤖"
+    assert experiments.read_study(store, study.id).name == "'\ufffd'"
+
+
 def test_an_invalid_spec_stores_nothing(store):
     with pytest.raises(InvalidSpec):
         experiments.submit_study(store, small_study(strategies=["random", "no_such"]))

@@ -40,7 +40,7 @@ def new_id() -> str:
 
 def insert_study(session: Session, name: str) -> StudyRow:
     """A study without experiments yet."""
-    study = StudyRow(id=new_id(), name=name, created_at=_moment(session))
+    study = StudyRow(id=new_id(), name=_plain(name), created_at=_moment(session))
     session.add(study)
     session.flush()
     return study
@@ -62,7 +62,7 @@ def insert_experiment(
         id=new_id(),
         study_id=study.id if study else None,
         position=position,
-        name=spec.name or spec.strategy.name,
+        name=_plain(spec.name or spec.strategy.name),
         strategy=spec.strategy.name,
         spec=spec.model_dump(mode="json"),
         iterations=extent.iterations,
@@ -204,7 +204,7 @@ T = TypeVar("T", str, str | None)
 
 
 def _plain(text: T) -> T:
-    """The text without the NULs that Postgres would refuse, so that it is a name like any other that is not there."""
+    """The text without the NULs that Postgres refuses: to look for, a name like any other that is not there."""
     return text.replace("\0", "\N{REPLACEMENT CHARACTER}") if text else text
 
 
