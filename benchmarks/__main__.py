@@ -1,0 +1,41 @@
+"""`python -m benchmarks`: the table of speeds. Absolute numbers are this machine's; the ratios are what counts."""
+
+import argparse
+import os
+import platform
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks import curves, overhead, physics, service
+from benchmarks.measure import Row
+
+
+def main() -> None:
+    """Measure everything, and print one table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=5, help="turns that the rivals of a ratio take")
+    rounds = parser.parse_args().rounds
+    console = Console()
+    table = Table(title=f"gaplab on {os.cpu_count()} cores of {platform.machine()}, Python {platform.python_version()}")
+    for column in ("figure", "value", "ratio", "to", "aim"):
+        table.add_column(column, justify="right" if column == "ratio" else "left")
+    for name, measure in (
+        ("physics", lambda: physics.rows(rounds)),
+        ("service", lambda: service.rows(max(2, rounds // 2))),
+        ("overhead", overhead.rows),
+        ("curves", curves.rows),
+    ):
+        console.print(f"measuring {name} ...")
+        for row in measure():
+            table.add_row(*_cells(row))
+    console.print(table)
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    shown = "" if row.ratio is None else f"{row.ratio:.3f}" if row.ratio < 0.1 else f"{row.ratio:.2f}"
+    return row.figure, row.value, shown, row.reference, row.target
+
+
+if __name__ == "__main__":
+    main()

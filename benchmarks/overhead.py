@@ -1,0 +1,63 @@
+"""What gaplab itself adds to the physics: time for each step of the evolution, and memory of a worker."""
+
+import resource
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from benchmarks.measure import Row
+from benchmarks.physics import genomes, simulation
+from services.core.arrays import FloatArray, Genomes
+from services.core.optimizers.base import maximise
+from services.core.optimizers.steady_state import SteadyState
+from services.core.robots.quadruped import Quadruped
+from services.core.streams import stream
+
+STEPS = 20_000
+ROLLOUTS = 5_000
+PAGE = resource.getpagesize()
+
+
+def evolution_step_s() -> float:
+    """Seconds of one step of the paper's evolution (ask, replacement, tell) where fitness costs nothing."""
+
+    def free(asked: Genomes) -> FloatArray:
+        return asked[:, 0]
+
+    begun = perf_counter()
+    maximise(SteadyState(), Quadruped().space, free, STEPS, stream(0, "benchmark"))
+    return (perf_counter() - begun) / STEPS
+
+
+def resident_bytes() -> int:
+    """Memory of this process now."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE
+
+
+def memory(rollouts: int = ROLLOUTS) -> tuple[int, int, float]:
+    """Bytes after a tenth of the rollouts and after all, in simulators that differ each time; seconds a rollout."""
+    simulate, drawn, rng = simulation(), genomes(100), np.random.default_rng(0)
+    early, begun = 0, perf_counter()
+    for index in range(rollouts):
+        simulate(drawn[[index % len(drawn)]], rng.random((1, 3)) * [1.5, 1.5, 0.6])
+        if index == rollouts // 10:
+            early = resident_bytes()
+    return early, resident_bytes(), (perf_counter() - begun) / rollouts
+
+
+def rows() -> list[Row]:
+    """The evolution's own cost as a share of a rollout, and memory over many rollouts."""
+    step_s = evolution_step_s()
+    early, late, rollout_s = memory()
+    mebibyte = 2**20
+    return [
+        Row("evolution, one step", f"{1e6 * step_s:.0f} µs", step_s / rollout_s, "a PyBullet rollout", "≤ 0.01"),
+        Row(
+            f"memory of a process after {ROLLOUTS:,} rollouts",
+            f"{late / mebibyte:.1f} MiB",
+            late / early,
+            f"after {ROLLOUTS // 10:,}: {early / mebibyte:.1f} MiB",
+            "flat",
+        ),
+    ]

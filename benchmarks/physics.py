@@ -1,0 +1,101 @@
+"""Rollouts per second on one core: a bare loop of Bullet steps against the same episode through `Simulate`."""
+
+from collections import defaultdict
+from collections.abc import Callable
+
+import numpy as np
+import pybullet
+
+from benchmarks.measure import Row, rates, ratio
+from services.core.arrays import Genomes, Parameters
+from services.core.robots.quadruped import Quadruped
+from services.core.tunables import tunables
+from services.core.world import Motion
+from services.engines.pybullet import PyBullet
+from services.engines.pybullet.scene import Scene
+from services.simulation import Simulation
+
+TUNED = ("static_friction", "dynamic_friction", "restitution")
+GENOMES = 12
+SWITCHING = np.array([[1.0, 0.8, 0.0]])
+EQUAL = np.array([[0.8, 0.8, 0.0]])
+
+
+def genomes(count: int = GENOMES) -> Genomes:
+    """The known genome and random ones: what a search evaluates."""
+    robot = Quadruped()
+    drawn: Genomes = np.vstack([robot.known, robot.space.draw(count - 1, np.random.default_rng(0))])
+    return drawn
+
+
+def simulation() -> Simulation:
+    """The quadruped on PyBullet, under the paper's three tunables."""
+    return Simulation(Quadruped(), PyBullet(), [tunables[name]() for name in TUNED])
+
+
+def through_simulate(parameters: Parameters) -> Callable[[], int]:
+    """Rollouts through `Simulate`, one genome a call as an evolution asks for them."""
+    simulate, drawn = simulation(), genomes()
+
+    def work() -> int:
+        for genome in drawn:
+            simulate(genome[None], parameters)
+        return len(drawn)
+
+    return work
+
+
+def bare() -> Callable[[], int]:
+    """`stepSimulation` in a loop, motors commanded at pulse edges only: what the physics alone costs."""
+    robot = Quadruped()
+    scene = Scene(pybullet, robot.world)
+    motions = [robot.motion(genome) for genome in genomes()]
+
+    def work() -> int:
+        for motion in motions:
+            commands, steps = edges(motion, robot.world.time_step_s)
+            scene.start(robot.world.material, robot.world.material.dynamic_friction)
+            for step in range(steps):
+                for actuator, target in commands.get(step, ()):
+                    scene.command(actuator, target)
+                pybullet.stepSimulation(physicsClientId=scene.client)
+            pybullet.getBasePositionAndOrientation(scene.robot, physicsClientId=scene.client)
+        return len(motions)
+
+    return work
+
+
+def edges(motion: Motion, time_step_s: float) -> tuple[dict[int, list[tuple[int, float]]], int]:
+    """Which motors get which new target at which step, and the number of steps."""
+    commands: dict[int, list[tuple[int, float]]] = defaultdict(list)
+    before = np.full(motion.targets.shape[1], np.nan)
+    for time_s, targets in zip(motion.times_s, motion.targets, strict=True):
+        for actuator in np.flatnonzero(targets != before):
+            commands[round(time_s / time_step_s)].append((int(actuator), float(targets[actuator])))
+        before = targets
+    return commands, round(motion.observe_s[-1] / time_step_s)
+
+
+def rows(rounds: int) -> list[Row]:
+    """Bare, and the engine with and without switching."""
+    measured = rates(
+        {"bare": bare(), "switching": through_simulate(SWITCHING), "equal": through_simulate(EQUAL)}, rounds
+    )
+    milliseconds = {name: f"{1e3 / float(np.median(each)):.1f} ms a rollout" for name, each in measured.items()}
+    return [
+        Row("bare loop of steps, one core", milliseconds["bare"]),
+        Row(
+            "engine, static ≠ dynamic friction (stick-slip switching)",
+            milliseconds["switching"],
+            ratio(measured["switching"], measured["bare"]),
+            "bare",
+            "≥ 0.80",
+        ),
+        Row(
+            "engine, static = dynamic friction",
+            milliseconds["equal"],
+            ratio(measured["equal"], measured["bare"]),
+            "bare",
+            "≥ 0.93",
+        ),
+    ]
