@@ -79,7 +79,7 @@ EDITS: dict[str, Callable[[World], World]] = {
     "motor.max_speed_rad_s": lambda world: each_motor(world, max_speed_rad_s=0.5),
     "start_height_m": lambda world: replace(world, start_height_m=world.start_height_m + 0.05),
     "gravity_m_s2": lambda world: replace(world, gravity_m_s2=1.62),
-    "time_step_s": lambda world: replace(world, time_step_s=1 / 100),
+    "time_step_s": lambda world: replace(world, time_step_s=0.8 * world.time_step_s),
     "solver_iterations": lambda world: replace(world, solver_iterations=5),
 }
 

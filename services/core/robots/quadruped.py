@@ -20,15 +20,15 @@ LIMB_M = 0.03
 """Thickness of hip, thigh and shin."""
 
 HIP_KG = 0.05
-MOTOR = Motor(position_gain=0.08, max_torque_nm=8.0)
+MOTOR = Motor(position_gain=0.07, max_torque_nm=8.0)
 AMPLITUDES_RAD = (0.63, 0.42, 0.49)
 """Of hip yaw, hip roll and knee: a pulse holds the joint at plus this, and at minus this between pulses."""
 
 PERIOD_S = 0.5
-SETTLING_S = 1.0
+SETTLING_S = 0.5
 """Not counted: the robot drops to the ground and falls into its gait."""
 
-COUNTED_S = 2.0
+COUNTED_S = 2.5
 NARROWEST, WIDEST = 0.1, 0.9
 """Widths of a pulse in periods, at genes 0 and 1."""
 
@@ -107,6 +107,7 @@ def _world() -> World:
         joints=tuple(joints),
         material=Material(static_friction=1.0, dynamic_friction=0.8, restitution=0.0),
         start_height_m=SHIN_M + FOOT_M,
+        time_step_s=1 / 100,
     )
 
 

@@ -15,6 +15,8 @@ STICKS_AGAIN = 0.9
 LINK, NORMAL_FORCE, FRICTION_1, FRICTION_2 = 3, 9, 10, 12
 """Places in a contact point, as `getContactPoints` returns it."""
 
+UNLOADED = (0.0, 0.0)
+
 
 class StickSlip:
     """Steps a scene, and after each step gives each link the coefficient of its state: static or dynamic.
@@ -27,6 +29,8 @@ class StickSlip:
     def __init__(self, scene: Scene, material: Material) -> None:
         self._scene = scene
         self._material = material
+        self._slides_from = SLIDES * material.static_friction
+        self._sticks_below = STICKS_AGAIN * material.dynamic_friction
         self._sliding: set[int] = set()
 
     def step(self, count: int) -> None:
@@ -38,21 +42,19 @@ class StickSlip:
             self._switch(contacts(robot, physicsClientId=client))
 
     def _switch(self, points: tuple[tuple[Any, ...], ...]) -> None:
-        loads: dict[int, float] = {}
-        frictions: dict[int, float] = {}
+        bearing: dict[int, tuple[float, float]] = {}
         for point in points:
-            link, normal = point[LINK], point[NORMAL_FORCE]
-            if normal > 0.0:
-                loads[link] = loads.get(link, 0.0) + normal
-                frictions[link] = frictions.get(link, 0.0) + hypot(point[FRICTION_1], point[FRICTION_2])
-        for link in self._sliding.difference(loads):
-            self._stick(link)
-        for link, load in loads.items():
+            if (normal := point[NORMAL_FORCE]) > 0.0:
+                load, friction = bearing.get(point[LINK], UNLOADED)
+                bearing[point[LINK]] = load + normal, friction + hypot(point[FRICTION_1], point[FRICTION_2])
+        for link, (load, friction) in bearing.items():
             if link in self._sliding:
-                if frictions[link] < STICKS_AGAIN * self._material.dynamic_friction * load:
+                if friction < self._sticks_below * load:
                     self._stick(link)
-            elif frictions[link] >= SLIDES * self._material.static_friction * load:
+            elif friction >= self._slides_from * load:
                 self._slide(link)
+        for link in self._sliding.difference(bearing):
+            self._stick(link)
 
     def _stick(self, link: int) -> None:
         self._sliding.remove(link)
