@@ -10,7 +10,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
-from api.violations import MOST_ERRORS, explain, finite
+from api.violations import MOST_ERRORS, explain, finite, without_consequences
 from schemas.problems import Problem, SpecError
 from services.core.errors import (
     Conflict,
@@ -66,10 +66,8 @@ def response(problem: Problem, headers: dict[str, str] | None = None) -> JSONRes
 
 def problem(status: int, kind: str, title: str, detail: str, errors: Sequence[SpecError] = ()) -> Problem:
     """A problem of a stable type; of very many errors it carries the first."""
-    left_out = len(errors) - MOST_ERRORS
-    more = f"; and {left_out} more" if left_out > 0 else ""
     name = f"urn:gaplab:problem:{kind}"
-    return Problem(type=name, title=title, status=status, detail=detail + more, errors=tuple(errors[:MOST_ERRORS]))
+    return Problem(type=name, title=title, status=status, detail=detail, errors=tuple(errors[:MOST_ERRORS]))
 
 
 def documented(*statuses: int) -> dict[int | str, dict[str, object]]:
@@ -91,7 +89,7 @@ def _of_gaplab(request: Request, error: Exception) -> JSONResponse:
         if errors and not any(each.pointer.startswith("/") or not each.pointer for each in errors)
         else kind
     )
-    detail = _sentence(errors) if errors else _readable(error)
+    detail = _sentence(errors, len(errors)) if errors else _readable(error)
     headers = {"Retry-After": "5"} if kind[0] == HTTPStatus.SERVICE_UNAVAILABLE else None
     return response(problem(*kind, detail, errors), headers)
 
@@ -111,19 +109,19 @@ def _violations(error: InvalidSpec) -> list[SpecError]:
 
 def _of_validation(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
-    found = error.errors()
+    found = without_consequences(error.errors())
     if found[0]["type"] == "json_invalid":
         where, what = found[0]["loc"][-1], found[0]["ctx"]["error"]
         return response(problem(*FRAMEWORK[400], f"The body is not JSON: {what} at character {where}."))
-    errors = [explain(each, error.body, request) for each in found]
+    errors = [explain(each, error.body, request) for each in found[:MOST_ERRORS]]
     in_body = all(each["loc"][0] == "body" for each in found)
     kind = KINDS[InvalidSpec] if in_body else INVALID_REQUEST
-    return response(problem(*kind, _sentence(errors), errors))
+    return response(problem(*kind, _sentence(errors, len(found)), errors))
 
 
-def _sentence(errors: Sequence[SpecError]) -> str:
+def _sentence(errors: Sequence[SpecError], count: int) -> str:
     first = errors[0]
-    others = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    others = f" (and {count - 1} more)" if count > 1 else ""
     return f"{first.pointer}: {first.message}{others}" if first.pointer else f"{first.message}{others}"
 
 

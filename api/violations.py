@@ -42,6 +42,12 @@ PERMITTED = {
 }
 
 
+def without_consequences(errors: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """The errors without those that only follow from others: a list is not too short because of what is wrong in it."""
+    longer = {each["loc"][:depth] for each in errors for depth in range(len(each["loc"]))}
+    return [each for each in errors if each["type"] != "too_short" or each["loc"] not in longer]
+
+
 def explain(error: Mapping[str, Any], body: object, request: Request) -> SpecError:
     """One error of pydantic's, as a reader wants it.
 

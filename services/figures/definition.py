@@ -130,7 +130,7 @@ def _names(curves: Sequence[Curve]) -> list[str]:
 def _spoken(name: str) -> str:
     """`known_fit` is written *Known fit*; a name that a person gave stays as it is."""
     identifier = re.fullmatch(r"[a-z][a-z0-9_]*", name)
-    return name.replace("_", " ").capitalize() if identifier else _printable(name)
+    return _printable(name.replace("_", " ").capitalize() if identifier else name)
 
 
 def _printable(text: str) -> str:
@@ -154,7 +154,7 @@ def _note(series: Sequence[Series], baselines: Sequence[Baseline], band: Band) -
 
 
 def _level(level: Point) -> str:
-    spread = f" ± {level.sd:.2f} SD" if level.sd is not None else ""
+    spread = f" ± {level.sd:.2g} SD" if level.sd is not None else ""
     return f"{level.mean:.2f}{spread} (n = {level.n})".replace(" ", "\N{NO-BREAK SPACE}")
 
 

@@ -71,7 +71,7 @@ def render_html(figure: Figure) -> str:
         config={
             "responsive": True,
             "displaylogo": False,
-            "plotlyServerURL": "",  # nothing of a figure is ever sent away
+            # "Share chart" would send the numbers to a company's server: nothing of a figure is ever sent away
             "modeBarButtonsToRemove": ["sendChartToCloud", "lasso2d", "select2d", "autoScale2d"],
             "toImageButtonOptions": {"format": "svg", "filename": "gaplab-curves"},
         },

@@ -1,6 +1,7 @@
 """Figures as SVG for papers, by matplotlib: the same bytes for the same figure."""
 
 from io import StringIO
+from math import ceil
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 WIDTH_IN = 4.8  # the text width of Springer's LNCS, in which the paper stands
 HEIGHT_IN = 3.1
 LEGEND_ROW_IN = 0.15
+WIDE = 36  # letters of a name, beyond which a legend has room for one column only
 
 DASHES: dict[str, Any] = {
     "solid": "-",
@@ -54,8 +56,7 @@ def _render(figure: Figure) -> str:
     from matplotlib.figure import Figure as Canvas
 
     with rc_context(LOOK):
-        rows = (len(figure.series) + len(figure.baselines) + 1) // 2
-        canvas = Canvas(figsize=(WIDTH_IN, HEIGHT_IN + LEGEND_ROW_IN * rows), layout="constrained")
+        canvas = Canvas(figsize=(WIDTH_IN, HEIGHT_IN + LEGEND_ROW_IN * _rows(figure)), layout="constrained")
         FigureCanvasSVG(canvas)
         axes = canvas.add_subplot()
         _draw(figure, axes)
@@ -73,7 +74,8 @@ def _draw(figure: Figure, axes: "Axes") -> None:
     for baseline in figure.baselines:
         _draw_baseline(baseline, axes)
     if figure.title:
-        axes.set_title(figure.title, loc="left", fontweight="bold")
+        title = axes.set_title(figure.title, loc="left", fontweight="bold")
+        title.set_in_layout(len(figure.title) <= WIDE)  # a wide one may end outside, but not squeeze the axes
     axes.set(xlabel=figure.x_label, ylabel=figure.y_label, xlim=(-0.02 * figure.span, 1.02 * figure.span))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=11, integer=True))
     axes.grid(axis="y", color="#e6e6e6", linewidth=0.5)
@@ -81,7 +83,8 @@ def _draw(figure: Figure, axes: "Axes") -> None:
     if figure.empty:
         axes.text(0.5, 0.5, "no results yet", transform=axes.transAxes, ha="center", color="#777777")
     else:
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2, frameon=False, handlelength=3.2)
+        columns = _columns(figure)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=columns, frameon=False, handlelength=3.2)
 
 
 def _draw_series(series: Series, axes: "Axes", order: float) -> None:
@@ -97,7 +100,7 @@ def _draw_series(series: Series, axes: "Axes", order: float) -> None:
         markersize=3.6,
         markeredgecolor="white",
         markeredgewidth=0.4,
-        label=series.name,
+        label=_label(series.name),
         zorder=order,
     )
     lower, upper = _band(series.points)
@@ -111,6 +114,20 @@ def _draw_baseline(baseline: Baseline, axes: "Axes") -> None:
     )
     if level.lower is not None and level.upper is not None:
         axes.axhspan(level.lower, level.upper, color=color, alpha=0.07, linewidth=0, zorder=1)
+
+
+def _columns(figure: Figure) -> int:
+    names = [each.name for each in figure.series] + [each.name for each in figure.baselines]
+    return 2 if all(len(name) <= WIDE for name in names) else 1
+
+
+def _rows(figure: Figure) -> int:
+    return ceil((len(figure.series) + len(figure.baselines)) / _columns(figure))
+
+
+def _label(name: str) -> str:
+    """The name in the legend, which leaves out what begins with an underscore."""
+    return f" {name}" if name.startswith("_") else name
 
 
 def _band(points: tuple[Point, ...]) -> tuple[list[float], list[float]]:

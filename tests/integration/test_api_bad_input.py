@@ -1,0 +1,307 @@
+"""What the API answers when it is asked wrongly: always a problem, always readable, never a failure of its own."""
+
+import json
+import math
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from api.limits import MOST_BYTES
+from services.core.errors import StoreUnavailable
+from services.store.session import Store
+
+LEAST = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke"}
+JSON = {"content-type": "application/json"}
+
+
+@pytest.fixture
+def api(sqlite_store: Store) -> Iterator[TestClient]:
+    with TestClient(create_app(sqlite_store), raise_server_exceptions=False) as client:
+        yield client
+
+
+def problem(answer: Any, status: int) -> dict[str, Any]:
+    """The problem that the answer carries, checked for what every problem must be."""
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    found = json.loads(answer.text, parse_constant=pytest.fail)
+    assert found["status"] == status
+    assert re.fullmatch(r"urn:gaplab:problem:[a-z-]+", found["type"])
+    assert found["title"]
+    assert found["detail"]
+    return found
+
+
+def only_error(answer: Any) -> dict[str, Any]:
+    errors = problem(answer, 422)["errors"]
+    assert len(errors) == 1, errors
+    return errors[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "pointer", "value", "nearest"),
+    [
+        ({"strategy": "simulated_fti"}, "/strategy", "simulated_fti", "simulated_fit"),
+        ({"strategy": {"name": "simulated_fti"}}, "/strategy", "simulated_fti", "simulated_fit"),
+        ({"robot": "quadruppet"}, "/robot", "quadruppet", "quadruped"),
+        ({"engine": "analytics"}, "/engine", "analytics", "analytic"),
+        ({"tunables": ["static_friktion"]}, "/tunables/0", "static_friktion", "static_friction"),
+        ({"optimizer": "steady_stat"}, "/optimizer", "steady_stat", "steady_state"),
+        ({"budget": "smok"}, "/budget", "smok", "smoke"),
+        ({"iteratons": 3}, "/iteratons", 3, "iterations"),
+        ({"budget": {"presett": "smoke"}}, "/budget/presett", "smoke", "preset"),
+        ({"robot": {"name": "toy_function", "optoins": {}}}, "/robot/optoins", {}, "options"),
+        ({"tunables": [{"name": "static_friction", "uper": 1.0}]}, "/tunables/0/uper", 1.0, "upper"),
+        (
+            {"optimizer": {"name": "steady_state", "options": {"populaton": 5}}},
+            "/optimizer/options/populaton",
+            "populaton",
+            "population",
+        ),
+        (
+            {"reality": {"parameters": {"static_frction": 0.9}}},
+            "/reality/parameters/static_frction",
+            "static_frction",
+            "static_friction",
+        ),
+    ],
+)
+def test_a_misspelt_name_is_refused_with_its_place_and_the_nearest_name(
+    api: TestClient, change: dict[str, Any], pointer: str, value: object, nearest: str
+):
+    error = only_error(api.post("/experiments", json=LEAST | change))
+
+    assert (error["pointer"], error["value"], error["nearest"]) == (pointer, value, nearest)
+    assert nearest in error["permitted"]
+
+
+@pytest.mark.parametrize(
+    ("change", "pointer"),
+    [
+        ({"iterations": 0}, "/iterations"),
+        ({"repetitions": -1}, "/repetitions"),
+        ({"iterations": "10"}, "/iterations"),
+        ({"iterations": 2.5}, "/iterations"),
+        ({"iterations": True}, "/iterations"),
+        ({"iterations": 10**400}, "/iterations"),
+        ({"seed": 2**64}, "/seed"),
+        ({"seed": -1}, "/seed"),
+        ({"strategy": 7}, "/strategy"),
+        ({"strategy": ""}, "/strategy"),
+        ({"tunables": []}, "/tunables"),
+        ({"tunables": "static_friction"}, "/tunables"),
+        ({"tunables": ["static_friction", "static_friction"]}, "/tunables"),
+        ({"tunables": [{"name": "static_friction", "lower": 0.9, "upper": 0.1}]}, "/tunables/0"),
+        ({"tunables": [{"name": "static_friction", "upper": 1e9}]}, "/tunables/0/upper"),
+        ({"tunables": [{"name": "static_friction", "lower": math.nan}]}, "/tunables/0/lower"),
+        ({"reality": {"parameters": {"static_friction": math.inf}}}, "/reality/parameters/static_friction"),
+        ({"budget": {"preset": "smoke", "controller_evaluations": 3}}, "/budget/controller_evaluations"),
+        ({"name": ""}, "/name"),
+        ({"name": "x" * 201}, "/name"),
+    ],
+)
+def test_a_value_out_of_its_range_is_refused_with_its_place(api: TestClient, change: dict[str, Any], pointer: str):
+    answer = api.post("/experiments", content=json.dumps(LEAST | change), headers=JSON)
+
+    error = problem(answer, 422)["errors"][0]
+    assert error["pointer"].startswith(pointer)
+    assert error["message"]
+
+
+def test_numbers_that_json_does_not_have_come_back_as_text(api: TestClient):
+    answer = api.post(
+        "/experiments", content='{"strategy": "random", "seed": NaN, "iterations": -Infinity}', headers=JSON
+    )
+
+    values = {each["pointer"]: each["value"] for each in problem(answer, 422)["errors"]}
+    assert values == {"/seed": "nan", "/iterations": "-inf"}
+
+
+def test_a_tunable_that_the_engine_ignores_and_a_robot_that_it_cannot_run_are_refused_with_the_engines_that_can(
+    api: TestClient,
+):
+    error = only_error(api.post("/experiments", json=LEAST | {"robot": "quadruped", "engine": "analytic"}))
+
+    assert error["pointer"] == "/engine"
+    assert "pybullet" in error["permitted"]
+
+
+def test_every_mistake_is_told_at_once(api: TestClient):
+    wrong = {"strategies": ["random", "randm", {"name": "informative", "options": {"x": 1}}], "robot": "toy_functoin"}
+    answer = api.post("/studies", json=wrong)
+
+    pointers = [each["pointer"] for each in problem(answer, 422)["errors"]]
+    assert set(pointers) == {"/strategies/1", "/strategies/2/options/x", "/robot"}
+    assert len(pointers) == 3
+
+
+def test_a_list_of_strategies_is_no_field_of_an_experiment_and_it_says_which_is(api: TestClient):
+    errors = problem(api.post("/experiments", json={"strategies": ["random"]}), 422)["errors"]
+
+    assert {(each["pointer"], each["nearest"]) for each in errors} == {("/strategies", "strategy"), ("/strategy", None)}
+
+
+@pytest.mark.parametrize("body", ["", "{", "[1, 2", '{"strategy": "random"} x', "nonsense", "\x00", '{"a": }'])
+def test_a_body_that_is_no_json_is_refused(api: TestClient, body: str):
+    found = problem(api.post("/experiments", content=body, headers=JSON), 422)
+
+    assert found["type"] in {"urn:gaplab:problem:not-json", "urn:gaplab:problem:invalid-spec"}
+
+
+@pytest.mark.parametrize("body", [b"\xff\xfe\x00", b'{"seed": ' + b"9" * 5000 + b"}", b"[" * 100_000])
+def test_a_body_that_breaks_parsers_is_refused_as_no_json(api: TestClient, body: bytes):
+    assert problem(api.post("/studies", content=body, headers=JSON), 422)["type"] == "urn:gaplab:problem:not-json"
+
+
+@pytest.mark.parametrize("body", ["[]", "1", '"random"', "null", "true"])
+def test_json_that_is_no_object_is_refused(api: TestClient, body: str):
+    problem(api.post("/experiments", content=body, headers=JSON), 422)
+
+
+def test_a_body_without_its_content_type_is_refused_with_the_header_that_it_needs(api: TestClient):
+    answer = api.post("/experiments", content=json.dumps(LEAST), headers={"content-type": "text/plain"})
+
+    assert "Content-Type: application/json" in only_error(answer)["message"]
+
+
+def test_text_that_is_no_unicode_is_answered_with_text_that_is(api: TestClient):
+    answer = api.post("/experiments", content=b'{"strategy": "\\ud800", "\\udfff": "\\ud800"}', headers=JSON)
+
+    problem(answer, 422)
+
+
+def test_a_hostile_number_of_mistakes_gets_an_answer_of_modest_size(api: TestClient):
+    answer = api.post("/experiments", json=LEAST | {"tunables": [7] * 100_000, "x" * 100_000: ["y" * 100_000] * 3})
+
+    found = problem(answer, 422)
+    assert len(found["errors"]) == 50
+    assert "more" in found["detail"]
+    assert len(answer.content) < 100_000
+
+
+def test_a_body_over_a_megabyte_is_too_large_whether_announced_streamed_or_lied_about(api: TestClient):
+    huge = b'{"name": "' + b"x" * MOST_BYTES + b'"}'
+
+    def stream() -> Iterator[bytes]:
+        for start in range(0, len(huge), 1000):
+            yield huge[start : start + 1000]
+
+    problem(api.post("/experiments", content=huge, headers=JSON), 413)
+    problem(api.post("/experiments", content=stream(), headers=JSON), 413)
+    problem(api.post("/experiments", content=stream(), headers=JSON | {"content-length": "10"}), 413)
+
+
+def test_a_body_of_just_a_megabyte_is_read(api: TestClient):
+    spec = json.dumps(LEAST)
+
+    assert api.post("/experiments", content=spec.ljust(MOST_BYTES), headers=JSON).status_code == 202
+
+
+@pytest.mark.parametrize("name", ["nope", "x" * 2000, "%00", "a'b", "ü", "-1", "%ff"])
+@pytest.mark.parametrize("path", ["/studies/{}", "/experiments/{}", "/experiments/{}/curve", "/studies/{}/curves"])
+def test_an_unknown_id_is_not_found(api: TestClient, path: str, name: str):
+    problem(api.get(path.format(name)), 404)
+
+
+@pytest.mark.parametrize(
+    "path", ["/curves?experiment=nope", "/figures/curves?study=nope", "/comparisons?experiment=a&experiment=b"]
+)
+def test_an_unknown_id_among_those_asked_for_is_not_found(api: TestClient, path: str):
+    problem(api.get(path), 404)
+
+
+def test_what_has_ended_cannot_be_cancelled(api: TestClient):
+    made = api.post("/experiments", json=LEAST).json()["id"]
+    api.post(f"/experiments/{made}/cancel")
+
+    assert "CANCELLED" in problem(api.post(f"/experiments/{made}/cancel"), 409)["detail"]
+    problem(api.post("/experiments/nope/cancel"), 404)
+
+
+def test_an_unknown_address_and_a_wrong_method_are_problems_too(api: TestClient):
+    problem(api.get("/nothing/here{}"), 404)
+    refused = api.delete("/experiments")
+    problem(refused, 405)
+    assert refused.headers["allow"]
+
+
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [
+        ("/experiments?limit=0", "limit"),
+        ("/experiments?limit=501", "limit"),
+        ("/experiments?limit=x", "limit"),
+        ("/experiments?limit=" + "9" * 5000, "limit"),
+        ("/experiments?cursor=nonsense", "cursor"),
+        ("/studies?cursor=%00", "cursor"),
+        ("/experiments?state=RUNING", "state"),
+        ("/experiments?limmit=3", "limmit"),
+        ("/experiments?strategy=%00", "strategy"),
+        ("/curves", "experiment"),
+        ("/curves?experiment=a&format=xml", "format"),
+        ("/comparisons?experiment=a", "experiment"),
+        ("/comparisons?experiment=a&experiment=b&from=-1", "from"),
+        ("/figures/curves?study=a&format=bmp", "format"),
+        ("/figures/curves", ""),
+    ],
+)
+def test_a_wrong_query_is_refused_with_the_parameters_name(api: TestClient, path: str, name: str):
+    found = problem(api.get(path), 422)
+
+    assert found["type"] == "urn:gaplab:problem:invalid-request"
+    assert found["errors"][0]["pointer"] == name
+
+
+def test_a_misspelt_choice_in_a_query_is_answered_with_the_nearest(api: TestClient):
+    error = only_error(api.get("/experiments?state=RUNING"))
+
+    assert error["nearest"] == "RUNNING"
+    assert "COMPLETED" in error["permitted"]
+
+
+@pytest.mark.parametrize("path", ["/studies", "/experiments", "/experiments/x/curve", "/readyz"])
+def test_requests_without_a_database_are_problems_and_succeed_when_it_is_back(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, path: str
+):
+    def away() -> None:
+        raise StoreUnavailable("the database cannot be used now: connection refused")
+
+    api = TestClient(create_app(sqlite_store))
+    with monkeypatch.context() as patch:
+        patch.setattr(sqlite_store, "check", away)
+        refused = api.get(path)
+        alive = api.get("/livez")
+
+    assert problem(refused, 503)["type"] == "urn:gaplab:problem:store-unavailable"
+    assert int(refused.headers["retry-after"]) > 0
+    assert alive.status_code == 200
+    assert api.get(path).status_code in {200, 404}
+
+
+def test_a_database_that_was_never_migrated_is_not_ready(tmp_path: Any):
+    store = Store(f"sqlite:///{tmp_path / 'empty.db'}")
+    api = TestClient(create_app(store))
+
+    assert "migrations" in problem(api.get("/readyz"), 503)["detail"]
+    problem(api.post("/experiments", json=LEAST), 503)
+    store.dispose()
+
+
+def test_an_accident_inside_leaks_nothing_but_a_number_to_find_it_by(
+    api: TestClient, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+):
+    def fail(*_: object) -> None:
+        raise RuntimeError("the password is swordfish")
+
+    monkeypatch.setattr("services.experiments.read_study", fail)
+    answer = api.get("/studies/some")
+
+    detail = problem(answer, 500)["detail"]
+    assert "swordfish" not in answer.text
+    incident = detail.split()[-1].rstrip(".")
+    assert incident in caplog.text
+    assert "swordfish" in caplog.text

@@ -1,0 +1,134 @@
+"""What /docs says: every endpoint, with an example that is true, and without the internet."""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from jsonschema import Draft202012Validator
+from referencing import Registry, Resource
+from referencing.jsonschema import DRAFT202012
+
+from api.app import create_app
+from services.store.session import Store
+
+METHODS = {"get", "post", "put", "patch", "delete"}
+ENDPOINTS = {
+    "POST /studies",
+    "GET /studies",
+    "GET /studies/{id}",
+    "GET /studies/{id}/curves",
+    "POST /experiments",
+    "GET /experiments",
+    "GET /experiments/{id}",
+    "GET /experiments/{id}/repetitions",
+    "GET /experiments/{id}/samples",
+    "GET /experiments/{id}/simulators",
+    "POST /experiments/{id}/cancel",
+    "GET /experiments/{id}/curve",
+    "GET /curves",
+    "GET /comparisons",
+    "GET /figures/curves",
+    "GET /catalogue",
+    "GET /livez",
+    "GET /readyz",
+}
+
+
+@pytest.fixture(scope="module")
+def api() -> Iterator[TestClient]:
+    store = Store("sqlite://")
+    yield TestClient(create_app(store))
+    store.dispose()
+
+
+@pytest.fixture(scope="module")
+def document(api: TestClient) -> dict[str, Any]:
+    return api.get("/openapi.json").json()
+
+
+def operations(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    for path, methods in document["paths"].items():
+        for method, operation in methods.items():
+            if method in METHODS:
+                yield f"{method.upper()} {path}", operation
+
+
+def complaints(document: dict[str, Any], schema: dict[str, Any], value: object) -> list[str]:
+    whole = Resource(contents=document, specification=DRAFT202012)
+    registry = Registry().with_resource("urn:api", whole)
+    pointed = _absolute(schema)
+    return [each.message for each in Draft202012Validator(pointed, registry=registry).iter_errors(value)]
+
+
+def _absolute(schema: Any) -> Any:
+    if isinstance(schema, dict):
+        return {key: f"urn:api{value}" if key == "$ref" else _absolute(value) for key, value in schema.items()}
+    return [_absolute(each) for each in schema] if isinstance(schema, list) else schema
+
+
+def test_every_endpoint_is_documented_and_no_other(document: dict[str, Any]):
+    assert {name for name, _ in operations(document)} == ENDPOINTS
+
+
+def test_operations_have_short_names_of_their_own_and_summaries(document: dict[str, Any]):
+    names = [operation["operationId"] for _, operation in operations(document)]
+
+    assert len(set(names)) == len(names)
+    assert all(re.fullmatch(r"[a-z]+(_[a-z]+)*", name) and len(name) < 25 for name in names)
+    assert all(operation["summary"] and operation["description"] for _, operation in operations(document))
+
+
+def test_every_answer_has_an_example_that_fits_its_schema(document: dict[str, Any]):
+    for name, operation in operations(document):
+        success = next(answer for status, answer in operation["responses"].items() if status.startswith("2"))
+        for media, content in success["content"].items():
+            if name.endswith(("/livez", "/readyz", "/catalogue")):
+                continue
+            assert "example" in content, (name, media)
+            assert complaints(document, content["schema"], content["example"]) == [], name
+
+
+def test_every_example_of_a_spec_is_accepted(document: dict[str, Any], sqlite_store: Store):
+    api = TestClient(create_app(sqlite_store))
+    for name, operation in operations(document):
+        if "requestBody" in operation:
+            examples = operation["requestBody"]["content"]["application/json"]["examples"]
+            for example in examples.values():
+                assert api.post(name.split()[1], json=example["value"]).status_code == 202, example
+
+
+def test_every_error_is_documented_as_a_problem(document: dict[str, Any]):
+    for name, operation in operations(document):
+        for status, answer in operation["responses"].items():
+            if not status.startswith("2"):
+                assert list(answer["content"]) == ["application/problem+json"], (name, status)
+    assert "HTTPValidationError" not in str(document)
+
+
+def test_real_answers_fit_their_documented_schema(document: dict[str, Any], sqlite_store: Store):
+    api = TestClient(create_app(sqlite_store))
+    made = api.post("/studies", json={"robot": "toy_function", "budget": "smoke"}).json()
+    experiment = made["experiments"][0]["id"]
+    for name, operation in operations(document):
+        if name.startswith("GET") and "{id}" in name:
+            path = name.split()[1].format(id=made["id"] if "/studies" in name else experiment)
+            schema = operation["responses"]["200"]["content"]["application/json"]["schema"]
+            assert complaints(document, schema, api.get(path).json()) == [], name
+
+
+@pytest.mark.parametrize("page", ["/docs", "/redoc"])
+def test_the_pages_load_everything_from_the_service_itself(api: TestClient, page: str):
+    answer = api.get(page)
+
+    assert answer.status_code == 200
+    assert "//" not in re.sub(r"<!--.*?-->", "", answer.text).replace("http://www.w3.org", "")
+    sources = re.findall(r'(?:src|href)="\.(/[^"]+)"', answer.text)
+    assert sources
+    for source in sources:
+        assert api.get(source).status_code == 200, source
+
+
+def test_the_address_of_the_service_leads_to_its_documentation(api: TestClient):
+    assert "swagger" in api.get("/").text

@@ -1,0 +1,131 @@
+"""Whatever is sent, the API answers with a result or with a problem that is valid JSON, and never fails itself."""
+
+import copy
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from api.app import create_app
+from schemas.problems import Problem
+from services.store.session import Store
+
+WHOLE: dict[str, Any] = {
+    "name": "whole",
+    "strategy": {"name": "simulated_fit_and_informative", "options": {"simulators": 5, "fit_weight": 1.0}},
+    "iterations": 2,
+    "repetitions": 2,
+    "robot": {"name": "toy_function", "options": {}},
+    "engine": {"name": "analytic", "options": {}},
+    "optimizer": {"name": "steady_state", "options": {"population": 10, "mutation_scale": 0.3}},
+    "tunables": ["restitution", {"name": "static_friction", "lower": 0.0, "upper": 1.5}],
+    "reality": {"engine": "analytic", "parameters": {"static_friction": 1.0}},
+    "budget": {"preset": "smoke", "controller_evaluations": 60},
+    "seed": 3,
+}
+
+ANYTHING = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.integers(min_value=-(2**70), max_value=2**70)
+    | st.floats()
+    | st.text()
+    | st.sampled_from(["pybullet", "quadruped", "direct", "random", "known_fit", "paper", "\x00", "\ud800", "é" * 300]),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """The path to every value inside a spec."""
+    if isinstance(value, dict | list):
+        inner = value.items() if isinstance(value, dict) else enumerate(value)
+        return [path] * bool(path) + [each for key, item in inner for each in places(item, (*path, key))]
+    return [path]
+
+
+@st.composite
+def mutated_specs(draw: st.DrawFn) -> dict[str, Any]:
+    """A valid spec in which up to three things are replaced, removed or added."""
+    spec = copy.deepcopy(WHOLE)
+    for _ in range(draw(st.integers(1, 3))):
+        *parents, last = draw(st.sampled_from(places(spec)))
+        target = spec
+        for key in parents:
+            target = target[key]
+        match draw(st.sampled_from(["replace", "remove", "add"])):
+            case "replace":
+                target[last] = draw(ANYTHING)
+            case "remove":
+                del target[last]
+            case "add" if isinstance(target, dict):
+                target[draw(st.text(max_size=8))] = draw(ANYTHING)
+        if not places(spec):
+            break
+    return spec
+
+
+@pytest.fixture(scope="module")
+def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    from migrations import upgrade
+
+    url = f"sqlite:///{tmp_path_factory.mktemp('fuzz') / 'gaplab.db'}"
+    upgrade(url)
+    store = Store(url)
+    with TestClient(create_app(store), raise_server_exceptions=False) as client:
+        yield client
+    store.dispose()
+
+
+FUZZ = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+
+
+@FUZZ
+@given(spec=mutated_specs())
+def test_no_mutation_of_a_spec_makes_the_service_fail(api: TestClient, spec: dict[str, Any]):
+    is_accepted_or_refused(api, "/experiments", json.dumps(spec))
+
+
+@FUZZ
+@given(spec=ANYTHING)
+def test_no_json_at_all_makes_the_service_fail(api: TestClient, spec: object):
+    is_accepted_or_refused(api, "/studies", json.dumps(spec))
+
+
+@FUZZ
+@given(body=st.binary(max_size=50))
+def test_no_bytes_make_the_service_fail(api: TestClient, body: bytes):
+    is_accepted_or_refused(api, "/experiments", body)
+
+
+@FUZZ
+@given(
+    path=st.sampled_from(
+        ["/experiments", "/studies", "/curves", "/comparisons", "/figures/curves", "/experiments/x/samples"]
+    ),
+    query=st.dictionaries(
+        st.sampled_from(["limit", "cursor", "study", "state", "experiment", "format", "from", "to", "repetition"]),
+        st.text(st.characters(codec="utf-8"), max_size=20)
+        | st.integers().map(str)
+        | st.sampled_from(["csv", "svg", "RUNNING"]),
+        max_size=3,
+    ),
+)
+def test_no_query_makes_the_service_fail(api: TestClient, path: str, query: dict[str, str]):
+    answer = api.get(path, params=query)
+
+    assert answer.status_code in {200, 404, 422}, answer.text
+
+
+def is_accepted_or_refused(api: TestClient, path: str, body: str | bytes) -> None:
+    answer = api.post(path, content=body, headers={"content-type": "application/json"})
+
+    assert answer.status_code in {202, 422}, answer.text
+    plain = json.loads(answer.content, parse_constant=pytest.fail)
+    if answer.status_code == 422:
+        Problem.model_validate(plain)
