@@ -18,7 +18,6 @@ from schemas.spec import StudySpec
 from services import execution, experiments
 from services.core.loop import repetition
 from services.execution import TimedStep
-from services.settings import Settings
 from services.simulation import setting
 from services.store.session import Store
 
@@ -46,9 +45,9 @@ def fill(store: Store) -> str:
 
 
 @contextmanager
-def served(url: str) -> Iterator[str]:
+def served(store: Store) -> Iterator[str]:
     """The API on a free port of loopback; its address."""
-    server = uvicorn.Server(uvicorn.Config(create_app(Settings(database_url=url)), port=0, log_level="error"))
+    server = uvicorn.Server(uvicorn.Config(create_app(store), port=0, log_level="error"))
     thread = threading.Thread(target=server.run)
     thread.start()
     while not server.started:
@@ -67,7 +66,7 @@ def rows() -> list[Row]:
         store = Store(url)
         study = fill(store)
         seconds = []
-        with served(url) as address, httpx2.Client(base_url=address) as client:
+        with served(store) as address, httpx2.Client(base_url=address) as client:
             for _ in range(CALLS):
                 begun = perf_counter()
                 client.get(f"/studies/{study}/curves").raise_for_status()

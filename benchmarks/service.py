@@ -44,10 +44,9 @@ def service() -> Iterator[Callable[[], int]]:
 
             def work() -> int:
                 experiment = experiments.submit_experiment(store, SPEC).id
-                supervisor.step()
-                while not supervisor.idle:
+                while not (read := experiments.read_experiment(store, experiment)).state.ended:
                     supervisor.step()
-                return experiments.read_experiment(store, experiment).progress.rollouts_done
+                return read.progress.rollouts_done
 
             yield work
         store.dispose()

@@ -1,23 +1,22 @@
-"""`python -m workers serve`: run what is queued until told to stop."""
+"""`python -m workers serve`: run what is queued until told to stop. `python -m workers check`: could it?"""
 
 import logging
 import signal
 import sys
+from collections.abc import Callable
 from threading import Event
 
+from services.core.errors import StoreUnavailable
 from services.settings import Settings
 from services.store.session import Store
-from workers.cluster import cluster
-from workers.supervisor import Supervisor
 
 
-def main(arguments: list[str]) -> int:
-    """Serve until SIGTERM or SIGINT; 2 if the command is not understood."""
-    if arguments != ["serve"]:
-        sys.stderr.write("usage: python -m workers serve\n")
-        return 2
+def serve(settings: Settings) -> int:
+    """Work until SIGTERM or SIGINT."""
+    from workers.cluster import cluster  # Ray takes a second to import
+    from workers.supervisor import Supervisor
+
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    settings = Settings.from_environment()
     stop = Event()
     for signum in (signal.SIGTERM, signal.SIGINT):
         signal.signal(signum, lambda *_: stop.set())
@@ -27,6 +26,32 @@ def main(arguments: list[str]) -> int:
         Supervisor(store, capacity).serve(stop)
     store.dispose()
     return 0
+
+
+def check(settings: Settings) -> int:
+    """0 if the database can be used, and 1 if not."""
+    try:
+        Store(settings.database_url).check()
+    except StoreUnavailable as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    return 0
+
+
+COMMANDS: dict[str, Callable[[Settings], int]] = {"serve": serve, "check": check}
+
+
+def main(arguments: list[str]) -> int:
+    """Run the command; 2 if it is not understood, or the environment is not."""
+    if len(arguments) != 1 or arguments[0] not in COMMANDS:
+        sys.stderr.write(f"usage: python -m workers {' | '.join(COMMANDS)}\n")
+        return 2
+    try:
+        settings = Settings.from_environment()
+    except ValueError as error:
+        sys.stderr.write(f"{error}\n")
+        return 2
+    return COMMANDS[arguments[0]](settings)
 
 
 if __name__ == "__main__":

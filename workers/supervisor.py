@@ -89,6 +89,7 @@ class Supervisor:
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
         self._runs: list[Run] = []
         self._beat = -HEARTBEAT_S
+        self._looked = -WAIT_S
 
     def serve(self, stop: Event) -> None:
         """Work until told to stop; then give the unfinished repetitions back to whoever comes next."""
@@ -112,11 +113,6 @@ class Supervisor:
         self._store_received()
         self._end()
 
-    @property
-    def idle(self) -> bool:
-        """Whether nothing is running."""
-        return not self._runs
-
     def _heartbeat(self) -> None:
         if monotonic() - self._beat < HEARTBEAT_S:
             return
@@ -129,8 +125,9 @@ class Supervisor:
 
     def _claim(self) -> None:
         free = self._capacity - len(self._runs)
-        if free <= 0:
+        if free <= 0 or monotonic() - self._looked < WAIT_S:
             return
+        self._looked = monotonic()
         for claim in execution.claim(self._store, self._owner, free):
             stream = repetition.run.remote(claim.spec, claim.number, claim.log)
             self._runs.append(Run(claim, stream))
@@ -168,6 +165,7 @@ class Supervisor:
                 execution.complete(self._store, run.claim)
                 log.info("%s: completed", run.name)
             self._runs.remove(run)
+            self._looked = -WAIT_S  # a core is free: look for work at once
 
     def _drop_all_but(self, held: list[Claim] | tuple[Claim, ...]) -> None:
         """Stop the runs whose claim holds no more: cancelled, or taken over."""

@@ -1,0 +1,17 @@
+# One image for every part of the service; docker-compose.yml says which command each part runs.
+FROM python:3.11-slim
+
+WORKDIR /app
+RUN useradd --create-home gaplab
+
+COPY pyproject.toml constraints.txt README.md LICENSE ./
+COPY api api
+COPY migrations migrations
+COPY schemas schemas
+COPY services services
+COPY workers workers
+RUN pip install --no-cache-dir --constraint constraints.txt .
+
+USER gaplab
+EXPOSE 8000
+CMD ["python", "-m", "api"]

@@ -1,0 +1,186 @@
+"""The supervisor on a real Ray: the same numbers as in one process, whatever happens on the way."""
+
+import os
+import signal
+import time
+from pathlib import Path
+from threading import Event
+
+import pytest
+import ray
+
+from schemas.lifecycle import State
+from schemas.spec import ExperimentSpec
+from services import execution, experiments
+from services.core.errors import StoreUnavailable
+from services.core.loop import repetition
+from services.resolution import resolve_experiment
+from services.settings import Settings
+from services.simulation import setting
+from services.store.models import RepetitionRow
+from services.store.repository.steps import logs
+from tests.fakes import flat
+from workers import repetition as task
+from workers.cluster import cluster
+from workers.supervisor import Supervisor
+
+DEADLINE_S = 60
+
+
+@pytest.fixture(scope="module", autouse=True)
+def capacity():
+    with cluster(Settings(workers=2)) as capacity:
+        yield capacity
+
+
+def toy(**changes):
+    return ExperimentSpec.model_validate(
+        {
+            "strategy": "simulated_fit_and_informative",
+            "robot": "toy_function",
+            "iterations": 2,
+            "repetitions": 3,
+            "budget": {"controller_evaluations": 40, "selection_evaluations": 30, "simulator_evaluations": 30},
+            "seed": 3,
+        }
+        | changes
+    )
+
+
+def long_toy():
+    """Some seconds of work in each repetition."""
+    return toy(repetitions=2, budget={"controller_evaluations": 20_000, "selection_evaluations": 3_000}, iterations=1)
+
+
+def run(supervisor, store, experiment, until=lambda: False):
+    """Rounds of the supervisor until the experiment has ended, or something else is so."""
+    deadline = time.monotonic() + DEADLINE_S
+    while not (experiments.read_experiment(store, experiment).state.ended or until()):
+        assert time.monotonic() < deadline
+        supervisor.step()
+
+
+def expected(spec):
+    resolved = resolve_experiment(spec)
+    return [[flat(step) for step in repetition(setting(resolved, number))] for number in range(resolved.repetitions)]
+
+
+def stored(store, experiment):
+    """The logs of an experiment's repetitions, as the supervisor after this one would read them."""
+    with store.reading() as session:
+        rows = session.query(RepetitionRow).filter_by(experiment_id=experiment).order_by(RepetitionRow.number).all()
+        found = logs(session, [row.id for row in rows])
+        return [[flat(step) for step in found[row.id]] for row in rows]
+
+
+def workers_of_ray():
+    """Processes that run a repetition now."""
+    names = ((int(path.name), (path / "cmdline")) for path in Path("/proc").glob("[0-9]*"))
+    return [pid for pid, name in names if name.exists() and name.read_bytes().startswith(b"ray::run")]
+
+
+@pytest.mark.parametrize("at_once", [1, 2, 4])
+def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store, at_once):
+    experiment = experiments.submit_experiment(store, toy()).id
+
+    run(Supervisor(store, at_once), store, experiment)
+
+    assert experiments.read_experiment(store, experiment).state is State.COMPLETED
+    assert stored(store, experiment) == expected(toy())
+
+
+def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store):
+    experiment = experiments.submit_experiment(sqlite_store, long_toy()).id
+    supervisor = Supervisor(sqlite_store, 1)
+    run(supervisor, sqlite_store, experiment, until=workers_of_ray)
+    time.sleep(0.5)
+
+    for pid in workers_of_ray():
+        os.kill(pid, signal.SIGKILL)
+    run(supervisor, sqlite_store, experiment)
+
+    repetitions = experiments.list_repetitions(sqlite_store, experiment)
+    assert [each.state for each in repetitions] == [State.COMPLETED] * 2
+    assert sum(each.attempts for each in repetitions) > 2
+    assert stored(sqlite_store, experiment) == expected(long_toy())
+
+
+def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others_go_on(sqlite_store, monkeypatch):
+    @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
+    def raising(spec, number, log):
+        if number == 1:
+            msg = "the second one is broken"
+            raise ZeroDivisionError(msg)
+        yield from task.batches(repetition(setting(spec, number), log))
+
+    monkeypatch.setattr(task, "run", raising)
+    experiment = experiments.submit_experiment(sqlite_store, toy()).id
+
+    run(Supervisor(sqlite_store, 4), sqlite_store, experiment)
+
+    read = experiments.read_experiment(sqlite_store, experiment)
+    states = [each.state for each in experiments.list_repetitions(sqlite_store, experiment)]
+    assert states == [State.COMPLETED, State.FAILED, State.COMPLETED]
+    assert (read.state, read.progress.failed) == (State.COMPLETED, 1)
+    assert read.reasons == ("ZeroDivisionError: the second one is broken",)
+
+
+def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_twice(sqlite_store, monkeypatch):
+    record_all, calls = execution.record_all, []
+
+    def flaky(store, deliveries):
+        calls.append(1)
+        if len(calls) % 3 == 1:
+            raise StoreUnavailable("before anything was written")
+        held = record_all(store, deliveries)
+        if len(calls) % 3 == 2:
+            raise StoreUnavailable("after everything was written")
+        return held
+
+    monkeypatch.setattr(execution, "record_all", flaky)
+    experiment = experiments.submit_experiment(sqlite_store, toy()).id
+    supervisor = Supervisor(sqlite_store, 4)
+
+    deadline = time.monotonic() + DEADLINE_S
+    while experiments.read_experiment(sqlite_store, experiment).state is not State.COMPLETED:
+        assert time.monotonic() < deadline
+        try:
+            supervisor.step()
+        except StoreUnavailable:
+            continue
+
+    assert len(calls) > 3
+    assert stored(sqlite_store, experiment) == expected(toy())
+
+
+def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store):
+    experiment = experiments.submit_experiment(sqlite_store, long_toy()).id
+    supervisor = Supervisor(sqlite_store, 2)
+    run(
+        supervisor,
+        sqlite_store,
+        experiment,
+        until=lambda: experiments.read_experiment(sqlite_store, experiment).progress.iterations_done,
+    )
+
+    experiments.cancel_experiment(sqlite_store, experiment)
+    deadline = time.monotonic() + DEADLINE_S
+    while workers_of_ray():
+        assert time.monotonic() < deadline
+        supervisor.step()
+
+    assert experiments.read_experiment(sqlite_store, experiment).state is State.CANCELLED
+    assert experiments.read_experiment(sqlite_store, experiment).progress.iterations_done
+
+
+def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_store):
+    experiment = experiments.submit_experiment(sqlite_store, toy()).id
+    first, stop = Supervisor(sqlite_store, 2), Event()
+    first.step()
+    stop.set()
+
+    first.serve(stop)
+    run(Supervisor(sqlite_store, 2), sqlite_store, experiment)
+
+    assert experiments.read_experiment(sqlite_store, experiment).state is State.COMPLETED
+    assert stored(sqlite_store, experiment) == expected(toy())
