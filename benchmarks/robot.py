@@ -7,7 +7,8 @@ same numbers. Ratios are to the direct baseline: the mean fitness of controllers
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -30,18 +31,22 @@ LOOK_S = 0.05
 
 
 class Laboratory:
-    """The robot in its reality and in simulators of three tunables; evolved controllers are kept."""
+    """The robot in its reality and in simulators of three tunables.
 
-    def __init__(self, evaluations: int) -> None:
+    Args:
+        evaluations: of each search for a controller.
+        kept: a folder in which evolved controllers are kept, for later tables and for other processes.
+    """
+
+    def __init__(self, evaluations: int, kept: Path) -> None:
         self.evaluations = evaluations
+        self.kept = kept
         self.robot = Quadruped()
         self.engine = PyBullet()
         edits = [tunables[name]() for name in NAMES]
         self.simulate = Simulation(self.robot, self.engine, edits)
         self.truth = np.array([edit.read(self.robot.world) for edit in edits])
         self.parameters = Space.box([edit.lower for edit in edits], [edit.upper for edit in edits])
-        self.in_reality = cache(lambda seed: self.evolve(self.truth, "direct", seed))
-        self.in_random = cache(lambda seed: self.evolve(self.random(seed), "random", seed))
 
     def real(self, genome: Genome) -> float:
         """The fitness of the genome `(g,)` in reality."""
@@ -49,18 +54,31 @@ class Laboratory:
 
     def random(self, seed: int) -> FloatArray:
         """`(3,)`: a simulator drawn uniformly within the bounds of the tunables."""
-        return self.parameters.draw(1, stream(seed, "random simulator"))[0]
+        drawn: FloatArray = self.parameters.draw(1, stream(seed, "random simulator"))[0]
+        return drawn
+
+    def in_reality(self, seed: int) -> Genome:
+        """A controller evolved in reality."""
+        return self.evolve(self.truth, "direct", seed)
+
+    def in_random(self, seed: int) -> Genome:
+        """A controller evolved in a random simulator."""
+        return self.evolve(self.random(seed), "random", seed)
 
     def evolve(self, parameters: FloatArray, *address: str | int) -> Genome:
         """The fittest controller that the budget finds in a simulator `(3,)`."""
-        found = maximise(
-            SteadyState(),
-            self.robot.space,
-            lambda genomes: self.simulate(genomes, parameters[None])[:, 0],
-            self.evaluations,
-            stream(0, *address),
-        )
-        return found.genomes[0]
+        file = self.kept / f"{self.evaluations}-{'-'.join(map(str, address))}.npy"
+        if not file.exists():
+            found = maximise(
+                SteadyState(),
+                self.robot.space,
+                lambda genomes: self.simulate(genomes, parameters[None])[:, 0],
+                self.evaluations,
+                stream(0, *address),
+            )
+            np.save(file, found.genomes[0])
+        genome: Genome = np.load(file)
+        return genome
 
     def direct(self, seeds: int) -> list[float]:
         """Fitness of controllers evolved in reality."""
@@ -111,7 +129,7 @@ def gap(laboratory: Laboratory, asked: Namespace) -> None:
 
     def rows() -> Iterable[str]:
         for seed in range(asked.seeds):
-            ratios.append(laboratory.real(laboratory.in_random(seed)) / np.mean(direct))
+            ratios.append(laboratory.real(laboratory.in_random(seed)) / float(np.mean(direct)))
             yield f"{seed} | {numbers(laboratory.random(seed))} | {ratios[-1]:.2f}"
 
     table("seed | static | dynamic | restitution | real fitness over direct", rows())
@@ -144,26 +162,28 @@ def smooth(laboratory: Laboratory, asked: Namespace) -> None:
 
 
 def identifiable(laboratory: Laboratory, asked: Namespace) -> None:
-    """Simulators tuned on fit samples: how far from the truth they are, and what is worth what evolves in them."""
-    direct = float(np.mean(laboratory.direct(asked.seeds)))
+    """Simulators tuned on fit samples: how far from the truth they are, and what evolves in them is worth."""
+    genomes = [laboratory.in_random(seed) for seed in range(10)]
+    samples = [Sample(genome, laboratory.real(genome)) for genome in genomes]
     found: dict[int, list[tuple[FloatArray, float]]] = {}
 
     def rows() -> Iterable[str]:
         for count in asked.samples:
             for seed in range(asked.tunings):
-                genomes = [laboratory.in_random(10 * seed + sample) for sample in range(count)]
-                samples = [Sample(genome, laboratory.real(genome)) for genome in genomes]
                 rng = stream(seed, "tune", count)
-                best = tune(laboratory.simulate, samples, laboratory.parameters, SteadyState(), asked.tuning, rng)[0]
-                fitness = laboratory.real(laboratory.evolve(best.parameters, "tuned", count, seed)) / direct
+                some = [samples[index] for index in rng.permutation(10)[:count]]
+                best = tune(laboratory.simulate, some, laboratory.parameters, SteadyState(), asked.tuning, rng)[0]
+                fitness = laboratory.real(laboratory.evolve(best.parameters, "tuned", asked.tuning, count, seed))
                 found.setdefault(count, []).append((best.parameters, fitness))
-                error = np.sqrt(best.squared_error / count) / direct
-                yield f"{count} | {seed} | {numbers(best.parameters)} | {error:.4f} | {fitness:.2f}"
+                error = np.sqrt(best.squared_error / count)
+                yield f"{count} | {seed} | {numbers(best.parameters)} | {error:.4f} | {fitness:.3f}"
 
-    table("samples | seed | static | dynamic | restitution | error over direct | real fitness over direct", rows())
+    table("samples | seed | static | dynamic | restitution | error m/s | real fitness m/s", rows())
+    direct = float(np.mean(laboratory.direct(asked.seeds)))
     for count, pairs in found.items():
         off = np.median([np.abs(parameters - laboratory.truth) for parameters, _ in pairs], axis=0)
-        print(f"{count} samples: median |error| {numbers(off)}; fitness {spread([fitness for _, fitness in pairs])}.")
+        ratios = [fitness / direct for _, fitness in pairs]
+        print(f"{count} samples: median |error| {numbers(off, ', ')}; real fitness over direct {spread(ratios)}.")
 
 
 def table(head: str, rows: Iterable[str]) -> None:
@@ -190,9 +210,9 @@ def spread(values: Sequence[float]) -> str:
     return f"{np.mean(values):.3f} ± {np.std(values, ddof=1):.3f} (n = {len(values)})"
 
 
-def numbers(values: FloatArray) -> str:
-    """Table cells of numbers."""
-    return " | ".join(f"{value:.2f}" for value in values)
+def numbers(values: FloatArray, between: str = " | ") -> str:
+    """Numbers in a row."""
+    return between.join(f"{value:.2f}" for value in values)
 
 
 def bar(share: float) -> str:
@@ -214,10 +234,13 @@ def main() -> None:
     parser.add_argument("--samples", type=int, nargs="+", default=[1, 3, 10], help="identifiable: how many to tune on")
     parser.add_argument("--tunings", type=int, default=3, help="identifiable: tunings with each number of samples")
     parser.add_argument("--tuning", type=int, default=2_000, help="identifiable: evaluations of each, the paper's 2000")
+    parser.add_argument("--keep", type=Path, help="a folder to keep evolved controllers in, for other calls")
     asked = parser.parse_args()
-    laboratory = Laboratory(asked.evaluations)
-    for name in asked.tables:
-        COMMANDS[name](laboratory, asked)
+    with TemporaryDirectory() as temporary:
+        kept = asked.keep or Path(temporary)
+        kept.mkdir(parents=True, exist_ok=True)
+        for name in asked.tables:
+            COMMANDS[name](Laboratory(asked.evaluations, kept), asked)
 
 
 if __name__ == "__main__":
