@@ -129,6 +129,11 @@ def _leg(name: str, ahead: int, left: int) -> tuple[list[Body], list[Joint]]:
 
 
 def _trot() -> Genome:
-    """Diagonal legs together, the pairs half a period apart; a leg is lifted while it swings forwards."""
-    lead = {"front_left": 0.0, "rear_right": 0.0, "front_right": 0.5, "rear_left": 0.5}
-    return frozen([gene for leg in LEGS for gene in (lead[leg], 0.5, lead[leg], 0.5, lead[leg], 0.5)])
+    """By hand: diagonal legs together, the pairs half a period apart.
+
+    A leg is lifted just before it swings forwards, and its knee opens for the stance; what else moves it is the lag of
+    its motors. Tuned by hand too, by trying a few phases and widths that are the same for all legs.
+    """
+    starts = {"front_left": 0.0, "front_right": 0.5, "rear_left": 0.5, "rear_right": 0.0}
+    yaw, roll, knee = (0.0, 0.5), (0.9375, 0.5), (0.25, 0.6)
+    return frozen([((starts[leg] + phase) % 1, width) for leg in LEGS for phase, width in (yaw, roll, knee)]).ravel()
