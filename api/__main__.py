@@ -1,7 +1,21 @@
 """The API alone, as a container runs it: `python -m api`. It neither migrates the database nor runs anything."""
 
-from api.server import serve_api
+import sys
+
+from api.exits import CommandError
+from api.server import listen, serve_api
+from services.core.errors import GaplabError
 from services.settings import Settings
 
+
+def main() -> None:
+    """Serve by the settings of the environment."""
+    try:
+        settings = Settings.from_environment()
+        serve_api(settings, listen(settings.host, settings.port))
+    except (CommandError, GaplabError, ValueError) as error:
+        sys.exit(f"gaplab: {error}")
+
+
 if __name__ == "__main__":
-    serve_api(Settings.from_environment())
+    main()

@@ -69,7 +69,7 @@ def submit(
         console = display.console()
         console.print(submitted.id, markup=False)
         if watch:
-            _finish(follow(client.watch(submitted.id), console))
+            _finish(_watched(client, submitted.id))
 
 
 @app.command("list")
@@ -152,9 +152,18 @@ def demo(
     run(folder, display.console())
 
 
+def _watched(client: Client, id: str) -> ExperimentRead | StudyRead:  # noqa: A002 - as the API says
+    try:
+        return follow(client.watch(id), display.console())
+    except KeyboardInterrupt:
+        msg = f"it goes on without you; `gaplab show {id}` says how far it is"
+        raise CommandError(msg, Exit.INTERRUPTED) from None
+
+
 def _leave(lines: list[str], code: Exit) -> None:
     for line in lines:
-        typer.echo(f"gaplab: {line}", err=True)
+        printable = line.encode("utf-8", "backslashreplace").decode()  # names of files need not be Unicode
+        typer.echo(f"gaplab: {printable}", err=True)
     sys.exit(code)
 
 

@@ -188,8 +188,8 @@ class Client:
 
 
 def _part(id: str) -> str:  # noqa: A002 - as the API says
-    """The id as one part of an address, whatever it is."""
-    return quote(id, safe="").replace(".", "%2E") or "%20"
+    """The id as one part of an address, whatever it is; servers decode a slash before they look for parts."""
+    return quote(id.replace("/", "%2F"), safe="").replace(".", "%2E") or "%20"
 
 
 def _for_good(error: Exception) -> bool:

@@ -1,16 +1,43 @@
 """The API as a process."""
 
+import signal
+import socket
+import sys
+
 import uvicorn
 
 from api.app import create_app
+from api.exits import CommandError, Exit
 from services.settings import Settings
 from services.store.session import Store
 
 
-def serve_api(settings: Settings) -> None:
-    """Serve until told to stop (SIGINT, SIGTERM); requests under way are answered first."""
+def listen(host: str, port: int) -> socket.socket:
+    """The address to serve on, taken.
+
+    Raises:
+        CommandError: it cannot be had; most often because a service has it already.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        return socket.create_server((host, port), family=family)
+    except OSError as error:
+        msg = f"cannot serve on {host}:{port}: {(error.strerror or str(error)).lower()}"
+        raise CommandError(msg, Exit.FAILED) from error
+
+
+def serve_api(settings: Settings, listener: socket.socket) -> None:
+    """Serve until told to stop (SIGINT, SIGTERM); requests under way are answered first. Then the process exits."""
+    end_in_order()
     store = Store(settings.database_url)
     try:
-        uvicorn.run(create_app(store), host=settings.host, port=settings.port, log_level="warning", server_header=False)
+        config = uvicorn.Config(create_app(store), log_level="warning", server_header=False)
+        uvicorn.Server(config).run([listener])
     finally:
         store.dispose()
+
+
+def end_in_order() -> None:
+    """Let SIGINT and SIGTERM unwind this process, so that what it opened is closed and what it started is ended."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: sys.exit(0))

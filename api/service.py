@@ -11,7 +11,7 @@ from threading import Event, Thread
 from time import monotonic
 
 from api.launch import end, start
-from api.server import serve_api
+from api.server import end_in_order, listen, serve_api
 from services.core.errors import StoreUnavailable
 from services.settings import Settings
 
@@ -27,16 +27,22 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
     Args:
         settings: of the API and of the supervisor.
         workers: whether experiments are run, or only taken and shown.
+
+    Raises:
+        CommandError: the address is taken.
+        StoreUnavailable: the database cannot be migrated.
     """
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     logging.getLogger("alembic").setLevel(logging.WARNING)
+    end_in_order()
+    listener = listen(settings.host, settings.port)
     migrate(settings.database_url)
     say(f"gaplab serves on http://{settings.host}:{settings.port} (/docs lists what it answers to; Ctrl-C ends it)")
     keeper = Keeper(environment_of(settings)) if workers else None
     try:
         if keeper:
             keeper.start()
-        serve_api(settings)
+        serve_api(settings, listener)
     finally:
         if keeper:
             keeper.stop()

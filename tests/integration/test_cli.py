@@ -1,0 +1,277 @@
+"""The command, against a service in a thread: what it prints, and how it ends."""
+
+import io
+import json
+import re
+import sys
+import threading
+import time
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+import uvicorn
+from fastapi import FastAPI
+
+from api.app import create_app
+from api.cli import main
+from api.client import Client, ServiceError, ServiceUnreachable
+from api.exits import Exit
+from api.server import listen
+from services import execution
+from services.store.session import Store
+from tests.experiments import run, some_log
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SMOKE = str(EXAMPLES / "smoke.json")
+
+
+class Said(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+Gaplab = Callable[..., Said]
+
+
+@contextmanager
+def served(app: Callable[..., Any]) -> Iterator[str]:
+    """The address of a service of this app in a thread."""
+    listener = listen("127.0.0.1", 0)
+    server = uvicorn.Server(uvicorn.Config(app, log_level="critical", lifespan="off"))
+    thread = threading.Thread(target=server.run, args=([listener],))
+    thread.start()
+    yield f"http://127.0.0.1:{listener.getsockname()[1]}"
+    server.should_exit = True
+    thread.join()
+    listener.close()
+
+
+@pytest.fixture(scope="module")
+def service() -> Iterator[tuple[FastAPI, str]]:
+    """A service without workers, and without a database yet."""
+    app = create_app(Store("sqlite://"))
+    with served(app) as address:
+        yield app, address
+
+
+@pytest.fixture
+def url(service: tuple[FastAPI, str], sqlite_store: Store) -> str:
+    """Where the service answers from this test's database."""
+    app, address = service
+    app.state.store = sqlite_store
+    return address
+
+
+@pytest.fixture
+def gaplab(url: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Gaplab:
+    """Runs the command as a shell would."""
+    monkeypatch.setenv("GAPLAB_URL", url)
+
+    def command(*arguments: str, stdin: str = "") -> Said:
+        monkeypatch.setattr(sys, "argv", ["gaplab", *arguments])
+        monkeypatch.setattr(sys, "stdin", io.StringIO(stdin))
+        with pytest.raises(SystemExit) as ended:
+            main()
+        printed = capsys.readouterr()
+        assert "Traceback" not in printed.out + printed.err
+        return Said(int(ended.value.code or 0), printed.out, printed.err)
+
+    return command
+
+
+def finish(store: Store) -> None:
+    """Run whatever is queued."""
+    while claims := execution.claim(store, "test", limit=10):
+        for number, claim in enumerate(claims):
+            iterations = 0 if claim.spec.strategy.name == "direct" else claim.spec.iterations
+            run(store, claim, some_log(iterations, recorded=1 + number / 10))
+
+
+def submitted(gaplab: Gaplab, spec: str = SMOKE) -> str:
+    return gaplab("submit", spec).out.strip()
+
+
+def test_submit_prints_the_id_that_show_and_list_know(gaplab: Gaplab):
+    id = submitted(gaplab)  # noqa: A001
+
+    shown, listed = gaplab("show", id), gaplab("list")
+
+    assert (shown.code, listed.code) == (0, 0)
+    assert id in shown.out
+    assert "QUEUED" in shown.out
+    assert '"preset": "smoke"' in shown.out
+    assert id in listed.out
+
+
+def test_a_spec_with_several_strategies_or_none_is_a_study(gaplab: Gaplab):
+    submitted(gaplab, str(EXAMPLES / "toy.json"))
+    submitted(gaplab, str(EXAMPLES / "weights.json"))
+
+    listed = gaplab("list").out
+
+    assert "toy function (7)" in listed
+    assert "information? (5)" in listed
+
+
+def test_a_spec_comes_from_standard_input_too(gaplab: Gaplab):
+    said = gaplab("submit", "-", stdin='{"strategy": "random", "budget": "smoke"}')
+
+    assert said.code == 0
+    assert "random" in gaplab("list").out
+
+
+def test_watching_shows_progress_line_by_line_where_there_is_no_terminal(gaplab: Gaplab, sqlite_store: Store):
+    def work() -> None:
+        time.sleep(0.5)
+        finish(sqlite_store)
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    said = gaplab("submit", SMOKE, "--watch")
+    worker.join()
+
+    assert said.code == 0
+    assert re.search(r"smoke: 0 %, 0 of 2 repetitions", said.out)
+    assert said.out.splitlines()[-1].startswith("smoke: COMPLETED; 2 of 2 repetitions")
+    assert "\x1b" not in said.out
+
+
+def test_watching_what_fails_says_why_and_ends_with_1(gaplab: Gaplab, sqlite_store: Store):
+    def work() -> None:
+        time.sleep(0.5)
+        for claim in execution.claim(sqlite_store, "test", limit=10):
+            execution.fail(sqlite_store, claim, "ValueError: the robot fell apart")
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    said = gaplab("submit", SMOKE, "--watch")
+    worker.join()
+
+    assert said.code == Exit.FAILED
+    assert "FAILED" in said.out
+    assert "the robot fell apart" in said.err
+
+
+def test_curves_are_a_table_values_or_drawings(gaplab: Gaplab, sqlite_store: Store, tmp_path: Path):
+    small = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "smoke", "repetitions": 3}
+    id = gaplab("submit", "-", stdin=json.dumps(small)).out.strip()  # noqa: A001
+    finish(sqlite_store)
+    svg, html = tmp_path / "new" / "fig.svg", tmp_path / "fig.html"
+
+    table, values = gaplab("curve", id), gaplab("curve", id, "--csv")
+    drawn = gaplab("curve", id, "--svg", str(svg), "--html", str(html))
+
+    assert re.search(r"^ *2 +\d+\.\d\d ± \d+\.\d\d", table.out, re.MULTILINE)
+    assert "evolved in reality itself" in table.out
+    assert values.out.startswith("experiment,name,strategy,repetition,evaluations,fitness\n")
+    assert drawn.code == 0
+    assert ET.fromstring(svg.read_text()).tag.endswith("svg")
+    assert html.read_text().startswith("<!doctype html>")
+
+
+def test_a_cancelled_study_has_no_experiment_left_to_run(gaplab: Gaplab):
+    id = submitted(gaplab, str(EXAMPLES / "toy.json"))  # noqa: A001
+
+    first, second = gaplab("cancel", id), gaplab("cancel", id)
+
+    assert first.code == 0
+    assert gaplab("show", id).out.count("CANCELLED") == 8
+    assert second.code == Exit.CONFLICT
+
+
+def test_the_catalogue_lists_every_kind_of_plug_in(gaplab: Gaplab):
+    said = gaplab("catalogue").out
+
+    assert all(
+        name in said for name in ("simulated_fit_and_unique", "quadruped", "pybullet", "restitution", "steady_state")
+    )
+
+
+def test_no_service_is_a_sentence_that_says_how_to_start_one(gaplab: Gaplab):
+    said = gaplab("list", "--url", "http://127.0.0.1:9")
+
+    assert said.code == Exit.UNREACHABLE
+    assert said.err.startswith("gaplab: no service answers at http://127.0.0.1:9")
+    assert "gaplab serve" in said.err
+
+
+@pytest.mark.parametrize("command", ["show", "curve", "cancel"])
+@pytest.mark.parametrize("name", ["nope", "..", "", "a/b", "x?y", "%", "ü"])
+def test_an_unknown_id_is_a_sentence(gaplab: Gaplab, command: str, name: str):
+    said = gaplab(command, name)
+
+    assert said.code == Exit.NOT_FOUND
+    assert re.fullmatch(r"gaplab: there is no.*\n", said.err)
+
+
+def test_every_mistake_in_a_spec_has_a_line_of_its_own(gaplab: Gaplab):
+    said = gaplab("submit", "-", stdin='{"strategy": "simulated_fti", "robot": "quadruppet"}')
+
+    assert said.code == Exit.INVALID
+    assert sorted(line.split(": ")[1] for line in said.err.splitlines()) == ["/robot", "/strategy"]
+    assert "did you mean 'simulated_fit'?" in said.err
+
+
+@pytest.mark.parametrize("text", ["", "{", "[1]", '{"seed": NaN}', "[" * 100_000, '"text"'])
+def test_a_file_that_is_no_spec_is_a_sentence(gaplab: Gaplab, tmp_path: Path, text: str):
+    file = tmp_path / "spec.json"
+    file.write_text(text)
+
+    said = gaplab("submit", str(file))
+
+    assert said.code == Exit.FILE
+    assert said.err.startswith(f"gaplab: {file}")
+    assert said.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("file", ["missing.json", ".", "\udcff.json"])
+def test_a_file_that_cannot_be_read_is_a_sentence(gaplab: Gaplab, file: str):
+    said = gaplab("submit", file)
+
+    assert said.code == Exit.FILE
+    assert said.err.count("\n") == 1
+
+
+def test_wrong_use_of_the_command_ends_with_2_and_help_tells_the_codes(gaplab: Gaplab):
+    assert gaplab("submit").code == Exit.USAGE
+    assert gaplab("list", "--limit", "0").code == Exit.USAGE
+    assert "Exit codes" in gaplab("--help").out
+
+
+def test_a_port_that_is_no_number_in_the_environment_is_a_sentence(gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("GAPLAB_PORT", "eighty")
+
+    said = gaplab("list")
+
+    assert said.code == Exit.FAILED
+    assert "GAPLAB_PORT is 'eighty'" in said.err
+
+
+@pytest.mark.parametrize("example", sorted(EXAMPLES.glob("*.json")), ids=lambda path: path.name)
+def test_every_example_is_accepted_and_says_its_name(gaplab: Gaplab, example: Path):
+    said = gaplab("submit", str(example))
+
+    assert said.code == 0, said.err
+    assert json.loads(example.read_text())["name"]
+
+
+def test_the_client_raises_the_services_problem(url: str):
+    with Client(url) as client, pytest.raises(ServiceError) as refused:
+        client.submit({"strategy": "simulated_fti"})
+
+    assert refused.value.problem.status == 422
+    assert refused.value.problem.errors[0].nearest == "simulated_fit"
+
+
+def test_the_client_knows_when_what_answers_is_no_gaplab():
+    async def other(scope: dict[str, Any], receive: object, send: Callable[..., Any]) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": b"<html>hello</html>"})
+
+    with served(other) as address, Client(address) as client, pytest.raises(ServiceUnreachable, match="no gaplab"):
+        client.studies()
