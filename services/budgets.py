@@ -20,7 +20,7 @@ PRESETS: dict[BudgetName, Preset] = {
     # to see that it works: seconds on the toy, about a minute on PyBullet
     "smoke": Preset(2, 2, 60, 30, 60),
     # to see an effect: about an hour on two cores for a study on PyBullet
-    "desk": Preset(5, 8, 400, 60, 200),
+    "desk": Preset(5, 8, 500, 150, 200),
     # Source: paper, sections 2 and 3; that a selection takes as many evaluations as the final search is its reading
     "paper": Preset(10, 40, 10_000, 10_000, 2_000),
 }

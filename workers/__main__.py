@@ -17,11 +17,10 @@ def serve(settings: Settings) -> int:
     from workers.supervisor import Supervisor
 
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    stop = Event()
-    for signum in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(signum, lambda *_: stop.set())
-    store = Store(settings.database_url)
+    store, stop = Store(settings.database_url), Event()
     with cluster(settings) as capacity:
+        for signum in (signal.SIGTERM, signal.SIGINT):  # only now, for Ray has put handlers of its own in place
+            signal.signal(signum, lambda *_: stop.set())
         logging.getLogger("gaplab.supervisor").info("ready for %d repetitions at once", capacity)
         Supervisor(store, capacity).serve(stop)
     store.dispose()

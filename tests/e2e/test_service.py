@@ -1,0 +1,117 @@
+"""From POST to curve through the real service: HTTP, database, Ray, physics."""
+
+import pytest
+
+from schemas.spec import StudySpec
+from services.core.loop import repetition
+from services.core.types import Measured, Probed
+from services.resolution import resolve_study
+from services.simulation import setting
+from tests.e2e.service import Service, wait_until
+
+TOY = {
+    "name": "toy",
+    "robot": "toy_function",
+    "strategies": ["simulated_fit_and_informative", "known_fit", "direct"],
+    "iterations": 3,
+    "repetitions": 4,
+    "budget": {"controller_evaluations": 60, "selection_evaluations": 40, "simulator_evaluations": 40},
+    "seed": 5,
+}
+SLOW_TOY = TOY | {"budget": {"controller_evaluations": 3_000, "selection_evaluations": 500}, "iterations": 2}
+QUADRUPED = {
+    "strategies": [
+        "simulated_fit",
+        {"name": "simulated_fit_and_informative", "options": {"simulators": 4}},
+        "direct",
+    ],
+    "budget": {"controller_evaluations": 25, "selection_evaluations": 20, "simulator_evaluations": 20},
+    "iterations": 1,
+    "repetitions": 2,
+}
+
+
+@pytest.fixture
+def service(tmp_path):
+    service = Service(tmp_path)
+    yield service
+    service.close()
+
+
+def computed_here(spec):
+    """Samples and recorded fitness of every experiment, computed in this process without any service."""
+    experiments = []
+    for resolved in resolve_study(StudySpec.model_validate(spec)):
+        logs = [list(repetition(setting(resolved, number))) for number in range(resolved.repetitions)]
+        experiments.append(
+            {
+                "recorded": [[step.recorded for step in log if isinstance(step, Probed)] for log in logs],
+                "samples": [[step.sample.fitness for step in log if isinstance(step, Measured)] for log in logs],
+            }
+        )
+    return experiments
+
+
+def told_by(service, study):
+    """The same, as the service tells it."""
+    experiments = []
+    for curve in service.get(f"/studies/{study}/curves"):
+        values = [point["values"] for point in curve["points"]]
+        samples = service.get(f"/experiments/{curve['experiment']}/samples", kind="sample", limit=1000)["items"]
+        by_repetition = [[] for _ in values[0]]
+        for each in sorted(samples, key=lambda sample: (sample["repetition"], sample["iteration"])):
+            by_repetition[each["repetition"]].append(each["fitness"])
+        recorded = [list(row) for row in zip(*values, strict=True)]
+        experiments.append({"recorded": recorded, "samples": by_repetition})
+    return experiments
+
+
+def test_a_toy_study_goes_from_post_to_curve_with_the_numbers_of_one_process(service):
+    service.start()
+
+    study = service.post("/studies", TOY)["id"]
+
+    ended = service.finish(f"/studies/{study}", within_s=90)
+    assert ended["state"] == "COMPLETED"
+    assert ended["progress"]["rollouts_done"] == ended["progress"]["rollouts"]
+    assert told_by(service, study) == computed_here(TOY)
+    ids = [each["id"] for each in ended["experiments"]]
+    assert len(service.get("/comparisons", experiment=ids)) == 3
+    assert "<svg" in service.http.get("/figures/curves", params={"study": study, "format": "svg"}).text
+
+
+def test_a_quadruped_study_on_pybullet_goes_from_post_to_curve(service):
+    service.start()
+
+    study = service.post("/studies", QUADRUPED)["id"]
+
+    ended = service.finish(f"/studies/{study}", within_s=180)
+    assert ended["state"] == "COMPLETED"
+    assert ended["progress"]["rollouts_failed"] == 0
+    assert told_by(service, study) == computed_here(QUADRUPED)
+
+
+def test_killed_in_the_middle_it_goes_on_where_it_was_with_the_same_numbers(service):
+    service.start()
+    study = service.post("/studies", SLOW_TOY)["id"]
+    wait_until(lambda: service.get(f"/studies/{study}")["progress"]["iterations_done"] >= 5, 60)
+
+    service.kill()
+    wait_until(lambda: not service.processes(), 30, service.processes)
+    service.start()
+
+    before = service.get(f"/studies/{study}")
+    assert before["state"] == "RUNNING"
+    assert before["progress"]["iterations_done"] >= 5
+    assert service.finish(f"/studies/{study}", within_s=150)["state"] == "COMPLETED"
+    assert told_by(service, study) == computed_here(SLOW_TOY)
+
+
+def test_stopped_in_order_it_leaves_no_process_behind(service):
+    service.start()
+    service.post("/studies", SLOW_TOY)
+    wait_until(lambda: service.get("/studies")["items"][0]["state"] == "RUNNING", 60)
+
+    service.stop()
+
+    wait_until(lambda: not service.processes(), 20, service.processes)

@@ -1,0 +1,37 @@
+"""The README says what there is, and all of it."""
+
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from services.catalogue import catalogue
+from services.settings import Settings
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text()
+
+
+@pytest.mark.parametrize("kind", ["strategies", "robots", "engines", "tunables", "optimizers"])
+def test_it_lists_every_plugin_of_a_kind_and_no_other(kind):
+    (row,) = re.findall(rf"^\| {kind} \| (.*) \|$", README, re.MULTILINE)
+
+    assert set(re.findall(r"`(\w+)`", row)) == {each.name for each in getattr(catalogue(), kind)}
+
+
+def test_it_lists_every_setting():
+    for field in fields(Settings):
+        assert f"`GAPLAB_{field.name.upper()}`" in README
+
+
+@pytest.mark.parametrize("command", sorted(set(re.findall(r"make (\w+)", README))))
+def test_its_make_commands_are_in_the_makefile(command):
+    assert re.search(rf"^{command}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    "path", sorted(set(re.findall(r"\]\(([\w./]+)\)|(examples/[\w.]+)|`(services/[\w/]+)/`", README)))
+)
+def test_its_links_and_paths_lead_somewhere(path):
+    assert (ROOT / next(filter(None, path))).exists()
