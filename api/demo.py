@@ -30,17 +30,18 @@ STUDIES = ("toy", "quadruped")
 START_WITHIN_S = 120.0
 
 
-def run(folder: Path, console: Console) -> None:
+def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
     """Run both studies, and say where everything is.
 
     Args:
         folder: gets the database, the figures and the service's log; made if it is not there.
         console: to show progress and results on.
+        specs_from: the folder that has the specs of the studies.
 
     Raises:
         CommandError: the service does not start, a study fails, or a person interrupts.
     """
-    specs = {name: _spec(name) for name in STUDIES}
+    specs = {name: _spec(specs_from / f"{name}.json") for name in STUDIES}
     folder.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
     try:
@@ -133,8 +134,7 @@ def _interruptible() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-def _spec(name: str) -> dict[str, object]:
-    path = SPECS / f"{name}.json"
+def _spec(path: Path) -> dict[str, object]:
     if not path.is_file():
         msg = f"{path} is not there; the demo runs from a clone of the repository"
         raise CommandError(msg, Exit.FILE)

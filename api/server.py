@@ -18,11 +18,15 @@ def listen(host: str, port: int) -> socket.socket:
     Raises:
         CommandError: it cannot be had; most often because a service has it already.
     """
+    if port >= 2**16:
+        msg = f"cannot serve on {host}:{port}: ports end at {2**16 - 1}"
+        raise CommandError(msg, Exit.FAILED)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)
     except OSError as error:
-        msg = f"cannot serve on {host}:{port}: {(error.strerror or str(error)).lower()}"
+        reason = str(error.strerror or error).split(" (while")[0]
+        msg = f"cannot serve on {host}:{port}: {reason.lower()}"
         raise CommandError(msg, Exit.FAILED) from error
 
 

@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from api.app import create_app
+from migrations import upgrade
 from schemas.problems import Problem
 from services.store.session import Store
 
@@ -70,11 +71,15 @@ def mutated_specs(draw: st.DrawFn) -> dict[str, Any]:
     return spec
 
 
-@pytest.fixture(scope="module")
-def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
-    from migrations import upgrade
-
-    url = f"sqlite:///{tmp_path_factory.mktemp('fuzz') / 'gaplab.db'}"
+@pytest.fixture(scope="module", params=["sqlite", "postgres"])
+def api(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    """Over either database: Postgres refuses texts that SQLite takes."""
+    if request.param == "sqlite":
+        url = f"sqlite:///{tmp_path_factory.mktemp('fuzz') / 'gaplab.db'}"
+    else:
+        server = request.getfixturevalue("postgres")
+        server.create("fuzz")
+        url = server.url("fuzz")
     upgrade(url)
     store = Store(url)
     with TestClient(create_app(store), raise_server_exceptions=False) as client:

@@ -1,0 +1,79 @@
+"""The demo on tiny studies, with everything real: it ends in order when interrupted, and goes on where it was."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+TINY = {"robot": "toy_function", "strategies": ["simulated_fit", "random", "direct"], "iterations": 3, "repetitions": 4}
+TINY_BUDGET = {"controller_evaluations": 40, "selection_evaluations": 40, "simulator_evaluations": 40}
+
+
+@pytest.fixture
+def specs(tmp_path: Path) -> Path:
+    folder = tmp_path / "specs"
+    folder.mkdir()
+    for name in ("toy", "quadruped"):
+        (folder / f"{name}.json").write_text(json.dumps(TINY | {"name": name, "budget": TINY_BUDGET}))
+    return folder
+
+
+def demo(folder: Path, specs: Path) -> "subprocess.Popen[str]":
+    script = (
+        "import sys; from pathlib import Path; from api.demo import run; from api.display import console\n"
+        "run(Path(sys.argv[1]), console(), Path(sys.argv[2]))"
+    )
+    return subprocess.Popen(
+        [sys.executable, "-c", script, str(folder), str(specs)],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def left_running(folder: Path) -> list[str]:
+    """Processes that have the demo's database in their environment."""
+    mark = f"GAPLAB_DATABASE_URL=sqlite:///{folder / 'gaplab.db'}".encode()
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            if mark in (path / "environ").read_bytes().split(b"\0"):
+                found.append((path / "cmdline").read_bytes().replace(b"\0", b" ").decode())
+        except OSError:
+            continue
+    return found
+
+
+def test_a_demo_killed_outright_leaves_nothing_running_and_goes_on_when_run_again(tmp_path: Path, specs: Path):
+    folder = tmp_path / "demo"
+    first = demo(folder, specs)
+    deadline = time.monotonic() + 60
+    while not (folder / "demo.json").exists():
+        assert first.poll() is None, first.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    os.kill(first.pid, signal.SIGKILL)
+    first.communicate()
+    while left_running(folder):
+        assert time.monotonic() < deadline, left_running(folder)
+        time.sleep(0.2)
+
+    second = demo(folder, specs)
+    said, _ = second.communicate(timeout=120)
+
+    assert second.returncode == 0, said
+    assert "going on with study" in said
+    assert "toy: 12 of 12 repetitions" in said
+    assert "evolved in reality itself" in said
+    assert "real-world evaluation" in said
+    for name in ("toy", "quadruped"):
+        assert (folder / f"{name}.html").read_text().startswith("<!doctype html>")
+        assert "<svg" in (folder / f"{name}.svg").read_text()
+    assert not (folder / "demo.json").exists()
+    assert left_running(folder) == []

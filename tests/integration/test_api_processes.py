@@ -1,0 +1,173 @@
+"""The processes of the service: what is started is ended, what dies is started again, and trouble is a sentence."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from api import service
+from api.client import Client
+from api.exits import CommandError
+from api.launch import end, start
+from api.server import listen
+from api.service import Keeper, environment_of, migrate
+from services.core.errors import StoreUnavailable
+from services.settings import Settings
+
+
+def within(seconds: float, condition: Callable[[], object]) -> bool:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().split(")")[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def serve(environment: dict[str, str], *arguments: str) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, "-m", "api.cli", "serve", *arguments],
+        env=os.environ | environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+@pytest.fixture
+def port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
+def test_a_service_migrates_its_database_answers_and_ends_in_order(tmp_path: Path, port: int, how: signal.Signals):
+    environment = {"GAPLAB_DATABASE_URL": f"sqlite:///{tmp_path / 'new.db'}"}
+    process = serve(environment, "--no-workers", "--port", str(port))
+
+    with Client(f"http://127.0.0.1:{port}") as client:
+        assert within(20, client.ready)
+    process.send_signal(how)
+    said, _ = process.communicate(timeout=20)
+
+    assert process.returncode == 0, said
+    assert said.startswith(f"gaplab serves on http://127.0.0.1:{port}")
+    assert said.count("\n") == 1
+    assert (tmp_path / "new.db").stat().st_size > 0
+
+
+def test_a_port_that_is_taken_is_a_sentence(tmp_path: Path):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        process = serve({"GAPLAB_DATABASE_URL": f"sqlite:///{tmp_path / 'x.db'}"}, "--port", str(port))
+        said, _ = process.communicate(timeout=20)
+
+    assert process.returncode == 1
+    assert re.fullmatch(rf"gaplab: cannot serve on 127\.0\.0\.1:{port}: address already in use\n", said)
+
+
+@pytest.mark.parametrize(("host", "port"), [("no-such-host.invalid", 9999), ("127.0.0.1", 99999), ("::1::", 1)])
+def test_an_address_that_is_none_is_a_sentence(host: str, port: int):
+    with pytest.raises(CommandError, match=f"^cannot serve on {host}:{port}: [^\n]+$"):
+        listen(host, port)
+
+
+@pytest.mark.parametrize(
+    "url", ["sqlite:////no/such/folder/x.db", "postgresql+psycopg://me:secret@127.0.0.1:9/x", "nonsense", "mysql://x/y"]
+)
+def test_a_database_that_cannot_be_migrated_is_a_sentence_without_its_password(url: str):
+    with pytest.raises(StoreUnavailable) as refused:
+        migrate(url)
+
+    assert "\n" not in str(refused.value)
+    assert "secret" not in str(refused.value)
+
+
+def test_a_supervisor_that_dies_is_started_again_and_it_is_said(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    monkeypatch.setattr(service, "LONGEST_PAUSE_S", 0.1)
+    keeper = Keeper({}, module="this")
+
+    keeper.start()
+    said = ""
+
+    def twice() -> bool:
+        nonlocal said
+        said += "".join(capfd.readouterr())
+        return said.count("another starts") >= 2
+
+    assert within(20, twice)
+    keeper.stop()
+    assert "ended by itself (exit code 0)" in said
+
+
+def test_a_keeper_that_is_stopped_ends_its_supervisor(tmp_path: Path):
+    keeper = Keeper({"PYTHONPATH": str(tmp_path)}, module="sleeper")
+    note = tmp_path / "pid"
+    (tmp_path / "sleeper.py").write_text(
+        f"import os, time; open({str(note)!r}, 'w').write(str(os.getpid())); time.sleep(60)"
+    )
+
+    keeper.start()
+    assert within(20, lambda: note.exists() and note.read_text())
+    keeper.stop()
+
+    assert not alive(int(note.read_text()))
+
+
+def test_a_child_ends_when_its_parent_is_killed_outright(tmp_path: Path):
+    note = tmp_path / "pid"
+    script = (
+        "import time; from api.launch import start; "
+        f"open({str(note)!r}, 'w').write(str(start('http.server', '0', '--bind', '127.0.0.1').pid)); time.sleep(60)"
+    )
+    parent = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    assert within(20, lambda: note.exists() and note.read_text())
+    time.sleep(1.0)
+
+    parent.kill()
+    parent.wait()
+
+    assert within(10, lambda: not alive(int(note.read_text())))
+
+
+def test_a_child_that_does_not_end_when_asked_is_killed(tmp_path: Path):
+    (tmp_path / "stubborn.py").write_text(
+        "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('ready', flush=True); time.sleep(60)"
+    )
+    log = tmp_path / "log"
+    with log.open("wb") as output:
+        process = start("stubborn", environment={"PYTHONPATH": str(tmp_path)}, log=output)
+    assert within(20, lambda: b"ready" in log.read_bytes())
+
+    end(process, patience_s=0.2)
+
+    assert process.returncode == -signal.SIGKILL
+
+
+def test_children_read_the_same_settings():
+    settings = Settings(database_url="sqlite:///x.db", ray_address="auto", workers=3, host="0.0.0.0", port=99)
+
+    assert environment_of(settings) == {
+        "GAPLAB_DATABASE_URL": "sqlite:///x.db",
+        "GAPLAB_RAY_ADDRESS": "auto",
+        "GAPLAB_WORKERS": "3",
+        "GAPLAB_HOST": "0.0.0.0",
+        "GAPLAB_PORT": "99",
+    }
