@@ -6,7 +6,7 @@ from types import ModuleType
 import numpy as np
 
 from services.core.arrays import FloatArray
-from services.core.world import Body, Box, Joint, Material, Shape, Vector, World
+from services.core.world import Body, Box, Joint, Material, World
 
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
 BASE = -1
@@ -119,8 +119,6 @@ class Scene:
         return robot
 
     def _create_shape(self, body: Body) -> int:
-        if not body.collides:
-            return -1
         shape, options = body.shape, {"collisionFramePosition": body.center_m, "physicsClientId": self.client}
         if isinstance(shape, Box):
             half = [edge / 2 for edge in shape.size_m]
@@ -128,20 +126,18 @@ class Scene:
         return int(self.bullet.createCollisionShape(self.bullet.GEOM_SPHERE, radius=shape.radius_m, **options))
 
     def _finish_robot(self, tree: "_Tree") -> None:
-        """Inertia from each body's shape, no damping, and hinges that are free unless they have a motor."""
-        bullet = self.bullet
+        """No damping, no collisions of bodies that have none, and hinges that are free unless they have a motor.
+
+        Bullet takes a link's inertia from its collision shape. A link without a shape would have none, and setting it
+        by `changeDynamics(localInertiaDiagonal=...)` changes the base's instead: so every body gets its shape.
+        """
+        bullet, robot, client = self.bullet, self.robot, self.client
         for index, body in enumerate(tree.bodies, start=BASE):
-            bullet.changeDynamics(
-                self.robot,
-                index,
-                localInertiaDiagonal=_inertia(body.shape, body.mass_kg),
-                linearDamping=0.0,
-                angularDamping=0.0,
-                physicsClientId=self.client,
-            )
+            bullet.changeDynamics(robot, index, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
+            if not body.collides:
+                bullet.setCollisionFilterGroupMask(robot, index, 0, 0, physicsClientId=client)
         for index in range(len(tree.joints)):
-            mode = bullet.VELOCITY_CONTROL
-            bullet.setJointMotorControl2(self.robot, index, mode, force=0.0, physicsClientId=self.client)
+            bullet.setJointMotorControl2(robot, index, bullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
 
 
 @dataclass(frozen=True)
@@ -161,12 +157,3 @@ def _tree(world: World) -> _Tree:
         joints=world.joints,
         parents=tuple(names.index(joint.parent) for joint in world.joints),
     )
-
-
-def _inertia(shape: Shape, mass_kg: float) -> Vector:
-    """The principal moments of inertia of a solid of even density, kg·m²."""
-    if isinstance(shape, Box):
-        x, y, z = (float(np.square(edge)) for edge in shape.size_m)
-        return mass_kg / 12 * (y + z), mass_kg / 12 * (x + z), mass_kg / 12 * (x + y)
-    moment = 0.4 * mass_kg * shape.radius_m**2
-    return moment, moment, moment

@@ -1,0 +1,143 @@
+"""What is particular to the PyBullet engine, beyond the contract that every engine keeps."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from services.core.arrays import FloatArray
+from services.core.robots.quadruped import Quadruped
+from services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, World
+from services.engines.pybullet import PyBullet
+from services.engines.pybullet.engine import WARM_SCENES
+from services.engines.pybullet.stick_slip import StickSlip
+
+pytest.importorskip("pybullet")
+
+ROBOT = Quadruped()
+MOTION = ROBOT.motion(ROBOT.known)
+
+
+@pytest.fixture
+def engine() -> Iterator[PyBullet]:
+    engine = PyBullet()
+    yield engine
+    engine.close()
+
+
+def in_material(material: Material) -> World:
+    return replace(ROBOT.world, material=material)
+
+
+def path(engine: PyBullet, world: World, motion: Motion = MOTION) -> FloatArray:
+    return engine.rollout(world, motion).positions_m
+
+
+def test_importing_the_engine_does_not_load_its_library() -> None:
+    script = "import sys; from services.engines import engines; list(engines); assert 'pybullet' not in sys.modules"
+
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_static_friction_below_dynamic_friction_acts_as_if_equal_to_it(engine: PyBullet) -> None:
+    below, equal = path(engine, in_material(Material(0.2, 0.8))), path(engine, in_material(Material(0.8, 0.8)))
+
+    assert np.array_equal(below, equal)
+
+
+def test_equal_frictions_cost_no_look_at_the_contacts(engine: PyBullet, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(StickSlip, "step", None)
+
+    assert np.all(np.isfinite(path(engine, in_material(Material(0.8, 0.8)))))
+
+
+def test_a_robot_in_its_gait_sticks_and_slides(engine: PyBullet, monkeypatch: pytest.MonkeyPatch) -> None:
+    slid: list[int] = []
+    original = StickSlip._slide
+    monkeypatch.setattr(StickSlip, "_slide", lambda self, link: (slid.append(link), original(self, link))[1])
+
+    path(engine, ROBOT.world)
+
+    assert len(slid) > 10
+    assert len(set(slid)) == 4, "every foot slides at times"
+
+
+def test_more_worlds_than_are_kept_warm_give_the_same_numbers(engine: PyBullet) -> None:
+    worlds = [replace(ROBOT.world, gravity_m_s2=9.0 + number / 10) for number in range(WARM_SCENES + 3)]
+    expected = [path(engine, world) for world in worlds]
+
+    again = [path(engine, world) for world in worlds]
+
+    assert np.array_equal(again, expected)
+
+
+def test_targets_may_change_between_time_steps_and_after_the_last_observation(engine: PyBullet) -> None:
+    late = replace(
+        MOTION,
+        times_s=np.append(MOTION.times_s, [100.0, 100.0001]),
+        targets=np.vstack([MOTION.targets, MOTION.targets[:2]]),
+    )
+
+    assert np.array_equal(path(engine, ROBOT.world, late), path(engine, ROBOT.world))
+
+
+def test_an_observation_at_time_zero_sees_the_start(engine: PyBullet) -> None:
+    trajectory = engine.rollout(ROBOT.world, replace(MOTION, observe_s=np.array([0.0, 0.5])))
+
+    assert trajectory.positions_m[0] == pytest.approx([0.0, 0.0, ROBOT.world.start_height_m])
+    assert trajectory.orientations[0] == pytest.approx([0.0, 0.0, 0.0, 1.0])
+
+
+def test_looking_more_often_changes_nothing_that_is_seen(engine: PyBullet) -> None:
+    often = replace(MOTION, observe_s=np.arange(0.0, 3.0001, 0.1))
+
+    assert np.array_equal(path(engine, ROBOT.world, often)[[5, 30]], path(engine, ROBOT.world))
+
+
+def test_the_pose_is_of_the_bodys_frame_not_of_its_center_of_mass(engine: PyBullet) -> None:
+    box = Body("box", 1.0, Box((0.1, 0.1, 0.1)), center_m=(0.0, 0.0, 0.05))
+    still = Motion(np.zeros(1), np.zeros((1, 0)), np.array([0.0, 1.0]))
+
+    heights = path(engine, World(bodies=(box,), start_height_m=0.0), still)[:, 2]
+
+    assert heights == pytest.approx(0.0, abs=2e-3)
+
+
+def test_every_body_has_the_mass_and_the_inertia_of_its_solid_shape(engine: PyBullet) -> None:
+    scene = engine._scene(replace(ROBOT.world, material=Material()))
+    names = ["trunk", *(joint.child for joint in ROBOT.world.joints)]
+    bodies = {body.name: body for body in ROBOT.world.bodies}
+
+    for index, name in enumerate(names, start=-1):
+        mass, _, inertia, center, *_ = scene.bullet.getDynamicsInfo(scene.robot, index, physicsClientId=scene.client)
+        assert mass == bodies[name].mass_kg
+        assert inertia == pytest.approx(solid(bodies[name]), rel=1e-6)
+        assert center == pytest.approx(bodies[name].center_m)
+
+
+def solid(body: Body) -> list[float]:
+    """Principal moments of inertia of even density."""
+    if isinstance(body.shape, Sphere):
+        return [0.4 * body.mass_kg * body.shape.radius_m**2] * 3
+    x, y, z = np.square(body.shape.size_m)
+    return [body.mass_kg / 12 * (y + z), body.mass_kg / 12 * (x + z), body.mass_kg / 12 * (x + y)]
+
+
+def test_a_motor_closes_its_share_of_the_error_in_each_step(engine: PyBullet) -> None:
+    wheel = World(
+        bodies=(Body("hub", 1e6, Box((1.0, 1.0, 1.0))), Body("arm", 1.0, Box((0.1, 0.1, 0.1)), collides=False)),
+        joints=(Joint("shaft", "hub", "arm", (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), Motor(0.1, 1e3)),),
+        start_height_m=0.5,
+        gravity_m_s2=0.0,
+    )
+    scene = engine._scene(wheel)
+    scene.start(Material(), 1.0)
+    scene.command(0, 1.0)
+
+    scene.step(10)
+
+    angle = scene.bullet.getJointState(scene.robot, 0, physicsClientId=scene.client)[0]
+    assert angle == pytest.approx(1 - 0.9**10, rel=0.02)
