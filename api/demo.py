@@ -80,7 +80,9 @@ def study_of(found: object) -> StudyRead:
 
 def _show(name: str, study: StudyRead, client: Client, folder: Path, console: Console) -> None:
     curves = client.curves([study.id])
-    console.print(f"\nRecorded fitness in reality ({curves[0].unit}), mean ± SD over repetitions")
+    console.print(
+        f"\nFitness in reality ({curves[0].unit}) after so many real-world evaluations, mean±SD over repetitions"
+    )
     console.print(display.curves(curves), *display.baselines(curves))
     for line in findings(client, curves):
         console.print(escape(line))

@@ -61,9 +61,13 @@ def numbers(progress: Progress) -> str:
 
 
 def curves(found: Sequence[Curve]) -> Table:
-    """Mean ± SD of the recorded fitness, a line for each number of real-world evaluations, a column for each curve."""
+    """Mean±SD of the recorded fitness, a line for each number of real-world evaluations, a column for each curve.
+
+    Seven curves fit into 80 columns: headings break between words, numbers never.
+    """
     lines = [each for each in found if not each.direct]
-    table = _table("evaluations", *(escape(each.name.replace("_", " ")) for each in lines))
+    table = _table("after", *(escape(each.name.replace("_", " ")) for each in lines))
+    table.collapse_padding = True
     by_count = [{point.evaluations: point for point in each.points} for each in lines]
     for count in sorted({count for points in by_count for count in points}):
         table.add_row(f"{count}", *(_cell(points.get(count)) for points in by_count))
@@ -126,7 +130,7 @@ def _table(*columns: str) -> Table:
 def _cell(point: CurvePoint | None) -> str:
     if point is None or point.mean is None:
         return "-"
-    return f"{point.mean:.2f} ± {point.sd:.2f}" if point.sd is not None else f"{point.mean:.2f}"
+    return f"{point.mean:.2f}±{point.sd:.2f}" if point.sd is not None else f"{point.mean:.2f}"
 
 
 def _plugins(kind: str, found: Iterable[PluginRead]) -> Table:

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TaskID, TextColumn
 
 from api import display
 from schemas.records import ExperimentRead, StudyRead
@@ -31,7 +31,6 @@ def _bars(stages: Iterable[Watched], console: Console) -> Watched:
         BarColumn(bar_width=None),
         TextColumn("{task.percentage:>3.0f} %"),
         TextColumn("{task.fields[rollouts]}", justify="right"),
-        TimeElapsedColumn(),
         TextColumn("{task.fields[left]}", justify="right"),
     )
     tasks: dict[str, TaskID] = {}
@@ -51,10 +50,8 @@ def _update(bars: Progress, task: TaskID, each: Watched) -> None:
         description=f"{bold[0]}{escape(each.name.replace('_', ' '))}{bold[1]} {display.state(each.state)}",
         completed=1.0 if each.state.ended else display.fraction(each.progress),
         rollouts=f"{each.progress.rollouts_done:,} rollouts",
-        left="" if each.state.ended else f"{display.left(each.progress)} left",
+        left=_left(each),
     )
-    if each.state.ended:
-        bars.stop_task(task)
 
 
 def _lines(stages: Iterable[Watched], console: Console) -> Watched:
@@ -73,8 +70,13 @@ def _lines(stages: Iterable[Watched], console: Console) -> Watched:
 
 def _line(stage: Watched) -> str:
     done = f"{display.percent(stage.progress)}, {display.numbers(stage.progress)}"
-    rest = stage.state if stage.state.ended else f"{display.left(stage.progress)} left"
+    rest = stage.state if stage.state.ended else _left(stage) or "time left unknown yet"
     return f"{escape(stage.name)}: {done}; {rest}"
+
+
+def _left(each: Watched) -> str:
+    unknown = each.state.ended or each.progress.seconds_left is None
+    return "" if unknown else f"{display.left(each.progress)} left"
 
 
 def _parts(stage: Watched) -> tuple[Watched, ...]:
