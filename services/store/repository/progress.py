@@ -18,6 +18,7 @@ class Tally:
     """What repetitions add up to; of a study, the sum of its experiments'.
 
     Attributes:
+        running: those with a step stored; a claimed one that has none may still wait for a core.
         rollouts_left: of the repetitions that have not ended.
         seconds: of work in the rollouts that are done.
     """
@@ -72,7 +73,7 @@ def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
             func.count(),
             _count(row.state == State.COMPLETED),
             _count(row.state == State.FAILED),
-            _count(row.state == State.RUNNING),
+            _count((row.state == State.RUNNING) & (row.steps > 0)),
             _count(row.state.in_(_OPEN)),
             func.sum(ExperimentRow.iterations),
             func.sum(row.iterations_done),
