@@ -27,6 +27,9 @@ T = TypeVar("T")
 Spec = ExperimentSpec | StudySpec | Mapping[str, Any]
 FigureFormat = Literal["html", "svg"]
 
+LOOPBACK = {"127.0.0.1", "localhost", "::1"}
+"""This machine: no proxy of the environment leads to it."""
+
 
 class ServiceError(Exception):
     """The service refused or failed; `problem` is its answer, and the message is the problem's detail."""
@@ -53,7 +56,12 @@ class Client:
 
     def __init__(self, url: str, *, timeout_s: float = 60.0, transport: httpx2.BaseTransport | None = None) -> None:
         self.url = url
-        self._http = httpx2.Client(base_url=url, timeout=timeout_s, transport=transport)
+        try:
+            here = httpx2.URL(url).host in LOOPBACK
+            self._http = httpx2.Client(base_url=url, timeout=timeout_s, transport=transport, trust_env=not here)
+        except httpx2.InvalidURL as error:
+            msg = f"{url!r} is no address of a service: {error}"
+            raise ServiceUnreachable(msg) from error
 
     def __enter__(self) -> Self:
         return self

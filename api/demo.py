@@ -23,7 +23,7 @@ from api.findings import findings
 from api.launch import end, start
 from api.watch import follow
 from schemas.lifecycle import State
-from schemas.records import StudyRead
+from schemas.records import ExperimentRead, StudyRead
 
 SPECS = Path(__file__).parent.parent / "examples"
 STUDIES = ("toy", "quadruped")
@@ -60,20 +60,20 @@ def _run_study(name: str, spec: dict[str, object], client: Client, folder: Path,
     if study:
         console.print(f"\n[bold]{name}[/]: going on with study {study.id} of an earlier run")
     else:
-        study = study_of(client.submit(spec))
+        study = _study(client.submit(spec))
         _remember(folder, name, spec, study.id)
         console.print(f"\n[bold]{name}[/]: POST /studies → 202, study {study.id}")
     ended = follow(client.watch(study.id, every_s=0.5), console)
     if ended.state is not State.COMPLETED:
-        reasons = {reason for each in study_of(ended).experiments for reason in each.reasons}
+        reasons = {reason for each in _study(ended).experiments for reason in each.reasons}
         msg = f"the study {name} ended as {ended.state}: {'; '.join(sorted(reasons)) or 'called off'}"
         raise CommandError(msg, Exit.FAILED)
     console.print(f"{name}: {display.numbers(ended.progress)}")
-    _show(name, study_of(ended), client, folder, console)
+    _show(name, _study(ended), client, folder, console)
 
 
-def study_of(found: object) -> StudyRead:
-    """What is known to be a study, as one."""
+def _study(found: ExperimentRead | StudyRead) -> StudyRead:
+    """What was submitted without a `strategy` is a study."""
     assert isinstance(found, StudyRead)
     return found
 

@@ -67,7 +67,7 @@ def curves(found: Sequence[Curve]) -> Table:
     """
     lines = [each for each in found if not each.direct]
     table = _table("after", *(escape(each.name.replace("_", " ")) for each in lines))
-    table.collapse_padding = True
+    table.collapse_padding, table.show_edge = True, False
     by_count = [{point.evaluations: point for point in each.points} for each in lines]
     for count in sorted({count for points in by_count for count in points}):
         table.add_row(f"{count}", *(_cell(points.get(count)) for points in by_count))

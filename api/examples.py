@@ -49,7 +49,7 @@ STUDY_SPECS: dict[str, Any] = {
         "value": {"name": "Fig. 4", "direct_repetitions": 100},
     },
     "quick": {
-        "summary": "The same on the toy function; a minute",
+        "summary": "The same on the toy function; seconds",
         "value": {"name": "toy", "robot": "toy_function", "budget": "smoke"},
     },
 }

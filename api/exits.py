@@ -19,9 +19,11 @@ class Exit(IntEnum):
     INTERRUPTED = 130
 
 
-EXPLAINED = """Exit codes: 0 done; 1 the service or what was watched failed; 2 wrong use of the command; 3 no service
-answers; 4 no such id; 5 invalid spec or request; 6 its state forbids it; 7 a file cannot be read or written, or is not
-JSON; 130 interrupted."""
+EXPLAINED = (
+    "Exit codes: 0 done; 1 the service or what was watched failed; 2 wrong use of the command; 3 no service answers; "
+    "4 no such id; 5 invalid spec or request; 6 its state forbids it; 7 a file cannot be read or written, or is not "
+    "JSON; 130 interrupted."
+)
 
 BY_STATUS = {404: Exit.NOT_FOUND, 409: Exit.CONFLICT, 413: Exit.INVALID, 422: Exit.INVALID}
 

@@ -1,5 +1,6 @@
 """Curves, as JSON or CSV, and the tests between them."""
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
@@ -10,6 +11,7 @@ from api.dependencies import Id, Parameters, StoreDep
 from api.problems import documented
 from schemas.curves import Comparison, Curve
 from services import reports
+from services.core.errors import InvalidSpec
 
 router = APIRouter(tags=["curves"])
 
@@ -34,9 +36,11 @@ class ComparisonQuery(Parameters):
 
     experiment: Annotated[Ids, Field(min_length=2)]
     from_evaluations: Evaluations = Field(
-        default=None, alias="from", description="pool from this count on; left out: the last that all have"
+        default=None, alias="from", description="pool from this count on; left out: 1"
     )
-    to_evaluations: Evaluations = Field(default=None, alias="to", description="pool up to this count")
+    to_evaluations: Evaluations = Field(
+        default=None, alias="to", description="pool up to this count; left out: the last that any has"
+    )
 
 
 @router.get(
@@ -94,11 +98,12 @@ def read_curves(store: StoreDep, query: Annotated[CurvesQuery, Query()]) -> tupl
 )
 def compare_experiments(store: StoreDep, query: Annotated[ComparisonQuery, Query()]) -> tuple[Comparison, ...]:
     """Every pair, by the paper's t-test and by Welch's and Mann-Whitney's, corrected after Holm over all pairs."""
-    return tuple(
-        reports.compare(
-            store, query.experiment, from_evaluations=query.from_evaluations, to_evaluations=query.to_evaluations
-        )
-    )
+    first, last = query.from_evaluations, query.to_evaluations
+    try:
+        return reports.compare(store, query.experiment, from_evaluations=first, to_evaluations=last)
+    except InvalidSpec as error:
+        renamed = (replace(each, pointer=each.pointer.removesuffix("_evaluations")) for each in error.violations)
+        raise InvalidSpec(renamed) from error
 
 
 def _wanted(curves: tuple[Curve, ...], query: CurveQuery) -> tuple[Curve, ...] | Response:

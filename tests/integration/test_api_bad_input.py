@@ -256,6 +256,14 @@ def test_a_wrong_query_is_refused_with_the_parameters_name(api: TestClient, path
     assert found["errors"][0]["pointer"] == name
 
 
+@pytest.mark.parametrize(("query", "name"), [("from=5&to=2", "from"), ("", "experiment")])
+def test_a_comparison_over_no_range_or_with_itself_is_refused(api: TestClient, query: str, name: str):
+    first, second = (api.post("/experiments", json=LEAST).json()["id"] for _ in range(2))
+    other = second if query else first
+
+    assert only_error(api.get(f"/comparisons?experiment={first}&experiment={other}&{query}"))["pointer"] == name
+
+
 def test_a_misspelt_choice_in_a_query_is_answered_with_the_nearest(api: TestClient):
     error = only_error(api.get("/experiments?state=RUNING"))
 

@@ -200,6 +200,15 @@ def test_no_service_is_a_sentence_that_says_how_to_start_one(gaplab: Gaplab):
     assert "gaplab serve" in said.err
 
 
+@pytest.mark.parametrize("address", ["nonsense", "http://[", "ftp://127.0.0.1", "http://no-such-host.invalid", ""])
+def test_an_address_that_is_none_is_a_sentence(gaplab: Gaplab, address: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("GAPLAB_URL", address)
+    said = gaplab("list")
+
+    assert said.code == Exit.UNREACHABLE
+    assert said.err.count("\n") == 1
+
+
 @pytest.mark.parametrize("command", ["show", "curve", "cancel"])
 @pytest.mark.parametrize("name", ["nope", "..", "", "a/b", "x?y", "%", "ü"])
 def test_an_unknown_id_is_a_sentence(gaplab: Gaplab, command: str, name: str):
