@@ -111,15 +111,17 @@ def walks(laboratory: Laboratory, asked: Namespace) -> None:
     def rows() -> Iterable[str]:
         for seed in range(asked.seeds):
             positions, tilt = laboratory.watch(laboratory.in_reality(seed), EPISODE_S + COUNTED_S)
-            first, second = (distance(positions[i : i + counted + 1]) for i in (settled, settled + counted))
+            paths = [positions[i : i + counted + 1] for i in (settled, settled + counted)]
+            first, second = (distance(path) / COUNTED_S for path in paths)
+            ahead = " | ".join(f"{(path[-1, 0] - path[0, 0]) / COUNTED_S:.2f}" for path in paths)
             ratios.append(second / first)
             clearances.append(positions[settled:, 2].min() - BODY_M[2] / 2)
-            speeds = f"{first / COUNTED_S:.3f} | {second / COUNTED_S:.3f} | {ratios[-1]:.2f}"
+            speeds = f"{first:.3f} | {second:.3f} | {ratios[-1]:.2f} | {ahead}"
             yield f"{seed} | {speeds} | {clearances[-1]:.3f} | {tilt[settled:].max():.0f}"
 
-    table("seed | speed m/s | in the next episode | ratio | least clearance m | greatest tilt °", rows())
+    table("seed | speed m/s | next episode | ratio | along x | next | least clearance m | greatest tilt °", rows())
     print(f"{COUNTED_S / PERIOD_S:.0f} gait periods are counted. Second over first: {spread(ratios)}.")
-    print(f"Clearance of the trunk's underside: {spread(clearances)} m.")
+    print(f"Clearance of the trunk's underside, m: {spread(clearances)}.")
 
 
 def gap(laboratory: Laboratory, asked: Namespace) -> None:
@@ -133,7 +135,7 @@ def gap(laboratory: Laboratory, asked: Namespace) -> None:
             yield f"{seed} | {numbers(laboratory.random(seed))} | {ratios[-1]:.2f}"
 
     table("seed | static | dynamic | restitution | real fitness over direct", rows())
-    print(f"Direct: {spread(direct)} m/s. Random simulators over direct: {spread(ratios)}.")
+    print(f"Direct, m/s: {spread(direct)}. Random simulators over direct: {spread(ratios)}.")
 
 
 def known(laboratory: Laboratory, asked: Namespace) -> None:
