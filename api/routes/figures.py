@@ -25,7 +25,10 @@ class FigureQuery(Parameters):
     experiment: list[Id] = Field(default=[], max_length=100, description="repeat it for more")
     study: list[Id] = Field(default=[], max_length=20, description="all of its experiments; repeat it for more")
     format: Literal["html", "svg"] = "html"
-    band: Band = Field(default="interval", description="around each curve: 95 % interval of the mean, or SD")
+    band: Band | None = Field(
+        default=None,
+        description="around each curve: 95 % interval of the mean, or SD; left out: SD below five repetitions",
+    )
     title: str | None = Field(default=None, max_length=200, description="left out: the study's name")
 
     @model_validator(mode="after")

@@ -16,6 +16,7 @@ BANDS: dict[Band, str] = {
     "sd": "one standard deviation",
 }
 
+FEW = 5  # repetitions; Student's t widens the interval of fewer to 1.6 SD and more, of two to 9 SD
 LONGEST = 60  # characters of a name or a title in a figure
 
 
@@ -56,6 +57,7 @@ class Figure:
     Attributes:
         note: how many repetitions there are, and what the bands are.
         span: of the horizontal axis; the greatest number of evaluations, at least 1.
+        limits: of the vertical axis; a band that is very wide, as of two repetitions, runs out of the frame.
     """
 
     title: str
@@ -63,6 +65,7 @@ class Figure:
     y_label: str
     note: str
     span: int
+    limits: tuple[float, float]
     series: tuple[Series, ...]
     baselines: tuple[Baseline, ...]
 
@@ -72,7 +75,7 @@ class Figure:
         return not self.baselines and not any(each.points for each in self.series)
 
 
-def curves_figure(curves: Sequence[Curve], *, title: str = "", band: Band = "interval") -> Figure:
+def curves_figure(curves: Sequence[Curve], *, title: str = "", band: Band | None = None) -> Figure:
     """The recorded fitness of experiments against their number of real-world evaluations.
 
     A point without a mean (no repetition got there yet) is left out; a band needs two repetitions.
@@ -80,8 +83,10 @@ def curves_figure(curves: Sequence[Curve], *, title: str = "", band: Band = "int
     Args:
         curves: in the order of the legend.
         title: above the figure; nothing if empty.
-        band: around the lines. The direct baseline has always its SD, as in the paper.
+        band: around the lines; left out: the interval, or the SD if there are too few repetitions for an interval to
+            be narrower than the figure. The direct baseline has always its SD, as in the paper.
     """
+    band = band or _telling_band(curves)
     names = _names(curves)
     lines = [(name, each) for name, each in zip(names, curves, strict=True) if not each.direct]
     levels = [(name, each) for name, each in zip(names, curves, strict=True) if each.direct]
@@ -97,6 +102,7 @@ def curves_figure(curves: Sequence[Curve], *, title: str = "", band: Band = "int
         y_label=_fitness_label({each.unit for each in curves}),
         note=_note(series, baselines, band),
         span=max([1, *(point.evaluations for each in series for point in each.points)]),
+        limits=_limits([*(point for each in series for point in each.points), *(each.level for each in baselines)]),
         series=series,
         baselines=baselines,
     )
@@ -110,12 +116,29 @@ def _points(curve: Curve, band: Band) -> tuple[Point, ...]:
     )
 
 
+def _telling_band(curves: Sequence[Curve]) -> Band:
+    counts = [point.n for each in curves if not each.direct for point in each.points if point.n]
+    return "interval" if min(counts, default=FEW) >= FEW else "sd"
+
+
 def _ends(point: CurvePoint, band: Band) -> tuple[float | None, float | None]:
     if band == "interval":
         return point.lower, point.upper
     if point.mean is None or point.sd is None:
         return None, None
     return point.mean - point.sd, point.mean + point.sd
+
+
+def _limits(points: Sequence[Point]) -> tuple[float, float]:
+    """Room for all means, and for as much of the bands above and below as the means themselves take."""
+    if not points:
+        return 0.0, 1.0
+    least, most = min(each.mean for each in points), max(each.mean for each in points)
+    room = max(most - least, 0.1 * abs(most), 1e-9)
+    lowest = max(least - room, min(each.mean if each.lower is None else each.lower for each in points))
+    highest = min(most + room, max(each.mean if each.upper is None else each.upper for each in points))
+    margin = 0.05 * max(highest - lowest, room)
+    return lowest - margin, highest + margin
 
 
 def _names(curves: Sequence[Curve]) -> list[str]:

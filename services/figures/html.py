@@ -84,9 +84,10 @@ def plotly_chart(figure: Figure) -> "Chart":
     """The figure as Plotly's own object, for a notebook."""
     from plotly.graph_objects import Figure as Chart
 
-    traces = [trace for each in figure.series for trace in (_band(each), _line(each))]
-    traces += [trace for each in figure.baselines for trace in _baseline(each, figure.span)]
-    chart = Chart(traces)
+    bands = [_band(each) for each in figure.series]  # beneath all lines
+    lines = [_line(each) for each in figure.series]
+    levels = [trace for each in figure.baselines for trace in _baseline(each, figure.span)]
+    chart = Chart([*bands, *lines, *levels])
     chart.update_layout(
         template="simple_white",
         font={"family": FONT, "size": 14, "color": INK},
@@ -94,8 +95,14 @@ def plotly_chart(figure: Figure) -> "Chart":
         hovermode="x unified",
         hoverlabel={"bgcolor": "rgba(255, 255, 255, 0.95)"},
         legend={"orientation": "h", "yanchor": "top", "y": -0.18, "x": 0, "entrywidth": 250, "itemsizing": "trace"},
-        xaxis={"title": figure.x_label, "range": _edges(figure.span), "tickformat": "d", "nticks": 11},
-        yaxis={"title": figure.y_label, "showgrid": True, "gridcolor": "#e6e6e6", "zeroline": False},
+        xaxis={"title": figure.x_label, "range": _edges(figure.span), "dtick": max(1, round(figure.span / 10))},
+        yaxis={
+            "title": figure.y_label,
+            "range": figure.limits,
+            "showgrid": True,
+            "gridcolor": "#e6e6e6",
+            "zeroline": False,
+        },
     )
     if figure.empty:
         chart.add_annotation(text="no results yet", showarrow=False, xref="paper", yref="paper", x=0.5, y=0.5)

@@ -76,7 +76,8 @@ def _draw(figure: Figure, axes: "Axes") -> None:
     if figure.title:
         title = axes.set_title(figure.title, loc="left", fontweight="bold")
         title.set_in_layout(len(figure.title) <= WIDE)  # a wide one may end outside, but not squeeze the axes
-    axes.set(xlabel=figure.x_label, ylabel=figure.y_label, xlim=(-0.02 * figure.span, 1.02 * figure.span))
+    axes.set(xlabel=figure.x_label, ylabel=figure.y_label)
+    axes.set(xlim=(-0.02 * figure.span, 1.02 * figure.span), ylim=figure.limits)
     axes.xaxis.set_major_locator(MaxNLocator(nbins=11, integer=True))
     axes.grid(axis="y", color="#e6e6e6", linewidth=0.5)
     axes.set_axisbelow(True)

@@ -16,7 +16,7 @@ from services.figures.svg import render_svg
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-def point(evaluations: int, mean: float | None, n: int = 3, sd: float | None = 0.1) -> CurvePoint:
+def point(evaluations: int, mean: float | None, n: int = 30, sd: float | None = 0.1) -> CurvePoint:
     ends = (mean - 0.2, mean + 0.2) if mean is not None and sd is not None else (None, None)
     return CurvePoint(evaluations=evaluations, n=n, mean=mean, sd=sd, lower=ends[0], upper=ends[1], values=(mean,))
 
@@ -49,11 +49,18 @@ def test_a_curve_becomes_a_line_with_its_interval_and_the_baseline_a_level_with_
     assert figure.span == 2
 
 
+def test_fewer_than_five_repetitions_are_drawn_with_their_sd():
+    few = curves_figure([curve("a", point(0, 1.0, n=4)), DIRECT])
+
+    assert "standard deviation" in few.note
+    assert few.series[0].points[0].upper == pytest.approx(1.1)
+
+
 def test_the_note_says_n_and_what_the_bands_are():
     interval = curves_figure([RISING, DIRECT]).note.replace("\N{NO-BREAK SPACE}", " ")
     deviation = curves_figure([curve("a", point(0, 1, n=2), point(1, 1, n=5))], band="sd").note
 
-    assert "Mean over 3 repetitions; bands: 95 % interval of the mean." in interval
+    assert "Mean over 30 repetitions; bands: 95 % interval of the mean." in interval
     assert "1.33 ± 0.1 SD (n = 100)" in interval
     assert "2\N{EN DASH}5 repetitions" in deviation
     assert "standard deviation" in deviation
@@ -66,6 +73,17 @@ def test_points_that_no_repetition_has_reached_are_left_out_and_one_repetition_h
     assert (only.mean, only.lower, only.upper) == (1.0, None, None)
     assert render_svg(figure)
     assert render_html(figure)
+
+
+def test_the_frame_shows_the_means_however_wide_a_band_is():
+    wild = CurvePoint(evaluations=1, n=2, mean=1.2, sd=0.1, lower=-50, upper=50, values=(1.1, 1.3))
+    least, most = curves_figure([curve("a", point(0, 1.0), wild)], band="interval").limits
+    tame = curves_figure([RISING]).limits
+
+    assert 0.7 < least < 1.0
+    assert 1.2 < most < 1.5
+    assert tame[0] <= 0.7
+    assert tame[1] > 1.5
 
 
 def test_experiments_of_one_name_are_told_apart_by_their_ids():
@@ -115,7 +133,7 @@ def test_the_page_has_its_numbers_in_a_table_for_those_who_cannot_see_the_lines(
     assert "<h1>The title</h1>" in page
     row = re.search(r'<tr><th scope="row">Simulated fit</th>(.*?)</tr>', page)
     assert row
-    assert re.findall(r"<td>(.*?)</td>", row[1]) == ["0.900 ± 0.100 (3)", "1.200 ± 0.100 (3)", "1.300 ± 0.100 (3)"]
+    assert re.findall(r"<td>(.*?)</td>", row[1]) == ["0.900 ± 0.100 (30)", "1.200 ± 0.100 (30)", "1.300 ± 0.100 (30)"]
 
 
 @pytest.mark.parametrize(
