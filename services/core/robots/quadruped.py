@@ -131,9 +131,9 @@ def _leg(name: str, ahead: int, left: int) -> tuple[list[Body], list[Joint]]:
 def _trot() -> Genome:
     """By hand: diagonal legs together, the pairs half a period apart.
 
-    A leg is lifted just before it swings forwards, and its knee opens for the stance; what else moves it is the lag of
-    its motors. Tuned by hand too, by trying a few phases and widths that are the same for all legs.
+    Every pulse lasts for half a period. A leg is lifted a tenth of a period before it swings forwards, and its knee
+    opens a quarter after; these two numbers were found by trying a few.
     """
     starts = {"front_left": 0.0, "front_right": 0.5, "rear_left": 0.5, "rear_right": 0.0}
-    yaw, roll, knee = (0.0, 0.5), (0.9375, 0.5), (0.25, 0.6)
-    return frozen([((starts[leg] + phase) % 1, width) for leg in LEGS for phase, width in (yaw, roll, knee)]).ravel()
+    yaw, roll, knee = 0.0, 0.9, 0.25
+    return frozen([((starts[leg] + phase) % 1, 0.5) for leg in LEGS for phase in (yaw, roll, knee)]).ravel()
