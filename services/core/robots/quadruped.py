@@ -14,12 +14,13 @@ from services.core.world import Body, Box, Joint, Material, Motion, Motor, Spher
 BODY_M: Vector = (0.30, 0.20, 0.06)
 BODY_KG = 1.5
 THIGH_M, THIGH_KG = 0.10, 0.15
-SHIN_M, SHIN_KG = 0.15, 0.10
-FOOT_M, FOOT_KG = 0.025, 0.05
-LIMB_M = 0.03
-"""Thickness of hip, thigh and shin."""
+SHIN_M = 0.15
+FOOT_RADIUS_M, FOOT_KG = 0.025, 0.15
+"""The shin's mass is in its foot."""
 
-HIP_KG = 0.05
+HIP_M, HIP_KG = 0.03, 0.05
+"""The hip is a small cube, and as thick as the thigh."""
+
 MOTOR = Motor(position_gain=0.07, max_torque_nm=8.0)
 AMPLITUDES_RAD = (0.63, 0.42, 0.49)
 """Of hip yaw, hip roll and knee: a pulse holds the joint at plus this, and at minus this between pulses."""
@@ -54,8 +55,8 @@ class Quadruped(Robot):
 
     Gene 2i is the phase of actuator i, and gene 2i + 1 the width of its pulse, both in [0, 1]; phases wrap around. The
     actuators are leg by leg, front left, front right, rear left, rear right; positive is forwards for a yaw, upwards
-    for a roll, outwards for a knee. Fitness is the speed along x, the way the robot faces at the start, m/s. A
-    reconstruction: the paper refers for the details of its robot to a publication that could not be found.
+    for a roll, outwards for a knee. Fitness is the distance over ground, in whatever direction, over the time that
+    counts. A reconstruction: the paper refers for its robot's details to a publication that could not be found.
     """
 
     name = "quadruped"
@@ -106,7 +107,7 @@ def _world() -> World:
         bodies=tuple(bodies),
         joints=tuple(joints),
         material=Material(static_friction=1.0, dynamic_friction=0.8, restitution=0.0),
-        start_height_m=SHIN_M + FOOT_M,
+        start_height_m=SHIN_M + FOOT_RADIUS_M,
         time_step_s=1 / 100,
     )
 
@@ -116,9 +117,9 @@ def _leg(name: str, ahead: int, left: int) -> tuple[list[Body], list[Joint]]:
     hip, thigh, shin = f"{name}_hip", f"{name}_thigh", f"{name}_shin"
     corner = (ahead * BODY_M[0] / 2, left * BODY_M[1] / 2, 0.0)
     bodies = [
-        Body(hip, HIP_KG, Box((LIMB_M, LIMB_M, LIMB_M)), collides=False),
-        Body(thigh, THIGH_KG, Box((LIMB_M, THIGH_M, LIMB_M)), (0.0, left * THIGH_M / 2, 0.0), collides=False),
-        Body(shin, SHIN_KG + FOOT_KG, Sphere(FOOT_M), (0.0, 0.0, -SHIN_M)),
+        Body(hip, HIP_KG, Box((HIP_M, HIP_M, HIP_M)), collides=False),
+        Body(thigh, THIGH_KG, Box((HIP_M, THIGH_M, HIP_M)), (0.0, left * THIGH_M / 2, 0.0), collides=False),
+        Body(shin, FOOT_KG, Sphere(FOOT_RADIUS_M), (0.0, 0.0, -SHIN_M)),
     ]
     joints = [
         Joint(f"{name}_yaw", "trunk", hip, corner, (0.0, 0.0, -float(left)), MOTOR),
