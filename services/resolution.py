@@ -49,6 +49,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ExperimentSpec:
     preset = PRESETS[budget.preset]
     return spec.model_copy(
         update={
+            "name": spec.name or _label(strategy),
             "iterations": spec.iterations or preset.iterations,
             "repetitions": spec.repetitions or preset.repetitions,
             "robot": _completed(robots, spec.robot),
@@ -127,6 +128,14 @@ def _completed(registry: Registry[Any], ref: PluginRef) -> PluginRef:
     """The reference with every option written out."""
     _, options = registry.check(ref)
     return PluginRef(name=ref.name, options=options.model_dump(mode="json"))
+
+
+def _label(strategy: Strategy) -> str:
+    """The strategy's name, with those of its options that are not the defaults."""
+    defaults = type(strategy).Options().model_dump(mode="json")
+    chosen = strategy.options.model_dump(mode="json")
+    changed = [f"{name} {value}" for name, value in chosen.items() if value != defaults[name]]
+    return f"{strategy.name} ({', '.join(changed)})"[:200] if changed else strategy.name
 
 
 def _with_bounds(ref: TunableRef) -> TunableRef:

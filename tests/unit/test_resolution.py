@@ -1,0 +1,144 @@
+"""From what a user wrote to what is run."""
+
+import pytest
+
+from schemas.spec import ExperimentSpec, StudySpec
+from services.budgets import PRESETS
+from services.core.errors import InvalidSpec
+from services.resolution import expected_rollouts, resolve_experiment, resolve_study
+
+
+def experiment(**spec):
+    return ExperimentSpec.model_validate({"strategy": "simulated_fit"} | spec)
+
+
+def refused(**spec):
+    with pytest.raises(InvalidSpec) as refusal:
+        resolve_experiment(experiment(**spec))
+    return {each.pointer: each for each in refusal.value.violations}
+
+
+def test_every_default_is_the_papers():
+    resolved = resolve_experiment(experiment())
+
+    assert (resolved.iterations, resolved.repetitions) == (10, 40)
+    numbers = resolved.budget.model_dump(exclude={"preset"})
+    assert numbers == {
+        "controller_evaluations": 10_000,
+        "selection_evaluations": 10_000,
+        "simulator_evaluations": 2_000,
+    }
+    assert resolved.reality.parameters == {"static_friction": 1.0, "dynamic_friction": 0.8, "restitution": 0.0}
+    assert (resolved.robot.name, resolved.engine.name, resolved.reality.engine.name) == ("quadruped", *["pybullet"] * 2)
+
+
+def test_a_resolved_spec_has_nothing_left_out_and_resolves_to_itself():
+    resolved = resolve_experiment(experiment(budget="desk", tunables=["restitution"]))
+
+    assert None not in [*dict(resolved).values(), *dict(resolved.budget).values(), *dict(resolved.tunables[0]).values()]
+    assert resolve_experiment(resolved) == resolved
+
+
+@pytest.mark.parametrize("preset", sorted(PRESETS))
+def test_any_number_of_a_budget_can_be_given_instead(preset):
+    resolved = resolve_experiment(
+        experiment(budget={"preset": preset, "simulator_evaluations": 777}, iterations=3, repetitions=5)
+    )
+
+    assert (resolved.iterations, resolved.repetitions, resolved.budget.simulator_evaluations) == (3, 5, 777)
+    assert resolved.budget.controller_evaluations == PRESETS[preset].controller_evaluations
+
+
+def test_the_papers_whole_figure_4_is_220_million_rollouts():
+    strategies = [each for each in resolve_study(StudySpec()) if each.strategy.name != "direct"]
+
+    total = sum(expected_rollouts(each) * each.repetitions for each in strategies)
+
+    # section 2: searches of 10 000 and 2 000, times 20 simulators where they are weighed
+    each_fit = 10 * 10_000 + 11 * 10_000 + 2_000 * 55
+    assert total == 40 * (2 * each_fit + 2 * (each_fit + 19 * 100_000) + 2 * (each_fit - 100_000)) == 220_800_000
+
+
+def test_the_toy_runs_on_its_own_engine_if_none_is_named():
+    assert resolve_experiment(experiment(robot="toy_function")).engine.name == "analytic"
+
+
+def test_the_baseline_of_a_study_may_have_more_repetitions():
+    *_, direct = resolve_study(StudySpec(repetitions=4, direct_repetitions=10))
+
+    assert (direct.strategy.name, direct.repetitions) == ("direct", 10)
+
+
+def test_an_experiment_is_called_after_what_sets_it_apart():
+    plain = resolve_experiment(experiment())
+    weighted = experiment(strategy={"name": "simulated_fit_and_informative", "options": {"fit_weight": 2}})
+    named = experiment(name="mine")
+
+    assert plain.name == "simulated_fit"
+    assert resolve_experiment(weighted).name == "simulated_fit_and_informative (fit_weight 2.0)"
+    assert resolve_experiment(named).name == "mine"
+
+
+def test_a_misspelt_name_is_refused_with_the_nearest_one():
+    violation = refused(strategy="simulated_fti")["/strategy"]
+
+    assert violation.nearest == "simulated_fit"
+    assert "random" in violation.permitted
+
+
+def test_everything_that_is_wrong_is_said_at_once():
+    violations = refused(
+        tunables=["frction", {"name": "restitution", "lower": 0.5, "upper": 0.1}],
+        reality={"parameters": {"static_friction": -1, "mass": 1}},
+        budget={"controller_evaluations": 3},
+    )
+
+    assert set(violations) == {
+        "/tunables/0",
+        "/tunables/1",
+        "/reality/parameters/static_friction",
+        "/reality/parameters/mass",
+        "/budget/controller_evaluations",
+    }
+
+
+@pytest.mark.parametrize(
+    ("spec", "pointer", "permitted"),
+    [
+        ({"engine": "analytic"}, "/engine", ["pybullet"]),
+        ({"robot": "toy_function", "engine": "pybullet"}, "/engine", ["analytic"]),
+        ({"reality": {"engine": "analytic"}}, "/reality/engine", ["pybullet"]),
+        ({"tunables": [{"name": "restitution", "upper": 2}]}, "/tunables/0/upper", "0 to 0.9"),
+        ({"tunables": ["restitution", "restitution"]}, "/tunables/1", None),
+        ({"budget": {"simulator_evaluations": 19}}, "/budget/simulator_evaluations", "at least 20"),
+        ({"optimizer": {"name": "steady_state", "options": {"population": 1}}}, "/optimizer/options/population", None),
+        ({"strategy": {"name": "known_fit", "options": {"spred": 1}}}, "/strategy/options/spred", ("spread",)),
+    ],
+)
+def test_what_cannot_be_run_is_refused_with_its_place_and_what_can(spec, pointer, permitted):
+    violations = refused(**spec)
+
+    assert violations[pointer].permitted == permitted
+
+
+def test_an_ensemble_larger_than_the_search_is_refused():
+    strategy = {"name": "informative", "options": {"simulators": 300}}
+
+    assert refused(strategy=strategy, budget="desk")["/budget/simulator_evaluations"].permitted == "at least 300"
+
+
+def test_an_engine_that_is_not_installed_is_refused_with_its_install_line(monkeypatch):
+    from services.engines import engines
+
+    monkeypatch.setattr(engines["pybullet"], "library", "a_library_that_is_not_there")
+
+    assert "pip install" in refused()["/engine"].message
+
+
+def test_what_is_wrong_with_a_study_points_into_the_study():
+    spec = StudySpec.model_validate({"strategies": ["random", "nonsense"], "engine": "analytic"})
+
+    with pytest.raises(InvalidSpec) as refusal:
+        resolve_study(spec)
+
+    assert {each.pointer for each in refusal.value.violations} == {"/strategies/1", "/engine"}
