@@ -22,7 +22,6 @@ class Counted:
         self._failures += int(np.isnan(fitnesses).sum())
         return fitnesses
 
-    @property
-    def cost(self) -> Cost:
-        """What was counted so far."""
-        return Cost(self._rollouts, self._failures)
+    def cost_of(self, budget: int) -> Cost:
+        """What was counted so far, of so many rollouts that there might have been."""
+        return Cost(self._rollouts, self._failures, budget - self._rollouts)
