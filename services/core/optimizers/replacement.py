@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from services.core.arrays import Genome
+from services.core.arrays import FloatArray, Genome, Genomes
 from services.core.optimizers.base import Population
 
 Replacement: TypeAlias = Callable[[Population], int]
@@ -13,6 +13,23 @@ Replacement: TypeAlias = Callable[[Population], int]
 
 Bound: TypeAlias = Callable[[Population, Genome], float]
 """The fitness below which a newcomer to a full population is itself the member to drop, whatever it is exactly."""
+
+
+def insert(
+    population: Population, genomes: Genomes, fitness: FloatArray, size: int, replacement: Replacement
+) -> Population:
+    """The population with each newcomer added in turn, and a member dropped for each beyond `size`.
+
+    The members keep their order, so age stays readable from it.
+    """
+    for genome, value in zip(genomes, fitness, strict=True):
+        population = Population(
+            population.space, np.vstack([population.genomes, genome]), np.append(population.fitness, value)
+        )
+        if population.size > size:
+            keep = np.arange(population.size) != replacement(population)
+            population = Population(population.space, population.genomes[keep], population.fitness[keep])
+    return population
 
 
 def least_fit(population: Population) -> int:

@@ -14,6 +14,7 @@ from services.core.optimizers.replacement import (
     Replacement,
     bound_of_least_fit,
     bound_of_most_similar,
+    insert,
     least_fit,
     less_fit_of_most_similar,
 )
@@ -83,12 +84,8 @@ class SteadyState(Optimizer):
 
     def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> Population:
         """The population with each newcomer added in turn, and a member dropped for each beyond its size."""
-        replacement, _ = REPLACEMENTS[self.options.replacement]
-        for genome, value in zip(genomes, fitness, strict=True):
-            state = _added(state, genome, value)
-            if state.size > self.options.population:
-                state = _dropped(state, replacement(state))
-        return state
+        rule, _ = REPLACEMENTS[self.options.replacement]
+        return insert(state, genomes, fitness, self.options.population, rule)
 
     def hopeless(self, state: Population, genomes: Genomes) -> FloatArray:
         """`(n,)` fitnesses below which each newcomer is dropped at once.
@@ -124,13 +121,3 @@ class SteadyState(Optimizer):
         finest, greatest = self.options.finest_scale, self.options.mutation_scale
         scale = finest * (greatest / finest) ** rng.random()
         return state.space.contain(genome + mutates * (scale * state.space.extent * rng.standard_normal(size)))
-
-
-def _added(state: Population, genome: Genome, fitness: float) -> Population:
-    return Population(state.space, np.vstack([state.genomes, genome]), np.append(state.fitness, fitness))
-
-
-def _dropped(state: Population, index: int) -> Population:
-    """The state without a member; the others keep their order, so age stays readable from it."""
-    keep = np.arange(state.size) != index
-    return Population(state.space, state.genomes[keep], state.fitness[keep])
