@@ -5,7 +5,7 @@ address, so the stored steps are the whole checkpoint: `repetition(setting, log)
 never stopped.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -50,7 +50,7 @@ class Setting:
         iterations: real-world evaluations to spend; 0 for the direct baseline.
         seed: of the experiment.
         repetition: its number.
-        batch: rollouts that `simulate` likes to be asked for at a time; no number depends on it.
+        batch: rollouts that `simulate` likes to be asked for at a time, now; no number depends on it.
     """
 
     simulate: Simulate
@@ -64,7 +64,7 @@ class Setting:
     iterations: int
     seed: int
     repetition: int
-    batch: int = 1
+    batch: Callable[[], int] = lambda: 1
 
     def stream(self, iteration: int, phase: str) -> Generator:
         """The random stream of one phase of one iteration."""
@@ -140,7 +140,7 @@ def _select(setting: Setting, history: History, iteration: int) -> Selected:
     search = _search(setting, simulate, belief.parameters, setting.stream(iteration, "search"))
     genome = setting.strategy.select(belief, search, setting.stream(iteration, "select"))
     searched = setting.budget.selection_evaluations * setting.strategy.ensemble if setting.strategy.searches else 0
-    return Selected(iteration, genome, simulate.cost_of(searched))
+    return Selected(iteration, genome, simulate.count.cost_of(searched))
 
 
 def _search(setting: Setting, simulate: Simulate, parameters: Parameters, rng: Generator) -> Search:
@@ -166,11 +166,10 @@ def _tune(setting: Setting, history: History, iteration: int) -> Tuned:
     if not samples:
         return Tuned(iteration, draw_simulators(setting.parameters, ensemble, rng))
     optimizer = setting.optimizer.diverse(ensemble) if ensemble > 1 else setting.optimizer
-    simulate = Counted(setting.simulate)
     evaluations = setting.budget.simulator_evaluations
-    misfit = Misfit(simulate, samples, setting.batch)
+    misfit = Misfit(setting.simulate, samples, setting.batch)
     found = tune(misfit, setting.parameters, optimizer, evaluations, rng)
-    return Tuned(iteration, found[:ensemble], simulate.cost_of(evaluations * len(samples)))
+    return Tuned(iteration, found[:ensemble], misfit.count.cost_of(evaluations * len(samples)))
 
 
 def _transfer(setting: Setting, history: History, iteration: int) -> Transferred:
@@ -185,7 +184,7 @@ def _transfer(setting: Setting, history: History, iteration: int) -> Transferred
         setting.stream(iteration, "transfer"),
     )
     fitness = float(found.fitness[0]) if np.isfinite(found.fitness[0]) else float("nan")
-    cost = simulate.cost_of(setting.budget.controller_evaluations)
+    cost = simulate.count.cost_of(setting.budget.controller_evaluations)
     return Transferred(iteration, found.genomes[0], fitness, cost)
 
 

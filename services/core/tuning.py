@@ -1,22 +1,18 @@
 """Simulator tuning: the search for simulators that reproduce the real fitness of the samples."""
 
-from collections.abc import Sequence
-from typing import TypeAlias
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from services.core.arrays import Fitnesses, FloatArray, Parameters
+from services.core.counted import Count
 from services.core.optimizers.base import Optimizer, maximise
 from services.core.ports import Simulate
 from services.core.types import Sample, Simulator, Space
 
 ROUNDING = 1e-9
 """By how much a partial sum must exceed a limit, relatively, for the whole to exceed it whatever the rounding."""
-
-Selection: TypeAlias = slice | NDArray[np.intp]
-"""Which samples: all, or these."""
 
 
 def squared_errors(fitnesses: Fitnesses, measured: FloatArray) -> FloatArray:
@@ -51,16 +47,21 @@ def draw_simulators(space: Space, count: int, rng: Generator) -> tuple[Simulator
 class Misfit:
     """−Σe² of simulators on samples, given up as soon as it is sure to be below a bound.
 
-    The samples on which simulators have erred most so far are asked first, a batch at a time; what the errors add up
-    to is added in the samples' own order, so nothing that is known exactly depends on the order of asking.
+    The samples on which simulators have erred most so far are asked first. What the errors add up to is added in the
+    samples' own order, and what was asked in vain, because it was asked together with what settled the matter, counts
+    for nothing: no number, not even a count, depends on how many samples are asked at a time.
 
     Args:
         simulate: fitness in simulation.
         samples: at least one, whose measurement succeeded.
-        batch: how many to ask at a time for a simulator that may be given up; no number depends on it.
+        batch: how many to ask at a time for a simulator that may be given up.
+
+    Attributes:
+        count: of the rollouts that were needed.
     """
 
-    def __init__(self, simulate: Simulate, samples: Sequence[Sample], batch: int = 1) -> None:
+    def __init__(self, simulate: Simulate, samples: Sequence[Sample], batch: Callable[[], int] = lambda: 1) -> None:
+        self.count = Count()
         self._simulate = simulate
         self._batch = batch
         self._genomes = np.array([each.genome for each in samples])
@@ -70,26 +71,34 @@ class Misfit:
 
     def __call__(self, parameters: Parameters, bounds: FloatArray) -> FloatArray:
         """`(m, p)` simulators, `(m,)` bounds -> `(m,)` of −Σe²; -inf for what is below its bound."""
-        if np.all(np.isneginf(bounds)) or self._batch >= len(self._measured):
-            return -self._errors(slice(None), parameters, np.zeros((len(self._measured), len(parameters))))
-        return np.array([self._one(row, -bound) for row, bound in zip(parameters, bounds, strict=True)])
+        if np.all(np.isneginf(bounds)):
+            fitnesses = self._simulate(self._genomes, parameters)
+            for index, row in enumerate(fitnesses):
+                self._learn(index, row)
+            return -squared_errors(fitnesses, self._measured)
+        return np.array([self._one(row[None, :], -bound) for row, bound in zip(parameters, bounds, strict=True)])
 
-    def _one(self, parameters: FloatArray, limit: float) -> float:
-        known = np.zeros((len(self._measured), 1))
+    def _one(self, parameters: Parameters, limit: float) -> float:
+        """−Σe² of one simulator `(1, p)`, or -inf if Σe² exceeds the limit."""
+        fitnesses = np.empty((len(self._measured), 1))
         order = np.argsort(-self._erred / np.maximum(self._asked, 1.0), kind="stable")
-        for begin in range(0, len(order), self._batch):
-            error = self._errors(order[begin : begin + self._batch], parameters[None, :], known)[0]
-            if error > limit * (1.0 + ROUNDING):
+        batch, partial = self._batch(), 0.0
+        for place, index in enumerate(order):
+            if place % batch == 0:
+                together = order[place : place + batch]
+                fitnesses[together] = self._simulate(self._genomes[together], parameters)
+            partial += self._learn(int(index), fitnesses[index])
+            if not partial <= limit * (1.0 + ROUNDING):
                 return -np.inf
-        return -float(error)
+        return -float(squared_errors(fitnesses, self._measured)[0])
 
-    def _errors(self, which: Selection, parameters: Parameters, known: FloatArray) -> FloatArray:
-        """Σe² over the samples asked so far and these, `(m,)`; `known` keeps fitnesses minus measurements."""
-        fitnesses = self._simulate(self._genomes[which], parameters)
-        known[which] = fitnesses - self._measured[which][:, None]
-        self._erred[which] += np.nan_to_num(known[which] ** 2).sum(axis=1)
-        self._asked[which] += fitnesses.shape[1]
-        return squared_errors(known, np.zeros(len(known)))
+    def _learn(self, sample: int, fitnesses: FloatArray) -> float:
+        """Count rollouts of a sample, remember how far they erred, and give the sum of their squared errors."""
+        self.count.add(fitnesses)
+        squares = (fitnesses - self._measured[sample]) ** 2
+        self._erred[sample] += np.nansum(squares)
+        self._asked[sample] += len(squares)
+        return float(squares.sum())
 
 
 def tune(misfit: Misfit, space: Space, optimizer: Optimizer, evaluations: int, rng: Generator) -> tuple[Simulator, ...]:

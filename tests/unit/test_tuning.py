@@ -56,7 +56,9 @@ def test_giving_hopeless_simulators_up_saves_rollouts_and_changes_no_bit(count, 
     def tuned(optimizer):
         simulate = Recorder()
         optimizer = optimizer.diverse(8) if diverse else optimizer
-        found = tune(Misfit(simulate, many_samples(count), batch), SPACE, optimizer, 300, np.random.default_rng(1))
+        found = tune(
+            Misfit(simulate, many_samples(count), lambda: batch), SPACE, optimizer, 300, np.random.default_rng(1)
+        )
         return [(each.parameters.tobytes(), each.squared_error) for each in found], simulate.rollouts
 
     thorough, all_rollouts = tuned(Thorough())
