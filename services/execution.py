@@ -8,23 +8,15 @@ All of them raise StoreUnavailable while the database cannot be used; each may t
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from datetime import timedelta
 
 from services.core.types import Step
 from services.store.lease import Claim as Claim
+from services.store.lease import TimedStep as TimedStep
 from services.store.repository import leases, steps
 from services.store.session import Store
 
 STALE_AFTER_S = 30.0
-
-
-@dataclass(frozen=True)
-class TimedStep:
-    """A step, and the seconds of work that it took."""
-
-    step: Step
-    seconds: float
 
 
 def claim(store: Store, owner: str, limit: int) -> tuple[Claim, ...]:
@@ -67,17 +59,10 @@ def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[TimedSte
     Raises:
         Conflict: as `record`; then nothing at all was written.
     """
-    delivered = [(claim, tuple(timed)) for claim, timed in deliveries]
-    return store.write(
-        lambda session: tuple(
-            claim
-            for claim, timed in delivered
-            if all(
-                steps.record(session, claim, each.step, seconds=each.seconds, measured_by=_measured_by(claim))
-                for each in timed
-            )
-        )
-    )
+    gathered: dict[Claim, list[TimedStep]] = {}
+    for claim, timed in deliveries:
+        gathered.setdefault(claim, []).extend(timed)
+    return store.write(lambda session: steps.record(session, gathered)) if gathered else ()
 
 
 def complete(store: Store, claim: Claim) -> bool:
@@ -86,7 +71,20 @@ def complete(store: Store, claim: Claim) -> bool:
     Raises:
         Conflict: some of its iterations are missing.
     """
-    return store.write(lambda session: leases.complete(session, claim))
+    return bool(complete_all(store, [claim]))
+
+
+def complete_all(store: Store, claims: Iterable[Claim]) -> tuple[Claim, ...]:
+    """Complete many repetitions in one transaction, each as `complete` does.
+
+    Returns:
+        The claims that held; the others were left alone.
+
+    Raises:
+        Conflict: as `complete`; then nothing at all was written.
+    """
+    ended = tuple(claims)
+    return store.write(lambda session: leases.complete(session, ended)) if ended else ()
 
 
 def fail(store: Store, claim: Claim, reason: str) -> bool:
@@ -116,8 +114,3 @@ def hand_back(store: Store, claim: Claim) -> bool:
 def requeue_lost(store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:
     """QUEUE again, as `release` does, repetitions whose holder was not heard of for so long; how many there were."""
     return store.write(lambda session: leases.requeue_lost(session, timedelta(seconds=stale_after_s)))
-
-
-def _measured_by(claim: Claim) -> str:
-    engine = claim.spec.reality.engine
-    return engine.name if engine else "unknown"

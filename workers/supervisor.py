@@ -91,6 +91,11 @@ class Supervisor:
         self._beat = -HEARTBEAT_S
         self._looked = -WAIT_S
 
+    @property
+    def busy(self) -> bool:
+        """Whether repetitions are under way."""
+        return bool(self._runs)
+
     def serve(self, stop: Event) -> None:
         """Work until told to stop; then give the unfinished repetitions back to whoever comes next."""
         while not stop.is_set():
@@ -129,9 +134,11 @@ class Supervisor:
             return
         self._looked = monotonic()
         for claim in execution.claim(self._store, self._owner, free):
-            stream = repetition.run.remote(claim.spec, claim.number, claim.log)
-            self._runs.append(Run(claim, stream))
+            self._runs.append(self._launch(claim))
             log.info("%s: on from step %d", self._runs[-1].name, len(claim.log))
+
+    def _launch(self, claim: Claim) -> Run:
+        return Run(claim, repetition.run.remote(claim.spec, claim.number, claim.log))
 
     def _receive(self) -> None:
         streams = {run.stream: run for run in self._runs if not run.over}
@@ -154,7 +161,11 @@ class Supervisor:
         self._drop_all_but([*held, *(run.claim for run in self._runs if run not in filled)])
 
     def _end(self) -> None:
-        for run in [each for each in self._runs if each.over]:
+        over = [each for each in self._runs if each.over]
+        if not over:
+            return
+        execution.complete_all(self._store, [run.claim for run in over if run.ended])
+        for run in over:
             if run.failed is not None:
                 execution.fail(self._store, run.claim, run.failed)
                 log.error("%s: failed: %s", run.name, run.failed)
@@ -162,10 +173,9 @@ class Supervisor:
                 execution.release(self._store, run.claim, run.lost)
                 log.warning("%s: queued again: %s", run.name, run.lost)
             else:
-                execution.complete(self._store, run.claim)
                 log.info("%s: completed", run.name)
             self._runs.remove(run)
-            self._looked = -WAIT_S  # a core is free: look for work at once
+        self._looked = -WAIT_S  # cores are free: look for work at once
 
     def _drop_all_but(self, held: list[Claim] | tuple[Claim, ...]) -> None:
         """Stop the runs whose claim holds no more: cancelled, or taken over."""

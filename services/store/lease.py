@@ -1,4 +1,4 @@
-"""A repetition in the hands of one supervisor."""
+"""A repetition in the hands of one supervisor, and what it delivers."""
 
 from dataclasses import dataclass, field
 
@@ -25,3 +25,11 @@ class Claim:
     number: int
     spec: ExperimentSpec = field(compare=False)
     log: tuple[Step, ...] = field(default=(), compare=False)
+
+
+@dataclass(frozen=True)
+class TimedStep:
+    """A step, and the seconds of work that it took."""
+
+    step: Step
+    seconds: float

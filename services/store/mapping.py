@@ -51,6 +51,14 @@ def simulator_columns(step: Tuned) -> list[dict[str, Any]]:
     ]
 
 
+def measurement_columns(step: Measured | Probed, measured_by: str) -> dict[str, Any]:
+    """One row; a probe's genome is the one that was transferred, which its step does not repeat."""
+    if isinstance(step, Probed):
+        return {"fitness": finite(step.fitness), "measured_by": measured_by}
+    genome, fitness = vector(step.sample.genome), finite(step.sample.fitness)
+    return {"genome": genome, "fitness": fitness, "measured_by": measured_by}
+
+
 def log(
     iterations: Iterable[IterationRow], measurements: Iterable[MeasurementRow], simulators: Iterable[SimulatorRow]
 ) -> tuple[Step, ...]:

@@ -103,10 +103,61 @@ def test_a_step_that_would_leave_a_hole_is_refused(store):
     assert len(execution.claim(store, "me", 1)[0].log) == 1
 
 
+def timed(steps):
+    return [execution.TimedStep(each, 0.5) for each in steps]
+
+
+def test_many_repetitions_at_once_are_recorded_as_one_step_after_another_would_be(store):
+    one_by_one, together = (experiments.submit_experiment(store, toy()).id for _ in range(2))
+    claims = execution.claim(store, "me", 6)
+    ends = (13, 7, 2)
+
+    for claim, end in zip(claims[:3], ends, strict=True):
+        for step in tuple(some_log())[:end]:
+            execution.record(store, claim, step, seconds=0.5)
+    for part in (slice(0, 2), slice(1, 7), slice(7, 13)):  # one step twice, and nothing new for some
+        deliveries = [
+            (claim, timed(tuple(some_log())[:end][part])) for claim, end in zip(claims[3:], ends, strict=True)
+        ]
+        assert execution.record_all(store, deliveries) == claims[3:]
+
+    for each in claims:
+        execution.hand_back(store, each)
+    again = execution.claim(store, "me", 6)
+    assert same(tuple(each.log for each in again[:3]), tuple(each.log for each in again[3:]))
+    assert [len(each.log) for each in again] == [*ends] * 2
+    first, second = (experiments.read_experiment(store, each) for each in (one_by_one, together))
+    assert first.progress == second.progress
+
+
+def test_of_many_deliveries_only_those_whose_claim_holds_are_written(store):
+    experiments.submit_experiment(store, toy())
+    lost, *held = execution.claim(store, "me", 3)
+    execution.release(store, lost, "killed")
+
+    assert execution.record_all(store, [(each, timed(some_log())) for each in (lost, *held)]) == tuple(held)
+    assert execution.complete_all(store, (lost, *held)) == tuple(held)
+
+    (again,) = execution.claim(store, "me", 3)
+    assert (again.number, again.log) == (lost.number, ())
+
+
+def test_a_hole_in_one_of_many_deliveries_refuses_them_all(store):
+    experiments.submit_experiment(store, toy())
+    whole, holed, _ = execution.claim(store, "me", 3)
+    first, _, third = tuple(some_log())[:3]
+
+    with pytest.raises(Conflict, match="step 2 of repetition 1 cannot be recorded: the log has 1 steps"):
+        execution.record_all(store, [(whole, timed(some_log())), (holed, timed((first, third)))])
+
+    execution.hand_back(store, whole)
+    assert execution.claim(store, "me", 1)[0].log == ()
+
+
 def test_a_holder_who_wakes_up_late_cannot_write(store):
     submitted = experiments.submit_experiment(store, toy(repetitions=1))
     (late,) = execution.claim(store, "late", 1)
-    assert execution.requeue_lost(store, stale_after_s=0) == 1
+    assert execution.requeue_lost(store, stale_after_s=-1) == 1
     (present,) = execution.claim(store, "present", 1)
     first, second, *_ = some_log()
     execution.record(store, present, first)
@@ -142,7 +193,7 @@ def test_a_repetition_that_was_lost_is_queued_again_and_goes_on_from_its_log(sto
     first, *_ = some_log()
     execution.record(store, claim, first)
 
-    assert execution.requeue_lost(store, stale_after_s=0) == 1
+    assert execution.requeue_lost(store, stale_after_s=-1) == 1
 
     (lost,) = experiments.list_repetitions(store, submitted.id)
     (again,) = execution.claim(store, "me", 1)

@@ -4,9 +4,8 @@ A lease ends when its holder ends the repetition, gives it back, or is not heard
 next epoch, so that a holder who wakes up late cannot write.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from datetime import datetime, timedelta
-from typing import Any
 
 from sqlalchemy import ColumnElement, case, func, select, tuple_, update
 from sqlalchemy.orm import Session
@@ -57,43 +56,49 @@ def claim(session: Session, owner: str, limit: int) -> tuple[Claim, ...]:
     return _claims(session, ids)
 
 
-def heartbeat(session: Session, claims: Iterable[Claim]) -> tuple[Claim, ...]:
+def heartbeat(session: Session, claims: Sequence[Claim]) -> tuple[Claim, ...]:
     """The claims that still hold, and hold on from now."""
-    by_key = {(each.repetition_id, each.epoch): each for each in claims}
     row = RepetitionRow
     alive = session.execute(
         update(row)
-        .where(tuple_(row.id, row.epoch).in_(list(by_key)), row.state == State.RUNNING)
+        .where(_any_of(claims), row.state == State.RUNNING)
         .values(heartbeat_at=now())
         .returning(row.id, row.epoch)
     )
     held = {(repetition, epoch) for repetition, epoch in alive}
-    return tuple(each for key, each in by_key.items() if key in held)
+    return tuple(each for each in claims if (each.repetition_id, each.epoch) in held)
 
 
-def complete(session: Session, claim: Claim) -> bool:
-    """The repetition COMPLETED; False if the claim holds no more.
+def complete(session: Session, claims: Sequence[Claim]) -> tuple[Claim, ...]:
+    """The repetitions COMPLETED; those of the claims that held.
 
     Raises:
-        Conflict: some of its iterations are missing.
+        Conflict: some iterations of one of them are missing.
     """
-    lock(session, [claim.experiment_id])
+    experiments = sorted({each.experiment_id for each in claims})
+    lock(session, experiments)
+    _refuse_unfinished(session, claims)
     row = RepetitionRow
-    missing = session.scalar(
-        select(ExperimentRow.iterations - row.iterations_done)
-        .join(row, row.experiment_id == ExperimentRow.id)
-        .where(mine(claim))
+    ended = session.execute(
+        update(row)
+        .where(_any_of(claims), row.state == State.RUNNING)
+        .values(state=State.COMPLETED, error=None, ended_at=now())
+        .returning(row.id)
     )
-    if missing:
-        msg = f"repetition {claim.number} of {claim.experiment_id!r} is not complete: {missing} iterations are missing"
-        raise Conflict(msg)
-    return _end(session, claim, State.COMPLETED, None)
+    held = set(ended.scalars())
+    for experiment in experiments:
+        _settle(session, experiment)
+    return tuple(each for each in claims if each.repetition_id in held)
 
 
 def fail(session: Session, claim: Claim, reason: str) -> bool:
     """The repetition FAILED for a reason; False if the claim holds no more."""
     lock(session, [claim.experiment_id])
-    return _end(session, claim, State.FAILED, _plain(reason))
+    row = RepetitionRow
+    values = {"state": State.FAILED, "error": _plain(reason), "ended_at": now()}
+    ended = session.execute(update(row).where(mine(claim)).values(values).returning(row.id)).first()
+    _settle(session, claim.experiment_id)
+    return ended is not None
 
 
 def release(session: Session, claim: Claim, reason: str) -> bool:
@@ -182,11 +187,22 @@ def _give_back(session: Session, which: ColumnElement[bool], experiments: Sequen
     return len(moved)
 
 
-def _end(session: Session, claim: Claim, state: State, reason: str | None) -> bool:
-    values: dict[str, Any] = {"state": state, "error": reason, "ended_at": now()}
-    ended = session.execute(update(RepetitionRow).where(mine(claim)).values(values).returning(RepetitionRow.id)).first()
-    _settle(session, claim.experiment_id)
-    return ended is not None
+def _any_of(claims: Sequence[Claim]) -> ColumnElement[bool]:
+    row = RepetitionRow
+    return tuple_(row.id, row.epoch).in_([(each.repetition_id, each.epoch) for each in claims])
+
+
+def _refuse_unfinished(session: Session, claims: Sequence[Claim]) -> None:
+    row = RepetitionRow
+    unfinished = session.execute(
+        select(row.number, row.experiment_id, ExperimentRow.iterations - row.iterations_done)
+        .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
+        .where(_any_of(claims), row.state == State.RUNNING, ExperimentRow.iterations != row.iterations_done)
+    ).first()
+    if unfinished is not None:
+        number, experiment, missing = unfinished
+        msg = f"repetition {number} of {experiment!r} is not complete: {missing} iterations are missing"
+        raise Conflict(msg)
 
 
 def _plain(reason: str) -> str:

