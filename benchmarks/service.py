@@ -39,8 +39,8 @@ def service() -> Iterator[Callable[[], int]]:
         url = f"sqlite:///{Path(folder) / 'bench.db'}"
         migrations.upgrade(url)
         store = Store(url)
-        with cluster(Settings(database_url=url, workers=CORES)) as capacity:
-            supervisor = Supervisor(store, capacity)
+        with cluster(Settings(database_url=url, workers=CORES)) as joined:
+            supervisor = Supervisor(store, joined.capacity)
 
             def work() -> int:
                 experiment = experiments.submit_experiment(store, SPEC).id

@@ -50,7 +50,7 @@ class WithoutRay(Supervisor):
     """The supervisor as it is, but for the workers: each round, every repetition has its next batch ready."""
 
     def __init__(self, store: Store, delivered: Batches) -> None:
-        super().__init__(store, AT_ONCE)
+        super().__init__(store, lambda: AT_ONCE)
         self._delivered = delivered
 
     def _launch(self, claim: Claim) -> Run:  # the claim's log is empty
@@ -67,7 +67,7 @@ class ThroughRay(Supervisor):
     """The supervisor as it is, on tasks that stream what was computed beforehand."""
 
     def __init__(self, store: Store, delivered: Batches) -> None:
-        super().__init__(store, AT_ONCE)
+        super().__init__(store, lambda: AT_ONCE)
         self._delivered = ray.put(delivered)
 
     def _launch(self, claim: Claim) -> Run:

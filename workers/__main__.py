@@ -1,29 +1,37 @@
 """`python -m workers serve`: run what is queued until told to stop. `python -m workers check`: could it?"""
 
 import logging
+import os
 import signal
 import sys
 from collections.abc import Callable
 from threading import Event
 
-from services.core.errors import StoreUnavailable
+from services.core.errors import ClusterUnusable, StoreUnavailable
 from services.settings import Settings
 from services.store.session import Store
 
 
 def serve(settings: Settings) -> int:
-    """Work until SIGTERM or SIGINT."""
+    """Work until SIGTERM or SIGINT; 1 if there is no cluster to work on."""
+    if settings.ray_address:  # of itself, Ray shows its token to a cluster that it started, but to no other
+        os.environ.setdefault("RAY_AUTH_MODE", "token")
     from workers.cluster import cluster  # Ray takes a second to import
     from workers.supervisor import Supervisor
 
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     store, stop = Store(settings.database_url), Event()
-    with cluster(settings) as capacity:
-        for signum in (signal.SIGTERM, signal.SIGINT):  # only now, for Ray has put handlers of its own in place
-            signal.signal(signum, lambda *_: stop.set())
-        logging.getLogger("gaplab.supervisor").info("ready for %d repetitions at once", capacity)
-        Supervisor(store, capacity).serve(stop)
-    store.dispose()
+    try:
+        with cluster(settings) as joined:
+            for signum in (signal.SIGTERM, signal.SIGINT):  # only now, for Ray has put handlers of its own in place
+                signal.signal(signum, lambda *_: stop.set())
+            logging.getLogger("gaplab.supervisor").info("ready for %d repetitions at once", joined.capacity())
+            Supervisor(store, joined.capacity, joined.versions).serve(stop)
+    except ClusterUnusable as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    finally:
+        store.dispose()
     return 0
 
 

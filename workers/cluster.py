@@ -3,40 +3,77 @@
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import ray
+from ray.exceptions import RayError
 
+from services.core.errors import ClusterUnusable
 from services.settings import Settings
+from workers.nodes import Versions, check_nodes, versions
 
 OBJECT_STORE_BYTES = 100 * 2**20
 """Steps are small: nothing here needs a large object store."""
 
 
-@contextmanager
-def cluster(settings: Settings) -> Iterator[int]:
-    """A connection to Ray for as long as the context lasts; its value is how many repetitions to give it at once.
+@dataclass(frozen=True)
+class Cluster:
+    """Ray, as it was started or joined.
 
-    On a Ray of our own, and on a cluster that we may use whole, that is two for each core: while one runs, the next one
-    waits at Ray, and no core idles between them.
+    Attributes:
+        workers: repetitions to run at once; None for as many as there are cores.
+        versions: that each node must have; none on a Ray of our own, which runs what this process runs.
+    """
+
+    workers: int | None
+    versions: Versions
+
+    def capacity(self) -> int:
+        """How many repetitions to have at Ray at once: it changes as nodes come and go.
+
+        That is two for each core: while one runs, the next one waits at Ray, and no core idles between them.
+        """
+        return self.workers or 2 * int(ray.cluster_resources().get("CPU", 0))
+
+
+@contextmanager
+def cluster(settings: Settings) -> Iterator[Cluster]:
+    """A connection to Ray for as long as the context lasts.
 
     A Ray of our own listens on loopback only, has no dashboard, and ends with this process, even if it is killed.
 
     Args:
         settings: `ray_address` names an existing cluster; `workers` limits the cores.
+
+    Raises:
+        ClusterUnusable: it cannot be joined, or a node has other versions than this process.
     """
-    if settings.ray_address:
-        ray.init(address=settings.ray_address, log_to_driver=False, logging_level=logging.ERROR)
-    else:
-        ray.init(
-            num_cpus=settings.workers,
-            include_dashboard=False,
-            log_to_driver=False,
-            logging_level=logging.ERROR,
-            object_store_memory=OBJECT_STORE_BYTES,
-            _node_ip_address="127.0.0.1",
-        )
     try:
-        limit = settings.workers if settings.ray_address else None
-        yield limit or 2 * int(ray.cluster_resources()["CPU"])
+        if settings.ray_address:
+            _join(settings.ray_address)
+            yield Cluster(settings.workers, versions())
+        else:
+            _start(settings.workers)
+            yield Cluster(None, {})
     finally:
         ray.shutdown()
+
+
+def _start(cores: int | None) -> None:
+    ray.init(
+        num_cpus=cores,
+        include_dashboard=False,
+        log_to_driver=False,
+        logging_level=logging.ERROR,
+        object_store_memory=OBJECT_STORE_BYTES,
+        _node_ip_address="127.0.0.1",
+    )
+
+
+def _join(address: str) -> None:
+    try:
+        ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
+    except (ConnectionError, ValueError, RuntimeError, RayError) as error:  # away; no node here; versions; token
+        msg = f"the Ray cluster at {address} cannot be joined (docs/scale.md says how): {error}"
+        raise ClusterUnusable(msg) from error
+    check_nodes()

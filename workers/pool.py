@@ -11,6 +11,7 @@ from schemas.spec import ExperimentSpec
 from services.core.arrays import Fitnesses, Genomes, Parameters
 from services.core.ports import Simulate
 from services.simulation import setting
+from workers.nodes import Versions, check_here
 
 LEAST_S = 0.02
 """A part that is sent to another core is worth at least this much work; sending costs a twentieth of it."""
@@ -30,12 +31,14 @@ class Pool:
         spec: resolved; another core builds the simulation from it, and keeps it warm.
         simulate: the same simulation here.
         batch: rollouts that the engine likes at a time.
+        versions: that a node must have to help.
     """
 
-    def __init__(self, spec: ExperimentSpec, simulate: Simulate, batch: int) -> None:
+    def __init__(self, spec: ExperimentSpec, simulate: Simulate, batch: int, versions: Versions | None = None) -> None:
         self._spec = ray.put(spec.model_dump_json())
         self._simulate = simulate
         self._batch = batch
+        self._versions = versions or {}
         self._rollout_s = 0.0
         self._idle = 0
         self._looked = -LOOK_S
@@ -58,7 +61,7 @@ class Pool:
 
     def _spread(self, parts: list[tuple[Genomes, Parameters]]) -> list[Fitnesses]:
         """The first part here, the others elsewhere; what comes back too late or not at all is done here after all."""
-        sent = [_part.remote(self._spec, *part) for part in parts[1:]]
+        sent = [_part.remote(self._spec, self._versions, *part) for part in parts[1:]]
         first = self._here(*parts[0])
         patience_s = PATIENCE * self._rollout_s * max(len(g) * len(p) for g, p in parts)
         _, late = ray.wait(sent, num_returns=len(sent), timeout=patience_s)
@@ -73,7 +76,7 @@ class Pool:
             return self._simulate(*part)
         try:
             return ray.get(ref)
-        except RayError:  # its node or its process died
+        except RayError:  # its node or its process died, or has other versions
             self._idle = 0
             return self._simulate(*part)
 
@@ -96,8 +99,9 @@ class Pool:
 
 
 @ray.remote(num_cpus=1, max_retries=0)
-def _part(spec: str, genomes: Genomes, parameters: Parameters) -> Fitnesses:
-    """The fitnesses of one part, on another core."""
+def _part(spec: str, expected: Versions, genomes: Genomes, parameters: Parameters) -> Fitnesses:
+    """The fitnesses of one part, on another core, which must have the versions that this one has."""
+    check_here(expected)
     return _simulation(spec)(genomes, parameters)
 
 

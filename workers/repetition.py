@@ -11,6 +11,7 @@ from services.core.loop import repetition
 from services.core.types import Measured, Probed, Step
 from services.execution import TimedStep
 from services.simulation import setting
+from workers.nodes import Versions, check_here
 from workers.pool import Pool
 
 BATCH_S = 0.2
@@ -18,14 +19,20 @@ BATCH_S = 0.2
 
 
 @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-def run(spec: ExperimentSpec, number: int, log: tuple[Step, ...]) -> Iterator[tuple[TimedStep, ...]]:
+def run(
+    spec: ExperimentSpec, number: int, log: tuple[Step, ...], expected: Versions
+) -> Iterator[tuple[TimedStep, ...]]:
     """The steps that follow the log, in batches, as they are computed.
 
     It is never retried by Ray: a repetition goes on from its stored log, not from its beginning. The engine stays warm
     in the worker process from one task to the next.
+
+    Raises:
+        ClusterUnusable: this node has not the versions that are expected.
     """
+    check_here(expected)
     alone = setting(spec, number)
-    pool = Pool(spec, alone.simulate, alone.batch())
+    pool = Pool(spec, alone.simulate, alone.batch(), expected)
     yield from batches(repetition(replace(alone, simulate=pool, batch=pool.batch), log))
 
 

@@ -6,6 +6,7 @@ It keeps nothing that it could not lose: killed at any moment and started again,
 import logging
 import os
 import socket
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from secrets import token_hex
 from threading import Event
@@ -16,10 +17,11 @@ from ray import ObjectRefGenerator
 from ray.exceptions import RayError, RayTaskError
 
 from services import execution
-from services.core.errors import StoreUnavailable
+from services.core.errors import ClusterUnusable, StoreUnavailable
 from services.execution import Claim, TimedStep
 from services.store.session import Store
 from workers import repetition
+from workers.nodes import Versions
 
 HEARTBEAT_S = 5.0
 """Between heartbeats; a lease is lost after 30 s without one."""
@@ -60,6 +62,8 @@ class Run:
         except StopIteration:
             self.ended = True
         except RayTaskError as error:
+            if isinstance(error.cause, ClusterUnusable):
+                raise error.cause from error
             self.failed = f"{type(error.cause).__name__}: {error.cause}"
         except RayError as error:
             self.lost = f"the worker was lost: {type(error).__name__}"
@@ -80,12 +84,14 @@ class Supervisor:
 
     Args:
         store: the database.
-        capacity: repetitions to have at Ray at once.
+        capacity: how many repetitions to have at Ray at once, as things are when it is asked.
+        versions: that a node must have to run them.
     """
 
-    def __init__(self, store: Store, capacity: int) -> None:
+    def __init__(self, store: Store, capacity: Callable[[], int], versions: Versions | None = None) -> None:
         self._store = store
         self._capacity = capacity
+        self._versions = versions or {}
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
         self._runs: list[Run] = []
         self._beat = -HEARTBEAT_S
@@ -97,20 +103,27 @@ class Supervisor:
         return bool(self._runs)
 
     def serve(self, stop: Event) -> None:
-        """Work until told to stop; then give the unfinished repetitions back to whoever comes next."""
-        while not stop.is_set():
-            try:
-                self.step()
-            except StoreUnavailable as error:
-                log.warning("waiting: %s", error)
-                stop.wait(RETRY_S)
-        self._hand_back()
+        """Work until told to stop; then give the unfinished repetitions back to whoever comes next.
+
+        Raises:
+            ClusterUnusable: a node would compute other numbers; this ends the work as well.
+        """
+        try:
+            while not stop.is_set():
+                try:
+                    self.step()
+                except StoreUnavailable as error:
+                    log.warning("waiting: %s", error)
+                    stop.wait(RETRY_S)
+        finally:
+            self._hand_back()
 
     def step(self) -> None:
         """One round: heartbeat, claim, receive, store.
 
         Raises:
             StoreUnavailable: nothing is lost by it; what was received is stored in a later round.
+            ClusterUnusable: a node that joined has other versions; nothing of it is stored.
         """
         self._heartbeat()
         self._claim()
@@ -129,16 +142,15 @@ class Supervisor:
         self._beat = monotonic()
 
     def _claim(self) -> None:
-        free = self._capacity - len(self._runs)
-        if free <= 0 or monotonic() - self._looked < WAIT_S:
+        if monotonic() - self._looked < WAIT_S:
             return
         self._looked = monotonic()
-        for claim in execution.claim(self._store, self._owner, free):
+        for claim in execution.claim(self._store, self._owner, self._capacity() - len(self._runs)):
             self._runs.append(self._launch(claim))
             log.info("%s: on from step %d", self._runs[-1].name, len(claim.log))
 
     def _launch(self, claim: Claim) -> Run:
-        return Run(claim, repetition.run.remote(claim.spec, claim.number, claim.log))
+        return Run(claim, repetition.run.remote(claim.spec, claim.number, claim.log, self._versions))
 
     def _receive(self) -> None:
         streams = {run.stream: run for run in self._runs if not run.over}

@@ -5,6 +5,7 @@
     ├── NotFound             no such study, experiment or plug-in
     ├── Conflict             not now: the state forbids it
     ├── StoreUnavailable     the database is unreachable, or its schema is not the one this version needs
+    ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
     └── EngineError
         └── EngineUnavailable    the engine's library is not installed
 
@@ -64,6 +65,10 @@ class Conflict(GaplabError):
 
 class StoreUnavailable(GaplabError):
     """The database cannot be used now."""
+
+
+class ClusterUnusable(GaplabError):
+    """Ray is unreachable, or one of its nodes would compute other numbers, or none."""
 
 
 class EngineError(GaplabError):

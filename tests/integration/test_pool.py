@@ -26,7 +26,7 @@ def alone():
 @pytest.fixture(scope="module", autouse=True)
 def ray_with_two_warm_cores(alone):
     with cluster(Settings(workers=2)):
-        ray.get([pools._part.remote(SPEC.model_dump_json(), *asked(alone, 10, 1)) for _ in range(4)])
+        ray.get([pools._part.remote(SPEC.model_dump_json(), {}, *asked(alone, 10, 1)) for _ in range(4)])
         yield
 
 

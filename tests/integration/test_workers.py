@@ -28,9 +28,9 @@ DEADLINE_S = 60
 
 
 @pytest.fixture(scope="module", autouse=True)
-def capacity():
-    with cluster(Settings(workers=2)) as capacity:
-        yield capacity
+def ray_of_our_own():
+    with cluster(Settings(workers=2)):
+        yield
 
 
 def toy(**changes):
@@ -83,7 +83,7 @@ def workers_of_ray():
 def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store, at_once):
     experiment = experiments.submit_experiment(store, toy()).id
 
-    run(Supervisor(store, at_once), store, experiment)
+    run(Supervisor(store, lambda: at_once), store, experiment)
 
     assert experiments.read_experiment(store, experiment).state is State.COMPLETED
     assert stored(store, experiment) == expected(toy())
@@ -91,7 +91,7 @@ def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store, at
 
 def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store):
     experiment = experiments.submit_experiment(sqlite_store, long_toy()).id
-    supervisor = Supervisor(sqlite_store, 1)
+    supervisor = Supervisor(sqlite_store, lambda: 1)
     run(supervisor, sqlite_store, experiment, until=workers_of_ray)
     time.sleep(0.5)
 
@@ -107,7 +107,7 @@ def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store):
 
 def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others_go_on(sqlite_store, monkeypatch):
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-    def raising(spec, number, log):
+    def raising(spec, number, log, expected):
         if number == 1:
             msg = "the second one is broken"
             raise ZeroDivisionError(msg)
@@ -116,7 +116,7 @@ def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others
     monkeypatch.setattr(task, "run", raising)
     experiment = experiments.submit_experiment(sqlite_store, toy()).id
 
-    run(Supervisor(sqlite_store, 4), sqlite_store, experiment)
+    run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
 
     read = experiments.read_experiment(sqlite_store, experiment)
     states = [each.state for each in experiments.list_repetitions(sqlite_store, experiment)]
@@ -139,7 +139,7 @@ def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_tw
 
     monkeypatch.setattr(execution, "record_all", flaky)
     experiment = experiments.submit_experiment(sqlite_store, toy()).id
-    supervisor = Supervisor(sqlite_store, 4)
+    supervisor = Supervisor(sqlite_store, lambda: 4)
 
     deadline = time.monotonic() + DEADLINE_S
     while experiments.read_experiment(sqlite_store, experiment).state is not State.COMPLETED:
@@ -155,7 +155,7 @@ def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_tw
 
 def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store):
     experiment = experiments.submit_experiment(sqlite_store, long_toy()).id
-    supervisor = Supervisor(sqlite_store, 2)
+    supervisor = Supervisor(sqlite_store, lambda: 2)
     run(
         supervisor,
         sqlite_store,
@@ -175,12 +175,12 @@ def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store):
 
 def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_store):
     experiment = experiments.submit_experiment(sqlite_store, toy()).id
-    first, stop = Supervisor(sqlite_store, 2), Event()
+    first, stop = Supervisor(sqlite_store, lambda: 2), Event()
     first.step()
     stop.set()
 
     first.serve(stop)
-    run(Supervisor(sqlite_store, 2), sqlite_store, experiment)
+    run(Supervisor(sqlite_store, lambda: 2), sqlite_store, experiment)
 
     assert experiments.read_experiment(sqlite_store, experiment).state is State.COMPLETED
     assert stored(sqlite_store, experiment) == expected(toy())
