@@ -5,23 +5,25 @@ from time import monotonic, perf_counter
 
 import numpy as np
 import ray
-from ray.exceptions import RayError
 
 from schemas.spec import ExperimentSpec
 from services.core.arrays import Fitnesses, Genomes, Parameters
 from services.core.ports import Simulate
 from services.simulation import setting
 from workers.nodes import Versions, check_here
+from workers.spread import Answer, Spread
 
-LEAST_S = 0.02
-"""A part that is sent to another core is worth at least this much work; sending costs a twentieth of it."""
+LEAST_S = 0.01
+"""A part that is lent to another core is worth at least this much work; lending costs less than a tenth of it."""
+
+PARTS = 10
+"""Parts for each core, if there is work enough: with more of them, the last one is waited for less long."""
 
 LOOK_S = 1.0
 """How often it is looked which cores are idle."""
 
-PATIENCE = 3.0
-"""A part that takes so many times as long as expected waits for a core that somebody else took, or for one that has yet
-to load the engine: it is done here, and what comes back later is not looked at."""
+OURS_S = 0.4
+"""A core that did a part stays ours for half a second, in which Ray does not count it among the idle ones."""
 
 
 class Pool:
@@ -42,6 +44,8 @@ class Pool:
         self._rollout_s = 0.0
         self._idle = 0
         self._looked = -LOOK_S
+        self._helped = 0
+        self._back = -OURS_S
 
     def batch(self) -> int:
         """Rollouts that one call should ask for, if there is a choice: as many as keep all cores busy."""
@@ -51,34 +55,27 @@ class Pool:
         """`(n, g)` genomes × `(m, p)` parameters -> `(n, m)` fitnesses; nan where the physics failed."""
         by_genome = len(genomes) >= len(parameters)
         many = len(genomes) if by_genome else len(parameters)
-        count = min(1 + self._helpers(), many, self._worthwhile(len(genomes) * len(parameters)))
+        helpers = self._helpers()
+        count = min(many, PARTS * (1 + helpers), self._worthwhile(len(genomes) * len(parameters))) if helpers else 1
         parts = [
             (genomes[rows], parameters) if by_genome else (genomes, parameters[rows])
             for rows in np.array_split(np.arange(many), max(1, count))
         ]
-        fitnesses = [self._here(*parts[0])] if len(parts) == 1 else self._spread(parts)
+        fitnesses = [self._here(*parts[0])] if len(parts) == 1 else self._spread(parts, helpers)
         return np.concatenate(fitnesses, axis=0 if by_genome else 1)
 
-    def _spread(self, parts: list[tuple[Genomes, Parameters]]) -> list[Fitnesses]:
-        """The first part here, the others elsewhere; what comes back too late or not at all is done here after all."""
-        sent = [_part.remote(self._spec, self._versions, *part) for part in parts[1:]]
-        first = self._here(*parts[0])
-        patience_s = PATIENCE * self._rollout_s * max(len(g) * len(p) for g, p in parts)
-        _, late = ray.wait(sent, num_returns=len(sent), timeout=patience_s)
-        if late:
-            self._idle = 0
-        return [first, *(self._fetched(ref, part, late) for ref, part in zip(sent, parts[1:], strict=True))]
-
-    def _fetched(
-        self, ref: "ray.ObjectRef[Fitnesses]", part: tuple[Genomes, Parameters], late: list["ray.ObjectRef[Fitnesses]"]
-    ) -> Fitnesses:
-        if ref in late:
-            return self._simulate(*part)
-        try:
-            return ray.get(ref)
-        except RayError:  # its node or its process died, or has other versions
-            self._idle = 0
-            return self._simulate(*part)
+    def _spread(self, parts: list[tuple[Genomes, Parameters]], helpers: int) -> list[Fitnesses]:
+        spread = Spread(
+            len(parts),
+            here=lambda index: self._here(*parts[index]),
+            lend=lambda index: _part.remote(self._spec, self._versions, *parts[index]),
+            helpers=helpers,
+        )
+        fitnesses = spread.run()
+        self._helped, self._back = len(spread.helped), monotonic()
+        if spread.late:
+            self._idle = self._helped
+        return fitnesses
 
     def _here(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
         begun = perf_counter()
@@ -93,16 +90,17 @@ class Pool:
     def _helpers(self) -> int:
         """Cores that are idle now, or were a moment ago."""
         if monotonic() - self._looked > LOOK_S:
-            self._idle = int(ray.available_resources().get("CPU", 0))
+            ours = self._helped if monotonic() - self._back < OURS_S else 0
+            self._idle = int(ray.available_resources().get("CPU", 0)) + ours
             self._looked = monotonic()
         return self._idle
 
 
 @ray.remote(num_cpus=1, max_retries=0)
-def _part(spec: str, expected: Versions, genomes: Genomes, parameters: Parameters) -> Fitnesses:
+def _part(spec: str, expected: Versions, genomes: Genomes, parameters: Parameters) -> Answer:
     """The fitnesses of one part, on another core, which must have the versions that this one has."""
     check_here(expected)
-    return _simulation(spec)(genomes, parameters)
+    return ray.get_runtime_context().get_worker_id(), _simulation(spec)(genomes, parameters)
 
 
 @cache

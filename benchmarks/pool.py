@@ -1,0 +1,94 @@
+"""One repetition of *informative* on two cores against one, and what two bare processes gain on this machine."""
+
+from collections.abc import Callable
+from statistics import median
+from time import perf_counter, sleep
+
+import ray
+
+from benchmarks.measure import Row, ratio
+from benchmarks.physics import SWITCHING, genomes, simulation
+from schemas.spec import ExperimentSpec
+from services.core.loop import repetition
+from services.resolution import resolve_experiment
+from services.settings import Settings
+from services.simulation import setting
+from workers import repetition as task
+from workers.cluster import cluster
+
+SPEC = ExperimentSpec.model_validate(
+    {
+        "strategy": "informative",
+        "optimizer": {"name": "steady_state", "options": {"population": 4}},
+        "iterations": 1,
+        "repetitions": 1,
+        "budget": {"controller_evaluations": 16, "selection_evaluations": 16, "simulator_evaluations": 20},
+    }
+)
+"""Nine tenths of its rollouts are the selection's, 20 for each newcomer, as at the paper's budgets."""
+
+ROLLOUTS = 120
+SETTLE_S = 1.0
+
+
+@ray.remote(num_cpus=1)
+def _alone() -> int:
+    """The repetition on one core, whatever else is idle."""
+    return sum(1 for _ in repetition(setting(resolve_experiment(SPEC), 0)))
+
+
+@ray.remote(num_cpus=1)
+def _rollouts(count: int) -> int:
+    """Rollouts of one process."""
+    simulate, drawn = simulation(), genomes()
+    for index in range(count):
+        simulate(drawn[[index % len(drawn)]], SWITCHING)
+    return count
+
+
+def alone() -> int:
+    """The steps of the repetition, in one process."""
+    return int(ray.get(_alone.remote()))
+
+
+def spread() -> int:
+    """The steps of the repetition, as the service runs it."""
+    stream = task.run.remote(resolve_experiment(SPEC), 0, (), {})
+    return sum(len(ray.get(batch)) for batch in stream)
+
+
+def bare(processes: int) -> Callable[[], int]:
+    """Rollouts shared by processes that need nothing of each other."""
+    return lambda: sum(ray.get([_rollouts.remote(ROLLOUTS // processes) for _ in range(processes)]))
+
+
+def settled(work: Callable[[], int]) -> float:
+    """The seconds that the work takes, once Ray knows that the cores of what was before are idle."""
+    sleep(SETTLE_S)
+    begun = perf_counter()
+    work()
+    return perf_counter() - begun
+
+
+def rows(rounds: int) -> list[Row]:
+    """The speed-up of a repetition beside that of bare processes, in the same turns."""
+    rivals = {"one": alone, "two": spread, "bare one": bare(1), "bare two": bare(2)}
+    taken: dict[str, list[float]] = {name: [] for name in rivals}
+    with cluster(Settings(workers=2)):
+        for turn in range(rounds + 1):
+            for name, work in rivals.items():
+                seconds = settled(work)
+                taken[name] += [seconds] if turn else []  # the first turn loads engines
+    possible, ours = ratio(taken["bare one"], taken["bare two"]), ratio(taken["one"], taken["two"])
+    value = f"{median(taken['two']):.1f} s; on one {median(taken['one']):.1f} s"
+    return [
+        Row(
+            "two bare processes of PyBullet, beside one", f"{ROLLOUTS} rollouts", possible, "one", "2 if cores are free"
+        ),
+        Row("one repetition of informative, two cores", value, ours, "one core", "≥ 1.7"),
+    ]
+
+
+if __name__ == "__main__":
+    for row in rows(3):
+        print(row.figure, row.value, row.ratio)
