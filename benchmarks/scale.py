@@ -1,0 +1,125 @@
+"""`python -m benchmarks.scale`: how long the paper's Fig. 4 takes on how many cores, from each engine's measured speed.
+
+Physics is all that is counted. A computation of W core-seconds, whose longest chain of steps that wait for each other
+takes S seconds, takes at least max(W / P, S) on P cores, and at most W / P + S if no core idles while there is work
+(Brent 1974). The longest chain is that of a repetition of *informative*: one newcomer after another, and within a
+newcomer as many rollouts at a time as `workers.pool` spreads.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import ceil
+from statistics import median
+from time import process_time
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.physics import TUNED, genomes
+from schemas.spec import ExperimentSpec, StudySpec
+from services.core.robots.quadruped import Quadruped
+from services.core.strategies import strategies
+from services.core.tunables import tunables
+from services.engines import engines
+from services.engines.base import Engine
+from services.resolution import resolve_study
+from services.simulation import Simulation
+from workers.pool import LEAST_S
+
+CORES = (2, 16, 64, 1_000)
+FIGURE_4 = StudySpec(direct_repetitions=100)
+LEND_S = 0.001
+"""To lend a part to another core and have it back. Measured: 0.4 to 1 ms."""
+
+TURNS = 7
+
+
+@dataclass(frozen=True)
+class Calls:
+    """A phase of a repetition: so many calls of `Simulate`, each of which waits for the one before."""
+
+    count: int
+    rollouts: int
+
+    def seconds(self, rollout_s: float) -> float:
+        """With as many cores as can be of use."""
+        parts = max(1, min(self.rollouts, int(self.rollouts * rollout_s / LEAST_S)))
+        return self.count * (ceil(self.rollouts / parts) * rollout_s + (LEND_S if parts > 1 else 0.0))
+
+
+def phases(spec: ExperimentSpec) -> Iterator[Calls]:
+    """What one repetition of a resolved spec asks for, as budgeted: what is saved comes on top."""
+    strategy, iterations = strategies.create(spec.strategy), spec.iterations or 0
+    if strategy.in_reality:
+        yield Calls(spec.budget.controller_evaluations or 0, 1)
+        return
+    yield Calls((iterations + 1) * (spec.budget.controller_evaluations or 0), 1)
+    if strategy.searches:
+        yield Calls(iterations * (spec.budget.selection_evaluations or 0), strategy.ensemble)
+    for samples in range(1, iterations + 1):
+        yield Calls(spec.budget.simulator_evaluations or 0, samples)
+
+
+def work() -> int:
+    """Rollouts of the paper's Fig. 4, the direct baseline included."""
+    return sum(
+        (spec.repetitions or 0) * each.count * each.rollouts
+        for spec in resolve_study(FIGURE_4)
+        for each in phases(spec)
+    )
+
+
+def chain_s(rollout_s: float) -> float:
+    """Seconds of the longest repetition, on as many cores as can be of use."""
+    return max(sum(each.seconds(rollout_s) for each in phases(spec)) for spec in resolve_study(FIGURE_4))
+
+
+def steps() -> int:
+    """Steps that the supervisor stores for it: five in an iteration, three in number 0."""
+    specs = resolve_study(FIGURE_4)
+    ends = ((spec, 0 if strategies.create(spec.strategy).in_reality else spec.iterations or 0) for spec in specs)
+    return sum((spec.repetitions or 0) * (5 * iterations + 3) for spec, iterations in ends)
+
+
+def rollout_s(engine: type[Engine]) -> float:
+    """Core-seconds of one rollout, of the genomes and simulators that searches meet; 20 at a time."""
+    simulate = Simulation(Quadruped(), engine(), [tunables[name]() for name in TUNED])
+    ranges = [[tunables[name].lower or 0.0, tunables[name].upper or 1.0] for name in TUNED]
+    drawn = np.random.default_rng(0).uniform(*np.transpose(ranges), (20, len(TUNED)))
+    seconds = []
+    for genome in genomes(TURNS + 1):
+        begun = process_time()
+        simulate(genome[None], drawn)
+        seconds.append((process_time() - begun) / len(drawn))
+    return median(seconds[1:])
+
+
+def main() -> None:
+    """Measure the engines that are installed, and print the table."""
+    console, total = Console(), work()
+    table = Table(title=f"the paper's Fig. 4: {total / 1e6:.1f} million rollouts, {steps():,} steps to store")
+    for column in ("engine", "a rollout", *(f"{cores:,} cores" for cores in CORES), "longest chain"):
+        table.add_column(column, justify="left" if column == "engine" else "right")
+    for engine in engines.values():
+        if engine.runs(Quadruped().world) and engine.available():
+            each_s = rollout_s(engine)
+            table.add_row(engine.name, f"{1e3 * each_s:.1f} ms", *_durations(total, each_s), _shown(chain_s(each_s)))
+    console.print(table)
+
+
+def _durations(total: int, each_s: float) -> Iterator[str]:
+    chain = chain_s(each_s)
+    for cores in CORES:
+        share = total * each_s / cores
+        least, most = _shown(max(share, chain)), _shown(share + chain)
+        yield least if least == most else f"{least} – {most}"
+
+
+def _shown(seconds: float) -> str:
+    hours = seconds / 3600
+    return f"{hours / 24:.0f} d" if hours >= 48 else f"{hours:.0f} h" if hours >= 10 else f"{hours:.1f} h"
+
+
+if __name__ == "__main__":
+    main()
