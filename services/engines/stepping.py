@@ -83,7 +83,8 @@ def watch(scene: Scene, advance: Callable[[int], None], motion: Motion) -> Float
     for now, then in pairwise([*moments, moments[-1]]):
         for actuator, target in commands.get(now, ()):
             scene.command(actuator, target)
-        poses[now] = scene.pose()
+        if now in observed:
+            poses[now] = scene.pose()
         advance(then - now)
     return np.array([poses[step] for step in observed])
 
