@@ -56,7 +56,7 @@ def numbers(progress: Progress) -> str:
     physics = f", {progress.rollouts_failed:,} of them nan" if progress.rollouts_failed else ""
     return (
         f"{progress.completed} of {progress.repetitions} repetitions{failed}; "
-        f"{progress.rollouts_done:,} of about {progress.rollouts:,} rollouts{physics}"
+        f"{progress.rollouts_done:,} rollouts{physics}, {progress.rollouts_saved:,} saved, of {progress.rollouts:,}"
     )
 
 
@@ -103,7 +103,8 @@ def state(of: State) -> str:
 
 def fraction(progress: Progress) -> float:
     """Between 0 and 1; of rollouts, which is where the time goes."""
-    return min(1.0, progress.rollouts_done / progress.rollouts) if progress.rollouts else 0.0
+    behind = progress.rollouts_done + progress.rollouts_saved
+    return min(1.0, behind / progress.rollouts) if progress.rollouts else 0.0
 
 
 def percent(progress: Progress) -> str:

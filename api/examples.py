@@ -69,6 +69,7 @@ PROGRESS = Progress(
     iterations_done=150,
     rollouts=12_800_000,
     rollouts_done=4_363_000,
+    rollouts_saved=1_204_000,
     rollouts_failed=17,
     seconds_left=3120.0,
 )

@@ -18,7 +18,7 @@ from services.core.optimizers.steady_state import SteadyState
 from services.core.robots.quadruped import BODY_M, COUNTED_S, PERIOD_S, SETTLING_S, Quadruped, QuadrupedOptions
 from services.core.streams import stream
 from services.core.tunables import tunables
-from services.core.tuning import squared_errors, tune
+from services.core.tuning import Misfit, squared_errors, tune
 from services.core.types import Sample, Space
 from services.core.world import Motion
 from services.engines.pybullet import PyBullet
@@ -174,7 +174,9 @@ def identifiable(laboratory: Laboratory, asked: Namespace) -> None:
             for seed in range(asked.tunings):
                 rng = stream(seed, "tune", count)
                 some = [samples[index] for index in rng.permutation(10)[:count]]
-                best = tune(laboratory.simulate, some, laboratory.parameters, SteadyState(), asked.tuning, rng)[0]
+                best = tune(Misfit(laboratory.simulate, some), laboratory.parameters, SteadyState(), asked.tuning, rng)[
+                    0
+                ]
                 fitness = laboratory.real(laboratory.evolve(best.parameters, "tuned", asked.tuning, count, seed))
                 found.setdefault(count, []).append((best.parameters, fitness))
                 error = np.sqrt(best.squared_error / count)

@@ -27,6 +27,11 @@ class BudgetSpec(Frozen):
     )
     selection_evaluations: Count | None = Field(default=None, description="of the search for the next sample")
     simulator_evaluations: Count | None = Field(default=None, description="of the search for a simulator")
+    reuse_transfer: bool = Field(
+        default=True,
+        strict=True,
+        description="`simulated_fit` tries the controller that was just transferred, instead of searching for it again",
+    )
 
     @model_validator(mode="before")
     @classmethod

@@ -204,7 +204,7 @@ def _reality_violations(spec: ExperimentSpec, engine: type[Engine]) -> Iterator[
 def _budget(spec: ExperimentSpec) -> BudgetSpec:
     """The budget with every number written out."""
     preset = PRESETS[spec.budget.preset]
-    names = (name for name in BudgetSpec.model_fields if name != "preset")
+    names = (name for name in BudgetSpec.model_fields if name not in {"preset", "reuse_transfer"})
     return spec.budget.model_copy(update={name: getattr(spec.budget, name) or getattr(preset, name) for name in names})
 
 

@@ -86,7 +86,8 @@ def setting(spec: ExperimentSpec, repetition: int) -> Setting:
     strategy = strategies.create(spec.strategy)
     edits = [tunables[ref.name]() for ref in spec.tunables]
     truth, real = reality_of(spec, robot)
-    simulate: Simulate = Simulation(robot, engine_of(spec.engine), edits)
+    engine = engine_of(spec.engine)
+    simulate: Simulate = Simulation(robot, engine, edits)
     if strategy.in_reality:
         simulate = EvolutionInReality(real, truth)
     return Setting(
@@ -103,6 +104,7 @@ def setting(spec: ExperimentSpec, repetition: int) -> Setting:
         iterations=0 if strategy.in_reality else spec.iterations or 0,
         seed=spec.seed,
         repetition=repetition,
+        batch=lambda: engine.batch,
     )
 
 

@@ -1,6 +1,7 @@
-"""One repetition as one Ray task on one core: it streams its steps back, and never sees the database."""
+"""One repetition as one Ray task: it streams its steps back, and never sees the database."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from time import perf_counter
 
 import ray
@@ -10,6 +11,7 @@ from services.core.loop import repetition
 from services.core.types import Measured, Probed, Step
 from services.execution import TimedStep
 from services.simulation import setting
+from workers.pool import Pool
 
 BATCH_S = 0.2
 """Steps shorter than this travel together; what reality answered never waits."""
@@ -22,7 +24,9 @@ def run(spec: ExperimentSpec, number: int, log: tuple[Step, ...]) -> Iterator[tu
     It is never retried by Ray: a repetition goes on from its stored log, not from its beginning. The engine stays warm
     in the worker process from one task to the next.
     """
-    yield from batches(repetition(setting(spec, number), log))
+    alone = setting(spec, number)
+    pool = Pool(spec, alone.simulate, alone.batch())
+    yield from batches(repetition(replace(alone, simulate=pool, batch=pool.batch), log))
 
 
 def batches(steps: Iterator[Step]) -> Iterator[tuple[TimedStep, ...]]:

@@ -2,27 +2,41 @@
 
 import numpy as np
 
-from services.core.arrays import Fitnesses, Genomes, Parameters
+from services.core.arrays import Fitnesses, FloatArray, Genomes, Parameters
 from services.core.ports import Simulate
 from services.core.types import Cost
 
 
+class Count:
+    """A running count of rollouts, and of those among them that failed."""
+
+    def __init__(self) -> None:
+        self._rollouts = 0
+        self._failures = 0
+
+    def add(self, fitnesses: FloatArray) -> None:
+        """So many more rollouts, of any shape."""
+        self._rollouts += fitnesses.size
+        self._failures += int(np.isnan(fitnesses).sum())
+
+    def cost_of(self, budget: int) -> Cost:
+        """What was counted so far, of so many rollouts that there might have been."""
+        return Cost(self._rollouts, self._failures, budget - self._rollouts)
+
+
 class Counted:
-    """A Simulate that counts its rollouts and how many of them failed."""
+    """A Simulate that counts its rollouts.
+
+    Attributes:
+        count: of them so far.
+    """
 
     def __init__(self, simulate: Simulate) -> None:
         self._simulate = simulate
-        self._rollouts = 0
-        self._failures = 0
+        self.count = Count()
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
         """As the Simulate that it counts."""
         fitnesses = self._simulate(genomes, parameters)
-        self._rollouts += fitnesses.size
-        self._failures += int(np.isnan(fitnesses).sum())
+        self.count.add(fitnesses)
         return fitnesses
-
-    @property
-    def cost(self) -> Cost:
-        """What was counted so far."""
-        return Cost(self._rollouts, self._failures)

@@ -5,7 +5,7 @@ address, so the stored steps are the whole checkpoint: `repetition(setting, log)
 never stopped.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,10 +17,11 @@ from services.core.optimizers.base import Optimizer, maximise
 from services.core.ports import Reality, Simulate
 from services.core.strategies.base import Score, Search, Strategy
 from services.core.streams import stream
-from services.core.tuning import draw_simulators, tune
+from services.core.tuning import Misfit, draw_simulators, tune
 from services.core.types import (
     Belief,
     Budget,
+    Cost,
     Measured,
     Probed,
     Sample,
@@ -49,6 +50,7 @@ class Setting:
         iterations: real-world evaluations to spend; 0 for the direct baseline.
         seed: of the experiment.
         repetition: its number.
+        batch: rollouts that `simulate` likes to be asked for at a time, now; no number depends on it.
     """
 
     simulate: Simulate
@@ -62,6 +64,7 @@ class Setting:
     iterations: int
     seed: int
     repetition: int
+    batch: Callable[[], int] = lambda: 1
 
     def stream(self, iteration: int, phase: str) -> Generator:
         """The random stream of one phase of one iteration."""
@@ -76,11 +79,13 @@ class History:
         last: the latest step; None at the very start.
         samples: measured so far.
         simulators: of the latest tuning, best first.
+        transferred: the latest transferred genome.
     """
 
     last: Step | None = None
     samples: tuple[Sample, ...] = ()
     simulators: tuple[Simulator, ...] = ()
+    transferred: Genome | None = None
 
     def after(self, step: Step) -> "History":
         """The history with one more step."""
@@ -89,6 +94,8 @@ class History:
                 return replace(self, last=step, samples=(*self.samples, sample))
             case Tuned(simulators=simulators):
                 return replace(self, last=step, simulators=simulators)
+            case Transferred(genome=genome):
+                return replace(self, last=step, transferred=genome)
         return replace(self, last=step)
 
 
@@ -126,11 +133,14 @@ def _draw(setting: Setting) -> Tuned:
 
 
 def _select(setting: Setting, history: History, iteration: int) -> Selected:
+    if setting.budget.reuse_transfer and setting.strategy.selects_transferred and history.transferred is not None:
+        return Selected(iteration, history.transferred, Cost(saved=setting.budget.selection_evaluations))
     belief = Belief(setting.genomes, setting.known, history.samples, history.simulators)
     simulate = Counted(setting.simulate)
     search = _search(setting, simulate, belief.parameters, setting.stream(iteration, "search"))
     genome = setting.strategy.select(belief, search, setting.stream(iteration, "select"))
-    return Selected(iteration, genome, simulate.cost)
+    searched = setting.budget.selection_evaluations * setting.strategy.ensemble if setting.strategy.searches else 0
+    return Selected(iteration, genome, simulate.count.cost_of(searched))
 
 
 def _search(setting: Setting, simulate: Simulate, parameters: Parameters, rng: Generator) -> Search:
@@ -138,7 +148,7 @@ def _search(setting: Setting, simulate: Simulate, parameters: Parameters, rng: G
         found = maximise(
             setting.optimizer,
             setting.genomes,
-            lambda genomes: score(genomes, simulate(genomes, parameters)),
+            lambda genomes, _: score(genomes, simulate(genomes, parameters)),
             setting.budget.selection_evaluations,
             rng,
         )
@@ -156,10 +166,10 @@ def _tune(setting: Setting, history: History, iteration: int) -> Tuned:
     if not samples:
         return Tuned(iteration, draw_simulators(setting.parameters, ensemble, rng))
     optimizer = setting.optimizer.diverse(ensemble) if ensemble > 1 else setting.optimizer
-    simulate = Counted(setting.simulate)
     evaluations = setting.budget.simulator_evaluations
-    found = tune(simulate, samples, setting.parameters, optimizer, evaluations, rng)
-    return Tuned(iteration, found[:ensemble], simulate.cost)
+    misfit = Misfit(setting.simulate, samples, setting.batch)
+    found = tune(misfit, setting.parameters, optimizer, evaluations, rng)
+    return Tuned(iteration, found[:ensemble], misfit.count.cost_of(evaluations * len(samples)))
 
 
 def _transfer(setting: Setting, history: History, iteration: int) -> Transferred:
@@ -169,12 +179,13 @@ def _transfer(setting: Setting, history: History, iteration: int) -> Transferred
     found = maximise(
         setting.optimizer,
         setting.genomes,
-        lambda genomes: simulate(genomes, best)[:, 0],
+        lambda genomes, _: simulate(genomes, best)[:, 0],
         setting.budget.controller_evaluations,
         setting.stream(iteration, "transfer"),
     )
     fitness = float(found.fitness[0]) if np.isfinite(found.fitness[0]) else float("nan")
-    return Transferred(iteration, found.genomes[0], fitness, simulate.cost)
+    cost = simulate.count.cost_of(setting.budget.controller_evaluations)
+    return Transferred(iteration, found.genomes[0], fitness, cost)
 
 
 def _probe(setting: Setting, history: History, iteration: int, genome: Genome) -> Probed:

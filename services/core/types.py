@@ -117,19 +117,31 @@ class Belief:
 
 @dataclass(frozen=True)
 class Budget:
-    """Fitness evaluations of each search; the paper's numbers are the defaults. Source: sections 2 and 3."""
+    """Fitness evaluations of each search; the paper's numbers are the defaults. Source: sections 2 and 3.
+
+    Attributes:
+        reuse_transfer: a strategy that would search for what the transfer has just found tries that one in reality.
+    """
 
     controller_evaluations: int = 10_000
     selection_evaluations: int = 10_000
     simulator_evaluations: int = 2_000
+    reuse_transfer: bool = True
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What a step took: rollouts simulated, and how many of them failed (nan)."""
+    """What a step took.
+
+    Attributes:
+        rollouts: that were simulated.
+        failures: how many of them failed (nan).
+        saved: that the budget had for it and that could not have changed its outcome.
+    """
 
     rollouts: int = 0
     failures: int = 0
+    saved: int = 0
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ class Analytic(Engine):
     name = "analytic"
     source = "Paper, section 2, Fig. 3 shows such a function; this one is gaplab's"
     honours = frozenset({"material.static_friction", "material.dynamic_friction", "material.restitution"})
+    batch = 1_000
 
     @classmethod
     def runs(cls, world: World) -> bool:

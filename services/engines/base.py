@@ -22,11 +22,13 @@ class Engine(Plugin):
         library: the Python module that it needs, or None; it is imported inside the class.
         install: the line that installs it.
         honours: the World fields that change what it computes, like `material.dynamic_friction`.
+        batch: rollouts that one call should ask for, if there is a choice; 1 where a call costs little beside one.
     """
 
     library: ClassVar[str | None] = None
     install: ClassVar[str] = ""
     honours: ClassVar[frozenset[str]]
+    batch: ClassVar[int] = 1
 
     @classmethod
     @abstractmethod

@@ -98,12 +98,14 @@ def plausible(poses: FloatArray) -> bool:
 def _commands(motion: Motion, time_step_s: float) -> dict[int, list[tuple[int, float]]]:
     """By time step: the actuators whose targets change then, with their new targets; at step 0, all of them."""
     changed = np.vstack([np.ones_like(motion.targets[:1], bool), motion.targets[1:] != motion.targets[:-1]])
-    steps = _steps(motion.times_s, time_step_s)
+    rows, actuators = np.nonzero(changed)
+    steps, targets = _steps(motion.times_s[rows], time_step_s), motion.targets[rows, actuators].tolist()
     commands: dict[int, list[tuple[int, float]]] = {}
-    for row, actuator in np.argwhere(changed).tolist():
-        commands.setdefault(steps[row], []).append((actuator, float(motion.targets[row, actuator])))
+    for step, actuator, target in zip(steps, actuators.tolist(), targets, strict=True):
+        commands.setdefault(step, []).append((actuator, target))
     return commands
 
 
 def _steps(times_s: FloatArray, time_step_s: float) -> list[int]:
-    return [int(step) for step in np.rint(times_s / time_step_s)]
+    steps: list[int] = np.rint(times_s / time_step_s).astype(int).tolist()
+    return steps

@@ -90,13 +90,17 @@ def finite(value: float) -> float | None:
 
 
 def _phase(name: str, cost: Cost) -> dict[str, int]:
-    return {f"{name}_rollouts": int(cost.rollouts), f"{name}_failures": int(cost.failures)}
+    return {f"{name}_{count}": int(getattr(cost, count)) for count in ("rollouts", "failures", "saved")}
 
 
 def _selected(row: IterationRow) -> Selected | None:
     if row.selected_genome is None:
         return None
-    return Selected(row.number, frozen(row.selected_genome), _cost(row.selection_rollouts, row.selection_failures))
+    return Selected(
+        row.number,
+        frozen(row.selected_genome),
+        _cost(row.selection_rollouts, row.selection_failures, row.selection_saved),
+    )
 
 
 def _measured(row: MeasurementRow | None) -> Measured | None:
@@ -109,13 +113,13 @@ def _tuned(row: IterationRow, simulators: Sequence[SimulatorRow]) -> Tuned | Non
     if row.tuning_rollouts is None:
         return None
     found = tuple(Simulator(frozen(each.parameters), _or(inf, each.squared_error)) for each in simulators)
-    return Tuned(row.number, found, _cost(row.tuning_rollouts, row.tuning_failures))
+    return Tuned(row.number, found, _cost(row.tuning_rollouts, row.tuning_failures, row.tuning_saved))
 
 
 def _transferred(row: IterationRow) -> Transferred | None:
     if row.transferred_genome is None:
         return None
-    spent = _cost(row.transfer_rollouts, row.transfer_failures)
+    spent = _cost(row.transfer_rollouts, row.transfer_failures, row.transfer_saved)
     return Transferred(row.number, frozen(row.transferred_genome), _or(nan, row.simulated_fitness), spent)
 
 
@@ -125,8 +129,8 @@ def _probed(row: IterationRow, probe: MeasurementRow | None) -> Probed | None:
     return Probed(row.number, _or(nan, probe.fitness), _or(nan, row.recorded_fitness))
 
 
-def _cost(rollouts: int | None, failures: int | None) -> Cost:
-    return Cost(rollouts or 0, failures or 0)
+def _cost(rollouts: int | None, failures: int | None, saved: int | None) -> Cost:
+    return Cost(rollouts or 0, failures or 0, saved or 0)
 
 
 def _or(missing: float, value: float | None) -> float:

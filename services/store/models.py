@@ -136,6 +136,7 @@ class RepetitionRow(Base):
     iterations_done: Mapped[int] = mapped_column(default=0)
     rollouts_done: Mapped[int] = mapped_column(BigInteger, default=0)
     rollouts_failed: Mapped[int] = mapped_column(BigInteger, default=0)
+    rollouts_saved: Mapped[int] = mapped_column(BigInteger, default=0)
     seconds: Mapped[float] = mapped_column(default=0.0)
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]
@@ -154,12 +155,15 @@ class IterationRow(Base):
     selected_genome: Mapped[list[float] | None]
     selection_rollouts: Mapped[int | None] = mapped_column(BigInteger)
     selection_failures: Mapped[int | None] = mapped_column(BigInteger)
+    selection_saved: Mapped[int | None] = mapped_column(BigInteger)
     tuning_rollouts: Mapped[int | None] = mapped_column(BigInteger)
     tuning_failures: Mapped[int | None] = mapped_column(BigInteger)
+    tuning_saved: Mapped[int | None] = mapped_column(BigInteger)
     transferred_genome: Mapped[list[float] | None]
     simulated_fitness: Mapped[float | None]
     transfer_rollouts: Mapped[int | None] = mapped_column(BigInteger)
     transfer_failures: Mapped[int | None] = mapped_column(BigInteger)
+    transfer_saved: Mapped[int | None] = mapped_column(BigInteger)
     recorded_fitness: Mapped[float | None]
     seconds: Mapped[float] = mapped_column(default=0.0)
     ended_at: Mapped[datetime | None]

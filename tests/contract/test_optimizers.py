@@ -19,9 +19,29 @@ class Hill:
         self.transform = transform
         self.asked = []
 
-    def __call__(self, genomes):
+    def __call__(self, genomes, bounds=None):
         self.asked.append(genomes.copy())
         return self.transform(-(((genomes - SUMMIT) / SPACE.extent) ** 2).sum(axis=1))
+
+
+class Watched:
+    """An optimizer that remembers what it was told."""
+
+    def __init__(self, optimizer):
+        self.optimizer = optimizer
+        self.told = []
+
+    def __getattr__(self, name):
+        return getattr(self.optimizer, name)
+
+    def tell(self, state, genomes, fitness):
+        self.told.append(genomes)
+        return self.optimizer.tell(state, genomes, fitness)
+
+
+def given_up(fitness, bounds):
+    """-inf for every fitness below its bound, as an evaluation that gave up says."""
+    return np.where(fitness < bounds, -np.inf, fitness)
 
 
 def search(name, evaluate, evaluations=300, seed=3):
@@ -31,12 +51,27 @@ def search(name, evaluate, evaluations=300, seed=3):
 @pytest.mark.parametrize("name", sorted(optimizers))
 class TestEveryOptimizer:
     @pytest.mark.parametrize("evaluations", [1, 19, 20, 21, 57, 300])
-    def test_spends_exactly_its_budget(self, name, evaluations):
-        hill = Hill()
+    def test_spends_exactly_its_budget_less_what_it_would_evaluate_again(self, name, evaluations):
+        hill, optimizer = Hill(), Watched(optimizers[name]())
 
-        search(name, hill, evaluations)
+        maximise(optimizer, SPACE, hill, evaluations, np.random.default_rng(3))
 
-        assert sum(map(len, hill.asked)) == evaluations
+        told = np.vstack(optimizer.told)
+        assert len(told) == evaluations
+        assert sum(map(len, hill.asked)) == len(np.unique(told, axis=0))
+
+    @pytest.mark.parametrize("diverse", [False, True])
+    def test_what_it_calls_hopeless_changes_nothing(self, name, diverse):
+        def search_with(hopeless):
+            optimizer = optimizers[name]().diverse(9) if diverse else optimizers[name]()
+            hill = Hill()
+            evaluate = (lambda genomes, bounds: given_up(hill(genomes), bounds)) if hopeless else hill
+            return maximise(optimizer, SPACE, evaluate, 400, np.random.default_rng(3))
+
+        exact, given = search_with(False), search_with(True)
+
+        np.testing.assert_array_equal(exact.genomes, given.genomes)
+        np.testing.assert_array_equal(exact.fitness, given.fitness)
 
     def test_asks_only_within_the_box(self, name):
         hill = Hill()

@@ -11,7 +11,7 @@ from services.core.types import Probed, Tuned
 from services.resolution import resolve_experiment
 from services.simulation import setting
 
-ITERATIONS, REPETITIONS = 6, 8
+ITERATIONS, REPETITIONS = 8, 10
 TRUTH = np.array([1.0, 0.8, 0.0])
 
 

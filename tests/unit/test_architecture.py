@@ -14,7 +14,7 @@ PHYSICS = {"pybullet", "mujoco", "sapien"}
 # code in -> what of ours it may import, and what of others; the first prefix that fits counts
 ARROWS = {
     "schemas": (("schemas",), {"pydantic", "pydantic_core"}),
-    "services/core": (("schemas", "services.core"), {"numpy", "scipy", "pydantic"}),
+    "services/core": (("schemas", "services.core"), {"numpy", "scipy", "pydantic", "cma"}),
     "services/engines": (("schemas", "services.core", "services.engines"), {"numpy"}),
     "services/store": (("schemas", "services.core", "services.store"), {"sqlalchemy", "psycopg"}),
     "services/figures": (("schemas", "services.figures"), {"plotly", "matplotlib"}),

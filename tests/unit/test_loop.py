@@ -66,17 +66,37 @@ def test_budgets_are_honoured_to_the_rollout_and_reported_in_the_steps(strategy,
 
     steps = list(repetition(small_setting(strategy, options, simulate=simulate)))
 
-    assert simulate.rollouts == expected
-    assert sum(step.cost.rollouts for step in steps if hasattr(step, "cost")) == expected
+    costs = [step.cost for step in steps if hasattr(step, "cost")]
+    assert sum(cost.rollouts + cost.saved for cost in costs) == expected
+    assert sum(cost.rollouts for cost in costs) == simulate.rollouts <= expected
+    assert all(cost.saved >= 0 for cost in costs)
 
 
 def test_a_budget_that_the_population_does_not_divide_is_honoured_too():
     simulate = Recorder()
-    budget = Budget(controller_evaluations=7, selection_evaluations=6, simulator_evaluations=9)
+    budget = Budget(controller_evaluations=7, selection_evaluations=6, simulator_evaluations=9, reuse_transfer=False)
 
-    list(repetition(small_setting(simulate=simulate, budget=budget, iterations=1)))
+    steps = list(repetition(small_setting(simulate=simulate, budget=budget, iterations=1)))
 
-    assert simulate.rollouts == 7 + 6 + 9 + 7
+    costs = [step.cost for step in steps if hasattr(step, "cost")]
+    assert sum(cost.rollouts + cost.saved for cost in costs) == 7 + 6 + 9 + 7
+
+
+def test_simulated_fit_tries_the_controller_that_was_just_transferred():
+    steps = list(repetition(small_setting()))
+
+    transferred = [step.genome for step in steps if isinstance(step, Transferred)]
+    selected = [step for step in steps if isinstance(step, Selected)]
+    np.testing.assert_array_equal([step.genome for step in selected], transferred[:-1])
+    assert {(step.cost.rollouts, step.cost.saved) for step in selected} == {(0, 30)}
+
+
+def test_without_reuse_simulated_fit_searches_anew():
+    steps = list(repetition(small_setting(budget=Budget(40, 30, 50, reuse_transfer=False))))
+
+    assert {step.cost.rollouts for step in steps if isinstance(step, Selected)} == {30}
+    transferred = [step.genome for step in steps if isinstance(step, Transferred)]
+    assert not any(np.array_equal(step.genome, transferred[0]) for step in steps if isinstance(step, Selected))
 
 
 def test_fit_strategies_close_the_gap():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
-from services.core.tuning import draw_simulators, simulator_fitness, squared_errors, tune
+from services.core.tuning import Misfit, draw_simulators, simulator_fitness, squared_errors, tune
 from services.core.types import Sample, Space
 from tests.fakes import TRUTH, Recorder, paraboloid
 
@@ -29,22 +29,68 @@ def test_a_simulator_that_fails_on_a_sample_has_an_infinite_error():
 
 
 def test_tuning_finds_the_parameters_of_reality():
-    best, *_ = tune(paraboloid, SAMPLES, SPACE, SteadyState(), 1000, np.random.default_rng(1))
+    best, *_ = tune(Misfit(paraboloid, SAMPLES), SPACE, SteadyState(), 1000, np.random.default_rng(1))
 
     np.testing.assert_allclose(best.parameters, TRUTH, atol=0.01)
 
 
-def test_tuning_spends_its_budget_exactly_and_evaluates_each_simulator_on_every_sample():
-    simulate = Recorder()
+def many_samples(count):
+    genomes = np.random.default_rng(9).random((count, 2))
+    return [Sample(genome, float(paraboloid(genome[None], TRUTH[None])[0, 0])) for genome in genomes]
 
-    tune(simulate, SAMPLES, SPACE, SteadyState(), 100, np.random.default_rng(1))
 
-    assert simulate.rollouts == 100 * len(SAMPLES)
-    assert {n for n, _ in simulate.calls} == {len(SAMPLES)}
+class Thorough(SteadyState):
+    """The same evolution, but it calls nothing hopeless: every simulator is asked for every sample."""
+
+    def hopeless(self, state, genomes):
+        return np.full(len(genomes), -np.inf)
+
+    def diverse(self, size):
+        return Thorough(super().diverse(size).options)
+
+
+@pytest.mark.parametrize("batch", [1, 4])
+@pytest.mark.parametrize("count", [1, 3, 10])
+@pytest.mark.parametrize("diverse", [False, True])
+def test_giving_hopeless_simulators_up_saves_rollouts_and_changes_no_bit(count, diverse, batch):
+    def tuned(optimizer):
+        simulate = Recorder()
+        optimizer = optimizer.diverse(8) if diverse else optimizer
+        found = tune(
+            Misfit(simulate, many_samples(count), lambda: batch), SPACE, optimizer, 300, np.random.default_rng(1)
+        )
+        return [(each.parameters.tobytes(), each.squared_error) for each in found], simulate.rollouts
+
+    thorough, all_rollouts = tuned(Thorough())
+    saving, rollouts = tuned(SteadyState())
+
+    assert saving == thorough
+    assert max(rollouts, all_rollouts) <= 300 * count
+    assert count <= batch or rollouts < 0.9 * all_rollouts
+
+
+def test_failing_physics_makes_a_simulator_hopeless_too():
+    def half_broken(genomes, parameters):
+        return np.where(parameters[None, :, 0] < 0.5, np.nan, paraboloid(genomes, parameters))
+
+    def tuned(optimizer):
+        found = tune(Misfit(half_broken, many_samples(5)), SPACE, optimizer, 200, np.random.default_rng(1))
+        return [(each.parameters.tobytes(), each.squared_error) for each in found]
+
+    assert tuned(SteadyState()) == tuned(Thorough())
+
+
+def test_a_simulators_error_does_not_depend_on_how_many_are_asked_for_at_once():
+    rng = np.random.default_rng(0)
+    fitnesses, measured = rng.normal(size=(50, 20)), rng.normal(size=50)
+
+    one_by_one = [squared_errors(fitnesses[:, [index]], measured)[0] for index in range(20)]
+
+    assert squared_errors(fitnesses, measured).tolist() == one_by_one
 
 
 def test_simulators_come_best_first_with_their_own_error():
-    simulators = tune(paraboloid, SAMPLES, SPACE, SteadyState(), 100, np.random.default_rng(1))
+    simulators = tune(Misfit(paraboloid, SAMPLES), SPACE, SteadyState(), 100, np.random.default_rng(1))
 
     errors = [each.squared_error for each in simulators]
     measured = np.array([each.fitness for each in SAMPLES])
@@ -55,7 +101,7 @@ def test_simulators_come_best_first_with_their_own_error():
 
 def test_a_diverse_ensemble_stays_farther_apart_than_a_converged_population():
     def spread(optimizer):
-        found = tune(paraboloid, SAMPLES, SPACE, optimizer, 500, np.random.default_rng(1))
+        found = tune(Misfit(paraboloid, SAMPLES), SPACE, optimizer, 500, np.random.default_rng(1))
         return np.array([each.parameters for each in found]).std(axis=0).mean()
 
     population = SteadyState(SteadyStateOptions(population=10))
@@ -67,7 +113,7 @@ def test_failing_physics_never_wins():
     def half_broken(genomes, parameters):
         return np.where(parameters[None, :, 0] < 0.5, np.nan, paraboloid(genomes, parameters))
 
-    best, *_ = tune(half_broken, SAMPLES, SPACE, SteadyState(), 300, np.random.default_rng(1))
+    best, *_ = tune(Misfit(half_broken, SAMPLES), SPACE, SteadyState(), 300, np.random.default_rng(1))
 
     assert best.parameters[0] >= 0.5
 

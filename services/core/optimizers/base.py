@@ -12,8 +12,11 @@ from services.core.arrays import FloatArray, Genomes
 from services.core.registry import Plugin
 from services.core.types import Space
 
-Evaluate: TypeAlias = Callable[[Genomes], FloatArray]
-"""`(n, g)` -> `(n,)`: the fitness of each, maximised; nan where it has none."""
+Evaluate: TypeAlias = Callable[[Genomes, FloatArray], FloatArray]
+"""`(n, g)` genomes, `(n,)` bounds -> `(n,)`: the fitness of each, maximised; nan where it has none.
+
+A fitness below its bound need not be exact: any number below the bound will do.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +67,10 @@ class Optimizer(Plugin):
     def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> Population:
         """The population after learning the fitness `(n,)` of genomes `(n, g)`."""
 
+    def hopeless(self, state: Population, genomes: Genomes) -> FloatArray:  # noqa: ARG002 - for those who know better
+        """`(n,)`: the fitness below which each of the genomes would change nothing, if it were told; -inf if none."""
+        return np.full(len(genomes), -np.inf)
+
     @abstractmethod
     def diverse(self, size: int) -> "Optimizer":
         """The same optimizer, but it keeps `size` members that differ from each other."""
@@ -71,6 +78,8 @@ class Optimizer(Plugin):
 
 def maximise(optimizer: Optimizer, space: Space, evaluate: Evaluate, evaluations: int, rng: Generator) -> Population:
     """The population after exactly `evaluations` fitness evaluations, ranked; nan never wins.
+
+    A genome that the search has evaluated before counts, but is not evaluated again.
 
     Args:
         optimizer: that searches.
@@ -80,9 +89,32 @@ def maximise(optimizer: Optimizer, space: Space, evaluate: Evaluate, evaluations
         rng: all randomness of the search.
     """
     state = optimizer.init(space)
+    remembered = Remembered(evaluate)
     while evaluations > 0:
         genomes = optimizer.ask(state, rng)[:evaluations]
-        fitness = evaluate(genomes)
+        fitness = remembered(genomes, optimizer.hopeless(state, genomes))
         state = optimizer.tell(state, genomes, np.where(np.isnan(fitness), -np.inf, fitness))
         evaluations -= len(genomes)
     return state.ranked()
+
+
+class Remembered:
+    """An Evaluate that knows what it evaluated: gene by gene the same genome has the same fitness.
+
+    Genes clip at their bounds, so a small mutation of a gene at its bound gives a copy more often than one would think.
+    """
+
+    def __init__(self, evaluate: Evaluate) -> None:
+        self._evaluate = evaluate
+        self._known: dict[bytes, float] = {}
+
+    def __call__(self, genomes: Genomes, bounds: FloatArray) -> FloatArray:
+        """As the Evaluate; only fitnesses that are exact are remembered."""
+        keys = [genome.tobytes() for genome in genomes]
+        fresh = [index for index, key in enumerate(keys) if key not in self._known]
+        fitness = np.array([self._known.get(key, np.nan) for key in keys])
+        if fresh:
+            fitness[fresh] = self._evaluate(genomes[fresh], bounds[fresh])
+            exact = (index for index in fresh if not fitness[index] < bounds[index])
+            self._known.update((keys[index], float(fitness[index])) for index in exact)
+        return fitness

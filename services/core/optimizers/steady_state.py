@@ -9,11 +9,19 @@ from pydantic import Field
 from schemas.base import Frozen
 from services.core.arrays import FloatArray, Genome, Genomes
 from services.core.optimizers.base import Optimizer, Population
-from services.core.optimizers.replacement import Replacement, least_fit, less_fit_of_most_similar
+from services.core.optimizers.replacement import (
+    Bound,
+    Replacement,
+    bound_of_least_fit,
+    bound_of_most_similar,
+    insert,
+    least_fit,
+    less_fit_of_most_similar,
+)
 
-REPLACEMENTS: dict[str, Replacement] = {
-    "least_fit": least_fit,
-    "less_fit_of_most_similar": less_fit_of_most_similar,
+REPLACEMENTS: dict[str, tuple[Replacement, Bound]] = {
+    "least_fit": (least_fit, bound_of_least_fit),
+    "less_fit_of_most_similar": (less_fit_of_most_similar, bound_of_most_similar),
 }
 
 
@@ -44,6 +52,9 @@ class SteadyStateOptions(Frozen):
     replacement: Literal["least_fit", "less_fit_of_most_similar"] = Field(
         default="least_fit", description="who leaves; tuning an ensemble of simulators always takes the second"
     )
+    offspring: Annotated[int, Field(strict=True, ge=1, le=10_000)] = Field(
+        default=1, description="newcomers that are evaluated at a time, to keep many cores busy; the paper: 1"
+    )
 
 
 class SteadyState(Optimizer):
@@ -64,20 +75,28 @@ class SteadyState(Optimizer):
         return self.options.population
 
     def ask(self, state: Population, rng: Generator) -> Genomes:
-        """The members still missing from the first population, drawn uniformly; then one newcomer at a time."""
+        """The members still missing from the first population, drawn uniformly; then newcomers."""
         missing = self.options.population - state.size
         if missing > 0:
             return state.space.draw(missing, rng)
-        return self._mutate(state, self._recombine(state, rng), rng)[None, :]
+        newcomers = range(self.options.offspring)
+        return np.array([self._mutate(state, self._recombine(state, rng), rng) for _ in newcomers])
 
     def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> Population:
         """The population with each newcomer added in turn, and a member dropped for each beyond its size."""
-        replacement = REPLACEMENTS[self.options.replacement]
-        for genome, value in zip(genomes, fitness, strict=True):
-            state = _added(state, genome, value)
-            if state.size > self.options.population:
-                state = _dropped(state, replacement(state))
-        return state
+        rule, _ = REPLACEMENTS[self.options.replacement]
+        return insert(state, genomes, fitness, self.options.population, rule)
+
+    def hopeless(self, state: Population, genomes: Genomes) -> FloatArray:
+        """`(n,)` fitnesses below which each newcomer is dropped at once.
+
+        Of several newcomers, those before one may change which pair is the most similar: then nothing is certain.
+        """
+        uncertain = self.options.replacement != "least_fit" and len(genomes) > 1
+        if state.size < self.options.population or uncertain:
+            return super().hopeless(state, genomes)
+        _, bound = REPLACEMENTS[self.options.replacement]
+        return np.array([bound(state, genome) for genome in genomes])
 
     def diverse(self, size: int) -> "SteadyState":
         """This evolution with `size` members, where the less fit of the most similar pair leaves."""
@@ -102,13 +121,3 @@ class SteadyState(Optimizer):
         finest, greatest = self.options.finest_scale, self.options.mutation_scale
         scale = finest * (greatest / finest) ** rng.random()
         return state.space.contain(genome + mutates * (scale * state.space.extent * rng.standard_normal(size)))
-
-
-def _added(state: Population, genome: Genome, fitness: float) -> Population:
-    return Population(state.space, np.vstack([state.genomes, genome]), np.append(state.fitness, fitness))
-
-
-def _dropped(state: Population, index: int) -> Population:
-    """The state without a member; the others keep their order, so age stays readable from it."""
-    keep = np.arange(state.size) != index
-    return Population(state.space, state.genomes[keep], state.fitness[keep])

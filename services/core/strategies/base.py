@@ -29,10 +29,12 @@ class Strategy(Plugin):
 
     Attributes:
         searches: its selection spends a search's budget.
+        selects_transferred: its search is the transfer's: for the fittest controller in the best simulator.
         in_reality: the experiment is the direct baseline, which evolves in reality and takes no samples.
     """
 
     searches: ClassVar[bool] = True
+    selects_transferred: ClassVar[bool] = False
     in_reality: ClassVar[bool] = False
 
     @property

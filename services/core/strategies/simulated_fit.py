@@ -15,6 +15,7 @@ class SimulatedFit(Strategy):
 
     name = "simulated_fit"
     source = "Paper, section 2, Simulated Fit; Back-to-Reality and Estimation-Exploration"
+    selects_transferred = True
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
         """The fittest controller found in the best simulator."""

@@ -60,8 +60,9 @@ class PyBullet(Engine):
     def rollout(self, world: World, motion: Motion) -> Trajectory:
         """The base's trajectory, `(t, 3)`; times are rounded to whole time steps."""
         bare = replace(world, material=Material())
+        scene = self._scenes[bare]
         try:
-            poses = _roll(self._scenes[bare], world.material, motion)
+            poses = _roll(scene, world.material, motion)
         except self._bullet.error:
             poses = np.full((len(motion.observe_s), 7), np.nan)
         if not plausible(poses):
@@ -75,6 +76,7 @@ class PyBullet(Engine):
 
 
 def _roll(scene: Scene, material: Material, motion: Motion) -> FloatArray:
+    """`(t, 7)`: position and quaternion of the base at each observation."""
     scene.start(material, max(material.static_friction, material.dynamic_friction))
     switches = material.dynamic_friction < material.static_friction
     return watch(scene, StickSlip(scene, material).step if switches else scene.step, motion)

@@ -33,7 +33,9 @@ class Scene:
         tree = _tree(world)
         self.robot = self._create_robot(tree)
         self.colliding = tuple(index for index, body in enumerate(tree.bodies, start=BASE) if body.collides)
-        self.actuators = tuple(tree.joints.index(joint) for joint in world.actuators)
+        self._motors = tuple(
+            (index, joint.motor) for index, joint in enumerate(world.joints) if joint.motor is not None
+        )
         self._from_center_of_mass = [-each for each in tree.bodies[0].center_m]
         self._finish_robot(tree)
         self._initial: int = bullet.saveState(physicsClientId=self.client)
@@ -52,11 +54,10 @@ class Scene:
 
     def command(self, actuator: int, target: float) -> None:
         """A new target for a motor, rad."""
-        motor = self.world.actuators[actuator].motor
-        assert motor is not None
+        index, motor = self._motors[actuator]
         self.bullet.setJointMotorControl2(
             self.robot,
-            self.actuators[actuator],
+            index,
             self.bullet.POSITION_CONTROL,
             targetPosition=target,
             force=motor.max_torque_nm,

@@ -33,6 +33,7 @@ class Tally:
     rollouts: int = 0
     rollouts_done: int = 0
     rollouts_failed: int = 0
+    rollouts_saved: int = 0
     rollouts_left: int = 0
     seconds: float = 0.0
 
@@ -44,9 +45,10 @@ class Tally:
         """What is left at the pace so far by those that run now; None while that is unknown."""
         if not self.open:
             return 0.0
-        if not (self.running and self.rollouts_done and self.seconds):
+        behind = self.rollouts_done + self.rollouts_saved
+        if not (self.running and behind and self.seconds):
             return None
-        return self.rollouts_left * self.seconds / self.rollouts_done / self.running
+        return self.rollouts_left * self.seconds / behind / self.running
 
     def progress(self) -> Progress:
         """As it is shown."""
@@ -59,6 +61,7 @@ class Tally:
             rollouts=self.rollouts,
             rollouts_done=self.rollouts_done,
             rollouts_failed=self.rollouts_failed,
+            rollouts_saved=self.rollouts_saved,
             seconds_left=self.seconds_left,
         )
 
@@ -66,7 +69,7 @@ class Tally:
 def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
     """The tally of each experiment."""
     row = RepetitionRow
-    left = ExperimentRow.rollouts - row.rollouts_done
+    left = ExperimentRow.rollouts - row.rollouts_done - row.rollouts_saved
     found = session.execute(
         select(
             row.experiment_id,
@@ -80,6 +83,7 @@ def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
             func.sum(ExperimentRow.rollouts),
             func.sum(row.rollouts_done),
             func.sum(row.rollouts_failed),
+            func.sum(row.rollouts_saved),
             func.sum(case(((left > 0) & row.state.in_(_OPEN), left), else_=0)),
             func.sum(row.seconds),
         )

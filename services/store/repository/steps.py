@@ -66,6 +66,7 @@ def _advance(session: Session, claim: Claim, step: Step, seconds: float) -> bool
             iterations_done=row.iterations_done + int(isinstance(step, Probed)),
             rollouts_done=row.rollouts_done + int(cost.rollouts),
             rollouts_failed=row.rollouts_failed + int(cost.failures),
+            rollouts_saved=row.rollouts_saved + int(cost.saved),
             seconds=row.seconds + seconds,
         )
         .returning(row.id)

@@ -1,0 +1,138 @@
+"""Covariance matrix adaptation: a search that learns which genes go together."""
+
+from copy import deepcopy
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.random import Generator
+from pydantic import Field
+
+from schemas.base import Frozen
+from services.core.arrays import FloatArray, Genome, Genomes
+from services.core.optimizers.base import Optimizer, Population
+from services.core.optimizers.replacement import insert, least_fit, less_fit_of_most_similar
+from services.core.types import Space
+
+CONVERGED = 1e-4
+"""A search that has shrunk to this share of each gene's extent starts anew elsewhere."""
+
+
+class CmaEsOptions(Frozen):
+    """The options of CMA-ES; the defaults are its authors'."""
+
+    population: Annotated[int, Field(strict=True, ge=4, le=10_000)] | None = Field(
+        default=None, description="genomes of a generation; left out: 4 + 3 ln g for g genes"
+    )
+    initial_scale: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+        default=0.3, description="standard deviation of the first generation after the start, as a share of the extent"
+    )
+    members: Annotated[int, Field(strict=True, ge=1, le=10_000)] = Field(
+        default=20, description="of the best genomes that are kept as the result"
+    )
+    diverse: bool = Field(default=False, strict=True, description="keep members that differ; tuning an ensemble does")
+
+
+@dataclass(frozen=True, eq=False)
+class Search(Population):
+    """The members, and the distribution that the next generation is drawn from.
+
+    Attributes:
+        distribution: of the library; a value: it is copied before anything changes it. None before a start.
+    """
+
+    distribution: Any = None
+
+
+class CmaEs(Optimizer):
+    """CMA-ES: generations drawn from a normal distribution that learns scale and correlations from ranks.
+
+    It starts from the best of a generation drawn uniformly, and does so again once it has converged. Genes are scaled
+    to their extents; periodic ones wrap, others clip.
+    """
+
+    name = "cma_es"
+    source = "Hansen 2016, The CMA Evolution Strategy: A Tutorial; https://github.com/CMA-ES/pycma"
+    Options = CmaEsOptions
+    options: CmaEsOptions
+
+    def init(self, space: Space) -> Search:
+        """No member, and no distribution yet."""
+        return Search(space, np.empty((0, space.size)), np.empty(0))
+
+    @property
+    def least_evaluations(self) -> int:
+        """Enough for the members."""
+        return max(self.options.population or 4, self.options.members)
+
+    def ask(self, state: Population, rng: Generator) -> Genomes:
+        """A generation: uniform at a start, else from the distribution."""
+        assert isinstance(state, Search)
+        if state.distribution is None:
+            return state.space.draw(self._size(state.space), rng)
+        distribution = deepcopy(state.distribution)
+        distribution.opts["randn"].rng = rng
+        return state.space.contain(_genomes(state.space, np.array(distribution.ask())))
+
+    def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> Search:
+        """The members with the newcomers among them, and the distribution that has learned from their ranks."""
+        assert isinstance(state, Search)
+        rule = less_fit_of_most_similar if self.options.diverse else least_fit
+        kept = insert(state, genomes, fitness, self.options.members, rule)
+        learned = self._learned(state, genomes, fitness)
+        return Search(state.space, kept.genomes, kept.fitness, learned)
+
+    def diverse(self, size: int) -> "CmaEs":
+        """This search, but its members are `size` that differ."""
+        return CmaEs(self.options.model_copy(update={"members": size, "diverse": True}))
+
+    def _learned(self, state: Search, genomes: Genomes, fitness: FloatArray) -> Any:  # noqa: ANN401 - of the library
+        if len(genomes) < self._size(state.space):
+            return state.distribution  # the budget's end cut the generation short
+        if state.distribution is None:
+            return self._start(state.space, genomes[fitness.argmax()])
+        distribution = deepcopy(state.distribution)
+        distribution.opts["randn"].rng = np.random.default_rng(0)
+        distribution.ask(1)  # the library wants to be asked before it is told; what it draws here is not used
+        ranks = np.argsort(np.argsort(-fitness, kind="stable"), kind="stable")
+        distribution.tell(list(_near(state.space, genomes, distribution.mean)), ranks.tolist(), check_points=False)
+        return None if distribution.stop() else distribution
+
+    def _start(self, space: Space, mean: Genome) -> Any:  # noqa: ANN401 - of the library
+        options = {
+            "popsize": self._size(space),
+            "randn": Draws(),
+            "seed": np.nan,
+            "tolx": CONVERGED,
+            "tolfun": 0,
+            "tolfunhist": 0,
+            "tolstagnation": np.inf,
+            "verbose": -9,
+        }
+        scaled = (mean - space.lower) / space.extent
+        return import_module("cma").CMAEvolutionStrategy(scaled, self.options.initial_scale, options)
+
+    def _size(self, space: Space) -> int:
+        return self.options.population or 4 + int(3 * np.log(space.size))
+
+
+class Draws:
+    """The library's source of normal random numbers: whatever generator it was last given."""
+
+    rng: Generator
+
+    def __call__(self, *shape: int) -> FloatArray:
+        """Standard normal numbers of that shape."""
+        return self.rng.standard_normal(shape)
+
+
+def _genomes(space: Space, scaled: FloatArray) -> Genomes:
+    return space.lower + space.extent * scaled
+
+
+def _near(space: Space, genomes: Genomes, mean: FloatArray) -> FloatArray:
+    """`(n, g)` scaled genomes; a periodic gene at the turn that is nearest to the mean."""
+    scaled = (genomes - space.lower) / space.extent
+    turned = mean + np.mod(scaled - mean + 0.5, 1.0) - 0.5
+    return np.where(space.periodic, turned, scaled)
