@@ -8,12 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from schemas.spec import ExperimentSpec
 from services.core.arrays import FloatArray
 from services.core.robots.quadruped import Quadruped
 from services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, Vector, World
 from services.engines.physx import PhysX
 from services.engines.physx.scene import Scene
 from services.engines.stepping import WARM_SCENES
+from services.resolution import resolve_experiment
+from services.simulation import setting
 
 if not PhysX.available():
     pytest.skip(PhysX.install, allow_module_level=True)
@@ -196,3 +199,15 @@ def test_joints_may_be_listed_in_any_order(engine: PhysX) -> None:
     height = path(engine, backwards, still)[-1, 2]
 
     assert height == pytest.approx(path(engine, ROBOT.world, still)[-1, 2], abs=1e-4)
+
+
+def test_reality_in_physx_is_a_gap_that_no_simulator_in_another_engine_closes() -> None:
+    pytest.importorskip("pybullet")
+    spec = {"strategy": "random", "engine": "pybullet", "reality": {"engine": "physx"}}
+
+    across = setting(resolve_experiment(ExperimentSpec.model_validate(spec)), 0)
+
+    truth = np.array([[1.0, 0.8, 0.0]])
+    real, simulated = across.reality(ROBOT.known), across.simulate(ROBOT.known[None], truth)[0, 0]
+    assert real == pytest.approx(simulated, rel=0.3)
+    assert real != simulated
