@@ -78,9 +78,26 @@ def stored(store, experiment):
 
 
 def workers_of_ray():
-    """Processes that run a repetition now."""
-    names = ((int(path.name), (path / "cmdline")) for path in Path("/proc").glob("[0-9]*"))
-    return [pid for pid, name in names if name.exists() and name.read_bytes().startswith(b"ray::run")]
+    """Processes that run a repetition now, of the Ray that this test started."""
+    return [pid for pid, name in processes() if name.startswith(b"ray::run") and is_ours(pid)]
+
+
+def processes():
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            yield int(path.name), (path / "cmdline").read_bytes()
+        except OSError:  # it has ended
+            continue
+
+
+def is_ours(pid):
+    """Whether the process descends from this one."""
+    while pid > 1 and pid != os.getpid():
+        try:
+            pid = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            return False
+    return pid == os.getpid()
 
 
 @pytest.mark.parametrize("at_once", [1, 2, 4])
