@@ -61,6 +61,7 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
 
 def _start(cores: int | None) -> None:
     ray.init(
+        address="local",  # not whatever else may run on this machine
         num_cpus=cores,
         include_dashboard=False,
         log_to_driver=False,

@@ -43,15 +43,15 @@ def check_here(expected: Versions) -> None:
 
 
 def check_nodes() -> None:
-    """Do nothing if every node of the cluster that may run a repetition has what this process has.
+    """Do nothing if every node of the cluster has what this process has.
 
     Raises:
         ClusterUnusable: one has not, or it does not have gaplab at all.
     """
-    able = [node for node in ray.nodes() if node["Alive"] and node["Resources"].get("CPU")]
-    only = [NodeAffinitySchedulingStrategy(node["NodeID"], soft=False) for node in able]
+    alive = [node for node in ray.nodes() if node["Alive"]]
+    only = [NodeAffinitySchedulingStrategy(node["NodeID"], soft=False) for node in alive]
     answers = [_versions_of_node.options(scheduling_strategy=each).remote() for each in only]
-    for answer, node in zip(answers, able, strict=True):
+    for answer, node in zip(answers, alive, strict=True):
         name = f"{node['NodeManagerHostname']} ({node['NodeManagerAddress']})"
         try:
             found = ray.get(answer, timeout=ANSWER_S)

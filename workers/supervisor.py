@@ -7,6 +7,7 @@ import logging
 import os
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from secrets import token_hex
 from threading import Event
@@ -22,6 +23,7 @@ from services.execution import Claim, TimedStep
 from services.store.session import Store
 from workers import repetition
 from workers.nodes import Versions
+from workers.sensitivity import Checks
 
 HEARTBEAT_S = 5.0
 """Between heartbeats; a lease is lost after 30 s without one."""
@@ -94,6 +96,7 @@ class Supervisor:
         self._versions = versions or {}
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
         self._runs: list[Run] = []
+        self._checks = Checks(store, self._owner)
         self._beat = -HEARTBEAT_S
         self._looked = -WAIT_S
 
@@ -119,13 +122,14 @@ class Supervisor:
             self._hand_back()
 
     def step(self) -> None:
-        """One round: heartbeat, claim, receive, store.
+        """One round: heartbeat, claim, receive, store; sensitivity checks before repetitions.
 
         Raises:
             StoreUnavailable: nothing is lost by it; what was received is stored in a later round.
             ClusterUnusable: a node that joined has other versions; nothing of it is stored.
         """
         self._heartbeat()
+        self._checks.step()
         self._claim()
         self._receive()
         self._store_received()
@@ -136,6 +140,7 @@ class Supervisor:
             return
         held = execution.heartbeat(self._store, [run.claim for run in self._runs])
         self._drop_all_but(held)
+        self._checks.heartbeat()
         requeued = execution.requeue_lost(self._store)
         if requeued:
             log.warning("%d repetitions whose supervisor was lost are queued again", requeued)
@@ -204,3 +209,5 @@ class Supervisor:
             except StoreUnavailable as error:
                 log.warning("%s: its lease will run out: %s", run.name, error)
         self._runs = []
+        with suppress(StoreUnavailable):  # then its lease will run out
+            self._checks.hand_back()

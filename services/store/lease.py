@@ -1,7 +1,8 @@
-"""A repetition in the hands of one supervisor, and what it delivers."""
+"""A repetition, or a sensitivity check, in the hands of one supervisor, and what it delivers."""
 
 from dataclasses import dataclass, field
 
+from schemas.sensitivity import Checked
 from schemas.spec import ExperimentSpec
 from services.core.types import Step
 
@@ -33,3 +34,18 @@ class TimedStep:
 
     step: Step
     seconds: float
+
+
+@dataclass(frozen=True)
+class CheckClaim:
+    """The right to run a sensitivity check, until its epoch is over.
+
+    Attributes:
+        id: of the check.
+        epoch: of the lease.
+        spec: what is checked.
+    """
+
+    id: str
+    epoch: int
+    spec: Checked = field(compare=False)

@@ -95,7 +95,7 @@ def fail(session: Session, claim: Claim, reason: str) -> bool:
     """The repetition FAILED for a reason; False if the claim holds no more."""
     lock(session, [claim.experiment_id])
     row = RepetitionRow
-    values = {"state": State.FAILED, "error": _plain(reason), "ended_at": now()}
+    values = {"state": State.FAILED, "error": plain(reason), "ended_at": now()}
     ended = session.execute(update(row).where(mine(claim)).values(values).returning(row.id)).first()
     _settle(session, claim.experiment_id)
     return ended is not None
@@ -104,7 +104,7 @@ def fail(session: Session, claim: Claim, reason: str) -> bool:
 def release(session: Session, claim: Claim, reason: str) -> bool:
     """The repetition QUEUED again, for its worker was lost; False if the claim holds no more."""
     lock(session, [claim.experiment_id])
-    return bool(_give_back(session, mine(claim), [claim.experiment_id], _plain(reason)))
+    return bool(_give_back(session, mine(claim), [claim.experiment_id], plain(reason)))
 
 
 def hand_back(session: Session, claim: Claim) -> bool:
@@ -205,7 +205,7 @@ def _refuse_unfinished(session: Session, claims: Sequence[Claim]) -> None:
         raise Conflict(msg)
 
 
-def _plain(reason: str) -> str:
+def plain(reason: str) -> str:
     """The reason in characters that any database stores, whatever the message of an exception had."""
     return reason.encode(errors="replace").decode().replace("\0", "?")
 
