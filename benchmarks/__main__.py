@@ -7,7 +7,7 @@ import platform
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import curves, overhead, physics, physx, service
+from benchmarks import curves, overhead, physics, physx, pool, service, supervisor
 from benchmarks.measure import Row
 from services.engines.physx import PhysX
 
@@ -25,6 +25,8 @@ def main() -> None:
         ("physics", lambda: physics.rows(rounds)),
         ("physx", lambda: physx.rows(rounds) if PhysX.available() else []),
         ("service", lambda: service.rows(max(2, rounds // 2))),
+        ("pool", lambda: pool.rows(max(2, rounds // 2))),
+        ("supervisor", supervisor.rows),
         ("overhead", overhead.rows),
         ("curves", curves.rows),
     ):

@@ -22,7 +22,7 @@ SPEC = ExperimentSpec.model_validate(
         "optimizer": {"name": "steady_state", "options": {"population": 4}},
         "iterations": 1,
         "repetitions": 1,
-        "budget": {"controller_evaluations": 16, "selection_evaluations": 16, "simulator_evaluations": 20},
+        "budget": {"controller_evaluations": 32, "selection_evaluations": 32, "simulator_evaluations": 20},
     }
 )
 """Nine tenths of its rollouts are the selection's, 20 for each newcomer, as at the paper's budgets."""

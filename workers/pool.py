@@ -1,6 +1,7 @@
 """One repetition on many cores: while cores are idle, the rollouts of a call are spread over them."""
 
 from functools import cache
+from math import ceil
 from time import monotonic, perf_counter
 
 import numpy as np
@@ -11,16 +12,16 @@ from services.core.arrays import Fitnesses, Genomes, Parameters
 from services.core.ports import Simulate
 from services.simulation import setting
 from workers.nodes import Versions, check_here
-from workers.spread import Answer, Spread
+from workers.spread import Answer, Spread, sizes
 
 LEAST_S = 0.01
 """A part that is lent to another core is worth at least this much work; lending costs less than a tenth of it."""
 
-PARTS = 10
-"""Parts for each core, if there is work enough: with more of them, the last one is waited for less long."""
-
 LOOK_S = 1.0
 """How often it is looked which cores are idle."""
+
+LONGEST_PAUSE_S = 30.0
+"""Cores that were no help are tried again after a pause that doubles each time, up to this."""
 
 OURS_S = 0.4
 """A core that did a part stays ours for half a second, in which Ray does not count it among the idle ones."""
@@ -44,6 +45,7 @@ class Pool:
         self._rollout_s = 0.0
         self._idle = 0
         self._looked = -LOOK_S
+        self._pause_s = LOOK_S
         self._helped = 0
         self._back = -OURS_S
 
@@ -53,28 +55,33 @@ class Pool:
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
         """`(n, g)` genomes × `(m, p)` parameters -> `(n, m)` fitnesses; nan where the physics failed."""
-        by_genome = len(genomes) >= len(parameters)
-        many = len(genomes) if by_genome else len(parameters)
         helpers = self._helpers()
-        count = min(many, PARTS * (1 + helpers), self._worthwhile(len(genomes) * len(parameters))) if helpers else 1
+        if not helpers or self._rollout_s * len(genomes) * len(parameters) < 2 * LEAST_S:
+            return self._here(genomes, parameters)
+        by_genome = len(genomes) >= len(parameters)
+        rows, across = (len(genomes), len(parameters)) if by_genome else (len(parameters), len(genomes))
+        least = ceil(max(LEAST_S / self._rollout_s, self._batch) / across)
+        ends = np.cumsum(sizes(rows, 1 + helpers, least))[:-1]
         parts = [
-            (genomes[rows], parameters) if by_genome else (genomes, parameters[rows])
-            for rows in np.array_split(np.arange(many), max(1, count))
+            (genomes[part], parameters) if by_genome else (genomes, parameters[part])
+            for part in np.split(np.arange(rows), ends)
         ]
-        fitnesses = [self._here(*parts[0])] if len(parts) == 1 else self._spread(parts, helpers)
-        return np.concatenate(fitnesses, axis=0 if by_genome else 1)
+        return np.concatenate(self._spread(parts, helpers), axis=0 if by_genome else 1)
 
     def _spread(self, parts: list[tuple[Genomes, Parameters]], helpers: int) -> list[Fitnesses]:
         spread = Spread(
-            len(parts),
+            [self._rollout_s * len(genomes) * len(parameters) for genomes, parameters in parts],
             here=lambda index: self._here(*parts[index]),
             lend=lambda index: _part.remote(self._spec, self._versions, *parts[index]),
             helpers=helpers,
         )
         fitnesses = spread.run()
         self._helped, self._back = len(spread.helped), monotonic()
-        if spread.late:
-            self._idle = self._helped
+        if spread.lost_s > spread.gained_s:  # cores that seem idle have other work, of which Ray knows nothing
+            self._idle = 0
+            self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
+        else:
+            self._pause_s = LOOK_S
         return fitnesses
 
     def _here(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
@@ -83,13 +90,9 @@ class Pool:
         self._rollout_s = (perf_counter() - begun) / fitnesses.size
         return fitnesses
 
-    def _worthwhile(self, rollouts: int) -> int:
-        """Into how many parts so many rollouts may be cut."""
-        return int(rollouts * self._rollout_s / LEAST_S)
-
     def _helpers(self) -> int:
         """Cores that are idle now, or were a moment ago."""
-        if monotonic() - self._looked > LOOK_S:
+        if monotonic() - self._looked > self._pause_s:
             ours = self._helped if monotonic() - self._back < OURS_S else 0
             self._idle = int(ray.available_resources().get("CPU", 0)) + ours
             self._looked = monotonic()

@@ -14,6 +14,7 @@ from services.simulation import setting
 from workers import pool as pools
 from workers.cluster import cluster
 from workers.pool import Pool
+from workers.spread import sizes
 
 SPEC = resolve_experiment(ExperimentSpec.model_validate({"strategy": "informative", "budget": "smoke"}))
 
@@ -58,8 +59,24 @@ def test_rollouts_are_spread_when_cores_are_idle_and_the_work_is_worth_it(alone,
     pool(*asked(alone, 1, 1))
     assert not sent
 
-    pool(*asked(alone, 1, 12))
-    assert sent
+    deadline = time.monotonic() + 20
+    while not sent:  # once a core is idle
+        assert time.monotonic() < deadline
+        pool(*asked(alone, 1, 12))
+
+
+@pytest.mark.parametrize(
+    ("rows", "cores", "least", "parts"),
+    [
+        (20, 2, 1, [8, 1, 1, 1, 1, 8]),  # first and last begin; the cores meet in the middle
+        (20, 20, 1, [1] * 20),
+        (20, 4, 2, [4, 2, 2, 4, 4, 4]),
+        (3, 5, 1, [1, 1, 1]),
+        (5, 2, 9, [5]),
+    ],
+)
+def test_a_call_is_dealt_in_large_parts_first_and_small_ones_in_the_end(rows, cores, least, parts):
+    assert sizes(rows, cores, least) == parts
 
 
 def test_it_asks_for_as_many_rollouts_at_a_time_as_keep_the_cores_busy(pool):
