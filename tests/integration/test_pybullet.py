@@ -12,8 +12,8 @@ from services.core.arrays import FloatArray
 from services.core.robots.quadruped import Quadruped
 from services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, World
 from services.engines.pybullet import PyBullet
-from services.engines.pybullet.engine import WARM_SCENES
 from services.engines.pybullet.stick_slip import StickSlip
+from services.engines.stepping import WARM_SCENES
 
 pytest.importorskip("pybullet")
 
@@ -107,7 +107,7 @@ def test_the_pose_is_of_the_bodys_frame_not_of_its_center_of_mass(engine: PyBull
 
 
 def test_every_body_has_the_mass_and_the_inertia_of_its_solid_shape(engine: PyBullet) -> None:
-    scene = engine._scene(replace(ROBOT.world, material=Material()))
+    scene = engine._scenes[replace(ROBOT.world, material=Material())]
     names = ["trunk", *(joint.child for joint in ROBOT.world.joints)]
     bodies = {body.name: body for body in ROBOT.world.bodies}
 
@@ -133,7 +133,7 @@ def test_a_motor_closes_its_share_of_the_error_in_each_step(engine: PyBullet) ->
         start_height_m=0.5,
         gravity_m_s2=0.0,
     )
-    scene = engine._scene(wheel)
+    scene = engine._scenes[wheel]
     scene.start(Material(), 1.0)
     scene.command(0, 1.0)
 
