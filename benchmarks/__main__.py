@@ -7,8 +7,9 @@ import platform
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import curves, overhead, physics, service
+from benchmarks import curves, overhead, physics, physx, service
 from benchmarks.measure import Row
+from services.engines.physx import PhysX
 
 
 def main() -> None:
@@ -22,6 +23,7 @@ def main() -> None:
         table.add_column(column, justify="right" if column == "ratio" else "left")
     for name, measure in (
         ("physics", lambda: physics.rows(rounds)),
+        ("physx", lambda: physx.rows(rounds) if PhysX.available() else []),
         ("service", lambda: service.rows(max(2, rounds // 2))),
         ("overhead", overhead.rows),
         ("curves", curves.rows),

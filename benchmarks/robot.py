@@ -72,7 +72,7 @@ class Laboratory:
             found = maximise(
                 SteadyState(),
                 self.robot.space,
-                lambda genomes: self.simulate(genomes, parameters[None])[:, 0],
+                lambda genomes, _: self.simulate(genomes, parameters[None])[:, 0],
                 self.evaluations,
                 stream(0, *address),
             )
@@ -174,9 +174,8 @@ def identifiable(laboratory: Laboratory, asked: Namespace) -> None:
             for seed in range(asked.tunings):
                 rng = stream(seed, "tune", count)
                 some = [samples[index] for index in rng.permutation(10)[:count]]
-                best = tune(Misfit(laboratory.simulate, some), laboratory.parameters, SteadyState(), asked.tuning, rng)[
-                    0
-                ]
+                misfit = Misfit(laboratory.simulate, some)
+                best = tune(misfit, laboratory.parameters, SteadyState(), asked.tuning, rng)[0]
                 fitness = laboratory.real(laboratory.evolve(best.parameters, "tuned", asked.tuning, count, seed))
                 found.setdefault(count, []).append((best.parameters, fitness))
                 error = np.sqrt(best.squared_error / count)

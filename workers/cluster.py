@@ -28,6 +28,7 @@ def cluster(settings: Settings) -> Iterator[int]:
         ray.init(address=settings.ray_address, log_to_driver=False, logging_level=logging.ERROR)
     else:
         ray.init(
+            address="local",  # not whatever else may run on this machine
             num_cpus=settings.workers,
             include_dashboard=False,
             log_to_driver=False,

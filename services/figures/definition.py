@@ -177,7 +177,7 @@ def _note(series: Sequence[Series], baselines: Sequence[Baseline], band: Band) -
 
 
 def _level(level: Point) -> str:
-    spread = f" ± {level.sd:.2g} SD" if level.sd is not None else ""
+    spread = f" ± {level.sd:.2f} SD" if level.sd is not None else ""
     return f"{level.mean:.2f}{spread} (n = {level.n})".replace(" ", "\N{NO-BREAK SPACE}")
 
 

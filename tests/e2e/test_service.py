@@ -73,7 +73,8 @@ def test_a_toy_study_goes_from_post_to_curve_with_the_numbers_of_one_process(ser
 
     ended = service.finish(f"/studies/{study}", within_s=90)
     assert ended["state"] == "COMPLETED"
-    assert ended["progress"]["rollouts_done"] == ended["progress"]["rollouts"]
+    progress = ended["progress"]
+    assert progress["rollouts_done"] + progress["rollouts_saved"] == progress["rollouts"]
     assert told_by(service, study) == computed_here(TOY)
     ids = [each["id"] for each in ended["experiments"]]
     assert len(service.get("/comparisons", experiment=ids)) == 3

@@ -327,12 +327,12 @@ def test_a_repetition_killed_after_every_step_ends_as_one_that_never_stopped(sto
     assert same(tuple(steps), claim.log)
 
 
-def test_the_expected_rollouts_are_those_that_a_repetition_takes(store):
+def test_the_budgeted_rollouts_are_those_that_a_repetition_takes_or_saves(store):
     for strategy in ("simulated_fit_and_informative", "known_fit", "direct"):
         experiments.submit_experiment(store, toy(strategy=strategy, repetitions=1))
     for claim in execution.claim(store, "me", 3):
         run(store, claim, repetition(setting(claim.spec, claim.number)))
 
-    found = experiments.list_experiments(store).items
+    found = [each.progress for each in experiments.list_experiments(store).items]
 
-    assert [each.progress.rollouts_done for each in found] == [each.progress.rollouts for each in found]
+    assert [each.rollouts_done + each.rollouts_saved for each in found] == [each.rollouts for each in found]

@@ -61,7 +61,7 @@ def test_the_note_says_n_and_what_the_bands_are():
     deviation = curves_figure([curve("a", point(0, 1, n=2), point(1, 1, n=5))], band="sd").note
 
     assert "Mean over 30 repetitions; bands: 95 % interval of the mean." in interval
-    assert "1.33 ± 0.1 SD (n = 100)" in interval
+    assert "1.33 ± 0.10 SD (n = 100)" in interval
     assert "2\N{EN DASH}5 repetitions" in deviation
     assert "standard deviation" in deviation
 

@@ -11,7 +11,7 @@ from services.core.types import Probed, Tuned
 from services.resolution import resolve_experiment
 from services.simulation import setting
 
-ITERATIONS, REPETITIONS = 8, 10
+ITERATIONS, REPETITIONS = 6, 8
 TRUTH = np.array([1.0, 0.8, 0.0])
 
 
@@ -50,7 +50,7 @@ def distances(strategy):
 def test_as_samples_are_added_the_simulations_become_more_accurate():
     means = distances("simulated_fit").mean(axis=0)
 
-    assert means[-1] < means[0] / 3
+    assert means[-1] < means[0] / 2
 
 
 def test_the_fitness_of_the_transferred_controller_rises_until_it_is_near_the_maximum_of_reality():
@@ -58,7 +58,7 @@ def test_the_fitness_of_the_transferred_controller_rises_until_it_is_near_the_ma
     best = recorded("direct").mean()
 
     assert means[0] < 0.75 * best
-    assert means[-1] > 0.98 * best
+    assert means[-1] > 0.95 * best
 
 
 @pytest.mark.parametrize("strategy", ["informative", "simulated_fit_and_informative"])

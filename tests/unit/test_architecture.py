@@ -19,7 +19,7 @@ ARROWS = {
     "services/store": (("schemas", "services.core", "services.store"), {"sqlalchemy", "psycopg"}),
     "services/figures": (("schemas", "services.figures"), {"plotly", "matplotlib"}),
     "services": (("schemas", "services"), {"numpy"}),
-    "workers": (("schemas", "services", "workers"), {"ray"}),
+    "workers": (("schemas", "services", "workers"), {"numpy", "ray"}),
     "api": (
         ("schemas", "services", "api", "migrations"),
         {"fastapi", "starlette", "uvicorn", "typer", "rich", "httpx2", "pydantic", "fastapi_offline"},

@@ -5,7 +5,11 @@ import pytest
 from schemas.spec import ExperimentSpec, StudySpec
 from services.budgets import PRESETS
 from services.core.errors import InvalidSpec
+from services.core.robots.quadruped import Quadruped
+from services.engines import engines
 from services.resolution import expected_rollouts, resolve_experiment, resolve_study
+
+EMBODIED = [name for name, engine in engines.items() if engine.runs(Quadruped().world)]
 
 
 def experiment(**spec):
@@ -105,9 +109,9 @@ def test_everything_that_is_wrong_is_said_at_once():
 @pytest.mark.parametrize(
     ("spec", "pointer", "permitted"),
     [
-        ({"engine": "analytic"}, "/engine", ["pybullet"]),
+        ({"engine": "analytic"}, "/engine", EMBODIED),
         ({"robot": "toy_function", "engine": "pybullet"}, "/engine", ["analytic"]),
-        ({"reality": {"engine": "analytic"}}, "/reality/engine", ["pybullet"]),
+        ({"reality": {"engine": "analytic"}}, "/reality/engine", EMBODIED),
         ({"tunables": [{"name": "restitution", "upper": 2}]}, "/tunables/0/upper", "0 to 0.9"),
         ({"tunables": ["restitution", "restitution"]}, "/tunables/1", None),
         ({"budget": {"simulator_evaluations": 19}}, "/budget/simulator_evaluations", "at least 20"),

@@ -60,7 +60,7 @@ class MuJoCo(Engine):
         if not self.available():
             msg = f"the engine {self.name!r} needs a library: {self.install}"
             raise EngineUnavailable(msg)
-        mujoco, _ = import_module("mujoco"), import_module("mujoco.rollout")
+        mujoco = import_module("mujoco")
         self._scenes = WarmScenes(lambda world: Scene(mujoco, world, self.options.threads))
         self._latest: Scene | None = None
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -48,7 +49,7 @@ class Scene:
         self._datas = [self._data() for _ in range(threads)]
         self._start = self._initial()
         self._memory = np.empty(0)
-        self._pool = mujoco.rollout.Rollout(nthread=threads if threads > 1 else 0)
+        self._pool = import_module("mujoco.rollout").Rollout(nthread=threads if threads > 1 else 0)
 
     def poses(self, materials: Sequence[Material], motions: Sequence[Motion]) -> FloatArray:
         """`(n, m, t, 7)`: positions and quaternions x, y, z, w of the base; nan throughout where the physics failed."""

@@ -1,0 +1,79 @@
+"""The engine itself: motions in worlds, one scene for each kind of world, kept warm."""
+
+from dataclasses import replace
+from functools import partial
+from importlib import import_module
+from types import ModuleType
+from warnings import catch_warnings, simplefilter
+
+import numpy as np
+
+from schemas.base import Frozen
+from services.core.errors import EngineUnavailable
+from services.core.world import Material, Motion, Trajectory, World
+from services.engines.base import Engine
+from services.engines.physx.scene import Scene
+from services.engines.stepping import WarmScenes, plausible, watch
+
+
+class PhysX(Engine):
+    """PhysX on the CPU, the paper's own engine, with static friction, dynamic friction and restitution of its own.
+
+    Deterministic within one version and architecture; needs neither a GPU nor Vulkan. Numbers are of single precision.
+    Restitution acts on impacts faster than 0.2 m/s.
+    """
+
+    name = "physx"
+    source = "PhysX 5.3.1 through SAPIEN, https://sapien.ucsd.edu, version 3.0.3; docs/engines.md"
+    library = "sapien"
+    install = "pip install 'gaplab[physx]'"
+    honours = frozenset(
+        {
+            "material.static_friction",
+            "material.dynamic_friction",
+            "material.restitution",
+            "body.mass_kg",
+            "body.shape",
+            "motor.position_gain",
+            "motor.max_torque_nm",
+            "motor.max_speed_rad_s",
+            "start_height_m",
+            "gravity_m_s2",
+            "time_step_s",
+            "solver_iterations",
+        }
+    )
+
+    def __init__(self, options: Frozen | None = None) -> None:
+        super().__init__(options)
+        if not self.available():
+            msg = f"the engine {self.name!r} needs a library: {self.install}"
+            raise EngineUnavailable(msg)
+        self._scenes = WarmScenes(partial(Scene, _sapien()))
+
+    @classmethod
+    def runs(cls, world: World) -> bool:
+        """Any world with bodies."""
+        return bool(world.bodies)
+
+    def rollout(self, world: World, motion: Motion) -> Trajectory:
+        """The base's trajectory, `(t, 3)`; times are rounded to whole time steps."""
+        bare = replace(world, material=Material())
+        scene = self._scenes[bare]
+        scene.start(world.material)
+        poses = watch(scene, scene.step, motion)
+        if not plausible(poses):
+            poses = np.full_like(poses, np.nan)
+            self._scenes.drop(bare)  # nan in a scene stays there
+        return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
+
+    def close(self) -> None:
+        """Give all scenes up."""
+        self._scenes.close()
+
+
+def _sapien() -> ModuleType:
+    """The library, without what it has to say about graphics: nothing is drawn here."""
+    with catch_warnings():
+        simplefilter("ignore")  # no Vulkan on the machine; in older versions, `pkg_resources` is deprecated
+        return import_module("sapien")
