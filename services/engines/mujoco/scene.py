@@ -17,7 +17,7 @@ from services.engines.mujoco.law import settings
 from services.engines.mujoco.model import compiled, driven, drives, paint
 from services.engines.stepping import plausible
 
-ROWS = 32
+ROWS = 64
 """Rollouts of one call of MuJoCo's, for each thread; more would only take memory, 0.1 MB each for the quadruped."""
 
 TIME, POSE = 0, slice(1, 8)
@@ -44,10 +44,13 @@ class Scene:
         self._mujoco = mujoco
         self._callbacks = callbacks()
         self._drives = drives(self.model, world)
+        self._dofs = [drive.dof for drive in self._drives]
         self._driven = [world.actuators.index(joint) for joint in driven(world)]
         self._models = [self.model]
         self._datas = [self._data() for _ in range(threads)]
         self._start = self._initial()
+        self._starts = np.tile(self._start, (ROWS * threads, 1))
+        self._channel = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
         self._memory = np.empty(0)
         self._pool = import_module("mujoco.rollout").Rollout(nthread=threads if threads > 1 else 0)
 
@@ -77,7 +80,7 @@ class Scene:
         changes = self._steps(motion.times_s)
         current = np.searchsorted(changes, np.arange(steps), side="right") - 1
         controls = np.zeros((steps, self.model.nv))
-        controls[:, [drive.dof for drive in self._drives]] = motion.targets[current][:, self._driven]
+        controls[:, self._dofs] = motion.targets[current][:, self._driven]
         return controls
 
     def _rolled(self, models: list[Any], controls: FloatArray) -> FloatArray:
@@ -88,9 +91,9 @@ class Scene:
             self._pool.rollout(
                 models * len(controls),
                 self._datas,
-                np.tile(self._start, (count, 1)),
+                self._starts[:count],
                 np.repeat(controls, len(models), axis=0),
-                control_spec=self._mujoco.mjtState.mjSTATE_QFRC_APPLIED.value,
+                control_spec=self._channel,
                 skip_checks=True,
                 nstep=steps,
                 state=states,
