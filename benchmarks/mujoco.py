@@ -38,6 +38,18 @@ def one_by_one(engine: Engine, count: int) -> Callable[[], int]:
     return work
 
 
+def call_by_call() -> Callable[[], int]:
+    """The engine alone, one motion a call, the motions made beforehand: what its own work costs."""
+    engine, motions = MuJoCo(), [ROBOT.motion(genome) for genome in genomes(MANY)]
+
+    def work() -> int:
+        for motion in motions:
+            engine.rollout(ROBOT.world, motion)
+        return MANY
+
+    return work
+
+
 def at_once(engine: Engine) -> Callable[[], int]:
     """The same through `Simulate` in one call."""
     simulate, drawn = simulation(engine), genomes(MANY)
@@ -54,7 +66,9 @@ def bare(threads: int) -> Callable[[], int]:
     scene: Scene = engine._scene(ROBOT.world)
     motions = [ROBOT.motion(genome) for genome in genomes(MANY)]
     steps = int(scene._steps(motions[0].observe_s)[-1])
-    controls = np.array([scene._controls(motion, steps) for motion in motions])
+    controls = np.zeros((MANY, steps, scene.model.nv))
+    for motion, each in zip(motions, controls, strict=True):
+        scene._aim(motion, each)
     start = np.tile(scene._start, (MANY, 1))
     models = scene._painted([ROBOT.world.material]) * MANY
     pool = library.Rollout(nthread=threads if threads > 1 else 0)
@@ -72,6 +86,7 @@ def rows(rounds: int) -> list[Row]:
     rivals = {
         "pybullet": one_by_one(PyBullet(), 12),
         "single": one_by_one(MuJoCo(), MANY),
+        "calls": call_by_call(),
         "batch": at_once(MuJoCo()),
         "bare": bare(1),
         "batch on 2": at_once(MuJoCo(MuJoCo.Options(threads=2))),
@@ -86,7 +101,7 @@ def rows(rounds: int) -> list[Row]:
     return [
         row("MuJoCo engine, one genome a call", "single", "pybullet", "PyBullet engine, switching", "≥ 5"),
         row(f"MuJoCo engine, {MANY} genomes a call", "batch", "pybullet", "PyBullet engine, switching", "≥ 5"),
-        row("MuJoCo engine, one genome a call", "single", "bare", "bare mujoco.rollout", "≥ 0.9"),
+        row("MuJoCo engine alone, one motion a call", "calls", "bare", "bare mujoco.rollout", "≥ 0.9"),
         row(f"MuJoCo engine, {MANY} genomes a call", "batch", "bare", "bare mujoco.rollout", "≥ 0.9"),
         row("the same on 2 threads", "batch on 2", "bare on 2", "bare mujoco.rollout on 2", "≥ 0.9"),
         row("the same on 2 threads", "batch on 2", "batch", "on 1 thread", "cores"),

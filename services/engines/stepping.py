@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from services.core.arrays import FloatArray
 from services.core.world import Motion, World
@@ -93,10 +94,10 @@ def watch(scene: Scene, advance: Callable[[int], None], motion: Motion) -> Float
     return np.array([poses[step] for step in observed])
 
 
-def plausible(poses: FloatArray) -> bool:
-    """Whether physics can have led to all of the poses `(t, 7)`; nan is not plausible."""
-    positions_m = poses[:, :3]
-    return bool(np.all(np.abs(positions_m) < FARTHEST_M) and np.all(positions_m[:, 2] > -DEEPEST_M))
+def plausible(poses: FloatArray) -> NDArray[np.bool_]:
+    """`(...)`: whether physics can have led to all of the poses `(..., t, 7)`; nan is not plausible."""
+    near = np.all(np.abs(poses[..., :3]) < FARTHEST_M, axis=(-2, -1))
+    return np.asarray(near & np.all(poses[..., 2] > -DEEPEST_M, axis=-1))
 
 
 def _commands(motion: Motion, time_step_s: float) -> dict[int, list[tuple[int, float]]]:

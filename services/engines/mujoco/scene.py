@@ -57,7 +57,9 @@ class Scene:
     def poses(self, materials: Sequence[Material], motions: Sequence[Motion]) -> FloatArray:
         """`(n, m, t, 7)`: positions and quaternions x, y, z, w of the base; nan throughout where the physics failed."""
         steps = self._steps(motions[0].observe_s)
-        controls = np.array([self._controls(motion, max(1, int(steps[-1]))) for motion in motions])
+        controls = np.zeros((len(motions), max(1, int(steps[-1])), self.model.nv))
+        for motion, each in zip(motions, controls, strict=True):
+            self._aim(motion, each)
         rows = ROWS * len(self._datas)
         found = np.empty((len(motions), len(materials), len(steps), 7))
         with _in_force(self._mujoco, *self._callbacks):
@@ -75,13 +77,10 @@ class Scene:
     def _steps(self, times_s: FloatArray) -> NDArray[np.int_]:
         return np.rint(times_s / self.world.time_step_s).astype(int)
 
-    def _controls(self, motion: Motion, steps: int) -> FloatArray:
-        """`(steps, degrees of freedom)`: the targets in each step, where the law looks for them."""
-        changes = self._steps(motion.times_s)
-        current = np.searchsorted(changes, np.arange(steps), side="right") - 1
-        controls = np.zeros((steps, self.model.nv))
+    def _aim(self, motion: Motion, controls: FloatArray) -> None:
+        """Write the targets in each step into `(steps, degrees of freedom)`, where the law looks for them."""
+        current = np.searchsorted(self._steps(motion.times_s), np.arange(len(controls)), side="right") - 1
         controls[:, self._dofs] = motion.targets[current][:, self._driven]
-        return controls
 
     def _rolled(self, models: list[Any], controls: FloatArray) -> FloatArray:
         """`(n · m, steps, state)`: states after each step, of each motion in each model; nan where MuJoCo gave up."""
@@ -92,7 +91,7 @@ class Scene:
                 models * len(controls),
                 self._datas,
                 self._starts[:count],
-                np.repeat(controls, len(models), axis=0),
+                controls if len(models) == 1 else np.repeat(controls, len(models), axis=0),
                 control_spec=self._channel,
                 skip_checks=True,
                 nstep=steps,
@@ -104,12 +103,10 @@ class Scene:
 
     def _seen(self, states: FloatArray, steps: NDArray[np.int_]) -> FloatArray:
         """`(rows, t, 7)`: poses after so many steps; nan of a rollout that MuJoCo stopped at a warning, or got lost."""
-        ended = states[:, -1, TIME] > (states.shape[1] - 0.5) * self.world.time_step_s
+        complete = states[:, -1, TIME] > (states.shape[1] - 0.5) * self.world.time_step_s
         poses = states[:, np.maximum(steps, 1) - 1, POSE]
         poses[:, steps == 0] = self._start[POSE]
-        for row, complete in zip(poses, ended.tolist(), strict=True):
-            if not (complete and plausible(row)):
-                row.fill(np.nan)
+        poses[~(complete & plausible(poses))] = np.nan
         return poses[..., TURNED]
 
     def _room(self, count: int, steps: int) -> FloatArray:
