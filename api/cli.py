@@ -1,17 +1,20 @@
 """The `gaplab` command: it runs the service, and talks to one that runs."""
 
-import json
 import sys
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any
 
 import typer
+from rich.console import Console
 
 from api import display
 from api.client import Client, ServiceError, ServiceUnreachable
 from api.exits import EXPLAINED, CommandError, Exit, code_of
+from api.files import read_spec
 from api.watch import follow
 from schemas.lifecycle import State
+from schemas.misfit import MisfitRead
 from schemas.records import ExperimentRead, StudyRead
 from services.core.errors import GaplabError
 from services.settings import Settings
@@ -65,7 +68,7 @@ def submit(
 ) -> None:
     """Submit an experiment, or a study if the spec names several strategies or none."""
     with _client(url) as client:
-        submitted = client.submit(_read_spec(spec))
+        submitted = client.submit(read_spec(spec))
         console = display.console()
         console.print(submitted.id, markup=False)
         if watch:
@@ -100,7 +103,26 @@ def show(id: Id, url: Url = None) -> None:  # noqa: A002 - as the API says
             console.print(display.overview(found.experiments))
         else:
             console.print(display.repetitions(client.repetitions(id)))
+            _print_misfit(client.misfit(id), console)
             console.print_json(data=found.spec)
+        _print_warnings(_experiments(found))
+
+
+@app.command()
+def sensitivity(
+    spec: Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or - to read standard input")],
+    url: Url = None,
+) -> None:
+    """Check what the tunables of a spec do: whether they change fitness, how much, and how smoothly."""
+    with _client(url) as client:
+        found = client.check(read_spec(spec))
+    if found.state is not State.COMPLETED:
+        msg = f"the check {found.id} ended as {found.state}: {found.reason}"
+        raise CommandError(msg, Exit.FAILED)
+    console = display.console()
+    console.print(display.sensitivity(found))
+    for each in found.warnings:
+        console.print(each, markup=False)
 
 
 @app.command()
@@ -178,27 +200,6 @@ def _settings(host: str | None, port: int | None) -> Settings:
     return replace(Settings.from_environment(), **given)
 
 
-def _read_spec(name: str) -> dict[str, Any]:
-    try:
-        text = sys.stdin.read() if name == "-" else Path(name).read_text("utf-8")
-        spec = json.loads(text, parse_constant=_refuse)
-    except OSError as error:
-        msg = f"{name}: {error.strerror or error}"
-        raise CommandError(msg, Exit.FILE) from error
-    except (ValueError, RecursionError) as error:
-        msg = f"{name} is not JSON: {error}"
-        raise CommandError(msg, Exit.FILE) from error
-    if not isinstance(spec, dict):
-        msg = f'{name} holds no JSON object; a spec is one, like {{"strategy": "simulated_fit"}}'
-        raise CommandError(msg, Exit.FILE)
-    return spec
-
-
-def _refuse(constant: str) -> NoReturn:
-    msg = f"{constant} is no number in JSON"
-    raise ValueError(msg)
-
-
 def _write(path: Path, text: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, "utf-8")
@@ -209,12 +210,23 @@ def _experiments(found: ExperimentRead | StudyRead) -> tuple[ExperimentRead, ...
     return found.experiments if isinstance(found, StudyRead) else (found,)
 
 
+def _print_misfit(found: MisfitRead, console: Console) -> None:
+    if found.remarks:
+        console.print(display.tuned(found), *found.remarks, sep="\n", markup=False)
+
+
+def _print_warnings(found: Iterable[ExperimentRead]) -> None:
+    for warning in sorted({warning for each in found for warning in each.warnings}):
+        typer.echo(f"warning: {warning}", err=True)
+
+
 def _finish(ended: ExperimentRead | StudyRead) -> None:
     """Say how it ended; a failure is one for the shell as well."""
     typer.echo(f"{ended.name}: {ended.state}; {display.numbers(ended.progress)}.")
     reasons = {reason for each in _experiments(ended) for reason in each.reasons}
     for reason in sorted(reasons):
         typer.echo(f"  {reason}", err=True)
+    _print_warnings(_experiments(ended))
     if ended.state is not State.COMPLETED:
         raise typer.Exit(Exit.FAILED)
 

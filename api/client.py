@@ -17,15 +17,20 @@ import httpx2
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from schemas.curves import Comparison, Curve
+from schemas.misfit import MisfitRead
 from schemas.plugin import Catalogue
 from schemas.problems import Problem
 from schemas.records import ExperimentRead, Page, RepetitionRead, StudyRead
+from schemas.sensitivity import SensitivityRead, SensitivitySpec
 from schemas.spec import ExperimentSpec, StudySpec
 
 T = TypeVar("T")
 
 Spec = ExperimentSpec | StudySpec | Mapping[str, Any]
 FigureFormat = Literal["html", "svg"]
+
+NOT_CHECKED = {"name", "strategy", "strategies", "direct_repetitions"}
+"""What a spec has beside the settings that a sensitivity check takes."""
 
 LOOPBACK = {"127.0.0.1", "localhost", "::1"}
 """This machine: no proxy of the environment leads to it."""
@@ -85,7 +90,7 @@ class Client:
 
     def submit(self, spec: Spec) -> ExperimentRead | StudyRead:
         """Queue an experiment if the spec names a `strategy`, else a study; it is checked by the service."""
-        body = spec.model_dump(mode="json", exclude_unset=True) if isinstance(spec, BaseModel) else dict(spec)
+        body = _body(spec)
         if "strategy" in body and "strategies" not in body:
             return self._read(ExperimentRead, self._request("POST", "/experiments", json=body))
         return self._read(StudyRead, self._request("POST", "/studies", json=body))
@@ -118,6 +123,19 @@ class Client:
     def repetitions(self, id: str) -> tuple[RepetitionRead, ...]:  # noqa: A002 - as the API says
         """The repetitions of an experiment."""
         return self._read(tuple[RepetitionRead, ...], self._get(f"/experiments/{_part(id)}/repetitions"))
+
+    def misfit(self, id: str) -> MisfitRead:  # noqa: A002 - as the API says
+        """How far an experiment's tuned simulators are from reality, and from each other."""
+        return self._read(MisfitRead, self._get(f"/experiments/{_part(id)}/misfit"))
+
+    def check(self, spec: Spec | SensitivitySpec, *, every_s: float = 0.5) -> SensitivityRead:
+        """What the tunables of a spec do to fitness: queued if that is not known yet, and waited for."""
+        body = {name: value for name, value in _body(spec).items() if name not in NOT_CHECKED}
+        check = self._read(SensitivityRead, self._request("POST", "/sensitivity", json=body))
+        while not check.state.ended:
+            time.sleep(every_s)
+            check = self._read(SensitivityRead, self._get(f"/sensitivity/{_part(check.id)}"))
+        return check
 
     def cancel(self, id: str) -> ExperimentRead:  # noqa: A002 - as the API says
         """Call an experiment off."""
@@ -193,6 +211,10 @@ class Client:
         except ValidationError as error:
             msg = f"what answers at {self.url} is no gaplab of this version"
             raise ServiceUnreachable(msg) from error
+
+
+def _body(spec: BaseModel | Mapping[str, Any]) -> dict[str, Any]:
+    return spec.model_dump(mode="json", exclude_unset=True) if isinstance(spec, BaseModel) else dict(spec)
 
 
 def _part(id: str) -> str:  # noqa: A002 - as the API says

@@ -10,9 +10,11 @@ from rich.table import Table
 
 from schemas.curves import Curve, CurvePoint
 from schemas.lifecycle import State
+from schemas.misfit import MisfitRead, TunedSpread
 from schemas.plugin import Catalogue, PluginRead
 from schemas.problems import Problem
 from schemas.records import ExperimentRead, Progress, RepetitionRead, StudyRead
+from schemas.sensitivity import SensitivityRead
 
 COLORS = {
     State.QUEUED: "dim",
@@ -89,6 +91,26 @@ def catalogue(plugins: Catalogue) -> list[Table]:
     return [_plugins(kind, getattr(plugins, kind)) for kind in type(plugins).model_fields]
 
 
+def sensitivity(found: SensitivityRead) -> Table:
+    """What each tunable does to fitness, a line each."""
+    table = _table("tunable", "over", f"effect, {found.unit}", "of the spread", "roughness", "nan", "verdict")
+    for each in found.tunables:
+        over = f"{each.values[0]:g} to {each.values[-1]:g}"
+        numbers = (_number(each.effect), _number(each.relative_effect), _number(each.roughness), f"{each.failures}")
+        table.add_row(each.name, over, *numbers, each.verdict)
+    return table
+
+
+def tuned(found: MisfitRead) -> Table:
+    """The tunables of the best simulators at the latest iteration, over repetitions, a line each."""
+    last = found.points[-1]
+    table = _table(f"tuned at {last.iteration}", "mean±SD", "least", "greatest", "at a bound")
+    for each in last.tunables:
+        spread = f"{_number(each.mean)}±{_number(each.sd)}"
+        table.add_row(each.name, spread, _number(each.least), _number(each.greatest), _at_bounds(each))
+    return table
+
+
 def problem(found: Problem) -> list[str]:
     """A problem in words: its sentence, or a line for each thing that is wrong."""
     if not found.errors:
@@ -126,6 +148,15 @@ def _table(*columns: str) -> Table:
     for column in columns:
         table.add_column(column, overflow="fold")
     return table
+
+
+def _at_bounds(found: TunedSpread) -> str:
+    sides = ((found.lower, found.at_lower), (found.upper, found.at_upper))
+    return ", ".join(f"{100 * share:.0f} % at {bound:g}" for bound, share in sides if share) or "-"
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
 
 
 def _cell(point: CurvePoint | None) -> str:

@@ -7,6 +7,7 @@ from pydantic import BaseModel
 
 from schemas.curves import Comparison, Curve, CurvePoint, Test
 from schemas.lifecycle import State
+from schemas.misfit import MisfitPoint, MisfitRead, Spread, TunedSpread
 from schemas.records import (
     ExperimentRead,
     MeasurementKind,
@@ -17,6 +18,7 @@ from schemas.records import (
     SimulatorRead,
     StudyRead,
 )
+from schemas.sensitivity import Checked, Sensitivity, SensitivityRead, Verdict
 from schemas.spec import ExperimentSpec
 
 EXPERIMENT_SPECS: dict[str, Any] = {
@@ -51,6 +53,17 @@ STUDY_SPECS: dict[str, Any] = {
     "quick": {
         "summary": "The same on the toy function; seconds",
         "value": {"name": "toy", "robot": "toy_function", "budget": "smoke"},
+    },
+}
+
+SENSITIVITY_SPECS: dict[str, Any] = {
+    "the least": {
+        "summary": "The quadruped and its three coefficients, as the paper has them; about 800 rollouts",
+        "value": {},
+    },
+    "finer": {
+        "summary": "One coefficient between bounds of one's own, at more values",
+        "value": {"tunables": [{"name": "restitution", "lower": 0.0, "upper": 0.3}], "points": 33},
     },
 }
 
@@ -123,6 +136,58 @@ def _point(evaluations: int, mean: float, sd: float) -> CurvePoint:
         evaluations=evaluations, n=2, mean=mean, sd=sd, lower=mean - sd, upper=mean + sd, values=(mean, mean)
     )
 
+
+SENSITIVITY = SensitivityRead(
+    id="3f0c52d1a9be7764",
+    state=State.COMPLETED,
+    spec=Checked.model_validate(
+        {"robot": "quadruped", "engine": "pybullet", "tunables": [{"name": "restitution", "lower": 0, "upper": 0.6}]}
+    ),
+    rollouts=536,
+    unit="m/s",
+    tunables=(
+        Sensitivity(
+            name="restitution",
+            effect=0.031,
+            relative_effect=0.29,
+            roughness=0.41,
+            failures=0,
+            verdict=Verdict.SMOOTH,
+            values=(0.0, 0.3, 0.6),
+            fitness=((0.31, 0.33, 0.28), (0.11, 0.12, 0.09)),
+        ),
+    ),
+    created_at=_CREATED,
+    started_at=_CREATED + timedelta(seconds=1),
+    ended_at=_CREATED + timedelta(seconds=9),
+)
+
+MISFIT = MisfitRead(
+    experiment=_ID,
+    unit="m/s",
+    points=(
+        MisfitPoint(
+            iteration=5,
+            error=Spread(n=8, mean=0.021, sd=0.008, least=0.004, greatest=0.034),
+            gap=Spread(n=8, mean=0.06, sd=0.03, least=0.01, greatest=0.12),
+            tunables=(
+                TunedSpread(
+                    name="restitution",
+                    lower=0.0,
+                    upper=0.6,
+                    at_lower=0.625,
+                    at_upper=0.0,
+                    n=8,
+                    mean=0.04,
+                    sd=0.05,
+                    least=0.0,
+                    greatest=0.13,
+                ),
+            ),
+        ),
+    ),
+    remarks=("restitution is at its lower bound, 0, in 62 % of 8 repetitions",),
+)
 
 CURVE = Curve(
     experiment=_ID,

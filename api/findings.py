@@ -31,7 +31,8 @@ def _ranges(last: int) -> list[tuple[int, int]]:
 
 def _sentence(pairs: Sequence[Comparison], names: dict[str, str], first: int, final: int) -> str:
     found = sorted((each for each in pairs if _p(each) < SIGNIFICANT), key=_p)
-    where = f"At {first} real-world evaluation" if first == final else f"At {first}-{final} real-world evaluations"
+    counts, plural = (f"{first}", "" if first == 1 else "s") if first == final else (f"{first}-{final}", "s")
+    where = f"At {counts} real-world evaluation{plural}"
     start = f"{where}, {len(found)} of {len(pairs)} pairs differ (p < {SIGNIFICANT}, Student's t, Holm)"
     shown = [_words(each, names) for each in found[:MOST]]
     more = [f"and {len(found) - MOST} more"] if len(found) > MOST else []

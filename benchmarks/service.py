@@ -10,8 +10,9 @@ import numpy as np
 import migrations
 from benchmarks import naive
 from benchmarks.measure import Row, rates, ratio
+from schemas.sensitivity import SensitivitySpec
 from schemas.spec import ExperimentSpec
-from services import experiments
+from services import experiments, sensitivity
 from services.core.loop import repetition
 from services.core.types import Selected, Transferred, Tuned
 from services.resolution import expected_rollouts, resolve_experiment
@@ -41,6 +42,7 @@ def service() -> Iterator[Callable[[], int]]:
         store = Store(url)
         with cluster(Settings(database_url=url, workers=CORES)) as capacity:
             supervisor = Supervisor(store, capacity)
+            _check(store, supervisor)
 
             def work() -> int:
                 experiment = experiments.submit_experiment(store, SPEC).id
@@ -50,6 +52,13 @@ def service() -> Iterator[Callable[[], int]]:
 
             yield work
         store.dispose()
+
+
+def _check(store: Store, supervisor: Supervisor) -> None:
+    """Run the sensitivity check that comes with the first such experiment, which is no part of what is measured."""
+    check = sensitivity.submit(store, SensitivitySpec()).id
+    while not sensitivity.read(store, check).state.ended:
+        supervisor.step()
 
 
 def in_one_process() -> int:

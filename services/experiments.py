@@ -10,7 +10,7 @@ from schemas.lifecycle import State
 from schemas.records import ExperimentRead, MeasurementKind, Page, RepetitionRead, SampleRead, SimulatorRead, StudyRead
 from schemas.spec import ExperimentSpec, StudySpec
 from services.resolution import expected_rollouts, is_direct, resolve_experiment, resolve_study
-from services.store.repository import experiments, reads, results
+from services.store.repository import experiments, reads, results, sensitivity
 from services.store.repository.experiments import Extent
 from services.store.session import Store
 
@@ -18,7 +18,7 @@ R = TypeVar("R")
 
 
 def submit_experiment(store: Store, spec: ExperimentSpec) -> ExperimentRead:
-    """Store the resolved experiment, its repetitions QUEUED.
+    """Store the resolved experiment, its repetitions QUEUED, and with it a sensitivity check unless there is one.
 
     Raises:
         InvalidSpec: with everything that is wrong with it.
@@ -26,11 +26,12 @@ def submit_experiment(store: Store, spec: ExperimentSpec) -> ExperimentRead:
     resolved = resolve_experiment(spec)
     with store.transaction() as session:
         row = experiments.insert_experiment(session, resolved, _extent(resolved))
+        sensitivity.queue_for(session, [row])
         return reads.read_experiments(session, [row])[0]
 
 
 def submit_study(store: Store, spec: StudySpec) -> StudyRead:
-    """Store the study and an experiment for each of its strategies.
+    """Store the study, an experiment for each of its strategies, and a sensitivity check unless there is one.
 
     Raises:
         InvalidSpec: with everything that is wrong with it.
@@ -38,8 +39,11 @@ def submit_study(store: Store, spec: StudySpec) -> StudyRead:
     resolved = resolve_study(spec)
     with store.transaction() as session:
         study = experiments.insert_study(session, spec.name or "study")
-        for position, each in enumerate(resolved):
+        rows = [
             experiments.insert_experiment(session, each, _extent(each), study=study, position=position)
+            for position, each in enumerate(resolved)
+        ]
+        sensitivity.queue_for(session, rows)
         return reads.read_studies(session, [study])[0]
 
 

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from schemas.plugin import PluginRef, TunableRef
-from schemas.spec import BudgetSpec, ExperimentSpec, RealitySpec, StudySpec
+from schemas.sensitivity import Checked, SensitivitySpec
+from schemas.spec import BudgetSpec, ExperimentSpec, RealitySpec, Settings, StudySpec
 from services.budgets import PRESETS
 from services.core.errors import InvalidSpec, Violation, gather, unknown_name
 from services.core.optimizers import optimizers
@@ -84,6 +85,18 @@ def resolve_study(spec: StudySpec) -> tuple[ExperimentSpec, ...]:
     if violations:
         raise InvalidSpec(violations.values())
     return tuple(resolved)
+
+
+def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
+    """What a sensitivity check looks at, with nothing left out.
+
+    Raises:
+        InvalidSpec: with every violation, as an experiment with these settings would have.
+    """
+    shared = {name: getattr(spec, name) for name in Settings.model_fields}
+    resolved = resolve_experiment(ExperimentSpec(**shared, strategy=PluginRef(name="random")))
+    effort = {"points": spec.points, "evaluations": spec.evaluations}
+    return Checked.model_validate({name: getattr(resolved, name) for name in ("robot", "engine", "tunables")} | effort)
 
 
 def is_direct(spec: ExperimentSpec) -> bool:

@@ -5,7 +5,8 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from schemas.plugin import PluginRef
+from schemas.plugin import PluginRef, TunableRef
+from schemas.sensitivity import Checked
 from schemas.spec import ExperimentSpec
 from services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters
 from services.core.loop import Setting
@@ -13,6 +14,7 @@ from services.core.optimizers import optimizers
 from services.core.ports import Simulate
 from services.core.robots import robots
 from services.core.robots.base import Robot
+from services.core.sensitivity import Subject
 from services.core.strategies import strategies
 from services.core.tunables import tunables
 from services.core.tunables.base import Tunable
@@ -96,15 +98,26 @@ def setting(spec: ExperimentSpec, repetition: int) -> Setting:
         strategy=strategy,
         optimizer=optimizers.create(spec.optimizer),
         genomes=robot.space,
-        parameters=Space.box(
-            [_bound(ref.lower) for ref in spec.tunables], [_bound(ref.upper) for ref in spec.tunables]
-        ),
+        parameters=parameters_of(spec.tunables),
         known=robot.known,
         budget=budget(spec),
         iterations=0 if strategy.in_reality else spec.iterations or 0,
         seed=spec.seed,
         repetition=repetition,
         batch=lambda: engine.batch,
+    )
+
+
+def subject(checked: Checked) -> Subject:
+    """What a sensitivity check simulates."""
+    robot = robots.create(checked.robot)
+    edits = [tunables[ref.name]() for ref in checked.tunables]
+    return Subject(
+        simulate=Simulation(robot, engine_of(checked.engine), edits),
+        genomes=robot.space,
+        known=robot.known,
+        parameters=parameters_of(checked.tunables),
+        names=tuple(ref.name for ref in checked.tunables),
     )
 
 
@@ -132,6 +145,11 @@ def budget(spec: ExperimentSpec) -> Budget:
     """The numbers of a resolved budget."""
     numbers = spec.budget.model_dump(exclude={"preset"}, exclude_none=True)
     return Budget(**numbers)
+
+
+def parameters_of(refs: Sequence[TunableRef]) -> Space:
+    """The space of simulators that resolved tunables span."""
+    return Space.box([_bound(ref.lower) for ref in refs], [_bound(ref.upper) for ref in refs])
 
 
 def _bound(value: float | None) -> float:

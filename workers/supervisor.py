@@ -6,6 +6,7 @@ It keeps nothing that it could not lose: killed at any moment and started again,
 import logging
 import os
 import socket
+from contextlib import suppress
 from dataclasses import dataclass, field
 from secrets import token_hex
 from threading import Event
@@ -20,6 +21,7 @@ from services.core.errors import StoreUnavailable
 from services.execution import Claim, TimedStep
 from services.store.session import Store
 from workers import repetition
+from workers.sensitivity import Checks
 
 HEARTBEAT_S = 5.0
 """Between heartbeats; a lease is lost after 30 s without one."""
@@ -88,6 +90,7 @@ class Supervisor:
         self._capacity = capacity
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
         self._runs: list[Run] = []
+        self._checks = Checks(store, self._owner)
         self._beat = -HEARTBEAT_S
         self._looked = -WAIT_S
 
@@ -102,12 +105,13 @@ class Supervisor:
         self._hand_back()
 
     def step(self) -> None:
-        """One round: heartbeat, claim, receive, store.
+        """One round: heartbeat, claim, receive, store; sensitivity checks before repetitions.
 
         Raises:
             StoreUnavailable: nothing is lost by it; what was received is stored in a later round.
         """
         self._heartbeat()
+        self._checks.step()
         self._claim()
         self._receive()
         self._store_received()
@@ -118,6 +122,7 @@ class Supervisor:
             return
         held = execution.heartbeat(self._store, [run.claim for run in self._runs])
         self._drop_all_but(held)
+        self._checks.heartbeat()
         requeued = execution.requeue_lost(self._store)
         if requeued:
             log.warning("%d repetitions whose supervisor was lost are queued again", requeued)
@@ -182,3 +187,5 @@ class Supervisor:
             except StoreUnavailable as error:
                 log.warning("%s: its lease will run out: %s", run.name, error)
         self._runs = []
+        with suppress(StoreUnavailable):  # then its lease will run out
+            self._checks.hand_back()

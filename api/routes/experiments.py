@@ -9,9 +9,11 @@ from api import examples
 from api.dependencies import Id, Paging, StoreDep
 from api.problems import documented
 from schemas.lifecycle import State
+from schemas.misfit import MisfitRead
 from schemas.records import ExperimentRead, MeasurementKind, Page, RepetitionRead, SampleRead, SimulatorRead
 from schemas.spec import ExperimentSpec
 from services import experiments
+from services.misfit import misfit
 
 router = APIRouter(prefix="/experiments", tags=["experiments"])
 
@@ -130,6 +132,16 @@ def list_simulators(
 ) -> Page[SimulatorRead]:
     """The simulators that were tuned on the samples, rank 0 the best of its iteration."""
     return experiments.list_simulators(store, id, **which.model_dump())
+
+
+@router.get(
+    "/{id}/misfit",
+    summary="Read an experiment's misfit",
+    responses={200: examples.shown(examples.MISFIT, "By iteration, over repetitions"), **documented(404)},
+)
+def read_misfit(id: Id, store: StoreDep) -> MisfitRead:  # noqa: A002 - the address says {id}
+    """The error that remains after tuning, how far repetitions agree, and coefficients that are stuck at a bound."""
+    return misfit(store, id)
 
 
 @router.post(

@@ -1,7 +1,8 @@
-"""A repetition in the hands of one supervisor."""
+"""A repetition, or a sensitivity check, in the hands of one supervisor."""
 
 from dataclasses import dataclass, field
 
+from schemas.sensitivity import Checked
 from schemas.spec import ExperimentSpec
 from services.core.types import Step
 
@@ -25,3 +26,18 @@ class Claim:
     number: int
     spec: ExperimentSpec = field(compare=False)
     log: tuple[Step, ...] = field(default=(), compare=False)
+
+
+@dataclass(frozen=True)
+class CheckClaim:
+    """The right to run a sensitivity check, until its epoch is over.
+
+    Attributes:
+        id: of the check.
+        epoch: of the lease.
+        spec: what is checked.
+    """
+
+    id: str
+    epoch: int
+    spec: Checked = field(compare=False)

@@ -1,10 +1,11 @@
 """Steps to rows and back: the log that is read equals the log that was written, number by number."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import inf, isfinite, nan
 from typing import Any
 
 from schemas.records import MeasurementKind
+from schemas.sensitivity import Checked
 from services.core.arrays import FloatArray, frozen
 from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
 from services.store.models import IterationRow, MeasurementRow, SimulatorRow
@@ -77,6 +78,11 @@ def log(
         )
         if step is not None
     )
+
+
+def checked(spec: Mapping[str, Any]) -> Checked:
+    """What a sensitivity check of this resolved spec looks at."""
+    return Checked.model_validate({name: spec[name] for name in ("robot", "engine", "tunables")})
 
 
 def vector(values: FloatArray) -> list[float]:

@@ -2,6 +2,7 @@
 
     study ──< experiment ──< repetition ──< iteration ──< measurement
                                                      └──< simulator
+    sensitivity, named after what it checks, which many experiments have in common
 
 What is plotted or filtered is a column; vectors are JSON arrays, in which floats round-trip exactly. Neither a database
 nor JSON has nan or infinity: a fitness of nan and a squared error of infinity are NULL.
@@ -32,7 +33,7 @@ from schemas.lifecycle import State
 from schemas.records import MeasurementKind
 from services.store.clock import UtcDateTime, now
 
-REVISION = "0001"
+REVISION = "0002"
 """The migration that makes these tables; a database at any other revision is not ours to touch."""
 
 SPEC_VERSION = 1
@@ -55,6 +56,7 @@ class Base(DeclarativeBase):
         datetime: UtcDateTime(),
         float: Double(),
         list[float]: JSON(none_as_null=True),
+        list[dict[str, Any]]: JSON(none_as_null=True),
         dict[str, Any]: JSON(none_as_null=True),
         State: Enum(State, native_enum=False, create_constraint=True, length=16, name="state"),
         MeasurementKind: Enum(
@@ -199,3 +201,31 @@ class SimulatorRow(Base):
     rank: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
     parameters: Mapped[list[float]]
     squared_error: Mapped[float | None]
+
+
+class SensitivityRow(Base):
+    """A sensitivity check, with its lease.
+
+    Attributes:
+        id: follows from the spec, so that the same is checked once.
+        spec: robot, engine and tunables, and how much is simulated.
+        owner, epoch, heartbeat_at, attempts, losses, error: as of a repetition.
+        found: what each tunable does to fitness; NULL until it is known.
+    """
+
+    __tablename__ = "sensitivity"
+    __table_args__ = (Index(None, "state", "created_at"),)
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    spec: Mapped[dict[str, Any]]
+    state: Mapped[State] = mapped_column(default=State.QUEUED)
+    owner: Mapped[str | None] = mapped_column(String(200))
+    epoch: Mapped[int] = mapped_column(default=0)
+    heartbeat_at: Mapped[datetime | None]
+    attempts: Mapped[int] = mapped_column(default=0)
+    losses: Mapped[int] = mapped_column(default=0)
+    error: Mapped[str | None] = mapped_column(Text)
+    found: Mapped[list[dict[str, Any]] | None]
+    created_at: Mapped[datetime]
+    started_at: Mapped[datetime | None]
+    ended_at: Mapped[datetime | None]

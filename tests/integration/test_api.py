@@ -12,7 +12,10 @@ from fastapi.testclient import TestClient
 from jsonschema import Draft202012Validator
 
 from api.app import create_app
-from services import execution
+from services import execution, sensitivity
+from services.core.optimizers.steady_state import SteadyState
+from services.core.sensitivity import Effort, check
+from services.simulation import subject
 from services.store.session import Store
 from tests.experiments import run, some_log, toy
 
@@ -196,6 +199,36 @@ def test_a_figure_is_a_page_without_links_to_elsewhere_or_a_file(store: Store, a
     assert "<script src" not in page.text
     assert drawing.headers["content-type"] == "image/svg+xml"
     assert ET.fromstring(drawing.text).tag == "{http://www.w3.org/2000/svg}svg"
+
+
+def test_a_sensitivity_check_exists_at_its_location_and_its_warnings_on_the_experiment(store: Store, api: TestClient):
+    dull = {"robot": "toy_function", "tunables": [{"name": "restitution", "lower": 0.3, "upper": 0.3001}]}
+    made = api.post("/sensitivity", json=dull)
+    experiment = api.post("/experiments", json=TOY | dull).json()
+    claim = sensitivity.claim(store, "test")
+    sensitivity.complete(store, claim, check(subject(claim.spec), SteadyState(), Effort(17, 100)))
+
+    found = api.get(made.headers["Location"]).json()
+
+    assert (made.status_code, made.json()["state"], found["state"]) == (202, "QUEUED", "COMPLETED")
+    assert experiment["sensitivity"] == found["id"]
+    (tunable,) = found["tunables"]
+    assert (tunable["verdict"], len(tunable["values"]), len(tunable["fitness"])) == ("nothing", 17, 8)
+    assert found["warnings"][0].startswith("restitution over 0.3 to 0.3001 does nothing")
+    assert api.get(f"/experiments/{experiment['id']}").json()["warnings"] == found["warnings"]
+    assert api.post("/sensitivity", json=dull).json() == found
+
+
+def test_misfit_has_error_gap_and_spread_of_simulators_by_iteration(store: Store, api: TestClient):
+    made = api.post("/experiments", json=toy().model_dump(mode="json")).json()
+    finish(store)
+
+    found = api.get(f"/experiments/{made['id']}/misfit").json()
+
+    assert [point["iteration"] for point in found["points"]] == [0, 1, 2]
+    assert found["points"][2]["error"]["n"] == 3
+    assert [each["name"] for each in found["points"][0]["tunables"]] == ["static_friction", "dynamic_friction"]
+    assert len(found["remarks"]) == 1
 
 
 def test_cancelling_keeps_what_is_stored(store: Store, api: TestClient):

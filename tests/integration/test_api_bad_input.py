@@ -112,6 +112,33 @@ def test_a_value_out_of_its_range_is_refused_with_its_place(api: TestClient, cha
     assert error["message"]
 
 
+@pytest.mark.parametrize(
+    ("change", "pointer"),
+    [
+        ({"points": 4}, "/points"),
+        ({"points": "17"}, "/points"),
+        ({"evaluations": 10**9}, "/evaluations"),
+        ({"strategy": "random"}, "/strategy"),
+        ({"robot": "quadruppet"}, "/robot"),
+        ({"engine": "pybullet"}, "/engine"),
+        ({"tunables": ["static_friktion"]}, "/tunables/0"),
+        ({"tunables": [{"name": "static_friction", "lower": 0.9, "upper": 0.1}]}, "/tunables/0"),
+        ({"reality": {"parameters": {"grip": 1.0}}}, "/reality/parameters/grip"),
+    ],
+)
+def test_a_sensitivity_check_is_refused_where_an_experiment_would_be(
+    api: TestClient, change: dict[str, Any], pointer: str
+):
+    answer = api.post("/sensitivity", json={"robot": "toy_function"} | change)
+
+    assert only_error(answer)["pointer"] == pointer
+
+
+def test_an_unknown_check_and_the_misfit_of_an_unknown_experiment_are_not_found(api: TestClient):
+    for address in ("/sensitivity/nope", "/sensitivity/%00", "/experiments/nope/misfit"):
+        problem(api.get(address), 404)
+
+
 def test_numbers_that_json_does_not_have_come_back_as_text(api: TestClient):
     answer = api.post(
         "/experiments", content='{"strategy": "random", "seed": NaN, "iterations": -Infinity}', headers=JSON

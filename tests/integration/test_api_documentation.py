@@ -25,11 +25,14 @@ ENDPOINTS = {
     "GET /experiments/{id}/repetitions",
     "GET /experiments/{id}/samples",
     "GET /experiments/{id}/simulators",
+    "GET /experiments/{id}/misfit",
     "POST /experiments/{id}/cancel",
     "GET /experiments/{id}/curve",
     "GET /curves",
     "GET /comparisons",
     "GET /figures/curves",
+    "POST /sensitivity",
+    "GET /sensitivity/{id}",
     "GET /catalogue",
     "GET /livez",
     "GET /readyz",
@@ -110,10 +113,11 @@ def test_every_error_is_documented_as_a_problem(document: dict[str, Any]):
 def test_real_answers_fit_their_documented_schema(document: dict[str, Any], sqlite_store: Store):
     api = TestClient(create_app(sqlite_store))
     made = api.post("/studies", json={"robot": "toy_function", "budget": "smoke"}).json()
-    experiment = made["experiments"][0]["id"]
+    experiment = made["experiments"][0]
+    ids = {"studies": made["id"], "experiments": experiment["id"], "sensitivity": experiment["sensitivity"]}
     for name, operation in operations(document):
         if name.startswith("GET") and "{id}" in name:
-            path = name.split()[1].format(id=made["id"] if "/studies" in name else experiment)
+            path = name.split()[1].format(id=ids[name.split("/")[1]])
             schema = operation["responses"]["200"]["content"]["application/json"]["schema"]
             assert complaints(document, schema, api.get(path).json()) == [], name
 

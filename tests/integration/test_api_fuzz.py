@@ -103,6 +103,14 @@ def test_no_json_at_all_makes_the_service_fail(api: TestClient, spec: object):
 
 
 @FUZZ
+@given(spec=mutated_specs())
+def test_no_mutation_of_what_is_checked_makes_the_service_fail(api: TestClient, spec: dict[str, Any]):
+    spec.pop("strategy", None)
+    spec.pop("name", None)
+    is_accepted_or_refused(api, "/sensitivity", json.dumps(spec))
+
+
+@FUZZ
 @given(body=st.binary(max_size=50))
 def test_no_bytes_make_the_service_fail(api: TestClient, body: bytes):
     is_accepted_or_refused(api, "/experiments", body)

@@ -21,7 +21,10 @@ from api.cli import main
 from api.client import Client, ServiceError, ServiceUnreachable
 from api.exits import Exit
 from api.server import listen
-from services import execution
+from services import execution, sensitivity
+from services.core.optimizers.steady_state import SteadyState
+from services.core.sensitivity import Effort, check
+from services.simulation import subject
 from services.store.session import Store
 from tests.experiments import run, some_log
 
@@ -190,6 +193,72 @@ def test_the_catalogue_lists_every_kind_of_plug_in(gaplab: Gaplab):
     assert all(
         name in said for name in ("simulated_fit_and_unique", "quadruped", "pybullet", "restitution", "steady_state")
     )
+
+
+def checked(store: Store) -> None:
+    """Run the check that is queued, as soon as one is."""
+    while (claim := sensitivity.claim(store, "test")) is None:
+        time.sleep(0.05)
+    sensitivity.complete(store, claim, check(subject(claim.spec), SteadyState(), Effort(17, 100)))
+
+
+DULL = {
+    "name": "dull",
+    "strategies": ["random"],
+    "robot": "toy_function",
+    "budget": "smoke",
+    "tunables": ["static_friction", {"name": "restitution", "lower": 0.3, "upper": 0.3001}],
+}
+
+
+def test_sensitivity_waits_for_a_table_and_warns(gaplab: Gaplab, sqlite_store: Store):
+    worker = threading.Thread(target=checked, args=(sqlite_store,))
+    worker.start()
+    said = gaplab("sensitivity", "-", stdin=json.dumps(DULL))
+    worker.join()
+
+    assert said.code == 0
+    assert re.search(r"^ *static_friction +0 to 1.5 .* smooth *$", said.out, re.MULTILINE)
+    assert re.search(r"^ *restitution +0.3 to 0.3001 .* nothing *$", said.out, re.MULTILINE)
+    assert "restitution over 0.3 to 0.3001 does nothing" in said.out
+
+
+def test_a_sensitivity_check_that_failed_is_a_sentence(gaplab: Gaplab, sqlite_store: Store):
+    def fail() -> None:
+        while (claim := sensitivity.claim(sqlite_store, "test")) is None:
+            time.sleep(0.05)
+        sensitivity.fail(sqlite_store, claim, "ValueError: no legs")
+
+    worker = threading.Thread(target=fail)
+    worker.start()
+    said = gaplab("sensitivity", SMOKE)
+    worker.join()
+
+    assert said.code == Exit.FAILED
+    assert re.fullmatch(r"gaplab: the check \w+ ended as FAILED: ValueError: no legs\n", said.err)
+
+
+def test_mistakes_in_what_is_to_be_checked_are_sentences(gaplab: Gaplab):
+    said = gaplab("sensitivity", "-", stdin='{"robot": "quadruppet", "points": 1}')
+
+    assert said.code == Exit.INVALID
+    assert said.err.startswith("gaplab: /points: ")
+
+
+def test_show_tells_warnings_and_misfit(gaplab: Gaplab, sqlite_store: Store):
+    small = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 3}
+    tunables = ["static_friction", {"name": "restitution", "lower": 0.3, "upper": 0.3001}]
+    id = gaplab("submit", "-", stdin=json.dumps(small | {"tunables": tunables})).out.strip()  # noqa: A001
+    checked(sqlite_store)
+    before = gaplab("show", id)
+    finish(sqlite_store)
+
+    after = gaplab("show", id)
+
+    assert "warning: restitution over 0.3 to 0.3001 does nothing" in before.err
+    assert "the best simulators err by" not in before.out
+    assert "at 2 real-world evaluations the best simulators err by" in after.out
+    assert re.search(r"^ *static_friction +0.1±0 ", after.out, re.MULTILINE)
 
 
 def test_no_service_is_a_sentence_that_says_how_to_start_one(gaplab: Gaplab):

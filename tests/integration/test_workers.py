@@ -10,17 +10,21 @@ import pytest
 import ray
 
 from schemas.lifecycle import State
+from schemas.sensitivity import SensitivitySpec, Verdict
 from schemas.spec import ExperimentSpec
-from services import execution, experiments
+from services import execution, experiments, sensitivity
 from services.core.errors import StoreUnavailable
 from services.core.loop import repetition
+from services.core.optimizers.steady_state import SteadyState
+from services.core.sensitivity import Effort, check
 from services.resolution import resolve_experiment
 from services.settings import Settings
-from services.simulation import setting
+from services.simulation import setting, subject
 from services.store.models import RepetitionRow
 from services.store.repository.steps import logs
 from tests.fakes import flat
 from workers import repetition as task
+from workers import sensitivity as checking
 from workers.cluster import cluster
 from workers.supervisor import Supervisor
 
@@ -74,9 +78,26 @@ def stored(store, experiment):
 
 
 def workers_of_ray():
-    """Processes that run a repetition now."""
-    names = ((int(path.name), (path / "cmdline")) for path in Path("/proc").glob("[0-9]*"))
-    return [pid for pid, name in names if name.exists() and name.read_bytes().startswith(b"ray::run")]
+    """Processes that run a repetition now, of the Ray that this test started."""
+    return [pid for pid, name in processes() if name.startswith(b"ray::run") and is_ours(pid)]
+
+
+def processes():
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            yield int(path.name), (path / "cmdline").read_bytes()
+        except OSError:  # it has ended
+            continue
+
+
+def is_ours(pid):
+    """Whether the process descends from this one."""
+    while pid > 1 and pid != os.getpid():
+        try:
+            pid = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            return False
+    return pid == os.getpid()
 
 
 @pytest.mark.parametrize("at_once", [1, 2, 4])
@@ -184,3 +205,88 @@ def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_sto
 
     assert experiments.read_experiment(sqlite_store, experiment).state is State.COMPLETED
     assert stored(sqlite_store, experiment) == expected(toy())
+
+
+def checked(store, check, supervisor):
+    deadline = time.monotonic() + DEADLINE_S
+    while not sensitivity.read(store, check).state.ended:
+        assert time.monotonic() < deadline
+        supervisor.step()
+    return sensitivity.read(store, check)
+
+
+def test_a_sensitivity_check_runs_beside_repetitions_and_tells_the_same_as_in_one_process(store):
+    experiment = experiments.submit_experiment(store, toy())
+    supervisor = Supervisor(store, 1)
+
+    found = checked(store, experiment.sensitivity, supervisor)
+    run(supervisor, store, experiment.id)
+
+    assert found.tunables == check(subject(found.spec), SteadyState(), Effort(17, 100))
+    assert experiments.read_experiment(store, experiment.id).state is State.COMPLETED
+    assert stored(store, experiment.id) == expected(toy())
+
+
+def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store, monkeypatch):
+    @ray.remote(num_cpus=0, max_retries=0)
+    def raising(spec):
+        msg = "the check is broken"
+        raise ZeroDivisionError(msg)
+
+    monkeypatch.setattr(checking, "check", raising)
+    experiment = experiments.submit_experiment(sqlite_store, toy())
+    supervisor = Supervisor(sqlite_store, 2)
+
+    found = checked(sqlite_store, experiment.sensitivity, supervisor)
+    run(supervisor, sqlite_store, experiment.id)
+
+    assert (found.state, found.reason) == (State.FAILED, "ZeroDivisionError: the check is broken")
+    read = experiments.read_experiment(sqlite_store, experiment.id)
+    assert read.state is State.COMPLETED
+    assert read.warnings[0].endswith("ZeroDivisionError: the check is broken")
+
+
+@ray.remote(num_cpus=0, max_retries=0)
+def killed_once(spec, mark):
+    if not os.path.exists(mark):
+        Path(mark).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return check(subject(spec), SteadyState(), Effort(spec.points, spec.evaluations))
+
+
+def test_a_sensitivity_check_whose_worker_is_killed_runs_again(sqlite_store, monkeypatch, tmp_path):
+    monkeypatch.setattr(checking.check, "remote", lambda spec: killed_once.remote(spec, str(tmp_path / "killed")))
+    check_id = experiments.submit_experiment(sqlite_store, toy()).sensitivity
+
+    found = checked(sqlite_store, check_id, Supervisor(sqlite_store, 2))
+
+    assert (tmp_path / "killed").exists()
+    assert found.state is State.COMPLETED
+    assert {each.verdict for each in found.tunables} == {Verdict.SMOOTH}
+
+
+def test_a_supervisor_that_is_told_to_stop_hands_its_check_to_the_next(sqlite_store, monkeypatch):
+    check_id = experiments.submit_experiment(sqlite_store, toy()).sensitivity
+    first, stop = Supervisor(sqlite_store, 2), Event()
+    first.step()
+    states = [sensitivity.read(sqlite_store, check_id).state]
+    stop.set()
+
+    first.serve(stop)
+    states.append(sensitivity.read(sqlite_store, check_id).state)
+
+    assert states == [State.RUNNING, State.QUEUED]
+    assert checked(sqlite_store, check_id, Supervisor(sqlite_store, 2)).state is State.COMPLETED
+
+
+def test_a_check_that_was_taken_over_is_dropped(sqlite_store):
+    check_id = sensitivity.submit(sqlite_store, SensitivitySpec(robot="toy_function")).id
+    checks = checking.Checks(sqlite_store, "first")
+    checks.step()
+
+    sensitivity.requeue_lost(sqlite_store, stale_after_s=0)
+    sensitivity.claim(sqlite_store, "second")
+    checks.heartbeat()
+    checks.step()
+
+    assert sensitivity.read(sqlite_store, check_id).state is State.RUNNING

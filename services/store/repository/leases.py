@@ -93,13 +93,13 @@ def complete(session: Session, claim: Claim) -> bool:
 def fail(session: Session, claim: Claim, reason: str) -> bool:
     """The repetition FAILED for a reason; False if the claim holds no more."""
     lock(session, [claim.experiment_id])
-    return _end(session, claim, State.FAILED, _plain(reason))
+    return _end(session, claim, State.FAILED, plain(reason))
 
 
 def release(session: Session, claim: Claim, reason: str) -> bool:
     """The repetition QUEUED again, for its worker was lost; False if the claim holds no more."""
     lock(session, [claim.experiment_id])
-    return bool(_give_back(session, mine(claim), [claim.experiment_id], _plain(reason)))
+    return bool(_give_back(session, mine(claim), [claim.experiment_id], plain(reason)))
 
 
 def hand_back(session: Session, claim: Claim) -> bool:
@@ -189,7 +189,7 @@ def _end(session: Session, claim: Claim, state: State, reason: str | None) -> bo
     return ended is not None
 
 
-def _plain(reason: str) -> str:
+def plain(reason: str) -> str:
     """The reason in characters that any database stores, whatever the message of an exception had."""
     return reason.encode(errors="replace").decode().replace("\0", "?")
 

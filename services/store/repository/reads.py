@@ -10,6 +10,7 @@ from schemas.records import ExperimentRead, RepetitionRead, StudyRead
 from services.store.models import ExperimentRow, RepetitionRow, StudyRow
 from services.store.repository.experiments import experiments_of, open_studies
 from services.store.repository.progress import Tally, reasons, tallies
+from services.store.repository.sensitivity import Warned, warned
 
 
 def read_experiments(session: Session, rows: Sequence[ExperimentRow]) -> tuple[ExperimentRead, ...]:
@@ -19,13 +20,14 @@ def read_experiments(session: Session, rows: Sequence[ExperimentRow]) -> tuple[E
     reality, and what one of them shows is known of all.
     """
     ids = [row.id for row in rows]
-    progress, failed = tallies(session, ids), reasons(session, ids)
+    progress, failed, warnings = tallies(session, ids), reasons(session, ids), warned(session, rows)
     secret = open_studies(session, [row.study_id for row in rows if row.study_id])
     return tuple(
         _experiment(
             row,
             progress.get(row.id, Tally()),
             failed.get(row.id, ()),
+            warnings.get(row.id, Warned()),
             secret=not row.state.ended or row.study_id in secret,
         )
         for row in rows
@@ -62,7 +64,9 @@ def state_of(states: Collection[State]) -> State:
     return State.QUEUED if all(each is State.QUEUED for each in states) else State.RUNNING
 
 
-def _experiment(row: ExperimentRow, tally: Tally, failed: tuple[str, ...], *, secret: bool) -> ExperimentRead:
+def _experiment(
+    row: ExperimentRow, tally: Tally, failed: tuple[str, ...], warned: Warned, *, secret: bool
+) -> ExperimentRead:
     return ExperimentRead(
         id=row.id,
         study=row.study_id,
@@ -72,6 +76,8 @@ def _experiment(row: ExperimentRow, tally: Tally, failed: tuple[str, ...], *, se
         spec=_without_truth(row.spec) if secret else row.spec,
         progress=tally.progress(),
         reasons=failed,
+        sensitivity=warned.check,
+        warnings=warned.warnings,
         created_at=row.created_at,
         started_at=row.started_at,
         ended_at=row.ended_at,

@@ -1,6 +1,7 @@
 """Samples, simulators and recorded fitnesses, as they are shown."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from sqlalchemy import case, select, tuple_
 from sqlalchemy.orm import Session
@@ -100,3 +101,61 @@ def recorded(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str
         .where(RepetitionRow.experiment_id.in_(experiments), row.recorded_fitness.is_not(None))
     )
     return session.execute(query).all()
+
+
+@dataclass(frozen=True)
+class Best:
+    """The best simulator of one iteration, and the controller that was evolved in it.
+
+    Attributes:
+        squared_error: None where its physics failed on a sample.
+        simulated: the controller's fitness in it; None if there is none.
+        real: the controller's fitness in reality; None if there is none.
+    """
+
+    repetition: int
+    iteration: int
+    parameters: list[float]
+    squared_error: float | None
+    simulated: float | None
+    real: float | None
+
+
+def best_simulators(session: Session, experiment: str) -> tuple[Best, ...]:
+    """The best simulator of every iteration of every repetition that has one."""
+    row, found, probe = IterationRow, SimulatorRow, MeasurementRow
+    query = (
+        select(
+            RepetitionRow.number,
+            row.number,
+            found.parameters,
+            found.squared_error,
+            row.simulated_fitness,
+            probe.fitness,
+        )
+        .join(RepetitionRow, RepetitionRow.id == row.repetition_id)
+        .join(found, (found.repetition_id == row.repetition_id) & (found.iteration == row.number) & (found.rank == 0))
+        .outerjoin(
+            probe,
+            (probe.repetition_id == row.repetition_id)
+            & (probe.iteration == row.number)
+            & (probe.kind == MeasurementKind.PROBE),
+        )
+        .where(RepetitionRow.experiment_id == experiment)
+        .order_by(RepetitionRow.number, row.number)
+    )
+    return tuple(Best(*each) for each in session.execute(query))
+
+
+def measured(session: Session, experiment: str) -> dict[int, list[int]]:
+    """By repetition, the iterations whose sample has a fitness: those that simulators are tuned on."""
+    row = MeasurementRow
+    query = (
+        select(RepetitionRow.number, row.iteration)
+        .join(RepetitionRow, RepetitionRow.id == row.repetition_id)
+        .where(RepetitionRow.experiment_id == experiment, row.kind == MeasurementKind.SAMPLE, row.fitness.is_not(None))
+    )
+    gathered: dict[int, list[int]] = {}
+    for repetition, iteration in session.execute(query):
+        gathered.setdefault(repetition, []).append(iteration)
+    return gathered

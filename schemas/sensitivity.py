@@ -1,0 +1,81 @@
+"""The sensitivity check: what each tunable does to fitness, before anything is tuned."""
+
+from datetime import datetime
+from enum import StrEnum
+from typing import Annotated
+
+from pydantic import Field
+
+from schemas.base import Count, Frozen
+from schemas.lifecycle import State
+from schemas.plugin import PluginRef, TunableRef
+from schemas.spec import Settings
+
+POINTS, EVALUATIONS = 17, 100
+
+
+class Verdict(StrEnum):
+    """What a check says of a tunable; `unknown` where physics failed too often to say."""
+
+    NOTHING = "nothing"
+    ROUGH = "rough"
+    SMOOTH = "smooth"
+    UNKNOWN = "unknown"
+
+
+class SensitivitySpec(Settings):
+    """The settings of an experiment; of them, robot, engine and tunables are what is checked."""
+
+    points: Annotated[Count, Field(ge=5, le=1_001)] = Field(
+        default=POINTS, description="values of each tunable; eight controllers are simulated at each"
+    )
+    evaluations: Annotated[Count, Field(ge=20, le=100_000)] = Field(
+        default=EVALUATIONS, description="of the short evolution of each of four of these controllers"
+    )
+
+
+class Checked(Frozen):
+    """What is checked, with nothing left out."""
+
+    robot: PluginRef
+    engine: PluginRef
+    tunables: tuple[TunableRef, ...]
+    points: int = POINTS
+    evaluations: int = EVALUATIONS
+
+
+class Sensitivity(Frozen):
+    """What one tunable does to fitness over its bounds, the others in the middle of theirs."""
+
+    name: str
+    effect: float | None = Field(
+        description="standard deviation of fitness along the profile, in its unit; null where physics failed too often"
+    )
+    relative_effect: float | None = Field(
+        description="the effect over the standard deviation of fitness between controllers"
+    )
+    roughness: float | None = Field(
+        description="the part of the effect that jumps from value to value, over the effect: 0 smooth, 1 noise"
+    )
+    failures: int = Field(description="rollouts along the profile whose physics failed (nan)")
+    verdict: Verdict
+    values: tuple[float, ...] = Field(description="of the tunable")
+    fitness: tuple[tuple[float | None, ...], ...] = Field(
+        description="a row for each controller, at each value: the known one, random ones, evolved ones"
+    )
+
+
+class SensitivityRead(Frozen):
+    """A sensitivity check; its id is that of what is checked, so that the same is checked once."""
+
+    id: str
+    state: State
+    spec: Checked
+    rollouts: int = Field(description="that the check takes at most")
+    unit: str = Field(description="of fitness")
+    tunables: tuple[Sensitivity, ...] = Field(default=(), description="once it is COMPLETED")
+    warnings: tuple[str, ...] = ()
+    reason: str | None = Field(default=None, description="why it failed, or was last queued again")
+    created_at: datetime
+    started_at: datetime | None = None
+    ended_at: datetime | None = None

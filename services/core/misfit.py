@@ -1,0 +1,131 @@
+"""Misfit after tuning: what error remains, how far simulators agree when tuning is repeated, what is stuck at a bound.
+
+An error that remains in every repetition, though its spread over them is small, is not bad luck in tuning: no setting
+of the tunables fits. A coefficient whose spread is as wide as that of random simulators has not been found; one at its
+bound may want to go further, or make up for something that no tunable says.
+
+Source: gaplab.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.misfit import MisfitPoint, Spread, TunedSpread
+from services.core.arrays import FloatArray
+from services.core.types import Space
+
+AT_BOUND = 0.01
+"""So near a bound, in units of the bounds' distance, is at it."""
+
+OFTEN = 0.5
+"""A coefficient that is at one bound in this share of repetitions is remarked on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tuning:
+    """The best simulator of one iteration of one repetition.
+
+    Attributes:
+        parameters: `(p,)`.
+        squared_error: over its samples; inf where the physics failed on one.
+        samples: that it was tuned on.
+        simulated: fitness, in it, of the controller evolved in it; nan if there is none yet.
+        real: fitness of the same in reality; nan if there is none yet.
+    """
+
+    parameters: FloatArray
+    squared_error: float
+    samples: int
+    simulated: float
+    real: float
+
+    @property
+    def error(self) -> float:
+        """√(Σe² / samples); nan without samples, or where the physics failed."""
+        if not self.samples or not np.isfinite(self.squared_error):
+            return float("nan")
+        return float(np.sqrt(self.squared_error / self.samples))
+
+
+def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str], space: Space) -> MisfitPoint:
+    """What the repetitions that got to an iteration have found there.
+
+    Args:
+        iteration: its number.
+        tunings: of these repetitions; none may be there.
+        names: `(p,)` of the tunables.
+        space: of the tunables.
+    """
+    parameters = np.array([each.parameters for each in tunings]).reshape(-1, space.size)
+    return MisfitPoint(
+        iteration=iteration,
+        error=Spread.model_validate(_spread([each.error for each in tunings])),
+        gap=Spread.model_validate(_spread([abs(each.simulated - each.real) for each in tunings])),
+        tunables=tuple(
+            _tuned(name, parameters[:, index], float(space.lower[index]), float(space.upper[index]))
+            for index, name in enumerate(names)
+        ),
+    )
+
+
+def remarks(points: Sequence[MisfitPoint], unit: str) -> tuple[str, ...]:
+    """The latest point that has an error, in sentences; nothing before the first sample."""
+    with_error = [each for each in points if each.error.n]
+    if not with_error:
+        return ()
+    last, first = with_error[-1], points[0]
+    stuck = [sentence for each in last.tunables for sentence in _stuck(each)]
+    return (_remaining(last, unit), *_gaps(first, last, unit), *stuck)
+
+
+def _tuned(name: str, values: FloatArray, lower: float, upper: float) -> TunedSpread:
+    near = AT_BOUND * (upper - lower)
+    at_lower = float((values <= lower + near).mean()) if len(values) else None
+    at_upper = float((values >= upper - near).mean()) if len(values) else None
+    return TunedSpread.model_validate(
+        {"name": name, "lower": lower, "upper": upper, "at_lower": at_lower, "at_upper": at_upper} | _spread(values)
+    )
+
+
+def _spread(values: Sequence[float] | FloatArray) -> dict[str, float | int | None]:
+    """As `Spread` has it, over the finite values."""
+    there = np.asarray(values, dtype=np.float64)
+    there = there[np.isfinite(there)]
+    return {
+        "n": len(there),
+        "mean": float(there.mean()) if len(there) else None,
+        "sd": float((there - there.min()).std(ddof=1)) if len(there) > 1 else None,  # exactly 0 if all are equal
+        "least": float(there.min()) if len(there) else None,
+        "greatest": float(there.max()) if len(there) else None,
+    }
+
+
+def _remaining(point: MisfitPoint, unit: str) -> str:
+    error = point.error
+    spread = f"SD {error.sd:.2g}, " if error.sd is not None else ""
+    return (
+        f"at {_many(point.iteration, 'real-world evaluation')} the best simulators err by {error.mean:.2g} {unit} "
+        f"a sample ({spread}{error.least:.2g} to {error.greatest:.2g} over {_many(error.n, 'repetition')})"
+    )
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def _gaps(first: MisfitPoint, last: MisfitPoint, unit: str) -> tuple[str, ...]:
+    if last.gap.mean is None:
+        return ()
+    before = f", and by {first.gap.mean:.2g} before tuning" if first.gap.mean is not None and first is not last else ""
+    return (f"the controller evolved in them differs by {last.gap.mean:.2g} {unit} in reality{before}",)
+
+
+def _stuck(tuned: TunedSpread) -> tuple[str, ...]:
+    sides = (("lower", tuned.lower, tuned.at_lower), ("upper", tuned.upper, tuned.at_upper))
+    return tuple(
+        f"{tuned.name} is at its {side} bound, {bound:g}, in {100 * share:.0f} % of {_many(tuned.n, 'repetition')}"
+        for side, bound, share in sides
+        if share is not None and share >= OFTEN
+    )

@@ -1,0 +1,86 @@
+"""Misfit from stored results, on both databases."""
+
+import pytest
+
+from services import execution, experiments
+from services.core.errors import NotFound
+from services.core.types import Measured, Sample, Selected, Simulator, Transferred, Tuned
+from services.misfit import misfit
+from tests.experiments import run, some_log, toy
+
+SECRET = 0.987654321
+
+
+def test_the_misfit_is_that_of_the_best_simulator_of_each_repetition(store):
+    experiment = experiments.submit_experiment(store, toy(repetitions=2)).id
+    for claim in execution.claim(store, "me", 2):
+        run(store, claim)
+
+    found = misfit(store, experiment)
+
+    assert (found.experiment, found.unit) == (experiment, "m/s")
+    assert [(each.iteration, each.error.n) for each in found.points] == [(0, 0), (1, 0), (2, 2)]
+    last = found.points[-1]
+    assert last.error.mean == pytest.approx(1e-150)  # of one sample: the other measurement failed
+    assert (last.tunables[0].name, last.tunables[0].mean, last.tunables[0].upper) == ("static_friction", 0.1, 1.5)
+    assert [each.gap.n for each in found.points] == [2, 0, 0]  # it failed in reality, then in simulation
+    assert found.points[0].gap.mean == pytest.approx(1 / 3)
+    assert found.remarks[0].startswith("at 2 real-world evaluations the best simulators err by 1e-150 m/s a sample")
+
+
+def test_repetitions_that_are_under_way_count_as_far_as_they_are(store):
+    experiment = experiments.submit_experiment(store, toy(repetitions=2)).id
+    first, second = execution.claim(store, "me", 2)
+    run(store, first)
+    for step in list(some_log())[:6]:  # up to the tuning of iteration 1
+        execution.record(store, second, step)
+
+    found = misfit(store, experiment)
+
+    assert [each.tunables[0].n for each in found.points] == [2, 2, 1]
+
+
+def test_a_coefficient_at_its_bound_is_remarked_on(store):
+    experiment = experiments.submit_experiment(store, toy(repetitions=1, iterations=1)).id
+    (claim,) = execution.claim(store, "me", 1)
+    simulators = (Simulator([1.5, 0.7], 0.04),)
+    log = [
+        *some_log(0),
+        Selected(1, [0.5]),
+        Measured(1, Sample([0.5], 0.3)),
+        Tuned(1, simulators),
+        Transferred(1, [0.1], 0.5),
+    ]
+    for step in log:
+        execution.record(store, claim, step)
+
+    found = misfit(store, experiment)
+
+    assert found.remarks == (
+        "at 1 real-world evaluation the best simulators err by 0.2 m/s a sample (0.2 to 0.2 over 1 repetition)",
+        "static_friction is at its upper bound, 1.5, in 100 % of 1 repetition",
+    )
+
+
+def test_an_experiment_without_results_has_no_misfit_yet_and_the_direct_baseline_never(store):
+    waiting = experiments.submit_experiment(store, toy()).id
+    execution.claim(store, "me", 9)
+    direct = experiments.submit_experiment(store, toy(strategy="direct", repetitions=1)).id
+    (claim,) = execution.claim(store, "me", 9)
+    run(store, claim, some_log(iterations=0))
+
+    for each in (waiting, direct):
+        assert (misfit(store, each).points, misfit(store, each).remarks) == ((), ())
+
+
+def test_nothing_of_reality_is_shown(store):
+    spec = toy(repetitions=1, reality={"parameters": {"static_friction": SECRET}})
+    experiment = experiments.submit_experiment(store, spec).id
+    run(store, execution.claim(store, "me", 1)[0])
+
+    assert str(SECRET) not in misfit(store, experiment).model_dump_json()
+
+
+def test_the_misfit_of_an_unknown_experiment_is_not_found(store):
+    with pytest.raises(NotFound, match="no-such"):
+        misfit(store, "no-such")

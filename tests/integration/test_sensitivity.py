@@ -1,0 +1,220 @@
+"""Sensitivity checks in the store: queued with experiments, run under a lease, told as warnings; on both databases."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from schemas.lifecycle import State
+from schemas.sensitivity import Sensitivity, SensitivitySpec, Verdict
+from schemas.spec import StudySpec
+from services import execution, experiments, sensitivity
+from services.core.errors import InvalidSpec, NotFound
+from services.core.optimizers.steady_state import SteadyState
+from services.core.sensitivity import Effort, check
+from services.resolution import resolve_sensitivity
+from services.simulation import subject
+from services.store.models import SensitivityRow
+from services.store.repository.leases import MAX_LOSSES
+from tests.experiments import toy
+
+SECRET = 0.987654321
+
+
+def settings(**changes):
+    small = {"robot": "toy_function", "tunables": ["static_friction", "dynamic_friction"]}
+    return SensitivitySpec.model_validate(small | changes)
+
+
+def shown(verdict, name="grip", effect=0.001):
+    return Sensitivity(
+        name=name,
+        effect=0.1,
+        relative_effect=effect,
+        roughness=0.7,
+        failures=0,
+        verdict=verdict,
+        values=(0.0, 1.5),
+        fitness=((0.1, None),),
+    )
+
+
+def checks(store):
+    with store.reading() as session:
+        return [row.id for row in session.query(SensitivityRow)]
+
+
+def test_submitting_an_experiment_queues_a_check_of_what_it_tunes(store):
+    experiment = experiments.submit_experiment(store, toy())
+
+    found = sensitivity.read(store, experiment.sensitivity)
+
+    assert found.state is State.QUEUED
+    assert found.spec.robot.name == "toy_function"
+    assert [(each.name, each.upper) for each in found.spec.tunables] == [
+        ("static_friction", 1.5),
+        ("dynamic_friction", 1.5),
+    ]
+    assert found.rollouts == 8 * 2 * 17 + 4 * 100
+    assert (found.unit, found.tunables, found.warnings) == ("m/s", (), ())
+
+
+def test_the_same_robot_engine_and_tunables_are_checked_once(store):
+    first = experiments.submit_experiment(store, toy())
+    second = experiments.submit_experiment(
+        store, toy(strategy="random", seed=7, budget="desk", reality={"parameters": {"static_friction": SECRET}})
+    )
+    asked = sensitivity.submit(store, settings(seed=3))
+    narrower = experiments.submit_experiment(store, toy(tunables=[{"name": "static_friction", "upper": 1.0}]))
+    finer = sensitivity.submit(store, settings(points=33))
+
+    assert first.sensitivity == second.sensitivity == asked.id
+    assert set(checks(store)) == {asked.id, narrower.sensitivity, finer.id}
+    assert len(checks(store)) == 3
+    assert str(SECRET) not in sensitivity.read(store, asked.id).model_dump_json()
+
+
+def test_a_study_has_one_check_and_the_direct_baseline_alone_has_none(store):
+    common = toy().model_dump(exclude={"strategy", "name"})
+    study = experiments.submit_study(store, StudySpec.model_validate(common | {"strategies": ["random", "direct"]}))
+
+    strategies = {each.strategy: each.sensitivity for each in study.experiments}
+
+    assert strategies == {"random": checks(store)[0], "direct": None}
+    other = experiments.submit_experiment(store, toy(strategy="direct", tunables=["restitution"]))
+    assert other.sensitivity is None
+    assert len(checks(store)) == 1
+
+
+def test_experiments_that_are_submitted_at_once_share_a_check(store):
+    with ThreadPoolExecutor(4) as pool:
+        submitted = list(pool.map(lambda seed: experiments.submit_experiment(store, toy(seed=seed)), range(8)))
+
+    assert len({each.sensitivity for each in submitted}) == len(checks(store)) == 1
+
+
+def test_what_a_check_finds_is_shown_and_warns_the_experiments(store):
+    experiment = experiments.submit_experiment(store, toy()).id
+    claim = sensitivity.claim(store, "me")
+    found = check(subject(claim.spec), SteadyState(), Effort(claim.spec.points, claim.spec.evaluations))
+
+    assert sensitivity.complete(store, claim, (*found, shown(Verdict.NOTHING), shown(Verdict.ROUGH, "slip", 0.5)))
+
+    read = sensitivity.read(store, claim.id)
+    assert read.state is State.COMPLETED
+    assert read.tunables[:2] == found
+    assert read.warnings == (
+        "grip over 0 to 1.5 does nothing: it changes fitness by 0.1 % of what controllers differ by",
+        "slip over 0 to 1.5 is rough: 70 % of what it does to fitness jumps from value to value",
+    )
+    assert experiments.read_experiment(store, experiment).warnings == read.warnings
+    assert experiments.list_experiments(store).items[0].warnings == read.warnings
+
+
+def test_the_toys_tunables_are_smooth_and_warn_of_nothing(store):
+    experiment = experiments.submit_experiment(store, toy(tunables=["static_friction", "restitution"])).id
+    claim = sensitivity.claim(store, "me")
+    found = check(subject(claim.spec), SteadyState(), Effort(claim.spec.points, claim.spec.evaluations))
+
+    sensitivity.complete(store, claim, found)
+
+    assert {each.verdict for each in found} == {Verdict.SMOOTH}
+    assert experiments.read_experiment(store, experiment).warnings == ()
+
+
+def test_a_tunable_between_bounds_too_narrow_to_matter_does_nothing():
+    spec = settings(tunables=["static_friction", {"name": "restitution", "lower": 0.3, "upper": 0.301}])
+
+    _, narrow = check(subject(resolve_sensitivity(spec)), SteadyState(), Effort(17, 100))
+
+    assert narrow.verdict is Verdict.NOTHING
+
+
+def test_a_failed_check_fails_no_experiment_and_says_why(store):
+    experiment = experiments.submit_experiment(store, toy()).id
+    claim = sensitivity.claim(store, "me")
+
+    assert sensitivity.fail(store, claim, "ValueError: nul\0")
+
+    found = experiments.read_experiment(store, experiment)
+    assert found.state is State.QUEUED
+    assert found.warnings == (
+        "the sensitivity check failed, so that nothing is known of the tunables: ValueError: nul?",
+    )
+    assert len(execution.claim(store, "me", 9)) == 3
+
+
+def test_a_failed_check_is_queued_again_when_it_is_asked_for_again(store):
+    check_id = sensitivity.submit(store, settings()).id
+    sensitivity.fail(store, sensitivity.claim(store, "me"), "out of luck")
+
+    again = sensitivity.submit(store, settings())
+
+    assert (again.id, again.state, again.reason, again.ended_at) == (check_id, State.QUEUED, None, None)
+    assert sensitivity.claim(store, "me").epoch == 2
+
+
+def test_a_check_is_claimed_once_the_oldest_first(store):
+    first, second = (sensitivity.submit(store, settings(points=points)).id for points in (20, 21))
+
+    with ThreadPoolExecutor(4) as pool:
+        claims = [each for each in pool.map(lambda owner: sensitivity.claim(store, owner), "abcd") if each]
+
+    assert sorted(each.id for each in claims) == sorted([first, second])
+    assert sensitivity.claim(store, "me") is None
+    assert {sensitivity.read(store, each).state for each in (first, second)} == {State.RUNNING}
+
+
+def test_a_lost_check_is_queued_again_and_its_old_holder_can_write_no_more(store):
+    check_id = sensitivity.submit(store, settings()).id
+    old = sensitivity.claim(store, "first")
+
+    assert sensitivity.requeue_lost(store) == 0
+    assert sensitivity.heartbeat(store, old)
+    assert sensitivity.requeue_lost(store, stale_after_s=0) == 1
+    new = sensitivity.claim(store, "second")
+
+    assert not sensitivity.heartbeat(store, old)
+    assert not sensitivity.complete(store, old, (shown(Verdict.NOTHING),))
+    assert not sensitivity.fail(store, old, "late")
+    assert not sensitivity.release(store, old, "late")
+    assert sensitivity.complete(store, new, ())
+    assert sensitivity.read(store, check_id).state is State.COMPLETED
+
+
+def test_a_check_that_loses_its_worker_again_and_again_is_what_kills_them(store):
+    check_id = sensitivity.submit(store, settings()).id
+
+    for _ in range(MAX_LOSSES):
+        assert sensitivity.release(store, sensitivity.claim(store, "me"), "killed")
+
+    found = sensitivity.read(store, check_id)
+    assert (found.state, found.reason) == (State.FAILED, "lost 5 times; the last time killed")
+    assert sensitivity.claim(store, "me") is None
+
+
+def test_a_check_that_is_handed_back_is_queued_as_if_it_had_not_been_claimed(store):
+    check_id = sensitivity.submit(store, settings()).id
+
+    assert sensitivity.hand_back(store, sensitivity.claim(store, "me"))
+
+    assert sensitivity.read(store, check_id).state is State.QUEUED
+    assert sensitivity.claim(store, "me").id == check_id
+
+
+@pytest.mark.parametrize("name", ["no-such", "", "nul\0", "'; DROP TABLE sensitivity; --"])
+def test_an_unknown_check_is_not_found(store, name):
+    with pytest.raises(NotFound) as caught:
+        sensitivity.read(store, name)
+
+    assert repr(name) in str(caught.value)
+
+
+def test_settings_that_no_experiment_could_have_are_refused_with_every_violation(store):
+    with pytest.raises(InvalidSpec) as caught:
+        sensitivity.submit(store, settings(engine="pybullet", tunables=["grip"], optimizer="no_such"))
+
+    assert {each.pointer for each in caught.value.violations} == {"/optimizer"}
+    with pytest.raises(InvalidSpec) as caught:
+        sensitivity.submit(store, settings(tunables=["grip", {"name": "restitution", "upper": 7.0}]))
+    assert {each.pointer for each in caught.value.violations} == {"/tunables/0", "/tunables/1/upper"}
+    assert checks(store) == []

@@ -1,0 +1,86 @@
+"""Sensitivity checks at Ray: one at a time, beside the repetitions, and never in their way."""
+
+import logging
+from time import monotonic
+
+import ray
+from ray import ObjectRef
+from ray.exceptions import RayError, RayTaskError
+
+from schemas.sensitivity import Checked, Sensitivity
+from services import sensitivity
+from services.core.optimizers.steady_state import SteadyState
+from services.core.sensitivity import Effort
+from services.core.sensitivity import check as check_tunables
+from services.sensitivity import CheckClaim
+from services.simulation import subject
+from services.store.session import Store
+
+LOOK_S = 0.2
+"""Between looks for a check that is queued."""
+
+log = logging.getLogger("gaplab.supervisor")
+
+
+@ray.remote(num_cpus=0, max_retries=0)
+def check(checked: Checked) -> tuple[Sensitivity, ...]:
+    """What each tunable does to fitness.
+
+    It reserves no core: it takes seconds, and what it says is wanted before hours of physics, not after them.
+    """
+    return check_tunables(subject(checked), SteadyState(), Effort(checked.points, checked.evaluations))
+
+
+class Checks:
+    """The sensitivity checks of one supervisor.
+
+    Args:
+        store: the database.
+        owner: the supervisor's name in it.
+
+    All methods raise StoreUnavailable; nothing is lost by it.
+    """
+
+    def __init__(self, store: Store, owner: str) -> None:
+        self._store = store
+        self._owner = owner
+        self._run: tuple[CheckClaim, ObjectRef[tuple[Sensitivity, ...]]] | None = None
+        self._looked = -LOOK_S
+
+    def step(self) -> None:
+        """Store what has ended, and start what is queued."""
+        if self._run is not None:
+            self._end(*self._run)
+        elif monotonic() - self._looked >= LOOK_S:
+            self._looked = monotonic()
+            self._claim()
+
+    def heartbeat(self) -> None:
+        """Hold on to the check that runs, or stop it if it is no longer ours; requeue those that others have lost."""
+        if self._run is not None and not sensitivity.heartbeat(self._store, self._run[0]):
+            ray.cancel(self._run[1], force=True)
+            self._run = None
+        sensitivity.requeue_lost(self._store)
+
+    def hand_back(self) -> None:
+        """Give the unfinished check back to whoever comes next."""
+        if self._run is not None:
+            sensitivity.hand_back(self._store, self._run[0])
+            self._run = None
+
+    def _claim(self) -> None:
+        if (claim := sensitivity.claim(self._store, self._owner)) is not None:
+            self._run = claim, check.remote(claim.spec)
+
+    def _end(self, claim: CheckClaim, result: "ObjectRef[tuple[Sensitivity, ...]]") -> None:
+        if not ray.wait([result], timeout=0)[0]:
+            return
+        try:
+            sensitivity.complete(self._store, claim, ray.get(result))
+        except RayTaskError as error:
+            sensitivity.fail(self._store, claim, f"{type(error.cause).__name__}: {error.cause}")
+            log.error("sensitivity check %s: failed: %s", claim.id, error.cause)
+        except RayError as error:
+            sensitivity.release(self._store, claim, f"the worker was lost: {type(error).__name__}")
+            log.warning("sensitivity check %s: queued again: %s", claim.id, type(error).__name__)
+        self._run = None
