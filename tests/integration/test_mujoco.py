@@ -100,6 +100,21 @@ def test_what_slid_to_rest_stays(world: World) -> None:
     assert sliding.data.qpos[:2] == pytest.approx(place, abs=1e-3)  # the board rocks a little
 
 
+@pytest.mark.parametrize("restitution", [0.3, 0.6, 0.85])
+@pytest.mark.parametrize("height_m", [0.2, 0.5, 1.0])
+def test_a_ball_leaves_with_the_restitutions_share_of_the_speed_at_which_it_came(
+    engine: MuJoCo, restitution: float, height_m: float
+) -> None:
+    ball = World(bodies=(Body("ball", 1.0, Sphere(0.05)),), start_height_m=0.05 + height_m, time_step_s=STEP_S)
+    still = Motion(np.zeros(1), np.zeros((1, 0)), np.arange(0, 1, STEP_S))
+
+    heights = path(engine, replace(ball, material=Material(restitution=restitution)), still)[:, 2]
+
+    speeds = np.diff(heights) / STEP_S
+    first = int(np.argmax(speeds > 0))
+    assert speeds[first] == pytest.approx(-restitution * speeds[first - 1], rel=1e-3)
+
+
 def test_its_fields_are_where_mujocos_description_of_itself_says() -> None:
     data = Sliding(BOX, Material()).data
     mujoco.mj_forward(Scene(mujoco, BOX, threads=1).model, data)
