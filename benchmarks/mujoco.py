@@ -66,9 +66,7 @@ def bare(threads: int) -> Callable[[], int]:
     scene: Scene = engine._scene(ROBOT.world)
     motions = [ROBOT.motion(genome) for genome in genomes(MANY)]
     steps = int(scene._steps(motions[0].observe_s)[-1])
-    controls = np.zeros((MANY, steps, scene.model.nv))
-    for motion, each in zip(motions, controls, strict=True):
-        scene._aim(motion, each)
+    controls = scene._controls(motions, steps)
     start = np.tile(scene._start, (MANY, 1))
     models = scene._painted([ROBOT.world.material]) * MANY
     pool = library.Rollout(nthread=threads if threads > 1 else 0)

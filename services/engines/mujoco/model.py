@@ -23,7 +23,7 @@ eight ninths of the speed that its motor wants. See docs/engines.md for what oth
 
 SWITCHED_OFF = (
     "mjDSBL_AUTORESET",  # what blew up stays so, and is seen
-    "mjDSBL_WARMSTART",  # with constraints so rigid it is never taken, only paid for
+    "mjDSBL_WARMSTART",  # its solver has nothing to do
     "mjDSBL_REFSAFE",
     "mjDSBL_EULERDAMP",
     "mjDSBL_ISLAND",

@@ -57,16 +57,14 @@ class Scene:
     def poses(self, materials: Sequence[Material], motions: Sequence[Motion]) -> FloatArray:
         """`(n, m, t, 7)`: positions and quaternions x, y, z, w of the base; nan throughout where the physics failed."""
         steps = self._steps(motions[0].observe_s)
-        controls = np.zeros((len(motions), max(1, int(steps[-1])), self.model.nv))
-        for motion, each in zip(motions, controls, strict=True):
-            self._aim(motion, each)
         rows = ROWS * len(self._datas)
         found = np.empty((len(motions), len(materials), len(steps), 7))
         with _in_force(self._mujoco, *self._callbacks):
-            for across in _slices(len(materials), rows):
-                models = self._painted(materials[across])
-                for down in _slices(len(motions), max(1, rows // len(models))):
-                    states = self._rolled(models, controls[down])
+            for down in _slices(len(motions), max(1, rows // len(materials))):
+                controls = self._controls(motions[down], max(1, int(steps[-1])))
+                for across in _slices(len(materials), rows):
+                    models = self._painted(materials[across])
+                    states = self._rolled(models, controls)
                     found[down, across] = self._seen(states, steps).reshape(-1, len(models), len(steps), 7)
         return found
 
@@ -77,10 +75,13 @@ class Scene:
     def _steps(self, times_s: FloatArray) -> NDArray[np.int_]:
         return np.rint(times_s / self.world.time_step_s).astype(int)
 
-    def _aim(self, motion: Motion, controls: FloatArray) -> None:
-        """Write the targets in each step into `(steps, degrees of freedom)`, where the law looks for them."""
-        current = np.searchsorted(self._steps(motion.times_s), np.arange(len(controls)), side="right") - 1
-        controls[:, self._dofs] = motion.targets[current][:, self._driven]
+    def _controls(self, motions: Sequence[Motion], steps: int) -> FloatArray:
+        """`(n, steps, degrees of freedom)`: the targets in each step, where the law looks for them."""
+        controls = np.zeros((len(motions), steps, self.model.nv))
+        for motion, each in zip(motions, controls, strict=True):
+            current = np.searchsorted(self._steps(motion.times_s), np.arange(steps), side="right") - 1
+            each[:, self._dofs] = motion.targets[current][:, self._driven]
+        return controls
 
     def _rolled(self, models: list[Any], controls: FloatArray) -> FloatArray:
         """`(n · m, steps, state)`: states after each step, of each motion in each model; nan where MuJoCo gave up."""
