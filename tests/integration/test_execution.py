@@ -106,7 +106,7 @@ def test_a_step_that_would_leave_a_hole_is_refused(store):
 def test_a_holder_who_wakes_up_late_cannot_write(store):
     submitted = experiments.submit_experiment(store, toy(repetitions=1))
     (late,) = execution.claim(store, "late", 1)
-    assert execution.requeue_lost(store, stale_after_s=0) == 1
+    assert execution.requeue_lost(store, stale_after_s=-1) == 1
     (present,) = execution.claim(store, "present", 1)
     first, second, *_ = some_log()
     execution.record(store, present, first)
@@ -142,7 +142,7 @@ def test_a_repetition_that_was_lost_is_queued_again_and_goes_on_from_its_log(sto
     first, *_ = some_log()
     execution.record(store, claim, first)
 
-    assert execution.requeue_lost(store, stale_after_s=0) == 1
+    assert execution.requeue_lost(store, stale_after_s=-1) == 1
 
     (lost,) = experiments.list_repetitions(store, submitted.id)
     (again,) = execution.claim(store, "me", 1)

@@ -24,7 +24,7 @@ class Killed(Exception):
 
 def log_of(store):
     """The log of the only repetition, and a new claim of it."""
-    execution.requeue_lost(store, stale_after_s=0)
+    execution.requeue_lost(store, stale_after_s=-1)
     (claim,) = execution.claim(store, "again", 1)
     return claim
 
