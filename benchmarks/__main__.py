@@ -7,8 +7,9 @@ import platform
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import curves, overhead, physics, physx, pool, service, supervisor
+from benchmarks import curves, mujoco, overhead, physics, physx, pool, service, supervisor
 from benchmarks.measure import Row
+from services.engines.mujoco import MuJoCo
 from services.engines.physx import PhysX
 
 
@@ -24,6 +25,7 @@ def main() -> None:
     for name, measure in (
         ("physics", lambda: physics.rows(rounds)),
         ("physx", lambda: physx.rows(rounds) if PhysX.available() else []),
+        ("mujoco", lambda: mujoco.rows(rounds) if MuJoCo.available() else []),
         ("service", lambda: service.rows(max(2, rounds // 2))),
         ("pool", lambda: pool.rows(max(2, rounds // 2))),
         ("supervisor", supervisor.rows),

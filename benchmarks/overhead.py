@@ -22,7 +22,7 @@ PAGE = resource.getpagesize()
 def evolution_step_s() -> float:
     """Seconds of one step of the paper's evolution (ask, replacement, tell) where fitness costs nothing."""
 
-    def free(asked: Genomes) -> FloatArray:
+    def free(asked: Genomes, _: FloatArray) -> FloatArray:
         return asked[:, 0]
 
     begun = perf_counter()

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from services.core.arrays import FloatArray
 from services.core.world import Motion, World
@@ -20,8 +21,15 @@ DEEPEST_M = 1.0
 """So was one that is deeper than this in the ground."""
 
 
-class Scene(Protocol):
-    """A world in an engine, at some time step."""
+class Warm(Protocol):
+    """A world in an engine, kept for the next rollout."""
+
+    def close(self) -> None:
+        """Give up what the engine holds for it."""
+
+
+class Scene(Warm, Protocol):
+    """A world that goes on step by step."""
 
     @property
     def world(self) -> World:
@@ -33,11 +41,8 @@ class Scene(Protocol):
     def pose(self) -> FloatArray:
         """`(7,)`: position and quaternion x, y, z, w of the base's frame."""
 
-    def close(self) -> None:
-        """Give up what the engine holds for it."""
 
-
-S = TypeVar("S", bound=Scene)
+S = TypeVar("S", bound=Warm)
 
 
 class WarmScenes(Generic[S]):
@@ -89,10 +94,10 @@ def watch(scene: Scene, advance: Callable[[int], None], motion: Motion) -> Float
     return np.array([poses[step] for step in observed])
 
 
-def plausible(poses: FloatArray) -> bool:
-    """Whether physics can have led to all of the poses `(t, 7)`; nan is not plausible."""
-    positions_m = poses[:, :3]
-    return bool(np.all(np.abs(positions_m) < FARTHEST_M) and np.all(positions_m[:, 2] > -DEEPEST_M))
+def plausible(poses: FloatArray) -> NDArray[np.bool_]:
+    """`(...)`: whether physics can have led to all of the poses `(..., t, 7)`; nan is not plausible."""
+    near = np.all(np.abs(poses[..., :3]) < FARTHEST_M, axis=(-2, -1))
+    return np.asarray(near & np.all(poses[..., 2] > -DEEPEST_M, axis=-1))
 
 
 def _commands(motion: Motion, time_step_s: float) -> dict[int, list[tuple[int, float]]]:

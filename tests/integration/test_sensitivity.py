@@ -170,7 +170,7 @@ def test_a_lost_check_is_queued_again_and_its_old_holder_can_write_no_more(store
 
     assert sensitivity.requeue_lost(store) == 0
     assert sensitivity.heartbeat(store, old)
-    assert sensitivity.requeue_lost(store, stale_after_s=0) == 1
+    assert sensitivity.requeue_lost(store, stale_after_s=-1) == 1
     new = sensitivity.claim(store, "second")
 
     assert not sensitivity.heartbeat(store, old)

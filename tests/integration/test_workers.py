@@ -284,7 +284,7 @@ def test_a_check_that_was_taken_over_is_dropped(sqlite_store):
     checks = checking.Checks(sqlite_store, "first")
     checks.step()
 
-    sensitivity.requeue_lost(sqlite_store, stale_after_s=0)
+    sensitivity.requeue_lost(sqlite_store, stale_after_s=-1)
     sensitivity.claim(sqlite_store, "second")
     checks.heartbeat()
     checks.step()

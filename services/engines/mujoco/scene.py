@@ -1,0 +1,164 @@
+"""One kind of world, warm: motions in it, in materials, many at a time and each from the very same start."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from copy import copy
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.core.arrays import FloatArray
+from services.core.world import Material, Motion, World
+from services.engines.mujoco.callback import callbacks
+from services.engines.mujoco.law import settings
+from services.engines.mujoco.model import compiled, driven, drives, paint
+from services.engines.stepping import plausible
+
+ROWS = 64
+"""Rollouts of one call of MuJoCo's, for each thread; more would only take memory, 0.1 MB each for the quadruped."""
+
+TIME, POSE = 0, slice(1, 8)
+"""Places in a state."""
+
+TURNED = np.array((0, 1, 2, 4, 5, 6, 3))
+"""MuJoCo's poses have w first, a Trajectory's have it last."""
+
+
+class Scene:
+    """A world in any material.
+
+    Nothing is carried from one rollout to the next: each sets the whole state, and the solver begins anew each step.
+
+    Args:
+        mujoco: the library.
+        world: whatever its material.
+        threads: that share the rollouts of a call.
+    """
+
+    def __init__(self, mujoco: ModuleType, world: World, threads: int) -> None:
+        self.world = world
+        self.model = compiled(mujoco, world)
+        self._mujoco = mujoco
+        self._callbacks = callbacks()
+        self._drives = drives(self.model, world)
+        self._dofs = [drive.dof for drive in self._drives]
+        self._driven = [world.actuators.index(joint) for joint in driven(world)]
+        self._models = [self.model]
+        self._datas = [self._data() for _ in range(threads)]
+        self._start = self._initial()
+        self._starts = np.tile(self._start, (ROWS * threads, 1))
+        self._channel = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
+        self._memory = np.empty(0)
+        self._pool = import_module("mujoco.rollout").Rollout(nthread=threads if threads > 1 else 0)
+
+    def poses(self, materials: Sequence[Material], motions: Sequence[Motion]) -> FloatArray:
+        """`(n, m, t, 7)`: positions and quaternions x, y, z, w of the base; nan throughout where the physics failed."""
+        steps = self._steps(motions[0].observe_s)
+        rows = ROWS * len(self._datas)
+        found = np.empty((len(motions), len(materials), len(steps), 7))
+        with _in_force(self._mujoco, *self._callbacks):
+            for down in _slices(len(motions), max(1, rows // len(materials))):
+                controls = self._controls(motions[down], max(1, int(steps[-1])))
+                for across in _slices(len(materials), rows):
+                    models = self._painted(materials[across])
+                    states = self._rolled(models, controls)
+                    found[down, across] = self._seen(states, steps).reshape(-1, len(models), len(steps), 7)
+        return found
+
+    def close(self) -> None:
+        """Give the threads up."""
+        self._pool.close()
+
+    def _steps(self, times_s: FloatArray) -> NDArray[np.int_]:
+        return np.rint(times_s / self.world.time_step_s).astype(int)
+
+    def _controls(self, motions: Sequence[Motion], steps: int) -> FloatArray:
+        """`(n, steps, degrees of freedom)`: the targets in each step, where the law looks for them."""
+        controls = np.zeros((len(motions), steps, self.model.nv))
+        for motion, each in zip(motions, controls, strict=True):
+            current = np.searchsorted(self._steps(motion.times_s), np.arange(steps), side="right") - 1
+            each[:, self._dofs] = motion.targets[current][:, self._driven]
+        return controls
+
+    def _rolled(self, models: list[Any], controls: FloatArray) -> FloatArray:
+        """`(n · m, steps, state)`: states after each step, of each motion in each model; nan where MuJoCo gave up."""
+        count, steps = len(models) * len(controls), controls.shape[1]
+        states = self._room(count, steps)
+        try:
+            self._pool.rollout(
+                models * len(controls),
+                self._datas,
+                self._starts[:count],
+                controls if len(models) == 1 else np.repeat(controls, len(models), axis=0),
+                control_spec=self._channel,
+                skip_checks=True,
+                nstep=steps,
+                state=states,
+            )
+        except self._mujoco.FatalError:
+            states.fill(np.nan)
+        return states
+
+    def _seen(self, states: FloatArray, steps: NDArray[np.int_]) -> FloatArray:
+        """`(rows, t, 7)`: poses after so many steps; nan of a rollout that MuJoCo stopped at a warning, or got lost."""
+        complete = states[:, -1, TIME] > (states.shape[1] - 0.5) * self.world.time_step_s
+        poses = states[:, np.maximum(steps, 1) - 1, POSE]
+        poses[:, steps == 0] = self._start[POSE]
+        poses[~(complete & plausible(poses))] = np.nan
+        return poses[..., TURNED]
+
+    def _room(self, count: int, steps: int) -> FloatArray:
+        """`(count, steps, state)`, in the same memory as the last time if it is large enough."""
+        size = count * steps * len(self._start)
+        if self._memory.size < size:
+            self._memory = np.empty(size)
+        return self._memory[:size].reshape(count, steps, -1)
+
+    def _painted(self, materials: Sequence[Material]) -> list[Any]:
+        """A model for each material: copies that are painted anew for each call, never compiled."""
+        while len(self._models) < len(materials):
+            self._models.append(copy(self.model))
+        models = self._models[: len(materials)]
+        for model, material in zip(models, materials, strict=True):
+            paint(model, material)
+        return models
+
+    def _data(self) -> Any:
+        data = self._mujoco.MjData(self.model)
+        known = settings(self.world, self.model.nv, self._drives)
+        data.userdata[: len(known)] = known
+        return data
+
+    def _initial(self) -> FloatArray:
+        full = self._mujoco.mjtState.mjSTATE_FULLPHYSICS
+        state = np.empty(self._mujoco.mj_stateSize(self.model, full))
+        self._mujoco.mj_getState(self.model, self._mujoco.MjData(self.model), state, full)
+        return state
+
+
+def _slices(count: int, size: int) -> Iterator[slice]:
+    for begin in range(0, count, size):
+        yield slice(begin, min(count, begin + size))
+
+
+@contextmanager
+def _in_force(mujoco: ModuleType, law: Any, clock: Any) -> Iterator[None]:
+    """The law is in force, and MuJoCo neither prints its warnings nor writes a file of them.
+
+    All this belongs to the process, so it is put back.
+    """
+    before, log = (mujoco.get_mjcb_control(), mujoco.get_mjcb_time()), mujoco.MjLogConfig.get()
+    silent = mujoco.MjLogConfig.get()
+    silent.logto_console = silent.logto_file = False
+    silent.set()
+    mujoco.set_mjcb_control(law)
+    mujoco.set_mjcb_time(clock)
+    try:
+        yield
+    finally:
+        mujoco.set_mjcb_control(before[0])
+        mujoco.set_mjcb_time(before[1])
+        log.set()

@@ -1,0 +1,113 @@
+"""The MuJoCo engine's law of motors and contacts, as plain functions."""
+
+import numpy as np
+import pytest
+
+from services.core.robots.quadruped import Quadruped
+from services.engines.mujoco.law import Drive, coast, drive, press, settings, spread, touch
+
+WORLD = Quadruped().world
+STEP_S = WORLD.time_step_s
+KNOWN = settings(WORLD, 7, [])
+SURFACE = np.array([1.0, 1.0, 0.8, 0.5, 0.0])
+
+
+def pressed(inverse, excess, friction, sweeps=50):
+    impulses = np.zeros(len(excess))
+    press(sweeps, inverse, excess, np.full(len(excess), friction), impulses)
+    return impulses
+
+
+def mass(rows, seed=0):
+    """Some inverse inertia: symmetric, positive definite."""
+    square = np.random.default_rng(seed).normal(size=(rows, rows))
+    return square @ square.T + np.eye(rows)
+
+
+def test_a_contact_that_leaves_is_let_go():
+    assert np.array_equal(pressed(mass(3), np.array([0.5, 0.0, 0.0]), 1.0), np.zeros(3))
+
+
+def test_a_contact_that_grips_has_the_speed_that_it_wants():
+    excess = np.array([-1.0, 0.1, -0.1])
+
+    pressed(mass(3), excess, 10.0)
+
+    assert excess == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def test_friction_stays_in_its_cone_and_opposes_the_slide():
+    excess = np.array([-1.0, 3.0, 4.0])
+
+    normal, *friction = pressed(np.eye(3), excess, 0.5)
+
+    assert np.hypot(*friction) == pytest.approx(0.5 * normal)
+    assert friction == pytest.approx([-0.3, -0.4])
+    assert excess[0] == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_many_contacts_obey_the_law_all_at_once(seed):
+    inverse, free = mass(12, seed), np.random.default_rng(seed).normal(size=12)
+    after = free.copy()
+
+    impulses = pressed(inverse, after, 0.7, sweeps=2000)
+
+    assert after == pytest.approx(free + inverse @ impulses)
+    for row in range(0, 12, 3):
+        normal, *friction = impulses[row : row + 3]
+        assert normal >= 0
+        assert normal == pytest.approx(0, abs=1e-6) or after[row] == pytest.approx(0, abs=1e-6)
+        assert after[row] >= -1e-6
+        assert np.hypot(*friction) <= 0.7 * normal + 1e-9
+        grips = np.hypot(*friction) < 0.7 * normal - 1e-6
+        assert not grips or after[row + 1 : row + 3] == pytest.approx(np.zeros(2), abs=1e-6)
+
+
+@pytest.mark.parametrize(("sliding", "friction"), [(0.0, 1.0), (0.005, 1.0), (0.02, 0.8), (3.0, 0.8)])
+def test_what_slides_has_the_dynamic_coefficient(sliding, friction):
+    assert touch(KNOWN, 0.0, np.array([0.0, 0.6 * sliding, 0.8 * sliding]), SURFACE, np.zeros(3)) == friction
+
+
+@pytest.mark.parametrize(("approach", "leaves"), [(3.0, 1.5), (0.3, 0.15), (0.15, 0.0)])
+def test_only_fast_approaches_bounce(approach, leaves):
+    excess = np.zeros(3)
+
+    touch(KNOWN, 0.0, np.array([-approach, 0.0, 0.0]), SURFACE, excess)
+
+    assert -excess[0] == pytest.approx(leaves)
+
+
+def test_what_is_in_the_ground_is_pushed_out_a_fifth_of_its_depth_in_a_step():
+    excess = np.zeros(3)
+
+    touch(KNOWN, 0.01, np.zeros(3), SURFACE, excess)
+
+    assert -excess[0] * STEP_S == pytest.approx(0.002)
+
+
+def test_a_motor_that_is_told_no_number_gives_none():
+    known = settings(WORLD, 7, [Drive(6, 0.1, 20.0, 8.0, 0.01)])
+    forces = np.array([*np.zeros(6), np.nan])
+
+    drive(known, forces, np.zeros(8), np.zeros(7), np.zeros(7))
+
+    assert np.isnan(forces[6])
+
+
+def test_impulses_act_on_the_degrees_of_freedom_as_these_move_the_contacts():
+    rng = np.random.default_rng(0)
+    jacobian, accelerations, impulses, before = (
+        rng.normal(size=(3, 7)),
+        rng.normal(size=7),
+        rng.normal(size=3),
+        np.ones(3),
+    )
+    excess, cleared, forces = np.empty(3), np.ones(3), np.zeros(7)
+
+    coast(STEP_S, jacobian, before, accelerations, excess, cleared)
+    spread(STEP_S, jacobian, impulses, forces)
+
+    assert excess == pytest.approx(before + STEP_S * jacobian @ accelerations)
+    assert np.array_equal(cleared, np.zeros(3))
+    assert forces == pytest.approx(jacobian.T @ impulses / STEP_S)
