@@ -1,87 +1,86 @@
 """One repetition on many cores: while cores are idle, the rollouts of a call are spread over them."""
 
-from functools import cache
 from math import ceil
-from time import monotonic, perf_counter
+from time import perf_counter
+from typing import TypeAlias
 
 import numpy as np
-import ray
+from numpy.typing import NDArray
 
 from schemas.spec import ExperimentSpec
 from services.core.arrays import Fitnesses, Genomes, Parameters
 from services.core.ports import Simulate
-from services.simulation import setting
-from workers.nodes import Versions, check_here
-from workers.spread import Answer, Spread, sizes
+from workers.helpers import LOOK_S, Handle, Helpers
+from workers.nodes import Versions
+from workers.spread import Part, Spread, sizes
 
-LEAST_S = 0.01
-"""A part that is lent to another core is worth at least this much work; lending costs less than a tenth of it."""
+Rows: TypeAlias = NDArray[np.intp]
 
-LOOK_S = 1.0
-"""How often it is looked which cores are idle."""
-
-LONGEST_PAUSE_S = 30.0
-"""Cores that were no help are tried again after a pause that doubles each time, up to this."""
-
-OURS_S = 0.4
-"""A core that did a part stays ours for half a second, in which Ray does not count it among the idle ones."""
+LEAST_S = 0.005
+"""A part that is lent to another core is worth at least this much work; lending costs about a tenth of it."""
 
 
 class Pool:
     """A Simulate that spreads its rollouts over the idle cores of the cluster, with the same numbers.
 
     Args:
-        spec: resolved; another core builds the simulation from it, and keeps it warm.
-        simulate: the same simulation here.
-        batch: rollouts that the engine likes at a time.
-        versions: that a node must have to help.
+        spec: of the experiment, from which the other cores make the same Simulate.
+        here: that Simulate, on this core.
+        batch: rollouts that are best asked of it at a time.
+        versions: that another node must have.
     """
 
-    def __init__(self, spec: ExperimentSpec, simulate: Simulate, batch: int, versions: Versions | None = None) -> None:
-        self._spec = ray.put(spec.model_dump_json())
-        self._simulate = simulate
+    def __init__(self, spec: ExperimentSpec, here: Simulate, batch: int, versions: Versions | None = None) -> None:
+        self._simulate = here
         self._batch = batch
-        self._versions = versions or {}
         self._rollout_s = 0.0
-        self._idle = 0
-        self._looked = -LOOK_S
-        self._pause_s = LOOK_S
-        self._helped = 0
-        self._back = -OURS_S
+        self._helpers = Helpers(spec, versions or {})
+        self._last: Part | None = None
 
     def batch(self) -> int:
-        """Rollouts that one call should ask for, if there is a choice: as many as keep all cores busy."""
-        return self._batch * (1 + self._helpers())
+        """Rollouts that one call should ask for, if there is a choice: as many as keep all cores busy.
+
+        Those of a fast engine are not worth lending a few at a time.
+        """
+        if self._last is None or self._rollout_s * self._batch < LEAST_S:
+            return self._batch
+        return self._batch * (1 + len(self._helpers.ready(*self._last)))
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
         """`(n, g)` genomes × `(m, p)` parameters -> `(n, m)` fitnesses; nan where the physics failed."""
-        helpers = self._helpers()
-        if not helpers or self._rollout_s * len(genomes) * len(parameters) < 2 * LEAST_S:
-            return self._here(genomes, parameters)
+        self._last = genomes, parameters
         by_genome = len(genomes) >= len(parameters)
         rows, across = (len(genomes), len(parameters)) if by_genome else (len(parameters), len(genomes))
-        least = ceil(max(LEAST_S / self._rollout_s, self._batch) / across)
-        ends = np.cumsum(sizes(rows, 1 + helpers, least))[:-1]
-        parts = [
-            (genomes[part], parameters) if by_genome else (genomes, parameters[part])
-            for part in np.split(np.arange(rows), ends)
-        ]
-        return np.concatenate(self._spread(parts, helpers), axis=0 if by_genome else 1)
 
-    def _spread(self, parts: list[tuple[Genomes, Parameters]], helpers: int) -> list[Fitnesses]:
-        spread = Spread(
-            [self._rollout_s * len(genomes) * len(parameters) for genomes, parameters in parts],
-            here=lambda index: self._here(*parts[index]),
-            lend=lambda index: _part.remote(self._spec, self._versions, *parts[index]),
-            helpers=helpers,
-        )
+        def part(rows: Rows) -> Part:
+            return (genomes[rows], parameters) if by_genome else (genomes, parameters[rows])
+
+        fitnesses: list[Fitnesses] = []
+        left = np.arange(rows)
+        while left.size:
+            helpers = self._helpers.ready(genomes, parameters)
+            now, left = np.split(left, [self._until_next_look(1 + len(helpers), across)])
+            ends = np.cumsum(sizes(len(now), 1 + len(helpers), self._least(across)))[:-1]
+            fitnesses += self._done([part(some) for some in np.split(now, ends)], helpers)
+        return np.concatenate(fitnesses, axis=0 if by_genome else 1)
+
+    def _until_next_look(self, cores: int, across: int) -> int:
+        """Rows to do before it is worth looking for idle cores again; one, to learn how long it takes."""
+        return max(1, int(cores * LOOK_S / (self._rollout_s * across))) if self._rollout_s else 1
+
+    def _least(self, across: int) -> int:
+        """Rows of a part that is worth lending."""
+        return ceil(max(LEAST_S / self._rollout_s, self._batch) / across) if self._rollout_s else 1
+
+    def _done(self, parts: list[Part], helpers: list[Handle]) -> list[Fitnesses]:
+        if not helpers or len(parts) == 1:
+            return [self._here(*part) for part in parts]
+        spread = Spread(parts, self._here, helpers, self._rollout_s)
         fitnesses = spread.run()
-        self._helped, self._back = len(spread.helped), monotonic()
-        if spread.lost_s > spread.gained_s:  # cores that seem idle have other work, of which Ray knows nothing
-            self._idle = 0
-            self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
+        if spread.lost > spread.gained:
+            self._helpers.failed()
         else:
-            self._pause_s = LOOK_S
+            self._helpers.helped()
         return fitnesses
 
     def _here(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
@@ -89,23 +88,3 @@ class Pool:
         fitnesses = self._simulate(genomes, parameters)
         self._rollout_s = (perf_counter() - begun) / fitnesses.size
         return fitnesses
-
-    def _helpers(self) -> int:
-        """Cores that are idle now, or were a moment ago."""
-        if monotonic() - self._looked > self._pause_s:
-            ours = self._helped if monotonic() - self._back < OURS_S else 0
-            self._idle = int(ray.available_resources().get("CPU", 0)) + ours
-            self._looked = monotonic()
-        return self._idle
-
-
-@ray.remote(num_cpus=1, max_retries=0)
-def _part(spec: str, expected: Versions, genomes: Genomes, parameters: Parameters) -> Answer:
-    """The fitnesses of one part, on another core, which must have the versions that this one has."""
-    check_here(expected)
-    return ray.get_runtime_context().get_worker_id(), _simulation(spec)(genomes, parameters)
-
-
-@cache
-def _simulation(spec: str) -> Simulate:
-    return setting(ExperimentSpec.model_validate_json(spec), 0).simulate

@@ -1,20 +1,22 @@
 """The parts of one call, done by this core and by others: who is slow gets less of them, and nobody is waited for."""
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from time import monotonic
 from typing import TypeAlias
 
 import ray
 from ray.exceptions import RayError
 
-from services.core.arrays import Fitnesses
+from services.core.arrays import Fitnesses, Genomes, Parameters
+from services.core.ports import Simulate
+from workers.helpers import Handle
 
-Answer: TypeAlias = tuple[str, Fitnesses]
-"""The core that did a part, and what came of it."""
+Part: TypeAlias = tuple[Genomes, Parameters]
 
 AHEAD = 2
-"""Parts that a core is lent at a time: while it does one, the next one waits for it."""
+"""Parts that a helper is lent at a time: while it does one, the next one waits for it."""
 
 SLOWEST = 2.0
 """What takes so many times as long as expected is not waited for."""
@@ -47,6 +49,15 @@ def sizes(rows: int, cores: int, least: int) -> list[int]:
     return [part for part in ours + theirs[::-1] if part]
 
 
+@dataclass(frozen=True)
+class Loan:
+    """A part that is with a helper, and until when it should be back."""
+
+    part: int
+    helper: Handle
+    until: float
+
+
 class Spread:
     """Does the first part here and lends the last ones, then the next here, and so on until both meet.
 
@@ -54,67 +65,67 @@ class Spread:
     slow, dead, or taken by somebody else therefore costs little more than the time of a part.
 
     Args:
-        expected_s: what each part should take, in seconds.
+        parts: of the call.
         here: does a part on this core.
-        lend: has a part done by another core.
-        helpers: other cores.
+        helpers: do parts on other cores.
+        rollout_s: what a rollout should take, in seconds.
 
     Attributes:
-        helped: the cores that did a part.
-        gained_s: of work that others did.
-        lost_s: of work that was lent, and had to be done here after all.
+        gained: rollouts that others did.
+        lost: rollouts that were lent, and had to be done here after all.
     """
 
-    def __init__(
-        self,
-        expected_s: Sequence[float],
-        here: Callable[[int], Fitnesses],
-        lend: Callable[[int], "ray.ObjectRef[Answer]"],
-        helpers: int,
-    ) -> None:
-        self.helped: set[str] = set()
-        self.gained_s = self.lost_s = 0.0
+    def __init__(self, parts: Sequence[Part], here: Simulate, helpers: Sequence[Handle], rollout_s: float) -> None:
+        self.gained = self.lost = 0
+        self._parts = parts
         self._here = here
-        self._lend = lend
-        self._room = AHEAD * helpers
-        self._left = deque(range(len(expected_s)))
-        self._lent: dict[ray.ObjectRef[Answer], tuple[int, float]] = {}
+        self._rollout_s = rollout_s
+        self._left = deque(range(len(parts)))
+        self._room = deque(helper for _ in range(AHEAD) for helper in helpers)
+        self._lent: dict[ray.ObjectRef[Fitnesses], Loan] = {}
         self._done: dict[int, Fitnesses] = {}
-        self._expected_s = expected_s
 
     def run(self) -> list[Fitnesses]:
         """What came of the parts, in their order."""
         while self._left or self._lent:
             self._collect(patient=not self._left)
-            while len(self._left) > 1 and len(self._lent) < self._room:
-                index = self._left.pop()
-                self._lent[self._lend(index)] = index, monotonic() + SLOWEST * self._expected_s[index]
+            while len(self._left) > 1 and self._room:
+                self._lend(self._left.pop(), self._room.popleft())
             if self._left:
                 index = self._left.popleft()
-                self._done[index] = self._here(index)
+                self._done[index] = self._here(*self._parts[index])
         return [self._done[index] for index in sorted(self._done)]
+
+    def _lend(self, index: int, helper: Handle) -> None:
+        before = sum(self._rollouts(loan.part) for loan in self._lent.values() if loan.helper is helper)
+        until = monotonic() + SLOWEST * self._rollout_s * (before + self._rollouts(index))
+        self._lent[helper.part.remote(*self._parts[index])] = Loan(index, helper, until)
 
     def _collect(self, *, patient: bool) -> None:
         """Take what has come back; if there is nothing else to do and nothing has in its time, take back the latest."""
         if not self._lent:
             return
-        until = next(reversed(self._lent.values()))[1] if patient else 0.0
+        until = next(reversed(self._lent.values())).until if patient else 0.0
         wait_s = max(0.0, until - monotonic())
         ready, _ = ray.wait(list(self._lent), num_returns=1 if patient else len(self._lent), timeout=wait_s)
         for ref in ready:
-            self._take(self._lent.pop(ref)[0], ref)
+            self._take(self._lent.pop(ref), ref)
         if patient and not ready:
-            self._take_back(self._lent.popitem()[1][0])
+            self._take_back(self._lent.popitem()[1])
 
-    def _take(self, index: int, ref: "ray.ObjectRef[Answer]") -> None:
+    def _take(self, loan: Loan, ref: "ray.ObjectRef[Fitnesses]") -> None:
         try:
-            core, self._done[index] = ray.get(ref)
-            self.helped.add(core)
-            self.gained_s += self._expected_s[index]
-        except RayError:  # its node or its process died, or has other versions
-            self._room = 0
-            self._take_back(index)
+            self._done[loan.part] = ray.get(ref)
+            self.gained += self._rollouts(loan.part)
+            self._room.append(loan.helper)
+        except RayError:  # its node or its process died
+            self._room.clear()
+            self._take_back(loan)
 
-    def _take_back(self, index: int) -> None:
-        self.lost_s += self._expected_s[index]
-        self._left.append(index)
+    def _take_back(self, loan: Loan) -> None:
+        self.lost += self._rollouts(loan.part)
+        self._left.append(loan.part)
+
+    def _rollouts(self, part: int) -> int:
+        genomes, parameters = self._parts[part]
+        return len(genomes) * len(parameters)

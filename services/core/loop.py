@@ -13,7 +13,8 @@ from numpy.random import Generator
 
 from services.core.arrays import Genome, Parameters
 from services.core.counted import Counted
-from services.core.optimizers.base import Optimizer, maximise
+from services.core.foresight import Foresight
+from services.core.optimizers.base import Ahead, Optimizer, maximise
 from services.core.ports import Reality, Simulate
 from services.core.strategies.base import Score, Search, Strategy
 from services.core.streams import stream
@@ -136,14 +137,15 @@ def _select(setting: Setting, history: History, iteration: int) -> Selected:
     if setting.budget.reuse_transfer and setting.strategy.selects_transferred and history.transferred is not None:
         return Selected(iteration, history.transferred, Cost(saved=setting.budget.selection_evaluations))
     belief = Belief(setting.genomes, setting.known, history.samples, history.simulators)
-    simulate = Counted(setting.simulate)
-    search = _search(setting, simulate, belief.parameters, setting.stream(iteration, "search"))
+    foresight = Foresight(setting.simulate, setting.batch, len(belief.simulators))
+    simulate = Counted(foresight)
+    search = _search(setting, simulate, foresight, belief.parameters, setting.stream(iteration, "search"))
     genome = setting.strategy.select(belief, search, setting.stream(iteration, "select"))
     searched = setting.budget.selection_evaluations * setting.strategy.ensemble if setting.strategy.searches else 0
     return Selected(iteration, genome, simulate.count.cost_of(searched))
 
 
-def _search(setting: Setting, simulate: Simulate, parameters: Parameters, rng: Generator) -> Search:
+def _search(setting: Setting, simulate: Simulate, ahead: Ahead, parameters: Parameters, rng: Generator) -> Search:
     def search(score: Score) -> Genome:
         found = maximise(
             setting.optimizer,
@@ -151,6 +153,7 @@ def _search(setting: Setting, simulate: Simulate, parameters: Parameters, rng: G
             lambda genomes, _: score(genomes, simulate(genomes, parameters)),
             setting.budget.selection_evaluations,
             rng,
+            ahead,
         )
         best: Genome = found.genomes[0]
         return best
@@ -174,7 +177,8 @@ def _tune(setting: Setting, history: History, iteration: int) -> Tuned:
 
 def _transfer(setting: Setting, history: History, iteration: int) -> Transferred:
     """A controller evolved in the best simulator."""
-    simulate = Counted(setting.simulate)
+    foresight = Foresight(setting.simulate, setting.batch, 1)
+    simulate = Counted(foresight)
     best = history.simulators[0].parameters[None, :]
     found = maximise(
         setting.optimizer,
@@ -182,6 +186,7 @@ def _transfer(setting: Setting, history: History, iteration: int) -> Transferred
         lambda genomes, _: simulate(genomes, best)[:, 0],
         setting.budget.controller_evaluations,
         setting.stream(iteration, "transfer"),
+        foresight,
     )
     fitness = float(found.fitness[0]) if np.isfinite(found.fitness[0]) else float("nan")
     cost = simulate.count.cost_of(setting.budget.controller_evaluations)

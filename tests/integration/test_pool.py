@@ -1,20 +1,20 @@
 """One repetition on many cores, with the numbers of one."""
 
 import os
+import signal
 import time
 
 import numpy as np
 import pytest
-import ray
 
 from schemas.spec import ExperimentSpec
 from services.resolution import resolve_experiment
 from services.settings import Settings
 from services.simulation import setting
-from workers import pool as pools
+from tests.processes import processes_of_ray
 from workers.cluster import cluster
 from workers.pool import Pool
-from workers.spread import sizes
+from workers.spread import Spread, sizes
 
 SPEC = resolve_experiment(ExperimentSpec.model_validate({"strategy": "informative", "budget": "smoke"}))
 
@@ -25,9 +25,8 @@ def alone():
 
 
 @pytest.fixture(scope="module", autouse=True)
-def ray_with_two_warm_cores(alone):
+def two_cores():
     with cluster(Settings(workers=2)):
-        ray.get([pools._part.remote(SPEC.model_dump_json(), {}, *asked(alone, 10, 1)) for _ in range(4)])
         yield
 
 
@@ -38,10 +37,22 @@ def asked(alone, genomes, simulators):
 
 @pytest.fixture
 def pool(alone):
-    """A pool that knows how long a rollout takes."""
+    """A pool that knows how long a rollout takes, and has a helper."""
     warm = Pool(SPEC, alone.simulate, 1)
-    warm(*asked(alone, 2, 1))
+    deadline = time.monotonic() + 60
+    while warm.batch() < 2:
+        assert time.monotonic() < deadline
+        warm(*asked(alone, 2, 1))
     return warm
+
+
+@pytest.fixture
+def spreads(monkeypatch):
+    """What was spread over cores."""
+    spread = []
+    run = Spread.run
+    monkeypatch.setattr(Spread, "run", lambda self: spread.append(self) or run(self))
+    return spread
 
 
 @pytest.mark.parametrize(("genomes", "simulators"), [(1, 1), (1, 8), (7, 1), (3, 5), (5, 3)])
@@ -51,18 +62,43 @@ def test_what_is_spread_over_cores_is_what_one_core_computes(alone, pool, genome
     np.testing.assert_array_equal(pool(*question), alone.simulate(*question))
 
 
-def test_rollouts_are_spread_when_cores_are_idle_and_the_work_is_worth_it(alone, pool, monkeypatch):
-    sent = []
-    remote = pools._part.remote
-    monkeypatch.setattr(pools._part, "remote", lambda *part: sent.append(part) or remote(*part))
-
+def test_rollouts_are_spread_if_there_are_several(alone, pool, spreads):
     pool(*asked(alone, 1, 1))
-    assert not sent
+    assert not spreads
 
-    deadline = time.monotonic() + 20
-    while not sent:  # once a core is idle
+    pool(*asked(alone, 1, 12))
+    assert spreads
+
+
+def test_it_asks_for_as_many_rollouts_at_a_time_as_keep_the_cores_busy(alone, pool):
+    deadline = time.monotonic() + 60
+    while pool.batch() != 3:  # this process, and two idle cores
         assert time.monotonic() < deadline
-        pool(*asked(alone, 1, 12))
+        pool(*asked(alone, 3, 1))
+
+
+def test_a_long_call_gets_help_that_came_after_it_began(alone, spreads):
+    def slow(genomes, parameters):
+        time.sleep(0.1 * len(genomes) * len(parameters))
+        return alone.simulate(genomes, parameters)
+
+    Pool(SPEC, slow, 1)(*asked(alone, 10, 20))
+
+    assert spreads
+
+
+@pytest.mark.parametrize("signum", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_helper_that_dies_or_dawdles_costs_time_and_no_result(alone, pool, spreads, signum):
+    question = asked(alone, 1, 12)
+    expected = alone.simulate(*question)
+
+    for helper in processes_of_ray("Helper"):
+        os.kill(helper, signum)
+    got = pool(*question)
+
+    np.testing.assert_array_equal(got, expected)
+    assert spreads[-1].lost
+    assert pool.batch() == 1  # it is not asked again
 
 
 @pytest.mark.parametrize(
@@ -77,28 +113,3 @@ def test_rollouts_are_spread_when_cores_are_idle_and_the_work_is_worth_it(alone,
 )
 def test_a_call_is_dealt_in_large_parts_first_and_small_ones_in_the_end(rows, cores, least, parts):
     assert sizes(rows, cores, least) == parts
-
-
-def test_it_asks_for_as_many_rollouts_at_a_time_as_keep_the_cores_busy(pool):
-    deadline = time.monotonic() + 20
-    while pool.batch() != 3:  # this process, and two idle cores
-        assert time.monotonic() < deadline
-        time.sleep(0.2)
-
-
-@ray.remote(num_cpus=1, max_retries=0)
-def dying(*part):
-    os._exit(1)
-
-
-@ray.remote(num_cpus=1, max_retries=0)
-def dawdling(*part):
-    time.sleep(60)
-
-
-@pytest.mark.parametrize("other", [dying, dawdling])
-def test_a_core_that_dies_or_dawdles_costs_time_and_no_result(alone, pool, monkeypatch, other):
-    monkeypatch.setattr(pools, "_part", other)
-    question = asked(alone, 1, 12)
-
-    np.testing.assert_array_equal(pool(*question), alone.simulate(*question))

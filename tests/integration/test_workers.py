@@ -23,12 +23,13 @@ from services.simulation import setting, subject
 from services.store.models import RepetitionRow
 from services.store.repository.steps import logs
 from tests.fakes import flat
+from tests.processes import processes_of_ray
 from workers import repetition as task
 from workers import sensitivity as checking
 from workers.cluster import cluster
 from workers.supervisor import Supervisor
 
-DEADLINE_S = 60
+DEADLINE_S = 180
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -77,29 +78,6 @@ def stored(store, experiment):
         return [[flat(step) for step in found[row.id]] for row in rows]
 
 
-def workers_of_ray():
-    """Processes that run a repetition now, of the Ray that this test started."""
-    return [pid for pid, name in processes() if name.startswith(b"ray::run") and is_ours(pid)]
-
-
-def processes():
-    for path in Path("/proc").glob("[0-9]*"):
-        try:
-            yield int(path.name), (path / "cmdline").read_bytes()
-        except OSError:  # it has ended
-            continue
-
-
-def is_ours(pid):
-    """Whether the process descends from this one."""
-    while pid > 1 and pid != os.getpid():
-        try:
-            pid = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
-        except OSError:
-            return False
-    return pid == os.getpid()
-
-
 @pytest.mark.parametrize("at_once", [1, 2, 4])
 def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store, at_once):
     experiment = experiments.submit_experiment(store, toy()).id
@@ -113,10 +91,10 @@ def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store, at
 def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store):
     experiment = experiments.submit_experiment(sqlite_store, long_toy()).id
     supervisor = Supervisor(sqlite_store, lambda: 1)
-    run(supervisor, sqlite_store, experiment, until=workers_of_ray)
+    run(supervisor, sqlite_store, experiment, until=lambda: processes_of_ray("run"))
     time.sleep(0.5)
 
-    for pid in workers_of_ray():
+    for pid in processes_of_ray("run"):
         os.kill(pid, signal.SIGKILL)
     run(supervisor, sqlite_store, experiment)
 
@@ -186,7 +164,7 @@ def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store):
 
     experiments.cancel_experiment(sqlite_store, experiment)
     deadline = time.monotonic() + DEADLINE_S
-    while workers_of_ray():
+    while processes_of_ray("run"):
         assert time.monotonic() < deadline
         supervisor.step()
 

@@ -31,6 +31,26 @@ def test_a_resumed_repetition_equals_an_uninterrupted_one_wherever_it_stopped(st
         assert [flat(step) for step in (*log, *rest)] == whole
 
 
+@pytest.mark.parametrize("batch", [2, 9, 1_000])
+@pytest.mark.parametrize("strategy", sorted(strategies))
+def test_no_number_depends_on_how_many_rollouts_are_asked_for_at_a_time(strategy, batch):
+    one_by_one = [flat(step) for step in repetition(small_setting(strategy))]
+
+    together = repetition(replace(small_setting(strategy), batch=lambda: batch))
+
+    assert [flat(step) for step in together] == one_by_one
+
+
+def test_newcomers_are_foreseen_so_that_fewer_calls_are_waited_for():
+    def calls_of_a_transfer(batch):
+        simulate = Recorder()
+        setting = small_setting("random", simulate=simulate, batch=lambda: batch)
+        next_step(setting, History().after(next_step(setting, History())))
+        return len(simulate.calls)
+
+    assert calls_of_a_transfer(8) < 0.8 * calls_of_a_transfer(1)
+
+
 def test_reality_is_asked_once_for_each_sample_and_each_probe():
     reality = CountedReality()
 

@@ -2,8 +2,9 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from numpy.random import Generator
@@ -76,7 +77,26 @@ class Optimizer(Plugin):
         """The same optimizer, but it keeps `size` members that differ from each other."""
 
 
-def maximise(optimizer: Optimizer, space: Space, evaluate: Evaluate, evaluations: int, rng: Generator) -> Population:
+class Ahead(Protocol):
+    """Evaluates what will probably be asked for next together with what is asked for now."""
+
+    def room(self) -> int:
+        """How many genomes can be evaluated at a time now, for little more than the price of one."""
+        ...
+
+    def expect(self, genomes: Genomes) -> None:
+        """These `(n, g)` will be asked for one after the other, if what is asked for now changes nothing."""
+        ...
+
+
+def maximise(
+    optimizer: Optimizer,
+    space: Space,
+    evaluate: Evaluate,
+    evaluations: int,
+    rng: Generator,
+    ahead: Ahead | None = None,
+) -> Population:
     """The population after exactly `evaluations` fitness evaluations, ranked; nan never wins.
 
     A genome that the search has evaluated before counts, but is not evaluated again.
@@ -87,15 +107,27 @@ def maximise(optimizer: Optimizer, space: Space, evaluate: Evaluate, evaluations
         evaluate: the fitness, called with as many genomes as the optimizer asks for, or as the budget has left.
         evaluations: the budget, at least 1.
         rng: all randomness of the search.
+        ahead: is told what follows if a newcomer is hopeless; changes no number.
     """
     state = optimizer.init(space)
     remembered = Remembered(evaluate)
     while evaluations > 0:
         genomes = optimizer.ask(state, rng)[:evaluations]
-        fitness = remembered(genomes, optimizer.hopeless(state, genomes))
+        bounds = optimizer.hopeless(state, genomes)
+        if ahead is not None and bounds.max() > -np.inf:
+            ahead.expect(_following(optimizer, state, deepcopy(rng), min(ahead.room(), evaluations) - len(genomes)))
+        fitness = remembered(genomes, bounds)
         state = optimizer.tell(state, genomes, np.where(np.isnan(fitness), -np.inf, fitness))
         evaluations -= len(genomes)
     return state.ranked()
+
+
+def _following(optimizer: Optimizer, state: Population, rng: Generator, count: int) -> Genomes:
+    """`(n, g)`, n ≥ count: what the optimizer asks for next, and after that, while its state is what it is."""
+    following = np.empty((0, state.space.size))
+    while len(following) < count:
+        following = np.vstack([following, optimizer.ask(state, rng)])
+    return following
 
 
 class Remembered:

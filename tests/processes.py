@@ -1,0 +1,28 @@
+"""The processes of a Ray that a test started, so that it can end one."""
+
+import os
+from pathlib import Path
+
+
+def processes_of_ray(task):
+    """Processes that run this task or actor now and descend from this one."""
+    name = f"ray::{task}".encode()
+    return [pid for pid, command in processes() if command.startswith(name) and is_ours(pid)]
+
+
+def processes():
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            yield int(path.name), (path / "cmdline").read_bytes()
+        except OSError:  # it has ended
+            continue
+
+
+def is_ours(pid):
+    """Whether the process descends from this one."""
+    while pid > 1 and pid != os.getpid():
+        try:
+            pid = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            return False
+    return pid == os.getpid()
