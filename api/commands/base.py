@@ -1,0 +1,41 @@
+"""The command itself, and what its parts have in common."""
+
+from collections.abc import Iterable
+from typing import Annotated
+
+import typer
+
+from api.client import Client
+from api.exits import EXPLAINED
+from schemas.records import ExperimentRead, StudyRead
+from services.settings import Settings
+
+app = typer.Typer(
+    help="Closes the reality gap: tunes a robot simulator from a handful of real-world evaluations.",
+    epilog=EXPLAINED,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Id = Annotated[str, typer.Argument(metavar="ID", help="of a study or an experiment")]
+Url = Annotated[
+    str | None,
+    typer.Option("--url", help="where the service is; left out: GAPLAB_URL, or this machine", show_default=False),
+]
+
+
+def connect(url: str | None) -> Client:
+    """A client of the service there."""
+    return Client(url or Settings.from_environment().url)
+
+
+def experiments_of(found: ExperimentRead | StudyRead) -> tuple[ExperimentRead, ...]:
+    """The experiments of a study, or the experiment itself."""
+    return found.experiments if isinstance(found, StudyRead) else (found,)
+
+
+def print_warnings(found: Iterable[ExperimentRead]) -> None:
+    """What is remarkable about their specs, on standard error."""
+    for warning in sorted({warning for each in found for warning in each.warnings}):
+        typer.echo(f"warning: {warning}", err=True)

@@ -1,0 +1,104 @@
+"""Look at what there is."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from api import display
+from api.commands.base import Id, Url, app, connect, experiments_of, print_warnings
+from api.exits import CommandError, Exit
+from api.files import read_spec
+from schemas.lifecycle import State
+from schemas.misfit import MisfitRead
+from schemas.records import ExperimentRead, StudyRead
+
+
+@app.command("list")
+def list_(
+    experiments: Annotated[bool, typer.Option("--experiments", help="experiments in place of studies")] = False,
+    limit: Annotated[int, typer.Option(min=1, max=500)] = 20,
+    url: Url = None,
+) -> None:
+    """List the newest studies, and the experiments that belong to none."""
+    with connect(url) as client:
+        found: list[ExperimentRead | StudyRead] = list(client.experiments(limit=limit).items)
+        if not experiments:
+            alone = [each for each in found if isinstance(each, ExperimentRead) and each.study is None]
+            found = [*client.studies(limit=limit).items, *alone]
+    newest = sorted(found, key=lambda each: each.created_at, reverse=True)[:limit]
+    display.console().print(display.overview(newest) if newest else "Nothing yet; `gaplab submit` starts something.")
+
+
+@app.command()
+def show(id: Id, url: Url = None) -> None:  # noqa: A002 - as the API says
+    """Show a study's experiments, or an experiment's repetitions."""
+    console = display.console()
+    with connect(url) as client:
+        found = client.find(id)
+        console.print(display.overview([found]))
+        console.print(display.numbers(found.progress))
+        if isinstance(found, StudyRead):
+            console.print(display.overview(found.experiments))
+        else:
+            console.print(display.repetitions(client.repetitions(id)))
+            _print_misfit(client.misfit(id), console)
+            console.print_json(data=found.spec)
+        print_warnings(experiments_of(found))
+
+
+@app.command()
+def curve(
+    ids: Annotated[list[str], typer.Argument(metavar="ID...", help="of studies or experiments")],
+    csv: Annotated[bool, typer.Option("--csv", help="print comma-separated values")] = False,
+    svg: Annotated[Path | None, typer.Option(help="draw into this file")] = None,
+    html: Annotated[Path | None, typer.Option(help="draw into this file")] = None,
+    url: Url = None,
+) -> None:
+    """Print curves: recorded fitness, mean ± SD, by number of real-world evaluations; or draw them."""
+    with connect(url) as client:
+        if csv:
+            typer.echo(client.curves_csv(ids), nl=False)
+        if svg:
+            _write(svg, client.figure(ids, "svg"))
+        if html:
+            _write(html, client.figure(ids, "html"))
+        if not (csv or svg or html):
+            found = client.curves(ids)
+            display.console().print(display.curves(found), *display.baselines(found))
+
+
+@app.command()
+def sensitivity(
+    spec: Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or - to read standard input")],
+    url: Url = None,
+) -> None:
+    """Check what the tunables of a spec do: whether they change fitness, how much, and how smoothly."""
+    with connect(url) as client:
+        found = client.check(read_spec(spec))
+    if found.state is not State.COMPLETED:
+        msg = f"the check {found.id} ended as {found.state}: {found.reason}"
+        raise CommandError(msg, Exit.FAILED)
+    console = display.console()
+    console.print(display.sensitivity(found))
+    for each in found.warnings:
+        console.print(each, markup=False)
+
+
+@app.command()
+def catalogue(url: Url = None) -> None:
+    """List the strategies, robots, engines, tunables and optimizers, and their options."""
+    with connect(url) as client:
+        display.console().print(*display.catalogue(client.catalogue()))
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, "utf-8")
+    typer.echo(f"Wrote {path}.")
+
+
+def _print_misfit(found: MisfitRead, console: Console) -> None:
+    if found.remarks:
+        console.print(display.tuned(found), *found.remarks, sep="\n", markup=False)

@@ -1,0 +1,23 @@
+"""The tables.
+
+    study ──< experiment ──< repetition ──< iteration ──< measurement
+                                                     └──< simulator
+    sensitivity, named after what it checks, which many experiments have in common
+
+What is plotted or filtered is a column; vectors are JSON arrays, in which floats round-trip exactly. Neither a database
+nor JSON has nan or infinity: a fitness of nan and a squared error of infinity are NULL.
+
+The tallies in `repetition` (steps, rollouts, seconds) are kept in the transaction that adds the rows they count, so
+that progress is a sum over repetitions and never reads results.
+"""
+
+from services.store.models.base import REVISION as REVISION
+from services.store.models.base import SPEC_VERSION as SPEC_VERSION
+from services.store.models.base import Base as Base
+from services.store.models.experiments import ExperimentRow as ExperimentRow
+from services.store.models.experiments import RepetitionRow as RepetitionRow
+from services.store.models.experiments import StudyRow as StudyRow
+from services.store.models.results import IterationRow as IterationRow
+from services.store.models.results import MeasurementRow as MeasurementRow
+from services.store.models.results import SimulatorRow as SimulatorRow
+from services.store.models.sensitivity import SensitivityRow as SensitivityRow

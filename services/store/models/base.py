@@ -1,0 +1,47 @@
+"""What all tables have in common."""
+
+from datetime import datetime
+from typing import Any, ClassVar
+
+from sqlalchemy import JSON, Double, Enum, MetaData
+from sqlalchemy.orm import DeclarativeBase
+
+from schemas.lifecycle import State
+from schemas.records import MeasurementKind
+from services.store.clock import UtcDateTime
+
+REVISION = "0002"
+"""The migration that makes these tables; a database at any other revision is not ours to touch."""
+
+SPEC_VERSION = 1
+"""Of the specs that are stored now."""
+
+
+class Base(DeclarativeBase):
+    """The base of all tables: every constraint has a name, so that a migration can name it."""
+
+    metadata = MetaData(
+        naming_convention={
+            "pk": "pk_%(table_name)s",
+            "fk": "fk_%(table_name)s_%(column_0_N_name)s_%(referred_table_name)s",
+            "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+            "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+            "ck": "ck_%(table_name)s_%(constraint_name)s",
+        }
+    )
+    type_annotation_map: ClassVar[dict[Any, Any]] = {
+        datetime: UtcDateTime(),
+        float: Double(),
+        list[float]: JSON(none_as_null=True),
+        list[dict[str, Any]]: JSON(none_as_null=True),
+        dict[str, Any]: JSON(none_as_null=True),
+        State: Enum(State, native_enum=False, create_constraint=True, length=16, name="state"),
+        MeasurementKind: Enum(
+            MeasurementKind,
+            native_enum=False,
+            create_constraint=True,
+            length=16,
+            name="kind",
+            values_callable=lambda kinds: [each.value for each in kinds],
+        ),
+    }

@@ -1,0 +1,91 @@
+"""What was submitted, and where it stands."""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import (
+    BigInteger,
+    ForeignKey,
+    Index,
+    String,
+    Text,
+    UniqueConstraint,
+)
+from sqlalchemy.orm import Mapped, mapped_column
+
+from schemas.lifecycle import State
+from services.store.models.base import SPEC_VERSION, Base
+
+
+class StudyRow(Base):
+    """Experiments that belong together to be compared."""
+
+    __tablename__ = "study"
+    __table_args__ = (Index(None, "created_at", "id"),)
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    name: Mapped[str] = mapped_column(String(200))
+    created_at: Mapped[datetime]
+
+
+class ExperimentRow(Base):
+    """One resolved spec.
+
+    Attributes:
+        position: within its study.
+        iterations: of one repetition, number 0 included.
+        rollouts: expected of one repetition.
+    """
+
+    __tablename__ = "experiment"
+    __table_args__ = (Index(None, "created_at", "position", "id"),)
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    study_id: Mapped[str | None] = mapped_column(ForeignKey("study.id"), index=True)
+    position: Mapped[int]
+    name: Mapped[str] = mapped_column(String(200))
+    strategy: Mapped[str] = mapped_column(String(100))
+    state: Mapped[State] = mapped_column(default=State.QUEUED)
+    spec: Mapped[dict[str, Any]]
+    spec_version: Mapped[int] = mapped_column(default=SPEC_VERSION)
+    iterations: Mapped[int]
+    rollouts: Mapped[int] = mapped_column(BigInteger)
+    created_at: Mapped[datetime]
+    started_at: Mapped[datetime | None]
+    ended_at: Mapped[datetime | None]
+
+
+class RepetitionRow(Base):
+    """One run of the algorithm, with its lease and its tallies.
+
+    Attributes:
+        owner: who holds or held the lease.
+        epoch: of the lease; every write of a holder carries it, and a write with an old one changes nothing.
+        heartbeat_at: when the holder was last heard of.
+        attempts: times that it was claimed.
+        losses: times that its worker was lost since a step was last recorded.
+        steps: recorded so far; the position that the next step takes in the log.
+        seconds: of work in the recorded steps.
+    """
+
+    __tablename__ = "repetition"
+    __table_args__ = (UniqueConstraint("experiment_id", "number"), Index(None, "state", "heartbeat_at"))
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    experiment_id: Mapped[str] = mapped_column(ForeignKey("experiment.id"))
+    number: Mapped[int]
+    state: Mapped[State] = mapped_column(default=State.QUEUED)
+    owner: Mapped[str | None] = mapped_column(String(200))
+    epoch: Mapped[int] = mapped_column(default=0)
+    heartbeat_at: Mapped[datetime | None]
+    attempts: Mapped[int] = mapped_column(default=0)
+    losses: Mapped[int] = mapped_column(default=0)
+    error: Mapped[str | None] = mapped_column(Text)
+    steps: Mapped[int] = mapped_column(default=0)
+    iterations_done: Mapped[int] = mapped_column(default=0)
+    rollouts_done: Mapped[int] = mapped_column(BigInteger, default=0)
+    rollouts_failed: Mapped[int] = mapped_column(BigInteger, default=0)
+    rollouts_saved: Mapped[int] = mapped_column(BigInteger, default=0)
+    seconds: Mapped[float] = mapped_column(default=0.0)
+    started_at: Mapped[datetime | None]
+    ended_at: Mapped[datetime | None]

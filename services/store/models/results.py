@@ -1,0 +1,74 @@
+"""What repetitions found."""
+
+from datetime import datetime
+
+from sqlalchemy import (
+    BigInteger,
+    ForeignKey,
+    ForeignKeyConstraint,
+    String,
+)
+from sqlalchemy.orm import Mapped, mapped_column
+
+from schemas.records import MeasurementKind
+from services.store.clock import now
+from services.store.models.base import Base
+
+
+class IterationRow(Base):
+    """Select, measure, tune, transfer; what has not happened yet is NULL.
+
+    The rollouts of a phase are NULL until it is recorded. Number 0, the untuned baseline, selects nothing.
+    """
+
+    __tablename__ = "iteration"
+
+    repetition_id: Mapped[int] = mapped_column(ForeignKey("repetition.id"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    selected_genome: Mapped[list[float] | None]
+    selection_rollouts: Mapped[int | None] = mapped_column(BigInteger)
+    selection_failures: Mapped[int | None] = mapped_column(BigInteger)
+    selection_saved: Mapped[int | None] = mapped_column(BigInteger)
+    tuning_rollouts: Mapped[int | None] = mapped_column(BigInteger)
+    tuning_failures: Mapped[int | None] = mapped_column(BigInteger)
+    tuning_saved: Mapped[int | None] = mapped_column(BigInteger)
+    transferred_genome: Mapped[list[float] | None]
+    simulated_fitness: Mapped[float | None]
+    transfer_rollouts: Mapped[int | None] = mapped_column(BigInteger)
+    transfer_failures: Mapped[int | None] = mapped_column(BigInteger)
+    transfer_saved: Mapped[int | None] = mapped_column(BigInteger)
+    recorded_fitness: Mapped[float | None]
+    seconds: Mapped[float] = mapped_column(default=0.0)
+    ended_at: Mapped[datetime | None]
+
+
+class MeasurementRow(Base):
+    """One real-world evaluation."""
+
+    __tablename__ = "measurement"
+    __table_args__ = (
+        ForeignKeyConstraint(["repetition_id", "iteration"], ["iteration.repetition_id", "iteration.number"]),
+    )
+
+    repetition_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    iteration: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    kind: Mapped[MeasurementKind] = mapped_column(primary_key=True)
+    genome: Mapped[list[float]]
+    fitness: Mapped[float | None]
+    measured_by: Mapped[str] = mapped_column(String(100))
+    measured_at: Mapped[datetime] = mapped_column(default=now())
+
+
+class SimulatorRow(Base):
+    """One tuned simulator; rank 0 is the best of its iteration."""
+
+    __tablename__ = "simulator"
+    __table_args__ = (
+        ForeignKeyConstraint(["repetition_id", "iteration"], ["iteration.repetition_id", "iteration.number"]),
+    )
+
+    repetition_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    iteration: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    rank: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    parameters: Mapped[list[float]]
+    squared_error: Mapped[float | None]
