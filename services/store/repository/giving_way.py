@@ -25,9 +25,14 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]) ->
     way is over, and nothing after it is kept.
     """
     asked = _asked(session, deliveries)
+    before = _lengths(session, [each for each in deliveries if each.experiment_id in asked])
     held = steps.record(session, deliveries)
-    _give_back(session, [each for each in held if each.experiment_id in asked], asked)
-    return tuple(each for each in held if each.experiment_id not in asked)
+    after = _lengths(session, [each for each in held if each.experiment_id in asked])
+    leaving = [
+        each for each in held if after.get(each, 0) > before.get(each, 0)
+    ]  # a second delivery brings no new step
+    _give_back(session, leaving, asked)
+    return tuple(each for each in held if each not in leaving)
 
 
 def unwanted(session: Session, waiting: Sequence[Claim]) -> tuple[Claim, ...]:
@@ -58,6 +63,15 @@ def _asked(session: Session, claims: Iterable[Claim]) -> dict[str, State]:
         lock(session, found)
         return dict(session.execute(wanted).all())
     return {}
+
+
+def _lengths(session: Session, claims: Sequence[Claim]) -> dict[Claim, int]:
+    """How many steps the log of each claim's repetition has."""
+    if not claims:
+        return {}
+    row = RepetitionRow
+    found = dict(session.execute(select(row.id, row.steps).where(row.id.in_([c.repetition_id for c in claims]))).all())
+    return {each: found[each.repetition_id] for each in claims}
 
 
 def _give_back(
