@@ -22,7 +22,7 @@ BATCH_S = 0.2
 def run(
     spec: ExperimentSpec, number: int, log: tuple[Step, ...], expected: Versions
 ) -> Iterator[tuple[TimedStep, ...]]:
-    """The steps that follow the log, in batches, as they are computed.
+    """The steps that follow the log, in batches, as they are computed; an empty batch says that it has its core.
 
     It is never retried by Ray: a repetition goes on from its stored log, not from its beginning. The engine stays warm
     in the worker process from one task to the next.
@@ -31,6 +31,7 @@ def run(
         ClusterUnusable: this node has not the versions that are expected.
     """
     check_here(expected)
+    yield ()
     alone = setting(spec, number)
     pool = Pool(spec, alone.simulate, alone.batch(), expected)
     yield from batches(repetition(replace(alone, simulate=pool, batch=pool.batch), log))

@@ -45,6 +45,7 @@ class Run:
         claim: the right to it.
         stream: batches of steps, as the task computes them.
         received: steps that are not yet stored.
+        started: it has a core; before, it waits for one at Ray.
         ended: the task is over; nothing more will be received.
         failed: why its code raised.
         lost: why its worker is gone.
@@ -53,6 +54,7 @@ class Run:
     claim: Claim
     stream: ObjectRefGenerator
     received: list[TimedStep] = field(default_factory=list)
+    started: bool = False
     ended: bool = False
     failed: str | None = None
     lost: str | None = None
@@ -61,6 +63,7 @@ class Run:
         """Take what the stream has ready: a batch, its end, or why there will be no end."""
         try:
             self.received += ray.get(next(self.stream))
+            self.started = True
         except StopIteration:
             self.ended = True
         except RayTaskError as error:
@@ -150,6 +153,9 @@ class Supervisor:
         if monotonic() - self._looked < WAIT_S:
             return
         self._looked = monotonic()
+        waiting = [run.claim for run in self._runs if not (run.started or run.over)]
+        if given := set(execution.give_way(self._store, waiting)):
+            self._drop_all_but([run.claim for run in self._runs if run.claim not in given])
         for claim in execution.claim(self._store, self._owner, self._capacity() - len(self._runs)):
             self._runs.append(self._launch(claim))
             log.info("%s: on from step %d", self._runs[-1].name, len(claim.log))
@@ -195,7 +201,7 @@ class Supervisor:
         self._looked = -WAIT_S  # cores are free: look for work at once
 
     def _drop_all_but(self, held: list[Claim] | tuple[Claim, ...]) -> None:
-        """Stop the runs whose claim holds no more: cancelled, or taken over."""
+        """Stop the runs whose claim holds no more: cancelled, paused, stopped, given back, or taken over."""
         keys = {(claim.repetition_id, claim.epoch) for claim in held}
         for run in [each for each in self._runs if (each.claim.repetition_id, each.claim.epoch) not in keys]:
             ray.cancel(run.stream, force=True)

@@ -33,12 +33,20 @@ class ExperimentRow(Base):
 
     Attributes:
         position: within its study.
+        spec: what makes its results.
         iterations: of one repetition, number 0 included.
         rollouts: expected of one repetition.
+        precedence: its priority, negated: the least has its turn first, so that one index is in the order of turns.
+        max_parallel: repetitions that run at once; NULL for any number.
+        running: repetitions that somebody has claimed.
+        claimable: whether one more may be claimed now. Both are kept by `repository/settling.py`.
     """
 
     __tablename__ = "experiment"
-    __table_args__ = (Index(None, "created_at", "position", "id"),)
+    __table_args__ = (
+        Index(None, "created_at", "position", "id"),
+        Index("ix_experiment_turn", "claimable", "precedence", "running", "created_at", "position", "id"),
+    )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     study_id: Mapped[str | None] = mapped_column(ForeignKey("study.id"), index=True)
@@ -50,6 +58,10 @@ class ExperimentRow(Base):
     spec_version: Mapped[int] = mapped_column(default=SPEC_VERSION)
     iterations: Mapped[int]
     rollouts: Mapped[int] = mapped_column(BigInteger)
+    precedence: Mapped[int] = mapped_column(default=0)
+    max_parallel: Mapped[int | None]
+    running: Mapped[int] = mapped_column(default=0)
+    claimable: Mapped[bool] = mapped_column(default=True)
     created_at: Mapped[datetime]
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]
@@ -69,7 +81,11 @@ class RepetitionRow(Base):
     """
 
     __tablename__ = "repetition"
-    __table_args__ = (UniqueConstraint("experiment_id", "number"), Index(None, "state", "heartbeat_at"))
+    __table_args__ = (
+        UniqueConstraint("experiment_id", "number"),
+        Index(None, "state", "heartbeat_at"),
+        Index(None, "experiment_id", "state", "number"),
+    )
 
     id: Mapped[int] = mapped_column(primary_key=True)
     experiment_id: Mapped[str] = mapped_column(ForeignKey("experiment.id"))

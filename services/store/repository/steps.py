@@ -48,6 +48,12 @@ def mine(claim: Claim) -> ColumnElement[bool]:
     return and_(row.id == claim.repetition_id, row.epoch == claim.epoch, row.state == State.RUNNING)
 
 
+def any_of(claims: Sequence[Claim]) -> ColumnElement[bool]:
+    """That a lease is one of these claims'; with `state = RUNNING`, that it still holds."""
+    row = RepetitionRow
+    return tuple_(row.id, row.epoch).in_([(each.repetition_id, each.epoch) for each in claims])
+
+
 def record(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]) -> tuple[Claim, ...]:
     """Append the steps to the logs of their repetitions; the claims that still hold, which alone were written.
 

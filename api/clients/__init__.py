@@ -1,0 +1,1 @@
+"""Parts of the client, each about one subject."""
