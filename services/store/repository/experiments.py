@@ -15,6 +15,7 @@ from services.core.errors import Conflict, NotFound
 from services.store.clock import now
 from services.store.cursor import decode, encode
 from services.store.models import ExperimentRow, RepetitionRow, StudyRow
+from services.store.repository import checkpoints
 
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 _OPEN = (State.QUEUED, State.RUNNING)
@@ -186,6 +187,7 @@ def cancel(session: Session, experiment_id: str) -> ExperimentRow:
     ended = {"state": State.CANCELLED, "ended_at": now()}
     row = RepetitionRow
     session.execute(update(row).where(row.experiment_id == experiment_id, row.state.in_(_OPEN)).values(ended))
+    checkpoints.forget(session, [each.id for each in repetitions_of(session, experiment_id) if each.checkpoints])
     session.execute(update(ExperimentRow).where(ExperimentRow.id == experiment_id).values(ended))
     session.refresh(experiment)
     return experiment

@@ -16,6 +16,7 @@ from services.core.errors import Conflict
 from services.store.clock import now
 from services.store.lease import Claim
 from services.store.models import ExperimentRow, RepetitionRow
+from services.store.repository import checkpoints
 from services.store.repository.experiments import lock
 from services.store.repository.steps import logs, mine
 
@@ -158,9 +159,9 @@ def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
         .order_by(ExperimentRow.created_at, ExperimentRow.position, ExperimentRow.id, row.number)
     ).all()
     specs = {experiment: ExperimentSpec.model_validate(spec) for _, _, experiment, _, spec in found}
-    past = logs(session, ids)
+    past, begun = logs(session, ids), checkpoints.stored(session, ids)
     return tuple(
-        Claim(repetition, epoch, experiment, number, specs[experiment], past[repetition])
+        Claim(repetition, epoch, experiment, number, specs[experiment], past[repetition], begun[repetition])
         for repetition, epoch, experiment, number, _ in found
     )
 
