@@ -102,9 +102,12 @@ class Recorder:
         self._rollout_s = (now - begun) / fitnesses.size
         self._answers.append((genomes, parameters, fitnesses))
         if now - self._last >= self._every_s:
-            self._emit(Checkpoint(self._step, self._part, pack(self._answers), now - self._last))
-            self._part, self._last, self._answers = self._part + 1, now, []
+            self._checkpoint(now)
         return fitnesses
+
+    def _checkpoint(self, now: float) -> None:
+        self._emit(Checkpoint(self._step, self._part, pack(self._answers), now - self._last))
+        self._part, self._last, self._answers = self._part + 1, now, []
 
 
 def _aside(compute: Callable[[Emit], None]) -> Iterator[Delivered]:

@@ -43,7 +43,7 @@ def half_broken(genomes, parameters):
 
 
 def setting_of(strategy, optimizer, simulate=half_broken, batch=1):
-    chosen = optimizers.create(PluginRef(name=optimizer, options={"population": 5}))
+    chosen = optimizers.create(PluginRef(name=optimizer, options={"population": 6}))
     small = small_setting(strategy, optimizer=chosen, budget=BUDGET, simulate=simulate, batch=lambda: batch)
     return replace(small, iterations=2)
 
