@@ -14,7 +14,9 @@ from collections.abc import Iterable
 from datetime import timedelta
 
 from services.core.types import Step
+from services.store.lease import Checkpoint as Checkpoint
 from services.store.lease import Claim as Claim
+from services.store.lease import Delivered as Delivered
 from services.store.lease import TimedStep as TimedStep
 from services.store.repository import giving_way, leases
 from services.store.session import Store
@@ -54,8 +56,10 @@ def record(store: Store, claim: Claim, step: Step, *, seconds: float = 0.0) -> b
     return bool(record_all(store, [(claim, (TimedStep(step, seconds),))]))
 
 
-def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[TimedStep]]]) -> tuple[Claim, ...]:
+def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[Delivered]]]) -> tuple[Claim, ...]:
     """Append steps to the logs of many repetitions in one transaction, each as `record` does.
+
+    A checkpoint is kept until its step is there; the next claim has it. One whose step is there already is left out.
 
     Returns:
         The claims that still hold; of the others nothing was written, but for those whose experiment was asked to pause
@@ -64,9 +68,9 @@ def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[TimedSte
     Raises:
         Conflict: as `record`; then nothing at all was written.
     """
-    gathered: dict[Claim, list[TimedStep]] = {}
-    for claim, timed in deliveries:
-        gathered.setdefault(claim, []).extend(timed)
+    gathered: dict[Claim, list[Delivered]] = {}
+    for claim, delivered in deliveries:
+        gathered.setdefault(claim, []).extend(delivered)
     return store.write(lambda session: giving_way.record(session, gathered)) if gathered else ()
 
 

@@ -75,8 +75,9 @@ class RepetitionRow(Base):
         epoch: of the lease; every write of a holder carries it, and a write with an old one changes nothing.
         heartbeat_at: when the holder was last heard of.
         attempts: times that it was claimed.
-        losses: times that its worker was lost since a step was last recorded.
+        losses: times that its worker was lost since a step, or a part of one, was last recorded.
         steps: recorded so far; the position that the next step takes in the log.
+        checkpoints: parts of that next step that are stored.
         seconds: of work in the recorded steps.
     """
 
@@ -98,6 +99,7 @@ class RepetitionRow(Base):
     losses: Mapped[int] = mapped_column(default=0)
     error: Mapped[str | None] = mapped_column(Text)
     steps: Mapped[int] = mapped_column(default=0)
+    checkpoints: Mapped[int] = mapped_column(default=0, server_default="0")
     iterations_done: Mapped[int] = mapped_column(default=0)
     rollouts_done: Mapped[int] = mapped_column(BigInteger, default=0)
     rollouts_failed: Mapped[int] = mapped_column(BigInteger, default=0)

@@ -2,6 +2,6 @@
 
 Experiments and studies are inserted, found and listed in `experiments`, and moved by people in `verbs`. `leases` says
 who may go on with a repetition, `turns` whose turn it is, `giving_way` who had better stop, `attempts` who had it;
-`settling` keeps an experiment in line with its repetitions, and `steps` appends to their logs. What is shown comes from
-`reads`, `progress` and `results`.
+`settling` keeps an experiment in line with its repetitions, `steps` appends to their logs, and `checkpoints` keeps what
+there is of the next step. What is shown comes from `reads`, `progress` and `results`.
 """

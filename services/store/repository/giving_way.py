@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 
 from schemas.lifecycle import ASKED, Ending, State
 from services.store.clock import now
-from services.store.lease import Claim, TimedStep
+from services.store.lease import Claim, Delivered
 from services.store.models import ExperimentRow, RepetitionRow
 from services.store.repository import attempts, steps
 from services.store.repository.experiments import lock
@@ -18,11 +18,11 @@ from services.store.repository.turns import ahead
 _ENDING = {State.PAUSING: Ending.PAUSED, State.STOPPING: Ending.STOPPED}
 
 
-def record(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]) -> tuple[Claim, ...]:
+def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -> tuple[Claim, ...]:
     """Append steps as `steps.record` does; the claims that go on.
 
     A delivery to an experiment that was asked to pause or stop is stored, and ends its lease: the step that was under
-    way is over, and nothing after it is kept.
+    way is over, and nothing after it is kept. A checkpoint is no step: work goes on to the step's end.
     """
     asked = _asked(session, deliveries)
     before = _lengths(session, [each for each in deliveries if each.experiment_id in asked])

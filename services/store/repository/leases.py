@@ -16,7 +16,7 @@ from services.core.errors import Conflict
 from services.store.clock import now
 from services.store.lease import Claim
 from services.store.models import ExperimentRow, RepetitionRow
-from services.store.repository import attempts
+from services.store.repository import attempts, checkpoints
 from services.store.repository.experiments import lock
 from services.store.repository.settling import settle
 from services.store.repository.steps import any_of, logs, mine
@@ -130,9 +130,9 @@ def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
         .where(row.id.in_(ids))
     ).all()
     specs = {experiment: ExperimentSpec.model_validate(spec) for _, _, experiment, _, spec in found}
-    past = logs(session, ids)
+    past, begun = logs(session, ids), checkpoints.stored(session, ids)
     claims = {
-        repetition: Claim(repetition, epoch, experiment, number, specs[experiment], past[repetition])
+        repetition: Claim(repetition, epoch, experiment, number, specs[experiment], past[repetition], begun[repetition])
         for repetition, epoch, experiment, number, _ in found
     }
     return tuple(claims[each] for each in ids)

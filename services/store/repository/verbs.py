@@ -11,7 +11,7 @@ from schemas.spec import ExperimentSpec
 from services.core.errors import Conflict
 from services.store.clock import now
 from services.store.models import ExperimentRow, RepetitionRow, StudyRow
-from services.store.repository import attempts
+from services.store.repository import attempts, checkpoints
 from services.store.repository.experiments import (
     Extent,
     experiments_of,
@@ -163,7 +163,9 @@ def _cancel(session: Session, experiment: ExperimentRow) -> None:
         .values(state=State.CANCELLED, ended_at=now())
         .returning(row.id)
     )
-    attempts.end(session, session.scalars(called_off).all(), Ending.CANCELLED)
+    repetitions = session.scalars(called_off).all()
+    attempts.end(session, repetitions, Ending.CANCELLED)
+    checkpoints.forget(session, repetitions)
     _move(session, experiment, state=State.CANCELLED, ended_at=now())
 
 
