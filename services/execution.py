@@ -10,18 +10,29 @@ All of them raise StoreUnavailable while the database cannot be used; each may t
 from collections.abc import Iterable
 from datetime import timedelta
 
+from schemas.provenance import Provenance
 from services.core.types import Step
 from services.store.lease import Claim as Claim
 from services.store.lease import TimedStep as TimedStep
 from services.store.repository import leases, steps
 from services.store.session import Store
+from services.versions import provenance
 
 STALE_AFTER_S = 30.0
 
 
-def claim(store: Store, owner: str, limit: int) -> tuple[Claim, ...]:
-    """Up to `limit` queued repetitions for the owner to run, of the oldest experiments first, each with its log."""
-    return store.write(lambda session: leases.claim(session, owner, limit)) if limit > 0 else ()
+def claim(store: Store, owner: str, limit: int, under: Provenance | None = None) -> tuple[Claim, ...]:
+    """Up to `limit` queued repetitions for the owner to run, of the oldest experiments first, each with its log.
+
+    Args:
+        store: where they are queued.
+        owner: who runs them.
+        limit: how many at most.
+        under: what they are to be computed with; this process's own if left out. An experiment that was begun under
+            other engine versions, another architecture or another version of the spec is left alone.
+    """
+    own = under or provenance()
+    return store.write(lambda session: leases.claim(session, owner, limit, own)) if limit > 0 else ()
 
 
 def heartbeat(store: Store, claims: Iterable[Claim]) -> tuple[Claim, ...]:

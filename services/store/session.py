@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
-from sqlalchemy import text
+from sqlalchemy import event, text
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session, sessionmaker
 
@@ -13,6 +13,7 @@ from services.core.errors import StoreUnavailable
 from services.store import troubles
 from services.store.engine import WRITES, open_engine
 from services.store.models import REVISION
+from services.store.repository import events
 
 T = TypeVar("T")
 
@@ -29,6 +30,7 @@ class Store:
         self._engine = open_engine(url)
         snapshot = {"isolation_level": "REPEATABLE READ"} if self._engine.name == "postgresql" else {}
         self._writer = sessionmaker(self._engine.execution_options(**{WRITES: True}), expire_on_commit=False)
+        event.listen(self._writer, "before_commit", events.write)
         self._reader = sessionmaker(self._engine.execution_options(**snapshot), expire_on_commit=False)
 
     @contextmanager

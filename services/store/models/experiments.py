@@ -35,6 +35,9 @@ class ExperimentRow(Base):
         position: within its study.
         iterations: of one repetition, number 0 included.
         rollouts: expected of one repetition.
+        computed_with: engines, machine and version of the spec, as its first steps had them.
+        refused_by: what a supervisor has that did not go on with it, for it is not the same.
+        sensitivity_id: of the check of what it tunes.
     """
 
     __tablename__ = "experiment"
@@ -50,6 +53,9 @@ class ExperimentRow(Base):
     spec_version: Mapped[int] = mapped_column(default=SPEC_VERSION)
     iterations: Mapped[int]
     rollouts: Mapped[int] = mapped_column(BigInteger)
+    computed_with: Mapped[str | None] = mapped_column(String(300))
+    refused_by: Mapped[str | None] = mapped_column(String(300))
+    sensitivity_id: Mapped[str | None] = mapped_column(String(32), index=True)
     created_at: Mapped[datetime]
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]
@@ -66,6 +72,7 @@ class RepetitionRow(Base):
         losses: times that its worker was lost since a step was last recorded.
         steps: recorded so far; the position that the next step takes in the log.
         seconds: of work in the recorded steps.
+        provenance_id: under what it was claimed the last time.
     """
 
     __tablename__ = "repetition"
@@ -87,5 +94,6 @@ class RepetitionRow(Base):
     rollouts_failed: Mapped[int] = mapped_column(BigInteger, default=0)
     rollouts_saved: Mapped[int] = mapped_column(BigInteger, default=0)
     seconds: Mapped[float] = mapped_column(default=0.0)
+    provenance_id: Mapped[str | None] = mapped_column(String(32))
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]

@@ -9,12 +9,14 @@ from typing import TypeVar
 from sqlalchemy import insert, select, tuple_, update
 from sqlalchemy.orm import Session
 
+from schemas.events import EventKind
 from schemas.lifecycle import State
 from schemas.spec import ExperimentSpec
 from services.core.errors import Conflict, NotFound
 from services.store.clock import now
 from services.store.cursor import decode, encode
 from services.store.models import ExperimentRow, RepetitionRow, StudyRow
+from services.store.repository.events import note
 
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 _OPEN = (State.QUEUED, State.RUNNING)
@@ -73,6 +75,7 @@ def insert_experiment(
     session.flush()
     numbers = range(spec.repetitions or 0)
     session.execute(insert(RepetitionRow), [{"experiment_id": experiment.id, "number": each} for each in numbers])
+    note(session, EventKind.SUBMITTED, experiment.id, name=experiment.name, repetitions=len(numbers))
     return experiment
 
 
@@ -187,6 +190,7 @@ def cancel(session: Session, experiment_id: str) -> ExperimentRow:
     row = RepetitionRow
     session.execute(update(row).where(row.experiment_id == experiment_id, row.state.in_(_OPEN)).values(ended))
     session.execute(update(ExperimentRow).where(ExperimentRow.id == experiment_id).values(ended))
+    note(session, EventKind.CANCELLED, experiment_id)
     session.refresh(experiment)
     return experiment
 

@@ -10,12 +10,16 @@ from datetime import datetime, timedelta
 from sqlalchemy import ColumnElement, case, func, select, tuple_, update
 from sqlalchemy.orm import Session
 
+from schemas.events import EventKind
 from schemas.lifecycle import State
+from schemas.provenance import Provenance
 from schemas.spec import ExperimentSpec
 from services.core.errors import Conflict
 from services.store.clock import now
 from services.store.lease import Claim
 from services.store.models import ExperimentRow, RepetitionRow
+from services.store.repository import provenance
+from services.store.repository.events import note
 from services.store.repository.experiments import lock
 from services.store.repository.steps import logs, mine
 
@@ -25,9 +29,14 @@ MAX_LOSSES = 5
 _OPEN = (State.QUEUED, State.RUNNING)
 
 
-def claim(session: Session, owner: str, limit: int) -> tuple[Claim, ...]:
-    """Up to `limit` queued repetitions, of the oldest experiments first; RUNNING from now on, and the owner's."""
-    experiments = _oldest_with_queued(session, limit)
+def claim(session: Session, owner: str, limit: int, under: Provenance) -> tuple[Claim, ...]:
+    """Up to `limit` queued repetitions, of the oldest experiments first; RUNNING from now on, and the owner's.
+
+    Experiments that were computed with something else than what it is under are left alone, and say so.
+    """
+    experiments = _oldest_with_queued(session, limit, under)
+    if len(experiments) < limit:
+        provenance.refuse(session, under)
     if not experiments:
         return ()
     lock(session, experiments)
@@ -35,7 +44,7 @@ def claim(session: Session, owner: str, limit: int) -> tuple[Claim, ...]:
     queued = (
         select(row.id)
         .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
-        .where(row.experiment_id.in_(experiments), row.state == State.QUEUED)
+        .where(row.experiment_id.in_(experiments), row.state == State.QUEUED, provenance.permitted(under))
         .order_by(ExperimentRow.created_at, ExperimentRow.position, ExperimentRow.id, row.number)
         .limit(limit)
     )
@@ -53,7 +62,9 @@ def claim(session: Session, owner: str, limit: int) -> tuple[Claim, ...]:
         )
     )
     _start(session, experiments, ids)
-    return _claims(session, ids)
+    claims = _claims(session, ids)
+    provenance.record(session, under, claims)
+    return claims
 
 
 def heartbeat(session: Session, claims: Sequence[Claim]) -> tuple[Claim, ...]:
@@ -86,6 +97,9 @@ def complete(session: Session, claims: Sequence[Claim]) -> tuple[Claim, ...]:
         .returning(row.id)
     )
     held = set(ended.scalars())
+    for each in claims:
+        if each.repetition_id in held:
+            note(session, EventKind.REPETITION_COMPLETED, each.experiment_id, each.number)
     for experiment in experiments:
         _settle(session, experiment)
     return tuple(each for each in claims if each.repetition_id in held)
@@ -97,6 +111,8 @@ def fail(session: Session, claim: Claim, reason: str) -> bool:
     row = RepetitionRow
     values = {"state": State.FAILED, "error": plain(reason), "ended_at": now()}
     ended = session.execute(update(row).where(mine(claim)).values(values).returning(row.id)).first()
+    if ended is not None:
+        note(session, EventKind.REPETITION_FAILED, claim.experiment_id, claim.number, reason=plain(reason))
     _settle(session, claim.experiment_id)
     return ended is not None
 
@@ -112,7 +128,10 @@ def hand_back(session: Session, claim: Claim) -> bool:
     lock(session, [claim.experiment_id])
     row = RepetitionRow
     values = {"state": State.QUEUED, "owner": None, "attempts": row.attempts - 1}
-    return session.execute(update(row).where(mine(claim)).values(values).returning(row.id)).first() is not None
+    held = session.execute(update(row).where(mine(claim)).values(values).returning(row.id)).first() is not None
+    if held:
+        note(session, EventKind.REPETITION_HANDED_BACK, claim.experiment_id, claim.number)
+    return held
 
 
 def requeue_lost(session: Session, stale_after: timedelta) -> int:
@@ -127,12 +146,12 @@ def requeue_lost(session: Session, stale_after: timedelta) -> int:
     return _give_back(session, stale, experiments, f"its worker was not heard of for {stale_after.total_seconds():g} s")
 
 
-def _oldest_with_queued(session: Session, limit: int) -> Sequence[str]:
+def _oldest_with_queued(session: Session, limit: int, under: Provenance) -> Sequence[str]:
     row = ExperimentRow
     queued = select(RepetitionRow.experiment_id).where(RepetitionRow.state == State.QUEUED)
     return session.scalars(
         select(row.id)
-        .where(row.id.in_(queued), row.state.in_(_OPEN))
+        .where(row.id.in_(queued), row.state.in_(_OPEN), provenance.permitted(under))
         .order_by(row.created_at, row.position, row.id)
         .limit(limit)
     ).all()
@@ -142,11 +161,14 @@ def _start(session: Session, experiments: Sequence[str], repetitions: Sequence[i
     """Move the experiments of these repetitions to RUNNING, unless they are."""
     row = ExperimentRow
     of_these = select(RepetitionRow.experiment_id).where(RepetitionRow.id.in_(repetitions))
-    session.execute(
+    started = session.scalars(
         update(row)
         .where(row.id.in_(experiments), row.id.in_(of_these), row.state == State.QUEUED)
         .values(state=State.RUNNING, started_at=now())
+        .returning(row.id)
     )
+    for experiment in started:
+        note(session, EventKind.STARTED, experiment)
 
 
 def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
@@ -180,8 +202,11 @@ def _give_back(session: Session, which: ColumnElement[bool], experiments: Sequen
             losses=row.losses + 1,
             owner=None,
         )
-        .returning(row.id)
+        .returning(row.experiment_id, row.number, row.state, row.error)
     ).all()
+    for experiment, number, state, said in moved:
+        kind = EventKind.REPETITION_FAILED if state is State.FAILED else EventKind.REPETITION_LOST
+        note(session, kind, experiment, number, reason=said)
     for experiment in experiments:
         _settle(session, experiment)
     return len(moved)
@@ -217,8 +242,11 @@ def _settle(session: Session, experiment: str) -> None:
     if states & set(_OPEN):
         return
     state = State.COMPLETED if State.COMPLETED in states else State.FAILED
-    session.execute(
+    ended = session.execute(
         update(ExperimentRow)
         .where(ExperimentRow.id == experiment, ExperimentRow.state == State.RUNNING)
         .values(state=state, ended_at=now())
-    )
+        .returning(ExperimentRow.id)
+    ).first()
+    if ended is not None:
+        note(session, EventKind(state.lower()), experiment)

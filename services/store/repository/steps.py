@@ -14,6 +14,7 @@ from services.store import mapping
 from services.store.clock import now
 from services.store.lease import Claim, TimedStep
 from services.store.models import IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
+from services.store.repository import events
 from services.store.repository.batch import Batch
 
 _REPETITION = cast("Table", RepetitionRow.__table__)
@@ -68,6 +69,7 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]) ->
         for each in steps:
             batch.add(claim, each)
     batch.write(session)
+    events.note_steps(session, fresh)
     return tuple(fresh)
 
 
