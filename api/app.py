@@ -5,8 +5,9 @@ from importlib.metadata import version
 from fastapi import FastAPI
 
 from api import documentation, problems
+from api.feed import Feed
 from api.limits import BodyLimit
-from api.routes import catalogue, curves, experiments, figures, health, sensitivity, studies
+from api.routes import catalogue, curves, events, experiments, figures, health, provenance, sensitivity, studies
 from services.store.session import Store
 
 DESCRIPTION = """
@@ -22,6 +23,7 @@ TAGS = [
     {"name": "studies", "description": "experiments that belong together to be compared"},
     {"name": "experiments", "description": "one strategy under one setting, repeated"},
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
+    {"name": "events", "description": "what happens to experiments, as it happens"},
     {"name": "sensitivity", "description": "what tunables do to fitness, checked before anything is tuned"},
     {"name": "catalogue", "description": "the plug-ins that a spec may name"},
     {"name": "health", "description": "for whoever keeps the service alive"},
@@ -44,9 +46,10 @@ def create_app(store: Store) -> FastAPI:
         license_info={"name": "MIT", "identifier": "MIT"},
     )
     app.state.store = store
+    app.state.feed = Feed(store)
     app.add_middleware(BodyLimit)
     problems.install(app)
-    for module in (studies, experiments, curves, figures, sensitivity, catalogue, health):
+    for module in (studies, experiments, provenance, events, curves, figures, sensitivity, catalogue, health):
         app.include_router(module.router)
     documentation.install(app)
     return app

@@ -11,15 +11,17 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import Any, Literal, Self, TypeVar
-from urllib.parse import quote
 
 import httpx2
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
+from api.clients.errors import ServiceError as ServiceError
+from api.clients.errors import ServiceUnreachable as ServiceUnreachable
+from api.clients.errors import is_for_good, problem_of
+from api.clients.history import History, part
 from schemas.curves import Comparison, Curve
 from schemas.misfit import MisfitRead
 from schemas.plugin import Catalogue
-from schemas.problems import Problem
 from schemas.records import ExperimentRead, Page, RepetitionRead, StudyRead
 from schemas.sensitivity import SensitivityRead, SensitivitySpec
 from schemas.spec import ExperimentSpec, StudySpec
@@ -36,19 +38,7 @@ LOOPBACK = {"127.0.0.1", "localhost", "::1"}
 """This machine: no proxy of the environment leads to it."""
 
 
-class ServiceError(Exception):
-    """The service refused or failed; `problem` is its answer, and the message is the problem's detail."""
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-        super().__init__(problem.detail)
-
-
-class ServiceUnreachable(Exception):
-    """Nothing answers at the service's address."""
-
-
-class Client:
+class Client(History):
     """A connection to a service.
 
     Args:
@@ -97,11 +87,11 @@ class Client:
 
     def experiment(self, id: str) -> ExperimentRead:  # noqa: A002 - as the API says
         """An experiment."""
-        return self._read(ExperimentRead, self._get(f"/experiments/{_part(id)}"))
+        return self._read(ExperimentRead, self._get(f"/experiments/{part(id)}"))
 
     def study(self, id: str) -> StudyRead:  # noqa: A002 - as the API says
         """A study."""
-        return self._read(StudyRead, self._get(f"/studies/{_part(id)}"))
+        return self._read(StudyRead, self._get(f"/studies/{part(id)}"))
 
     def find(self, id: str) -> ExperimentRead | StudyRead:  # noqa: A002 - as the API says
         """The study of this id, or the experiment."""
@@ -122,11 +112,11 @@ class Client:
 
     def repetitions(self, id: str) -> tuple[RepetitionRead, ...]:  # noqa: A002 - as the API says
         """The repetitions of an experiment."""
-        return self._read(tuple[RepetitionRead, ...], self._get(f"/experiments/{_part(id)}/repetitions"))
+        return self._read(tuple[RepetitionRead, ...], self._get(f"/experiments/{part(id)}/repetitions"))
 
     def misfit(self, id: str) -> MisfitRead:  # noqa: A002 - as the API says
         """How far an experiment's tuned simulators are from reality, and from each other."""
-        return self._read(MisfitRead, self._get(f"/experiments/{_part(id)}/misfit"))
+        return self._read(MisfitRead, self._get(f"/experiments/{part(id)}/misfit"))
 
     def check(self, spec: Spec | SensitivitySpec, *, every_s: float = 0.5) -> SensitivityRead:
         """What the tunables of a spec do to fitness: queued if that is not known yet, and waited for."""
@@ -134,12 +124,12 @@ class Client:
         check = self._read(SensitivityRead, self._request("POST", "/sensitivity", json=body))
         while not check.state.ended:
             time.sleep(every_s)
-            check = self._read(SensitivityRead, self._get(f"/sensitivity/{_part(check.id)}"))
+            check = self._read(SensitivityRead, self._get(f"/sensitivity/{part(check.id)}"))
         return check
 
     def cancel(self, id: str) -> ExperimentRead:  # noqa: A002 - as the API says
         """Call an experiment off."""
-        return self._read(ExperimentRead, self._request("POST", f"/experiments/{_part(id)}/cancel"))
+        return self._read(ExperimentRead, self._request("POST", f"/experiments/{part(id)}/cancel"))
 
     def watch(self, id: str, *, every_s: float = 1.0, patience_s: float = 60.0) -> Iterator[ExperimentRead | StudyRead]:  # noqa: A002
         """A study or an experiment again and again, until it has ended; the last one is what it ended as.
@@ -155,7 +145,7 @@ class Client:
             try:
                 current = again(id)
             except (ServiceError, ServiceUnreachable) as error:
-                if _for_good(error) or time.monotonic() - heard_at > patience_s:
+                if is_for_good(error) or time.monotonic() - heard_at > patience_s:
                     raise
                 continue
             heard_at = time.monotonic()
@@ -203,7 +193,7 @@ class Client:
             raise ServiceUnreachable(msg) from error
         if answer.is_success:
             return answer
-        raise ServiceError(_problem(answer))
+        raise ServiceError(problem_of(answer))
 
     def _read(self, kind: type[T], answer: httpx2.Response) -> T:
         try:
@@ -215,20 +205,3 @@ class Client:
 
 def _body(spec: BaseModel | Mapping[str, Any]) -> dict[str, Any]:
     return spec.model_dump(mode="json", exclude_unset=True) if isinstance(spec, BaseModel) else dict(spec)
-
-
-def _part(id: str) -> str:  # noqa: A002 - as the API says
-    """The id as one part of an address, whatever it is; servers decode a slash before they look for parts."""
-    return quote(id.replace("/", "%2F"), safe="").replace(".", "%2E") or "%20"
-
-
-def _for_good(error: Exception) -> bool:
-    return isinstance(error, ServiceError) and error.problem.status < 500
-
-
-def _problem(answer: httpx2.Response) -> Problem:
-    try:
-        return Problem.model_validate_json(answer.content)
-    except ValidationError:
-        detail = f"{answer.url} answers {answer.status_code} and no problem; is it a gaplab?"
-        return Problem(type="about:blank", title="Not understood", status=answer.status_code, detail=detail)

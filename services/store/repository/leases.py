@@ -19,7 +19,7 @@ from services.store.clock import now
 from services.store.lease import Claim
 from services.store.models import ExperimentRow, RepetitionRow
 from services.store.repository import provenance
-from services.store.repository.events import note
+from services.store.repository.events import note, note_losses
 from services.store.repository.experiments import lock
 from services.store.repository.steps import logs, mine
 
@@ -97,12 +97,12 @@ def complete(session: Session, claims: Sequence[Claim]) -> tuple[Claim, ...]:
         .returning(row.id)
     )
     held = set(ended.scalars())
-    for each in claims:
-        if each.repetition_id in held:
-            note(session, EventKind.REPETITION_COMPLETED, each.experiment_id, each.number)
+    kept = tuple(each for each in claims if each.repetition_id in held)
+    for each in kept:
+        note(session, EventKind.REPETITION_COMPLETED, each.experiment_id, each.number)
     for experiment in experiments:
         _settle(session, experiment)
-    return tuple(each for each in claims if each.repetition_id in held)
+    return kept
 
 
 def fail(session: Session, claim: Claim, reason: str) -> bool:
@@ -204,9 +204,7 @@ def _give_back(session: Session, which: ColumnElement[bool], experiments: Sequen
         )
         .returning(row.experiment_id, row.number, row.state, row.error)
     ).all()
-    for experiment, number, state, said in moved:
-        kind = EventKind.REPETITION_FAILED if state is State.FAILED else EventKind.REPETITION_LOST
-        note(session, kind, experiment, number, reason=said)
+    note_losses(session, moved)
     for experiment in experiments:
         _settle(session, experiment)
     return len(moved)

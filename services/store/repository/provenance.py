@@ -10,7 +10,7 @@ from hashlib import sha256
 from itertools import combinations_with_replacement
 from typing import Any, TypeAlias
 
-from sqlalchemy import ColumnElement, Table, func, select, update
+from sqlalchemy import ColumnElement, func, select, update
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
@@ -107,7 +107,9 @@ def read(session: Session, experiment_id: str) -> ProvenanceRead:
         NotFound: no such experiment.
     """
     experiment = get_experiment(session, experiment_id)
-    return ProvenanceRead(computed_with=experiment.computed_with, refused_by=experiment.refused_by, uses=_uses(session, experiment_id))
+    return ProvenanceRead(
+        computed_with=experiment.computed_with, refused_by=experiment.refused_by, uses=_uses(session, experiment_id)
+    )
 
 
 def _uses(session: Session, experiment_id: str) -> tuple[ProvenanceUse, ...]:
