@@ -7,7 +7,19 @@ from fastapi import FastAPI
 from api import documentation, problems
 from api.feed import Feed
 from api.limits import BodyLimit
-from api.routes import catalogue, curves, events, experiments, figures, health, provenance, sensitivity, studies
+from api.metrics import Measured, Metrics
+from api.routes import (
+    catalogue,
+    curves,
+    events,
+    experiments,
+    figures,
+    health,
+    metrics,
+    provenance,
+    sensitivity,
+    studies,
+)
 from services.store.session import Store
 
 DESCRIPTION = """
@@ -47,9 +59,11 @@ def create_app(store: Store) -> FastAPI:
     )
     app.state.store = store
     app.state.feed = Feed(store)
+    app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(BodyLimit)
+    app.add_middleware(Measured, metrics=app.state.metrics)
     problems.install(app)
-    for module in (studies, experiments, provenance, events, curves, figures, sensitivity, catalogue, health):
+    for module in (studies, experiments, provenance, events, curves, figures, sensitivity, catalogue, health, metrics):
         app.include_router(module.router)
     documentation.install(app)
     return app

@@ -35,7 +35,7 @@ def serve_api(settings: Settings, listener: socket.socket) -> None:
     end_in_order()
     store = Store(settings.database_url)
     try:
-        config = uvicorn.Config(create_app(store), log_level="warning", server_header=False)
+        config = uvicorn.Config(create_app(store), log_config=None, server_header=False)
         Server(config).run([listener])
     finally:
         store.dispose()

@@ -17,7 +17,7 @@ import ray
 from ray import ObjectRefGenerator
 from ray.exceptions import RayError, RayTaskError
 
-from services import execution
+from services import execution, supervisors
 from services.core.errors import ClusterUnusable, StoreUnavailable
 from services.execution import Claim, TimedStep
 from services.store.session import Store
@@ -76,9 +76,9 @@ class Run:
         return self.ended or self.failed is not None or self.lost is not None
 
     @property
-    def name(self) -> str:
+    def place(self) -> dict[str, str | int]:
         """The experiment and the number, for the log."""
-        return f"{self.claim.experiment_id}/{self.claim.number}"
+        return {"experiment": self.claim.experiment_id, "repetition": self.claim.number}
 
 
 class Supervisor:
@@ -138,6 +138,7 @@ class Supervisor:
     def _heartbeat(self) -> None:
         if monotonic() - self._beat < HEARTBEAT_S:
             return
+        supervisors.heartbeat(self._store, self._owner)
         held = execution.heartbeat(self._store, [run.claim for run in self._runs])
         self._drop_all_but(held)
         self._checks.heartbeat()
@@ -152,7 +153,7 @@ class Supervisor:
         self._looked = monotonic()
         for claim in execution.claim(self._store, self._owner, self._capacity() - len(self._runs)):
             self._runs.append(self._launch(claim))
-            log.info("%s: on from step %d", self._runs[-1].name, len(claim.log))
+            log.info("on from step %d", len(claim.log), extra=self._runs[-1].place)
 
     def _launch(self, claim: Claim) -> Run:
         return Run(claim, repetition.run.remote(claim.spec, claim.number, claim.log, self._versions))
@@ -185,12 +186,12 @@ class Supervisor:
         for run in over:
             if run.failed is not None:
                 execution.fail(self._store, run.claim, run.failed)
-                log.error("%s: failed: %s", run.name, run.failed)
+                log.error("failed: %s", run.failed, extra=run.place)
             elif run.lost is not None:
                 execution.release(self._store, run.claim, run.lost)
-                log.warning("%s: queued again: %s", run.name, run.lost)
+                log.warning("queued again: %s", run.lost, extra=run.place)
             else:
-                log.info("%s: completed", run.name)
+                log.info("completed", extra=run.place)
             self._runs.remove(run)
         self._looked = -WAIT_S  # cores are free: look for work at once
 
@@ -200,14 +201,16 @@ class Supervisor:
         for run in [each for each in self._runs if (each.claim.repetition_id, each.claim.epoch) not in keys]:
             ray.cancel(run.stream, force=True)
             self._runs.remove(run)
-            log.info("%s: dropped, it is no longer ours", run.name)
+            log.info("dropped, it is no longer ours", extra=run.place)
 
     def _hand_back(self) -> None:
         for run in self._runs:
             try:
                 execution.hand_back(self._store, run.claim)
             except StoreUnavailable as error:
-                log.warning("%s: its lease will run out: %s", run.name, error)
+                log.warning("its lease will run out: %s", error, extra=run.place)
         self._runs = []
         with suppress(StoreUnavailable):  # then its lease will run out
             self._checks.hand_back()
+        with suppress(StoreUnavailable):  # then it is taken for lost, which it nearly is
+            supervisors.end(self._store, self._owner)

@@ -40,6 +40,7 @@ ENDPOINTS = {
     "GET /catalogue",
     "GET /livez",
     "GET /readyz",
+    "GET /metrics",
 }
 
 

@@ -60,7 +60,7 @@ def note_steps(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]
             note(session, kind, claim.experiment_id, claim.number, iteration=each.step.iteration, **body)
 
 
-def note_losses(session: Session, moved: Iterable[Row[tuple[str, int, State, str | None]]]) -> None:
+def note_losses(session: Session, moved: Iterable[Row[str, int, State, str | None]]) -> None:
     """An event for each repetition whose worker was lost: experiment, number, what it became, and why."""
     for experiment, number, state, reason in moved:
         kind = EventKind.REPETITION_FAILED if state is State.FAILED else EventKind.REPETITION_LOST
