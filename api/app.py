@@ -5,8 +5,22 @@ from importlib.metadata import version
 from fastapi import FastAPI
 
 from api import documentation, problems
+from api.feed import Feed
 from api.limits import BodyLimit
-from api.routes import catalogue, curves, experiments, figures, health, life_cycle, sensitivity, studies
+from api.metrics import Measured, Metrics
+from api.routes import (
+    catalogue,
+    curves,
+    events,
+    experiments,
+    figures,
+    health,
+    life_cycle,
+    metrics,
+    provenance,
+    sensitivity,
+    studies,
+)
 from services.store.session import Store
 
 DESCRIPTION = """
@@ -22,6 +36,7 @@ TAGS = [
     {"name": "studies", "description": "experiments that belong together to be compared"},
     {"name": "experiments", "description": "one strategy under one setting, repeated"},
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
+    {"name": "events", "description": "what happens to experiments, as it happens"},
     {"name": "sensitivity", "description": "what tunables do to fitness, checked before anything is tuned"},
     {"name": "catalogue", "description": "the plug-ins that a spec may name"},
     {"name": "health", "description": "for whoever keeps the service alive"},
@@ -44,9 +59,24 @@ def create_app(store: Store) -> FastAPI:
         license_info={"name": "MIT", "identifier": "MIT"},
     )
     app.state.store = store
+    app.state.feed = Feed(store)
+    app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(BodyLimit)
+    app.add_middleware(Measured, metrics=app.state.metrics)
     problems.install(app)
-    for module in (studies, experiments, life_cycle, curves, figures, sensitivity, catalogue, health):
+    for module in (
+        studies,
+        experiments,
+        life_cycle,
+        provenance,
+        events,
+        curves,
+        figures,
+        sensitivity,
+        catalogue,
+        health,
+        metrics,
+    ):
         app.include_router(module.router)
     documentation.install(app)
     return app

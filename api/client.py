@@ -15,11 +15,14 @@ from typing import Any, Literal, Self, TypeVar
 import httpx2
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
+from api.clients.errors import ServiceError as ServiceError
+from api.clients.errors import ServiceUnreachable as ServiceUnreachable
+from api.clients.errors import is_for_good, problem_of
+from api.clients.history import History
 from api.clients.life_cycle import LifeCycle, part
 from schemas.curves import Comparison, Curve
 from schemas.misfit import MisfitRead
 from schemas.plugin import Catalogue
-from schemas.problems import Problem
 from schemas.records import ExperimentRead, Page, RepetitionRead, StudyRead
 from schemas.sensitivity import SensitivityRead, SensitivitySpec
 from schemas.spec import ExperimentSpec, StudySpec
@@ -36,19 +39,7 @@ LOOPBACK = {"127.0.0.1", "localhost", "::1"}
 """This machine: no proxy of the environment leads to it."""
 
 
-class ServiceError(Exception):
-    """The service refused or failed; `problem` is its answer, and the message is the problem's detail."""
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-        super().__init__(problem.detail)
-
-
-class ServiceUnreachable(Exception):
-    """Nothing answers at the service's address."""
-
-
-class Client(LifeCycle):
+class Client(LifeCycle, History):
     """A connection to a service.
 
     Args:
@@ -151,7 +142,7 @@ class Client(LifeCycle):
             try:
                 current = again(id)
             except (ServiceError, ServiceUnreachable) as error:
-                if _for_good(error) or time.monotonic() - heard_at > patience_s:
+                if is_for_good(error) or time.monotonic() - heard_at > patience_s:
                     raise
                 continue
             heard_at = time.monotonic()
@@ -199,7 +190,7 @@ class Client(LifeCycle):
             raise ServiceUnreachable(msg) from error
         if answer.is_success:
             return answer
-        raise ServiceError(_problem(answer))
+        raise ServiceError(problem_of(answer))
 
     def _read(self, kind: type[T], answer: httpx2.Response) -> T:
         try:
@@ -211,15 +202,3 @@ class Client(LifeCycle):
 
 def _body(spec: BaseModel | Mapping[str, Any]) -> dict[str, Any]:
     return spec.model_dump(mode="json", exclude_unset=True) if isinstance(spec, BaseModel) else dict(spec)
-
-
-def _for_good(error: Exception) -> bool:
-    return isinstance(error, ServiceError) and error.problem.status < 500
-
-
-def _problem(answer: httpx2.Response) -> Problem:
-    try:
-        return Problem.model_validate_json(answer.content)
-    except ValidationError:
-        detail = f"{answer.url} answers {answer.status_code} and no problem; is it a gaplab?"
-        return Problem(type="about:blank", title="Not understood", status=answer.status_code, detail=detail)

@@ -35,10 +35,19 @@ def serve_api(settings: Settings, listener: socket.socket) -> None:
     end_in_order()
     store = Store(settings.database_url)
     try:
-        config = uvicorn.Config(create_app(store), log_level="warning", server_header=False)
-        uvicorn.Server(config).run([listener])
+        config = uvicorn.Config(create_app(store), log_config=None, server_header=False)
+        Server(config).run([listener])
     finally:
         store.dispose()
+
+
+class Server(uvicorn.Server):
+    """Uvicorn, that ends event streams when it is told to stop: it would wait for them for ever."""
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End the streams, answer the requests under way, and close."""
+        self.config.app.state.feed.close()
+        await super().shutdown(sockets)
 
 
 def end_in_order() -> None:

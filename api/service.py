@@ -5,15 +5,17 @@ The supervisor is a process of its own. The two meet in the database only, so ei
 
 import logging
 import re
-import sys
 from collections.abc import Mapping
 from threading import Event, Thread
 from time import monotonic
 
 from api.launch import end, start
 from api.server import end_in_order, listen, serve_api
+from services import logs
 from services.core.errors import StoreUnavailable
 from services.settings import Settings
+
+log = logging.getLogger("gaplab.service")
 
 LONG_LIFE_S = 60.0
 """A supervisor that lived so long did not fail at its start; it is started again at once."""
@@ -32,12 +34,12 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
         CommandError: the address is taken.
         StoreUnavailable: the database cannot be migrated.
     """
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    logging.getLogger("alembic").setLevel(logging.WARNING)
+    logs.configure()
     end_in_order()
     listener = listen(settings.host, settings.port)
     migrate(settings.database_url)
-    say(f"gaplab serves on http://{settings.host}:{settings.port} (/docs lists what it answers to; Ctrl-C ends it)")
+    address = f"http://{settings.host}:{settings.port}"
+    log.info("gaplab serves on %s (/docs lists what it answers to; Ctrl-C ends it)", address)
     keeper = Keeper(environment_of(settings)) if workers else None
     try:
         if keeper:
@@ -108,7 +110,7 @@ class Keeper:
             if self._stopping.is_set():
                 return
             pause_s = 1.0 if monotonic() - began > LONG_LIFE_S else min(2 * pause_s, LONGEST_PAUSE_S)
-            say(f"the supervisor ended by itself (exit code {code}); another starts in {pause_s:.0f} s")
+            log.warning("the supervisor ended by itself (exit code %s); another starts in %.0f s", code, pause_s)
             self._stopping.wait(pause_s)
 
     def _live(self) -> int:
@@ -118,9 +120,3 @@ class Keeper:
             pass
         end(process)
         return process.returncode
-
-
-def say(sentence: str) -> None:
-    """Tell whoever reads the terminal or the log."""
-    sys.stderr.write(sentence + "\n")
-    sys.stderr.flush()

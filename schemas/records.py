@@ -51,7 +51,9 @@ class ExperimentRead(Frozen):
     progress: Progress
     reasons: tuple[str, ...] = Field(default=(), description="why repetitions failed, each reason once")
     sensitivity: str | None = Field(default=None, description="id of the check of what its tunables do to fitness")
-    warnings: tuple[str, ...] = Field(default=(), description="what that check found amiss: useless or rough tunables")
+    warnings: tuple[str, ...] = Field(
+        default=(), description="what that check found amiss, and versions that keep it from going on"
+    )
     created_at: datetime
     started_at: datetime | None = None
     ended_at: datetime | None = None

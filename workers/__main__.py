@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from threading import Event
 
+from services import logs
 from services.core.errors import ClusterUnusable, StoreUnavailable
 from services.settings import Settings
 from services.store.session import Store
@@ -19,7 +20,8 @@ def serve(settings: Settings) -> int:
     from workers.cluster import cluster  # Ray takes a second to import
     from workers.supervisor import Supervisor
 
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    logs.adopt("ray")
+    logs.configure()
     store, stop = Store(settings.database_url), Event()
     try:
         with cluster(settings) as joined:

@@ -1,1 +1,1 @@
-"""Parts of the client, each about one subject."""
+"""The parts of the client; one file in this folder is a group of what it can do."""

@@ -32,6 +32,10 @@ ENDPOINTS = {
     "POST /experiments/{id}/pause",
     "POST /experiments/{id}/resume",
     "POST /experiments/{id}/stop",
+    "GET /experiments/{id}/provenance",
+    "POST /experiments/{id}/accept-versions",
+    "GET /events",
+    "GET /events/page",
     "POST /experiments/{id}/cancel",
     "POST /experiments/{id}/extend",
     "PATCH /experiments/{id}",
@@ -48,6 +52,7 @@ ENDPOINTS = {
     "GET /catalogue",
     "GET /livez",
     "GET /readyz",
+    "GET /metrics",
 }
 
 

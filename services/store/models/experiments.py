@@ -40,6 +40,9 @@ class ExperimentRow(Base):
         max_parallel: repetitions that run at once; NULL for any number.
         running: repetitions that somebody has claimed.
         claimable: whether one more may be claimed now. Both are kept by `repository/settling.py`.
+        computed_with: engines, machine and version of the spec, as its first steps had them.
+        refused_by: what a supervisor has that did not go on with it, for it is not the same.
+        sensitivity_id: of the check of what it tunes.
     """
 
     __tablename__ = "experiment"
@@ -62,6 +65,9 @@ class ExperimentRow(Base):
     max_parallel: Mapped[int | None]
     running: Mapped[int] = mapped_column(default=0)
     claimable: Mapped[bool] = mapped_column(default=True)
+    computed_with: Mapped[str | None] = mapped_column(String(300))
+    refused_by: Mapped[str | None] = mapped_column(String(300))
+    sensitivity_id: Mapped[str | None] = mapped_column(String(32), index=True)
     created_at: Mapped[datetime]
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]
@@ -79,6 +85,7 @@ class RepetitionRow(Base):
         steps: recorded so far; the position that the next step takes in the log.
         checkpoints: parts of that next step that are stored.
         seconds: of work in the recorded steps.
+        provenance_id: under what it was claimed the last time.
     """
 
     __tablename__ = "repetition"
@@ -105,5 +112,6 @@ class RepetitionRow(Base):
     rollouts_failed: Mapped[int] = mapped_column(BigInteger, default=0)
     rollouts_saved: Mapped[int] = mapped_column(BigInteger, default=0)
     seconds: Mapped[float] = mapped_column(default=0.0)
+    provenance_id: Mapped[str | None] = mapped_column(String(32))
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]

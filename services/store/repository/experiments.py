@@ -6,15 +6,17 @@ from datetime import datetime
 from secrets import choice
 from typing import TypeVar
 
-from sqlalchemy import insert, select, tuple_
+from sqlalchemy import event, insert, select, tuple_
 from sqlalchemy.orm import Session
 
+from schemas.events import EventKind
 from schemas.lifecycle import OPEN, State
 from schemas.spec import ExperimentSpec, Schedule
-from services.core.errors import NotFound
+from services.core.errors import NotFound, StoreUnavailable
 from services.store.clock import now
 from services.store.cursor import decode, encode
-from services.store.models import ExperimentRow, RepetitionRow, StudyRow
+from services.store.models import SPEC_VERSION, ExperimentRow, RepetitionRow, StudyRow
+from services.store.repository.events import note
 
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 
@@ -73,6 +75,7 @@ def insert_experiment(
     session.add(experiment)
     session.flush()
     insert_repetitions(session, experiment.id, range(spec.repetitions or 0))
+    note(session, EventKind.SUBMITTED, experiment.id, name=experiment.name, repetitions=spec.repetitions)
     return experiment
 
 
@@ -184,6 +187,15 @@ def lock(session: Session, experiments: Sequence[str]) -> None:
     """
     row = ExperimentRow
     session.execute(select(row.id).where(row.id.in_(experiments)).order_by(row.id).with_for_update())
+
+
+@event.listens_for(ExperimentRow, "load")
+def _refuse_newer(row: ExperimentRow, _: object) -> None:
+    """A spec of a later version may mean something else than what it seems to: it is not read at all."""
+    if row.spec_version > SPEC_VERSION:
+        msg = f"the spec of experiment {row.id!r} is of version {row.spec_version}, and this gaplab reads up to "
+        msg += f"{SPEC_VERSION}: use a later gaplab with this database"
+        raise StoreUnavailable(msg)
 
 
 T = TypeVar("T", str, str | None)

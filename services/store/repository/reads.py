@@ -86,7 +86,7 @@ def _experiment(
         progress=tally.progress(),
         reasons=failed,
         sensitivity=warned.check,
-        warnings=warned.warnings,
+        warnings=(*warned.warnings, *_refusal(row, tally)),
         created_at=row.created_at,
         started_at=row.started_at,
         ended_at=row.ended_at,
@@ -101,6 +101,16 @@ def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: dict[
         experiments=tuple(experiments),
         progress=sum((progress[each.id] for each in experiments), Tally()).progress(),
         created_at=row.created_at,
+    )
+
+
+def _refusal(row: ExperimentRow, tally: Tally) -> tuple[str, ...]:
+    """Why it does not go on, if that is for a supervisor's versions."""
+    if row.refused_by is None or row.state.ended or tally.running:
+        return ()
+    return (
+        f"its first steps were computed with {row.computed_with}, and a supervisor with {row.refused_by} does not go "
+        f"on with it: start one with the same as at first, or accept the others (`gaplab accept-versions {row.id}`)",
     )
 
 
