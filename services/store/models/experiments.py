@@ -18,13 +18,19 @@ from services.store.models.base import SPEC_VERSION, Base
 
 
 class StudyRow(Base):
-    """Experiments that belong together to be compared."""
+    """Experiments that belong together to be compared.
+
+    Attributes:
+        notes, edits: as of an experiment.
+    """
 
     __tablename__ = "study"
-    __table_args__ = (Index(None, "created_at", "id"),)
+    __table_args__ = (Index(None, "created_at", "id"), Index(None, "name", "id"))
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     name: Mapped[str] = mapped_column(String(200))
+    notes: Mapped[str | None] = mapped_column(Text)
+    edits: Mapped[int] = mapped_column(default=0, server_default="0")
     created_at: Mapped[datetime]
 
 
@@ -35,10 +41,18 @@ class ExperimentRow(Base):
         position: within its study.
         iterations: of one repetition, number 0 included.
         rollouts: expected of one repetition.
+        token_id: of the token that submitted it; NULL where none is needed.
+        notes: of people, about it.
+        edits: how often people changed its name or notes.
     """
 
     __tablename__ = "experiment"
-    __table_args__ = (Index(None, "created_at", "position", "id"),)
+    __table_args__ = (
+        Index(None, "created_at", "position", "id"),
+        Index(None, "name", "id"),
+        Index(None, "strategy", "id"),
+        Index(None, "state", "id"),
+    )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     study_id: Mapped[str | None] = mapped_column(ForeignKey("study.id"), index=True)
@@ -50,6 +64,9 @@ class ExperimentRow(Base):
     spec_version: Mapped[int] = mapped_column(default=SPEC_VERSION)
     iterations: Mapped[int]
     rollouts: Mapped[int] = mapped_column(BigInteger)
+    token_id: Mapped[str | None] = mapped_column(String(32))
+    notes: Mapped[str | None] = mapped_column(Text)
+    edits: Mapped[int] = mapped_column(default=0, server_default="0")
     created_at: Mapped[datetime]
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]
