@@ -1,8 +1,8 @@
 """Access: who asks, by which token, and what that permits. Each function is one transaction.
 
-A token is `gaplab_ID_SECRET`. The secret has 256 random bits, and only its SHA-256 is stored: nobody can try out so many
-secrets, so that a slow hash, which passwords need because people choose them, would add nothing but its time to every
-request.
+A token is `gaplab_ID_SECRET`. The secret has 256 random bits, and only its SHA-256 is stored: nobody can try out so
+many secrets, so that a slow hash, which passwords need because people choose them, would add nothing but its time to
+every request.
 """
 
 import hmac

@@ -17,9 +17,7 @@ ORDERS = {"experiment": ("name", "strategy", "state"), "study": ("name",)}
 
 def upgrade() -> None:
     """Add tables and columns; what is stored stays as it is."""
-    role = sa.Enum(
-        "reader", "runner", "admin", name="role", native_enum=False, create_constraint=True, length=16
-    )
+    role = sa.Enum("reader", "runner", "admin", name="role", native_enum=False, create_constraint=True, length=16)
     op.create_table(
         "token",
         sa.Column("id", sa.String(length=32), nullable=False),
