@@ -5,8 +5,11 @@ from importlib.metadata import version
 from fastapi import FastAPI
 
 from api import documentation, problems
-from api.limits import BodyLimit
+from api.access import Access
+from api.limits import BodyLimit, Streams
+from api.pages import Headers
 from api.routes import catalogue, curves, experiments, figures, health, sensitivity, studies
+from services.settings import Limits, Settings
 from services.store.session import Store
 
 DESCRIPTION = """
@@ -28,10 +31,15 @@ TAGS = [
 ]
 
 
-def create_app(store: Store) -> FastAPI:
+def create_app(store: Store, settings: Settings | None = None, limits: Limits | None = None) -> FastAPI:
     """The application over a database, which it neither migrates nor closes.
 
     It never touches Ray: it inserts what is asked for and reads what there is.
+
+    Args:
+        store: the database.
+        settings: of the process that serves; left out where the app is asked within this process.
+        limits: left out: as they are by default.
     """
     app = FastAPI(
         title="gaplab",
@@ -43,8 +51,11 @@ def create_app(store: Store) -> FastAPI:
         generate_unique_id_function=lambda route: route.name,
         license_info={"name": "MIT", "identifier": "MIT"},
     )
-    app.state.store = store
-    app.add_middleware(BodyLimit)
+    limits = limits or Limits()
+    app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
+    app.add_middleware(BodyLimit, most_bytes=limits.body_bytes)
+    app.add_middleware(Access, settings=settings)
+    app.add_middleware(Headers)
     problems.install(app)
     for module in (studies, experiments, curves, figures, sensitivity, catalogue, health):
         app.include_router(module.router)

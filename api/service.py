@@ -11,7 +11,7 @@ from threading import Event, Thread
 from time import monotonic
 
 from api.launch import end, start
-from api.server import end_in_order, listen, serve_api
+from api.server import end_in_order, listen, refuse_strangers, serve_api
 from services.core.errors import StoreUnavailable
 from services.settings import Settings
 
@@ -31,12 +31,14 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
     Raises:
         CommandError: the address is taken.
         StoreUnavailable: the database cannot be migrated.
+        Unauthenticated: the host is more than loopback, and no token lets anyone in.
     """
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     logging.getLogger("alembic").setLevel(logging.WARNING)
     end_in_order()
     listener = listen(settings.host, settings.port)
     migrate(settings.database_url)
+    refuse_strangers(settings)
     say(f"gaplab serves on http://{settings.host}:{settings.port} (/docs lists what it answers to; Ctrl-C ends it)")
     keeper = Keeper(environment_of(settings)) if workers else None
     try:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -26,6 +27,8 @@ ENDPOINTS = {
     "GET /experiments/{id}/samples",
     "GET /experiments/{id}/simulators",
     "GET /experiments/{id}/misfit",
+    "PATCH /studies/{id}",
+    "PATCH /experiments/{id}",
     "POST /experiments/{id}/cancel",
     "GET /experiments/{id}/curve",
     "GET /curves",
@@ -40,8 +43,8 @@ ENDPOINTS = {
 
 
 @pytest.fixture(scope="module")
-def api() -> Iterator[TestClient]:
-    store = Store("sqlite://")
+def api(sqlite_template: Path) -> Iterator[TestClient]:
+    store = Store(f"sqlite:///{sqlite_template}")
     yield TestClient(create_app(store))
     store.dispose()
 
@@ -96,7 +99,7 @@ def test_every_answer_has_an_example_that_fits_its_schema(document: dict[str, An
 def test_every_example_of_a_spec_is_accepted(document: dict[str, Any], sqlite_store: Store):
     api = TestClient(create_app(sqlite_store))
     for name, operation in operations(document):
-        if "requestBody" in operation:
+        if "requestBody" in operation and name.startswith("POST"):
             examples = operation["requestBody"]["content"]["application/json"]["examples"]
             for example in examples.values():
                 assert api.post(name.split()[1], json=example["value"]).status_code == 202, example
@@ -105,7 +108,7 @@ def test_every_example_of_a_spec_is_accepted(document: dict[str, Any], sqlite_st
 def test_every_error_is_documented_as_a_problem(document: dict[str, Any]):
     for name, operation in operations(document):
         for status, answer in operation["responses"].items():
-            if not status.startswith("2"):
+            if status[0] in "45":
                 assert list(answer["content"]) == ["application/problem+json"], (name, status)
     assert "HTTPValidationError" not in str(document)
 

@@ -37,5 +37,5 @@ def load(session: Session) -> dict[str | None, Load]:
         .where(row.state.in_(open_), run.state.in_(open_))
         .group_by(row.token_id)
     )
-    sums = {token: int(found) for token, found in session.execute(rollouts).tuples()}
-    return {token: Load(count, sums.get(token, 0)) for token, count in session.execute(counts).tuples()}
+    sums = {token: int(found) for token, found in session.execute(rollouts)}
+    return {token: Load(count, sums.get(token, 0)) for token, count in session.execute(counts)}
