@@ -10,8 +10,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api.app import create_app
-from services.settings import Limits
 from services.core.errors import StoreUnavailable
+from services.settings import Limits
 from services.store.session import Store
 
 MOST_BYTES = Limits().body_bytes
