@@ -87,7 +87,7 @@ def _describe_access(document: dict[str, Any]) -> None:
 
 
 def _drop_foreign_errors(document: dict[str, Any]) -> None:
-    """The framework promises its own shape of 422 for every parameter; no answer of ours has it."""
+    """Say 422 where a query, a header or a body can be wrong, in our own shape; an id is never wrong, only unknown."""
     for foreign in ("HTTPValidationError", "ValidationError"):
         document["components"]["schemas"].pop(foreign, None)
     for operations in document["paths"].values():
@@ -95,3 +95,5 @@ def _drop_foreign_errors(document: dict[str, Any]) -> None:
             answers = operation["responses"]
             if "application/json" in answers.get("422", {}).get("content", {}):
                 del answers["422"]
+            if "requestBody" in operation or any(each["in"] != "path" for each in operation.get("parameters", ())):
+                answers |= {str(status): each for status, each in documented(422).items()}

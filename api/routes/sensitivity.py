@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
-from api import examples
+from api import examples, links
 from api.dependencies import AdmissionDep, Id, StoreDep, created
 from api.problems import documented
 from schemas.sensitivity import SensitivityRead, SensitivitySpec
@@ -18,7 +18,8 @@ router = APIRouter(prefix="/sensitivity", tags=["sensitivity"])
     status_code=202,
     summary="Check what tunables do",
     responses={
-        202: examples.shown(examples.SENSITIVITY, "It is queued or known, and exists at `Location`"),
+        202: examples.shown(examples.SENSITIVITY, "It is queued or known, and exists at `Location`")
+        | links.leading_to(*links.FROM_CHECK),
         **documented(413, 415, 422),
     },
 )

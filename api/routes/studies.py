@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Body, Query, Request, Response
 from pydantic import Field
 
-from api import conditional, examples
+from api import conditional, examples, links
 from api.dependencies import AdmissionDep, CallerDep, Id, Paging, Revealing, StoreDep, created
 from api.problems import documented
 from schemas.editing import Edit
@@ -34,7 +34,8 @@ class StudyFilter(Paging):
     status_code=202,
     summary="Submit a study",
     responses={
-        202: examples.shown(examples.STUDY, "It is queued, and exists at `Location`"),
+        202: examples.shown(examples.STUDY, "It is queued, and exists at `Location`")
+        | links.leading_to(*links.FROM_STUDY),
         **documented(413, 415, 422, 429),
     },
 )
