@@ -7,7 +7,6 @@ of the catalogue, or a cursor one that was given out; such requests are refused 
 
 import os
 from collections import Counter
-from collections.abc import Iterator
 
 import pytest
 import schemathesis
@@ -16,7 +15,6 @@ from schemathesis.engine.events import EngineFinished, FatalError, NonFatalError
 from schemathesis.schemas import BaseSchema
 
 from api.app import create_app
-from migrations import upgrade
 from services.store.session import Store
 
 EXAMPLES = int(os.environ.get("SCHEMATHESIS_EXAMPLES", "5"))
@@ -24,12 +22,12 @@ EXAMPLES = int(os.environ.get("SCHEMATHESIS_EXAMPLES", "5"))
 
 
 @pytest.fixture
-def document(request: pytest.FixtureRequest, store: Store) -> Iterator[BaseSchema]:
+def document(store: Store) -> BaseSchema:
     """The service, as its own document describes it."""
     found = schemathesis.openapi.from_asgi("/openapi.json", create_app(store))
     found.config.checks.update(excluded_check_names=["positive_data_acceptance"])
     found.config.generation.update(max_examples=EXAMPLES, deterministic=True)
-    yield found
+    return found
 
 
 def test_whatever_is_asked_and_whatever_follows_is_answered_as_the_document_says(document: BaseSchema):
