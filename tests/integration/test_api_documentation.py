@@ -41,6 +41,32 @@ ENDPOINTS = {
     "GET /readyz",
 }
 
+OPERATIONS = {
+    "submit_study",
+    "list_studies",
+    "read_study",
+    "edit_study",
+    "read_study_curves",
+    "submit_experiment",
+    "list_experiments",
+    "read_experiment",
+    "edit_experiment",
+    "cancel_experiment",
+    "list_repetitions",
+    "list_samples",
+    "list_simulators",
+    "read_misfit",
+    "read_curve",
+    "read_curves",
+    "compare_experiments",
+    "draw_curves",
+    "submit_sensitivity",
+    "read_sensitivity",
+    "read_catalogue",
+    "live",
+    "ready",
+}
+
 
 @pytest.fixture(scope="module")
 def api(sqlite_template: Path) -> Iterator[TestClient]:
@@ -84,6 +110,20 @@ def test_operations_have_short_names_of_their_own_and_summaries(document: dict[s
     assert len(set(names)) == len(names)
     assert all(re.fullmatch(r"[a-z]+(_[a-z]+)*", name) and len(name) < 25 for name in names)
     assert all(operation["summary"] and operation["description"] for _, operation in operations(document))
+
+
+def test_operations_keep_the_names_that_generated_clients_call_them_by(document: dict[str, Any]):
+    assert {operation["operationId"] for _, operation in operations(document)} == OPERATIONS
+
+
+def test_every_operation_says_which_token_it_wants_and_links_lead_to_operations(document: dict[str, Any]):
+    for name, operation in operations(document):
+        open_ = name in {"GET /livez", "GET /readyz"}
+        assert operation["security"] == ([] if open_ else [{"token": []}, {}]), name
+        assert ({"401", "403"} <= operation["responses"].keys()) is not open_, name
+        for answer in operation["responses"].values():
+            assert {each["operationId"] for each in answer.get("links", {}).values()} <= OPERATIONS
+    assert document["components"]["securitySchemes"]["token"]["scheme"] == "bearer"
 
 
 def test_every_answer_has_an_example_that_fits_its_schema(document: dict[str, Any]):

@@ -1,8 +1,8 @@
 """Schemathesis reads the OpenAPI document and asks everything that it permits, and what it does not.
 
-It takes the examples, the edges of every schema, random requests of both kinds, and follows the links of answers. All of
-its checks hold but one: that whatever fits the document is accepted. A document cannot say that a strategy must be one
-of the catalogue, or a cursor one that was given out; such requests are refused with 422.
+It takes the examples, the edges of every schema, random requests of both kinds, and follows the links of answers. All
+of its checks hold but one: that whatever fits the document is accepted. A document cannot say that a strategy must be
+one of the catalogue, or a cursor one that was given out; such requests are refused with 422.
 """
 
 import os
@@ -10,7 +10,7 @@ from collections import Counter
 
 import pytest
 import schemathesis
-from schemathesis.engine import Status, from_schema
+from schemathesis.engine import from_schema
 from schemathesis.engine.events import EngineFinished, FatalError, NonFatalError, ScenarioFinished
 from schemathesis.schemas import BaseSchema
 
