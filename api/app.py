@@ -5,9 +5,11 @@ from importlib.metadata import version
 from fastapi import FastAPI
 
 from api import documentation, problems
+from api.access import Access
 from api.feed import Feed
-from api.limits import BodyLimit
+from api.limits import BodyLimit, Streams
 from api.metrics import Measured, Metrics
+from api.pages import Headers
 from api.routes import (
     catalogue,
     curves,
@@ -21,6 +23,7 @@ from api.routes import (
     sensitivity,
     studies,
 )
+from services.settings import Limits, Settings
 from services.store.session import Store
 
 DESCRIPTION = """
@@ -43,10 +46,15 @@ TAGS = [
 ]
 
 
-def create_app(store: Store) -> FastAPI:
+def create_app(store: Store, settings: Settings | None = None, limits: Limits | None = None) -> FastAPI:
     """The application over a database, which it neither migrates nor closes.
 
     It never touches Ray: it inserts what is asked for and reads what there is.
+
+    Args:
+        store: the database.
+        settings: of the process that serves; left out where the app is asked within this process.
+        limits: left out: as they are by default.
     """
     app = FastAPI(
         title="gaplab",
@@ -61,7 +69,11 @@ def create_app(store: Store) -> FastAPI:
     app.state.store = store
     app.state.feed = Feed(store)
     app.state.metrics = Metrics(store, app.state.feed)
-    app.add_middleware(BodyLimit)
+    limits = limits or Limits()
+    app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
+    app.add_middleware(BodyLimit, most_bytes=limits.body_bytes)
+    app.add_middleware(Access, settings=settings)
+    app.add_middleware(Headers)
     app.add_middleware(Measured, metrics=app.state.metrics)
     problems.install(app)
     for module in (

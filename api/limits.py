@@ -1,19 +1,31 @@
-"""How much a client may send."""
+"""How much a client may send, and how many streams it may hold open."""
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Lock
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from api.problems import FRAMEWORK, problem, response
+from services.core.errors import LimitReached
+from services.settings import Limits, variable_of
 
-MOST_BYTES = 1_000_000
+RETRY_AFTER_S = 10
+"""Streams come and go with the pages that show them."""
 
 
 class BodyLimit:
-    """Refuses a body over `MOST_BYTES` with 413: by what its header announces, and by what really arrives."""
+    """Refuses a body over so many bytes with 413: by what its header announces, and by what really arrives."""
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, most_bytes: int) -> None:
         self.app = app
+        self._most = most_bytes
+        self._detail = (
+            f"The body has more than {most_bytes:,} bytes ({variable_of('body_bytes')}); a spec has a few hundred."
+        )
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request within the limit."""
@@ -21,25 +33,56 @@ class BodyLimit:
             await self.app(scope, receive, send)
             return
         announced = Headers(scope=scope).get("content-length", "")
-        if announced.isdecimal() and int(announced[:20]) > MOST_BYTES:
-            refusal = response(problem(*FRAMEWORK[413], _DETAIL), {"Connection": "close"})
+        if announced.isdecimal() and int(announced[:20]) > self._most:
+            refusal = response(problem(*FRAMEWORK[413], self._detail), {"Connection": "close"})
             await refusal(scope, receive, send)
             return
-        await self.app(scope, _counted(receive), send)
+        await self.app(scope, self._counted(receive), send)
+
+    def _counted(self, receive: Receive) -> Receive:
+        arrived = 0
+
+        async def count() -> Message:
+            nonlocal arrived
+            message = await receive()
+            arrived += len(message.get("body", b""))
+            if arrived > self._most:
+                raise HTTPException(413, self._detail)
+            return message
+
+        return count
 
 
-_DETAIL = f"The body has more than {MOST_BYTES:,} bytes; a spec has a few hundred."
+class Streams:
+    """Streams that are open at this process, within limits for a token and for all.
 
+    with streams.open(caller.token):
+        ...
+    """
 
-def _counted(receive: Receive) -> Receive:
-    arrived = 0
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._open: Counter[str | None] = Counter()
+        self._lock = Lock()
 
-    async def count() -> Message:
-        nonlocal arrived
-        message = await receive()
-        arrived += len(message.get("body", b""))
-        if arrived > MOST_BYTES:
-            raise HTTPException(413, _DETAIL)
-        return message
+    @contextmanager
+    def open(self, token: str | None) -> Iterator[None]:
+        """Hold one of this token's streams open for as long as the context lasts.
 
-    return count
+        Raises:
+            LimitReached: too many are; the message names the limit.
+        """
+        with self._lock:
+            self._check("streams_per_token", self._open[token], "of this token ")
+            self._check("streams", self._open.total(), "")
+            self._open[token] += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._open[token] -= 1
+
+    def _check(self, name: str, present: int, whose: str) -> None:
+        if present >= (limit := getattr(self._limits, name)):
+            msg = f"{present} streams {whose}are open, and more than {limit} may not be ({variable_of(name)})"
+            raise LimitReached(msg, RETRY_AFTER_S)

@@ -8,7 +8,8 @@ import uvicorn
 
 from api.app import create_app
 from api.exits import CommandError, Exit
-from services.settings import Settings
+from services.access import demand_token_beyond_loopback
+from services.settings import Limits, Settings
 from services.store.session import Store
 
 
@@ -31,12 +32,32 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def serve_api(settings: Settings, listener: socket.socket) -> None:
-    """Serve until told to stop (SIGINT, SIGTERM); requests under way are answered first. Then the process exits."""
+    """Serve until told to stop (SIGINT, SIGTERM); requests under way are answered first. Then the process exits.
+
+    Raises:
+        Unauthenticated: the host is more than loopback, and no token lets anyone in.
+        StoreUnavailable: the database cannot tell.
+    """
     end_in_order()
+    refuse_strangers(settings)
+    store, limits = Store(settings.database_url), Limits.from_environment()
+    try:
+        config = uvicorn.Config(create_app(store, settings, limits), log_config=None, server_header=False)
+        Server(config).run([listener])
+    finally:
+        store.dispose()
+
+
+def refuse_strangers(settings: Settings) -> None:
+    """Do nothing if only this machine reaches the host, or a token lets someone in.
+
+    Raises:
+        Unauthenticated: neither; the message has the command that makes one.
+        StoreUnavailable: the database cannot tell.
+    """
     store = Store(settings.database_url)
     try:
-        config = uvicorn.Config(create_app(store), log_config=None, server_header=False)
-        Server(config).run([listener])
+        demand_token_beyond_loopback(store, settings.host)
     finally:
         store.dispose()
 

@@ -10,7 +10,7 @@ from threading import Event, Thread
 from time import monotonic
 
 from api.launch import end, start
-from api.server import end_in_order, listen, serve_api
+from api.server import end_in_order, listen, refuse_strangers, serve_api
 from services import logs
 from services.core.errors import StoreUnavailable
 from services.settings import Settings
@@ -33,11 +33,13 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
     Raises:
         CommandError: the address is taken.
         StoreUnavailable: the database cannot be migrated.
+        Unauthenticated: the host is more than loopback, and no token lets anyone in.
     """
     logs.configure()
     end_in_order()
     listener = listen(settings.host, settings.port)
     migrate(settings.database_url)
+    refuse_strangers(settings)
     address = f"http://{settings.host}:{settings.port}"
     log.info("gaplab serves on %s (/docs lists what it answers to; Ctrl-C ends it)", address)
     keeper = Keeper(environment_of(settings)) if workers else None

@@ -43,6 +43,8 @@ class ExperimentRead(Frozen):
     id: str
     study: str | None = None
     name: str
+    notes: str | None = Field(default=None, description="of people, about it")
+    edits: int = Field(default=0, description="how often its name or notes were changed")
     strategy: str
     state: State
     spec: dict[str, Any]
@@ -64,6 +66,8 @@ class StudyRead(Frozen):
 
     id: str
     name: str
+    notes: str | None = Field(default=None, description="of people, about it")
+    edits: int = Field(default=0, description="how often its name or notes were changed")
     state: State
     experiments: tuple[ExperimentRead, ...]
     progress: Progress

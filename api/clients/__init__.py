@@ -1,1 +1,1 @@
-"""The parts of the client; one file in this folder is a group of what it can do."""
+"""What the Python client is put together from; `api.client` is what programs import."""

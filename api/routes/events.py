@@ -1,7 +1,7 @@
 """Events: what happens to experiments, as it happens or page by page."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from typing import Annotated
 
 from anyio.to_thread import run_sync
@@ -10,8 +10,9 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import Field
 
 from api import event_examples, examples
-from api.dependencies import Id, Parameters, StoreDep
+from api.dependencies import CallerDep, Id, Parameters, StoreDep
 from api.feed import Feed
+from api.limits import Streams
 from api.problems import documented
 from schemas.events import EventKind, EventPage
 from services import events
@@ -47,6 +48,13 @@ def _feed(request: Request) -> Feed:
     return feed
 
 
+def _room(request: Request, caller: CallerDep) -> Iterator[None]:
+    """Room for one more stream, for as long as it is open."""
+    streams: Streams = request.app.state.streams
+    with streams.open(caller.token):
+        yield
+
+
 def _found(store: StoreDep, asked: Annotated[EventFilter, Query()]) -> Which:
     """Before a stream begins, for later no problem can be answered any more."""
     events.check(store, asked.which())
@@ -62,8 +70,9 @@ def _found(store: StoreDep, asked: Annotated[EventFilter, Query()]) -> Which:
             "description": "Server-sent events: the number is the `id`, the kind the `event`, all of it the `data`",
             "content": {"text/event-stream": {"schema": {"type": "string"}, "example": event_examples.STREAM}},
         },
-        **documented(404, 422),
+        **documented(404, 422, 429),
     },
+    dependencies=[Depends(_room)],
 )
 async def stream_events(
     asked: Annotated[EventFilter, Query()],

@@ -73,6 +73,7 @@ def test_every_constraint_has_the_name_that_the_models_give_it(store_url):
         ("measurement", "ck_measurement_kind"),
         ("sensitivity", "ck_sensitivity_state"),
         ("attempt", "ck_attempt_ending"),
+        ("token", "ck_token_role"),
     }
 
 

@@ -8,6 +8,7 @@
     provenance, named after its facts, which many experiments have in common: experiment_provenance
     event, numbered by event_counter
     supervisor
+    token, who may ask;  idempotency, which requests were answered already
 
 What is plotted or filtered is a column; vectors are JSON arrays, in which floats round-trip exactly. Neither a database
 nor JSON has nan or infinity: a fitness of nan and a squared error of infinity are NULL.
@@ -16,6 +17,8 @@ The tallies in `repetition` (steps, rollouts, seconds) are kept in the transacti
 that progress is a sum over repetitions and never reads results.
 """
 
+from services.store.models.access import IdempotencyRow as IdempotencyRow
+from services.store.models.access import TokenRow as TokenRow
 from services.store.models.attempts import AttemptRow as AttemptRow
 from services.store.models.base import REVISION as REVISION
 from services.store.models.base import SPEC_VERSION as SPEC_VERSION

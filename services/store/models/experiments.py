@@ -18,13 +18,19 @@ from services.store.models.base import SPEC_VERSION, Base
 
 
 class StudyRow(Base):
-    """Experiments that belong together to be compared."""
+    """Experiments that belong together to be compared.
+
+    Attributes:
+        notes, edits: as of an experiment.
+    """
 
     __tablename__ = "study"
-    __table_args__ = (Index(None, "created_at", "id"),)
+    __table_args__ = (Index(None, "created_at", "id"), Index(None, "name", "id"))
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     name: Mapped[str] = mapped_column(String(200))
+    notes: Mapped[str | None] = mapped_column(Text)
+    edits: Mapped[int] = mapped_column(default=0, server_default="0")
     created_at: Mapped[datetime]
 
 
@@ -43,12 +49,18 @@ class ExperimentRow(Base):
         computed_with: engines, machine and version of the spec, as its first steps had them.
         refused_by: what a supervisor has that did not go on with it, for it is not the same.
         sensitivity_id: of the check of what it tunes.
+        token_id: of the token that submitted it; NULL where none is needed.
+        notes: of people, about it.
+        edits: how often people changed its name or notes.
     """
 
     __tablename__ = "experiment"
     __table_args__ = (
         Index(None, "created_at", "position", "id"),
         Index("ix_experiment_turn", "claimable", "precedence", "running", "created_at", "position", "id"),
+        Index(None, "name", "id"),
+        Index(None, "strategy", "id"),
+        Index(None, "state", "id"),
     )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
@@ -68,6 +80,9 @@ class ExperimentRow(Base):
     computed_with: Mapped[str | None] = mapped_column(String(300))
     refused_by: Mapped[str | None] = mapped_column(String(300))
     sensitivity_id: Mapped[str | None] = mapped_column(String(32), index=True)
+    token_id: Mapped[str | None] = mapped_column(String(32))
+    notes: Mapped[str | None] = mapped_column(Text)
+    edits: Mapped[int] = mapped_column(default=0, server_default="0")
     created_at: Mapped[datetime]
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]

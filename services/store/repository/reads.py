@@ -13,11 +13,13 @@ from services.store.repository.progress import Tally, reasons, tallies
 from services.store.repository.sensitivity import Warned, warned
 
 
-def read_experiments(session: Session, rows: Sequence[ExperimentRow]) -> tuple[ExperimentRead, ...]:
+def read_experiments(
+    session: Session, rows: Sequence[ExperimentRow], *, reveal: bool = False
+) -> tuple[ExperimentRead, ...]:
     """The experiments as they are shown, with their progress.
 
     Reality's parameters are null until the experiment has ended, and with it all others of its study: they share one
-    reality, and what one of them shows is known of all.
+    reality, and what one of them shows is known of all. `reveal` shows them nevertheless.
     """
     ids = [row.id for row in rows]
     progress, failed, warnings = tallies(session, ids), reasons(session, ids), warned(session, rows)
@@ -28,16 +30,16 @@ def read_experiments(session: Session, rows: Sequence[ExperimentRow]) -> tuple[E
             progress.get(row.id, Tally()),
             failed.get(row.id, ()),
             warnings.get(row.id, Warned()),
-            secret=not row.state.ended or row.study_id in secret,
+            secret=not reveal and (not row.state.ended or row.study_id in secret),
         )
         for row in rows
     )
 
 
-def read_studies(session: Session, rows: Sequence[StudyRow]) -> tuple[StudyRead, ...]:
+def read_studies(session: Session, rows: Sequence[StudyRow], *, reveal: bool = False) -> tuple[StudyRead, ...]:
     """The studies as they are shown, with their experiments."""
     experiments = experiments_of(session, [row.id for row in rows])
-    shown = read_experiments(session, experiments)
+    shown = read_experiments(session, experiments, reveal=reveal)
     progress = tallies(session, [row.id for row in experiments])
     return tuple(_study(row, [each for each in shown if each.study == row.id], progress) for row in rows)
 
@@ -78,6 +80,8 @@ def _experiment(
         id=row.id,
         study=row.study_id,
         name=row.name,
+        notes=row.notes,
+        edits=row.edits,
         strategy=row.strategy,
         state=row.state,
         spec=_without_truth(row.spec) if secret else row.spec,
@@ -97,6 +101,8 @@ def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: dict[
     return StudyRead(
         id=row.id,
         name=row.name,
+        notes=row.notes,
+        edits=row.edits,
         state=state_of([each.state for each in experiments]),
         experiments=tuple(experiments),
         progress=sum((progress[each.id] for each in experiments), Tally()).progress(),
