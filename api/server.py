@@ -11,6 +11,9 @@ from api.exits import CommandError, Exit
 from services.settings import Settings
 from services.store.session import Store
 
+GRACE_S = 5
+"""How long requests that are under way may take when the service ends."""
+
 
 def listen(host: str, port: int) -> socket.socket:
     """The address to serve on, taken.
@@ -31,11 +34,13 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def serve_api(settings: Settings, listener: socket.socket) -> None:
-    """Serve until told to stop (SIGINT, SIGTERM); requests under way are answered first. Then the process exits."""
+    """Serve until told to stop (SIGINT, SIGTERM); then answer what is asked already, and exit."""
     end_in_order()
     store = Store(settings.database_url)
     try:
-        config = uvicorn.Config(create_app(store), log_level="warning", server_header=False)
+        config = uvicorn.Config(
+            create_app(store), log_level="warning", server_header=False, timeout_graceful_shutdown=GRACE_S
+        )
         uvicorn.Server(config).run([listener])
     finally:
         store.dispose()
