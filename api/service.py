@@ -21,8 +21,10 @@ LONG_LIFE_S = 60.0
 LONGEST_PAUSE_S = 60.0
 
 GRACE_S = 24.0
-"""How long the supervisor may take to end: its repetitions deliver once more, and Ray ends. With the time that the API's
-last requests have, the service is gone half a minute after it was told to be."""
+"""How long the supervisor may take to end: its repetitions deliver once more, and Ray ends.
+
+With the time that the API's last requests have, the service is gone half a minute after it was told to be.
+"""
 
 
 def serve(settings: Settings, *, workers: bool = True) -> None:

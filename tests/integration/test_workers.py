@@ -55,7 +55,7 @@ def toy(**changes):
 
 def long_toy():
     """Some seconds of work in each repetition."""
-    return toy(repetitions=2, budget={"controller_evaluations": 5_000, "selection_evaluations": 1_000}, iterations=1)
+    return toy(repetitions=2, budget={"controller_evaluations": 3_000, "selection_evaluations": 300}, iterations=1)
 
 
 def run(supervisor, store, experiment, until=lambda: False):
