@@ -15,7 +15,7 @@ from services.store.lease import Checkpoint as Checkpoint
 from services.store.lease import Claim as Claim
 from services.store.lease import Delivered as Delivered
 from services.store.lease import TimedStep as TimedStep
-from services.store.repository import leases, steps
+from services.store.repository import leases, steps, unheard
 from services.store.session import Store
 
 STALE_AFTER_S = 30.0
@@ -113,6 +113,21 @@ def hand_back(store: Store, claim: Claim) -> bool:
     False if the claim holds no more.
     """
     return store.write(lambda session: leases.hand_back(session, claim))
+
+
+def hand_back_unheard(store: Store, owner: str, claims: Iterable[Claim]) -> int:
+    """Hand back what the owner was given and does not know of, since `claim` did its work and could not say so.
+
+    Args:
+        store: of the claims.
+        owner: who asks.
+        claims: all that the owner knows of.
+
+    Returns:
+        How many there were.
+    """
+    held = tuple(claims)
+    return store.write(lambda session: unheard.hand_back(session, owner, held))
 
 
 def requeue_lost(store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:

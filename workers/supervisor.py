@@ -66,6 +66,7 @@ class Supervisor:
         self._checks = Checks(store, self._owner)
         self._beat = -HEARTBEAT_S
         self._looked = -WAIT_S
+        self._unsure = False
 
     @property
     def busy(self) -> bool:
@@ -120,7 +121,12 @@ class Supervisor:
         if monotonic() - self._looked < WAIT_S:
             return
         self._looked = monotonic()
-        for claim in execution.claim(self._store, self._owner, self._capacity() - len(self._runs)):
+        if self._unsure:
+            execution.hand_back_unheard(self._store, self._owner, [run.claim for run in self._runs])
+        self._unsure = True
+        claims = execution.claim(self._store, self._owner, self._capacity() - len(self._runs))
+        self._unsure = False
+        for claim in claims:
             self._runs.append(self._launch(claim))
             log.info("%s: on from step %d", self._runs[-1].name, len(claim.log))
 

@@ -182,3 +182,16 @@ def test_cancelling_forgets_checkpoints(store):
     experiments.cancel_experiment(store, submitted.id)
 
     assert checkpoints_left(store) == 0
+
+
+def test_a_claim_that_timed_out_is_handed_back_and_those_that_are_known_stay(store):
+    submitted = experiments.submit_experiment(store, toy())
+    (known,) = execution.claim(store, "me", 1)
+    execution.claim(store, "me", 1)
+    (others,) = execution.claim(store, "you", 1)
+
+    assert execution.hand_back_unheard(store, "me", [known]) == 1
+
+    states = [(each.state, each.attempts) for each in experiments.list_repetitions(store, submitted.id)]
+    assert states == [(State.RUNNING, 1), (State.QUEUED, 0), (State.RUNNING, 1)]
+    assert execution.heartbeat(store, [known, others]) == (known, others)
