@@ -12,6 +12,9 @@ from services.access import demand_token_beyond_loopback
 from services.settings import Limits, Settings
 from services.store.session import Store
 
+GRACE_S = 5
+"""How long requests that are under way may take when the service ends."""
+
 
 def listen(host: str, port: int) -> socket.socket:
     """The address to serve on, taken.
@@ -42,7 +45,12 @@ def serve_api(settings: Settings, listener: socket.socket) -> None:
     refuse_strangers(settings)
     store, limits = Store(settings.database_url), Limits.from_environment()
     try:
-        config = uvicorn.Config(create_app(store, settings, limits), log_config=None, server_header=False)
+        config = uvicorn.Config(
+            create_app(store, settings, limits),
+            log_config=None,
+            server_header=False,
+            timeout_graceful_shutdown=GRACE_S,
+        )
         Server(config).run([listener])
     finally:
         store.dispose()

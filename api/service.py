@@ -22,6 +22,12 @@ LONG_LIFE_S = 60.0
 
 LONGEST_PAUSE_S = 60.0
 
+GRACE_S = 24.0
+"""How long the supervisor may take to end: its repetitions deliver once more, and Ray ends.
+
+With the time that the API's last requests have, the service is gone half a minute after it was told to be.
+"""
+
 
 def serve(settings: Settings, *, workers: bool = True) -> None:
     """Serve until told to stop (SIGINT, SIGTERM), then end in order.
@@ -120,5 +126,5 @@ class Keeper:
         process = start(self._module, "serve", environment=self._environment)
         while process.poll() is None and not self._stopping.wait(0.2):
             pass
-        end(process)
+        end(process, patience_s=GRACE_S)
         return process.returncode

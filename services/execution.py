@@ -19,7 +19,7 @@ from services.store.lease import Checkpoint as Checkpoint
 from services.store.lease import Claim as Claim
 from services.store.lease import Delivered as Delivered
 from services.store.lease import TimedStep as TimedStep
-from services.store.repository import giving_way, leases
+from services.store.repository import giving_way, leases, unheard
 from services.store.session import Store
 from services.versions import provenance
 
@@ -148,6 +148,21 @@ def give_way(store: Store, waiting: Iterable[Claim], under: Provenance | None = 
     with store.reading() as session:
         unwanted = giving_way.unwanted(session, held, under or provenance())
     return store.write(lambda session: giving_way.hand_back(session, unwanted)) if unwanted else ()
+
+
+def hand_back_unheard(store: Store, owner: str, claims: Iterable[Claim]) -> int:
+    """Hand back what the owner was given and does not know of, since `claim` did its work and could not say so.
+
+    Args:
+        store: of the claims.
+        owner: who asks.
+        claims: all that the owner knows of.
+
+    Returns:
+        How many there were.
+    """
+    held = tuple(claims)
+    return store.write(lambda session: unheard.hand_back(session, owner, held))
 
 
 def requeue_lost(store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:

@@ -66,6 +66,7 @@ class Supervisor:
         self._checks = Checks(store, self._owner)
         self._beat = -HEARTBEAT_S
         self._looked = -WAIT_S
+        self._unsure = False
 
     @property
     def busy(self) -> bool:
@@ -126,7 +127,12 @@ class Supervisor:
         waiting = [run.claim for run in self._runs if not (run.begun or run.over)]
         if given := set(execution.give_way(self._store, waiting)):
             self._drop_all_but([run.claim for run in self._runs if run.claim not in given])
-        for claim in execution.claim(self._store, self._owner, self._capacity() - len(self._runs)):
+        if self._unsure:
+            execution.hand_back_unheard(self._store, self._owner, [run.claim for run in self._runs])
+        self._unsure = True
+        claims = execution.claim(self._store, self._owner, self._capacity() - len(self._runs))
+        self._unsure = False
+        for claim in claims:
             self._runs.append(self._launch(claim))
             log.info("on from step %d", len(claim.log), extra=self._runs[-1].place)
 
