@@ -1,4 +1,4 @@
-"""`gaplab events`, `gaplab accept-versions`, and what `gaplab show` says of provenance, against a service in a thread."""
+"""`gaplab events`, `gaplab accept-versions`, and what `gaplab show` says of provenance, on a service in a thread."""
 
 import re
 import sys
@@ -64,5 +64,5 @@ def test_a_refusal_is_shown_and_can_be_lifted(sqlite_store, gaplab):
     assert f"`gaplab accept-versions {id_}`" in warned
     assert (code, accepted) == (0, f"{id_} goes on under the versions of the next supervisor.\n")
     assert silent == ""
-    assert refused == Exit.REFUSED if hasattr(Exit, "REFUSED") else refused != 0
+    assert refused == Exit.CONFLICT
     assert "has not begun" in why
