@@ -48,6 +48,7 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
     Raises:
         ClusterUnusable: it cannot be joined, or a node has other versions than this process.
     """
+    logging.getLogger("ray").setLevel(logging.ERROR)
     try:
         if settings.ray_address:
             _join(settings.ray_address)
@@ -65,7 +66,7 @@ def _start(cores: int | None) -> None:
         num_cpus=cores,
         include_dashboard=False,
         log_to_driver=False,
-        logging_level=logging.ERROR,
+        configure_logging=False,
         object_store_memory=OBJECT_STORE_BYTES,
         _node_ip_address="127.0.0.1",
     )
@@ -73,7 +74,7 @@ def _start(cores: int | None) -> None:
 
 def _join(address: str) -> None:
     try:
-        ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
+        ray.init(address=address, log_to_driver=False, configure_logging=False)
     except (ConnectionError, ValueError, RuntimeError, RayError) as error:  # away; no node here; versions; token
         msg = f"the Ray cluster at {address} cannot be joined (docs/scale.md says how): {error}"
         raise ClusterUnusable(msg) from error
