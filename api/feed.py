@@ -51,7 +51,7 @@ class Feed:
     async def follow(self, after: int, which: Which) -> AsyncIterator[EventRead]:
         """These events, in order and each once, from the first after that number; until the feed is closed."""
         with self._counted():
-            while not self._closed:
+            while not (self._closed or self._reader is None or self._reader.done()):
                 news, found = self._news, self._after(after)
                 if found is None:
                     page = await self._page(after, which)
@@ -74,6 +74,7 @@ class Feed:
         self._open += 1
         if self._reader is None and not self._closed:
             self._reader = asyncio.get_running_loop().create_task(self._read())
+            self._reader.add_done_callback(self._give_up)
         try:
             yield
         finally:
@@ -107,6 +108,12 @@ class Feed:
             except StoreUnavailable as error:
                 log.warning("event streams wait: %s", error)
                 await asyncio.sleep(RETRY_S)
+
+    def _give_up(self, reader: "asyncio.Task[None]") -> None:
+        """A reader that failed ends all streams: whoever resumes his gets a new one."""
+        if not reader.cancelled() and (error := reader.exception()) is not None:
+            log.error("event streams end: their reader failed", exc_info=error)
+            self._tell()
 
     async def _look(self) -> None:
         if self._head is None:

@@ -2,9 +2,10 @@
 
 import platform
 import subprocess
+from contextlib import suppress
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, packages_distributions, version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from schemas.provenance import Provenance
@@ -13,6 +14,9 @@ from services.store.models import SPEC_VERSION
 
 CODE = ("schemas", "services", "workers")
 LIBRARIES = ("numpy", "scipy", "cma", "numba")
+DISTRIBUTIONS = {"mujoco": ("mujoco-core", "mujoco")}
+"""Of modules that need not come in a distribution of their name."""
+
 ROOT = Path(__file__).parents[1]
 GIT_S = 5.0
 """How long git may take to say which commit this is; large folders on slow disks take a second."""
@@ -56,17 +60,10 @@ def _engine(library: str | None) -> str:
 
 @cache
 def _version(module: str) -> str:
-    """Of the distribution that has the module, which need not have its name: MuJoCo's is mujoco-core."""
-    names = _distributions().get(module, [module])
-    try:
-        return version(names[0])
-    except PackageNotFoundError:
-        return "none"
-
-
-@cache
-def _distributions() -> dict[str, list[str]]:
-    return {module: list(names) for module, names in packages_distributions().items()}
+    for name in DISTRIBUTIONS.get(module, (module,)):
+        with suppress(PackageNotFoundError):
+            return version(name)
+    return "none"
 
 
 @cache

@@ -51,6 +51,7 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
         ClusterUnusable: it cannot be joined, a node has other versions than this process, or a Ray of our own would
             ask nobody for a token.
     """
+    logging.getLogger("ray").setLevel(logging.ERROR)
     try:
         if settings.ray_address:
             _join(settings.ray_address)
@@ -72,7 +73,7 @@ def _start(cores: int | None) -> None:
             num_cpus=cores,
             include_dashboard=False,
             log_to_driver=False,
-            logging_level=logging.ERROR,
+            configure_logging=False,
             object_store_memory=OBJECT_STORE_BYTES,
             _node_ip_address="127.0.0.1",
         )
@@ -95,7 +96,7 @@ def _on_loopback() -> Iterator[None]:
 
 def _join(address: str) -> None:
     try:
-        ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
+        ray.init(address=address, log_to_driver=False, configure_logging=False)
     except (ConnectionError, ValueError, RuntimeError, RayError) as error:  # away; no node here; versions; token
         msg = f"the Ray cluster at {address} cannot be joined (docs/scale.md says how): {error}"
         raise ClusterUnusable(msg) from error

@@ -1,5 +1,6 @@
 """The processes of the service: what is started is ended, what dies is started again, and trouble is a sentence."""
 
+import json
 import os
 import re
 import signal
@@ -69,7 +70,7 @@ def test_a_service_migrates_its_database_answers_and_ends_in_order(tmp_path: Pat
     said, _ = process.communicate(timeout=20)
 
     assert process.returncode == 0, said
-    assert said.startswith(f"gaplab serves on http://127.0.0.1:{port}")
+    assert json.loads(said)["message"].startswith(f"gaplab serves on http://127.0.0.1:{port}")
     assert said.count("\n") == 1
     assert (tmp_path / "new.db").stat().st_size > 0
 
@@ -140,22 +141,15 @@ def test_a_database_that_cannot_be_migrated_is_a_sentence_without_its_password(u
 
 
 def test_a_supervisor_that_dies_is_started_again_and_it_is_said(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ):
     monkeypatch.setattr(service, "LONGEST_PAUSE_S", 0.1)
     keeper = Keeper({}, module="this")
 
     keeper.start()
-    said = ""
-
-    def twice() -> bool:
-        nonlocal said
-        said += "".join(capfd.readouterr())
-        return said.count("another starts") >= 2
-
-    assert within(20, twice)
+    assert within(20, lambda: caplog.text.count("another starts") >= 2)
     keeper.stop()
-    assert "ended by itself (exit code 0)" in said
+    assert "ended by itself (exit code 0)" in caplog.text
 
 
 def test_a_keeper_that_is_stopped_ends_its_supervisor(tmp_path: Path):

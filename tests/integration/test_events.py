@@ -344,6 +344,25 @@ def test_all_streams_together_ask_the_database_once_a_look(sqlite_store, monkeyp
     assert second == [2] * 8
 
 
+def test_a_stream_whose_reader_failed_is_resumed_by_the_client(sqlite_store, monkeypatch):
+    monkeypatch.setattr("api.clients.events.RETRY_S", 0.05)
+    experiments.submit_experiment(sqlite_store, toy())
+    latest, failing = events.latest, iter([True])
+
+    def fail_once(store: Store) -> int:
+        if next(failing, False):
+            msg = "a mistake of ours"
+            raise ValueError(msg)
+        return latest(store)
+
+    monkeypatch.setattr(feeding.events, "latest", fail_once)
+    with served(sqlite_store) as (url, _), Client(url) as client:
+        found = take(client.events(), 1)
+
+    assert found[0].number == 1
+    assert next(failing, None) is None
+
+
 def test_an_idle_stream_says_that_it_lives_and_holds_no_transaction(store, monkeypatch):
     monkeypatch.setattr("fastapi.routing._PING_INTERVAL", 0.2)
     with served(store) as (url, _), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
