@@ -5,6 +5,8 @@
     ├── NotFound             no such study, experiment or plug-in
     ├── Conflict             not now: the state forbids it
     ├── StoreUnavailable     the database is unreachable, or its schema is not the one this version needs
+    ├── InvalidArchive       a file that is no archive of ours, or one that was damaged or made to harm
+    ├── Unsupported          another kind of database is needed for what was asked
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
     └── EngineError
         └── EngineUnavailable    the engine's library is not installed
@@ -65,6 +67,14 @@ class Conflict(GaplabError):
 
 class StoreUnavailable(GaplabError):
     """The database cannot be used now."""
+
+
+class InvalidArchive(GaplabError):
+    """What was sent is no archive of experiments that can be read; the message says where it is wrong."""
+
+
+class Unsupported(GaplabError):
+    """This kind of database cannot do what was asked; the message says what can."""
 
 
 class ClusterUnusable(GaplabError):
