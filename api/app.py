@@ -6,7 +6,7 @@ from fastapi import FastAPI
 
 from api import documentation, problems
 from api.limits import BodyLimit
-from api.routes import catalogue, curves, experiments, figures, health, sensitivity, studies
+from api.routes import archives, catalogue, curves, experiments, figures, health, sensitivity, studies
 from services.store.session import Store
 
 DESCRIPTION = """
@@ -22,6 +22,7 @@ TAGS = [
     {"name": "studies", "description": "experiments that belong together to be compared"},
     {"name": "experiments", "description": "one strategy under one setting, repeated"},
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
+    {"name": "archives", "description": "everything of an experiment or a study as one file, and back"},
     {"name": "sensitivity", "description": "what tunables do to fitness, checked before anything is tuned"},
     {"name": "catalogue", "description": "the plug-ins that a spec may name"},
     {"name": "health", "description": "for whoever keeps the service alive"},
@@ -46,7 +47,7 @@ def create_app(store: Store) -> FastAPI:
     app.state.store = store
     app.add_middleware(BodyLimit)
     problems.install(app)
-    for module in (studies, experiments, curves, figures, sensitivity, catalogue, health):
+    for module in (studies, experiments, curves, figures, archives, sensitivity, catalogue, health):
         app.include_router(module.router)
     documentation.install(app)
     return app

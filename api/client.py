@@ -9,6 +9,7 @@ with Client("http://127.0.0.1:8000") as gaplab:
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Literal, Self, TypeVar
 from urllib.parse import quote
@@ -16,6 +17,7 @@ from urllib.parse import quote
 import httpx2
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
+from api.clients.archives import Archives
 from schemas.curves import Comparison, Curve
 from schemas.misfit import MisfitRead
 from schemas.plugin import Catalogue
@@ -48,7 +50,7 @@ class ServiceUnreachable(Exception):
     """Nothing answers at the service's address."""
 
 
-class Client:
+class Client(Archives):
     """A connection to a service.
 
     Args:
@@ -196,13 +198,21 @@ class Client:
     def _request(
         self, method: str, path: str, *, params: Mapping[str, Any] | None = None, json: object = None
     ) -> httpx2.Response:
+        with self._reached():
+            return self._successful(self._http.request(method, path, params=params, json=json))
+
+    @contextmanager
+    def _reached(self) -> Iterator[None]:
         try:
-            answer = self._http.request(method, path, params=params, json=json)
+            yield
         except (httpx2.TransportError, httpx2.InvalidURL) as error:
             msg = f"no service answers at {self.url} ({type(error).__name__}); start one with `gaplab serve`"
             raise ServiceUnreachable(msg) from error
+
+    def _successful(self, answer: httpx2.Response) -> httpx2.Response:
         if answer.is_success:
             return answer
+        answer.read()
         raise ServiceError(_problem(answer))
 
     def _read(self, kind: type[T], answer: httpx2.Response) -> T:

@@ -8,9 +8,12 @@ from api.problems import FRAMEWORK, problem, response
 
 MOST_BYTES = 1_000_000
 
+MOST_BYTES_OF = {"/import": 64 * 2**20}
+"""Of the addresses that take more than a spec."""
+
 
 class BodyLimit:
-    """Refuses a body over `MOST_BYTES` with 413: by what its header announces, and by what really arrives."""
+    """Refuses a body over what its address takes with 413: by what its header announces, and by what really arrives."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -20,26 +23,29 @@ class BodyLimit:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
+        most = MOST_BYTES_OF.get(scope["path"], MOST_BYTES)
         announced = Headers(scope=scope).get("content-length", "")
-        if announced.isdecimal() and int(announced[:20]) > MOST_BYTES:
-            refusal = response(problem(*FRAMEWORK[413], _DETAIL), {"Connection": "close"})
+        if announced.isdecimal() and int(announced[:20]) > most:
+            refusal = response(problem(*FRAMEWORK[413], _detail(most)), {"Connection": "close"})
             await refusal(scope, receive, send)
             return
-        await self.app(scope, _counted(receive), send)
+        await self.app(scope, _counted(receive, most), send)
 
 
-_DETAIL = f"The body has more than {MOST_BYTES:,} bytes; a spec has a few hundred."
+def _detail(most: int) -> str:
+    hint = "; a spec has a few hundred" if most == MOST_BYTES else ""
+    return f"The body has more than {most:,} bytes{hint}."
 
 
-def _counted(receive: Receive) -> Receive:
+def _counted(receive: Receive, most: int) -> Receive:
     arrived = 0
 
     async def count() -> Message:
         nonlocal arrived
         message = await receive()
         arrived += len(message.get("body", b""))
-        if arrived > MOST_BYTES:
-            raise HTTPException(413, _DETAIL)
+        if arrived > most:
+            raise HTTPException(413, _detail(most))
         return message
 
     return count

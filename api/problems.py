@@ -16,6 +16,7 @@ from services.core.errors import (
     Conflict,
     EngineUnavailable,
     GaplabError,
+    InvalidArchive,
     InvalidSpec,
     NotFound,
     StoreUnavailable,
@@ -27,6 +28,7 @@ KINDS: dict[type[GaplabError], tuple[int, str, str]] = {
     InvalidSpec: (422, "invalid-spec", "This cannot be run as it is"),
     NotFound: (404, "not-found", "There is no such thing"),
     Conflict: (409, "conflict", "Its present state forbids it"),
+    InvalidArchive: (422, "invalid-archive", "This archive cannot be read"),
     StoreUnavailable: (503, "store-unavailable", "The database cannot be used now"),
     EngineUnavailable: (422, "engine-unavailable", "An engine is not installed here"),
 }

@@ -7,12 +7,21 @@ from typing import Any
 
 import numpy as np
 from sqlalchemy import insert
+from sqlalchemy.orm import Session
 
 from schemas.lifecycle import State
 from schemas.records import MeasurementKind
 from schemas.spec import ExperimentSpec
 from services.resolution import expected_rollouts, resolve_experiment
-from services.store.models import Base, ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow, StudyRow
+from services.store.models import (
+    Base,
+    ExperimentRow,
+    IterationRow,
+    MeasurementRow,
+    RepetitionRow,
+    SimulatorRow,
+    StudyRow,
+)
 from services.store.session import Store
 
 IN_A_STUDY = 7
@@ -75,7 +84,7 @@ def experiment_id(number: int) -> str:
     return f"experiment{number:06d}"
 
 
-def _insert(session: Any, model: type[Base], rows: list[Row]) -> None:
+def _insert(session: Session, model: type[Base], rows: list[Row]) -> None:
     if rows:
         session.execute(insert(model), rows)
 

@@ -1,6 +1,6 @@
 """Experiments, studies and repetitions as they are shown: rows, their progress, and nothing that is secret yet."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -21,17 +21,29 @@ def read_experiments(session: Session, rows: Sequence[ExperimentRow]) -> tuple[E
     """
     ids = [row.id for row in rows]
     progress, failed, warnings = tallies(session, ids), reasons(session, ids), warned(session, rows)
-    secret = open_studies(session, [row.study_id for row in rows if row.study_id])
+    secret = hidden(session, rows)
     return tuple(
         _experiment(
             row,
             progress.get(row.id, Tally()),
             failed.get(row.id, ()),
             warnings.get(row.id, Warned()),
-            secret=not row.state.ended or row.study_id in secret,
+            secret=row.id in secret,
         )
         for row in rows
     )
+
+
+def hidden(session: Session, rows: Sequence[ExperimentRow]) -> frozenset[str]:
+    """The ids of those of these experiments whose reality's parameters may not be shown yet."""
+    going_on = open_studies(session, [row.study_id for row in rows if row.study_id])
+    return frozenset(row.id for row in rows if not row.state.ended or row.study_id in going_on)
+
+
+def without_truth(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """The spec with null in place of each of reality's parameters."""
+    reality = spec["reality"]
+    return {**spec, "reality": reality | {"parameters": dict.fromkeys(reality["parameters"])}}
 
 
 def read_studies(session: Session, rows: Sequence[StudyRow]) -> tuple[StudyRead, ...]:
@@ -73,7 +85,7 @@ def _experiment(
         name=row.name,
         strategy=row.strategy,
         state=row.state,
-        spec=_without_truth(row.spec) if secret else row.spec,
+        spec=without_truth(row.spec) if secret else row.spec,
         progress=tally.progress(),
         reasons=failed,
         sensitivity=warned.check,
@@ -93,8 +105,3 @@ def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: dict[
         progress=sum((progress[each.id] for each in experiments), Tally()).progress(),
         created_at=row.created_at,
     )
-
-
-def _without_truth(spec: dict[str, Any]) -> dict[str, Any]:
-    reality = spec["reality"]
-    return spec | {"reality": reality | {"parameters": dict.fromkeys(reality["parameters"])}}
