@@ -1,8 +1,9 @@
 """`python -m benchmarks.load`: does a service with 400 000 samples answer as fast as an empty one?
 
 50 clients read lists and curves, 20 submit, and 10 follow the events, all at once, of a real service over HTTP; on
-SQLite and on Postgres, with hardly anything stored and with 10 000 experiments. A client pauses between its requests
-as a person or a page does, so that what is measured is answering and not queueing; `--pause 0` asks as fast as it can.
+SQLite and on Postgres, with next to nothing stored, with a page of everything, and with 10 000 experiments. A client
+pauses between its requests as a person or a page does, so that what is measured is answering and not queueing;
+`--pause 0` asks as fast as it can.
 """
 
 import argparse
@@ -33,7 +34,9 @@ from benchmarks.supervisor import postgres
 from services.store.session import Store
 
 READERS, SUBMITTERS, STREAMS = 50, 20, 10
-FEW = IN_A_STUDY
+NEXT_TO_NOTHING, A_PAGE = IN_A_STUDY, 50 * IN_A_STUDY
+"""Experiments: one study's, and as many as the longest list shows. What comes after these is what storing costs."""
+
 SPEC = json.dumps({"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "repetitions": 2})
 PATIENCE_S = 60.0
 
@@ -220,18 +223,22 @@ def measure(url: str, folder: Path, experiments: int, options: argparse.Namespac
         return Load(port, experiments, options.seconds, options.pause).run()
 
 
-def table(name: str, empty: Measured, full: Measured, experiments: int) -> Table:
-    """The figures of one kind of database."""
-    samples = experiments * REPETITIONS * SAMPLES
+def table(name: str, found: dict[int, Measured]) -> Table:
+    """The figures of one kind of database, by the number of experiments stored."""
+    *_, page, full = found.values()
     shown = Table(title=f"{name}: median / 99th percentile in ms / errors")
-    for column in ("request", f"{FEW} experiments", f"{experiments:,} with {samples:,} samples", "medians"):
-        shown.add_column(column, justify="left" if column == "request" else "right")
+    shown.add_column("request")
+    for experiments in found:
+        shown.add_column(
+            f"{experiments:,} experiments, {experiments * REPETITIONS * SAMPLES:,} samples", justify="right"
+        )
+    shown.add_column("medians, last to a page", justify="right")
     for kind in (*READS, SUBMIT):
-        shown.add_row(kind, empty.of(kind), full.of(kind), f"{full.median(kind) / empty.median(kind):.2f}")
-    events = [f"{each.events:,} events / {each.errors[FOLLOW]} errors" for each in (empty, full)]
-    shown.add_row(FOLLOW, *events, "") if any(each.events for each in (empty, full)) else None
-    counts = [f"{sum(map(len, each.seconds.values())):,}" for each in (empty, full)]
-    shown.add_row("answers in all", *counts, "")
+        times = f"{full.median(kind) / page.median(kind):.2f}"
+        shown.add_row(kind, *(each.of(kind) for each in found.values()), times)
+    if any(each.events for each in found.values()):
+        shown.add_row(FOLLOW, *(f"{each.events:,} / {each.errors[FOLLOW]} errors" for each in found.values()), "")
+    shown.add_row("answers in all", *(f"{sum(map(len, each.seconds.values())):,}" for each in found.values()), "")
     return shown
 
 
@@ -246,14 +253,14 @@ def main() -> None:
     print(f"{READERS} readers, {SUBMITTERS} submitters on {os.cpu_count()} cores of {platform.machine()}", flush=True)
     for database in options.databases:
         with TemporaryDirectory() as folder:
-            found = []
-            for experiments in (FEW, options.experiments):
+            found = {}
+            for experiments in (NEXT_TO_NOTHING, A_PAGE, options.experiments):
                 place = Path(folder) / str(experiments)
                 place.mkdir()
                 with postgres(place) if database == "postgres" else _sqlite(place) as url:
-                    found.append(measure(url, place, experiments, options))
-            Console(width=120).print(table(database, found[0], found[1], options.experiments))
-            if not any(each.events for each in found):
+                    found[experiments] = measure(url, place, experiments, options)
+            Console(width=120).print(table(database, found))
+            if not any(each.events for each in found.values()):
                 print("Events were left out: the service serves none at /events.", flush=True)
 
 

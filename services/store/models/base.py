@@ -10,7 +10,7 @@ from schemas.lifecycle import State
 from schemas.records import MeasurementKind
 from services.store.clock import UtcDateTime
 
-REVISION = "0002"
+REVISION = "0007"
 """The migration that makes these tables; a database at any other revision is not ours to touch."""
 
 SPEC_VERSION = 1

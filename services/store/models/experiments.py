@@ -38,7 +38,11 @@ class ExperimentRow(Base):
     """
 
     __tablename__ = "experiment"
-    __table_args__ = (Index(None, "created_at", "position", "id"),)
+    __table_args__ = (
+        Index(None, "created_at", "position", "id"),
+        Index(None, "state", "created_at", "position", "id"),
+        Index(None, "strategy", "created_at", "position", "id"),
+    )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     study_id: Mapped[str | None] = mapped_column(ForeignKey("study.id"), index=True)

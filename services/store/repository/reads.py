@@ -1,5 +1,6 @@
 """Experiments, studies and repetitions as they are shown: rows, their progress, and nothing that is secret yet."""
 
+from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
@@ -19,8 +20,11 @@ def read_experiments(session: Session, rows: Sequence[ExperimentRow]) -> tuple[E
     Reality's parameters are null until the experiment has ended, and with it all others of its study: they share one
     reality, and what one of them shows is known of all.
     """
-    ids = [row.id for row in rows]
-    progress, failed, warnings = tallies(session, ids), reasons(session, ids), warned(session, rows)
+    return _read(session, rows, tallies(session, [row.id for row in rows]))
+
+
+def _read(session: Session, rows: Sequence[ExperimentRow], progress: Mapping[str, Tally]) -> tuple[ExperimentRead, ...]:
+    failed, warnings = reasons(session, [row.id for row in rows]), warned(session, rows)
     secret = hidden(session, rows)
     return tuple(
         _experiment(
@@ -49,9 +53,11 @@ def without_truth(spec: Mapping[str, Any]) -> dict[str, Any]:
 def read_studies(session: Session, rows: Sequence[StudyRow]) -> tuple[StudyRead, ...]:
     """The studies as they are shown, with their experiments."""
     experiments = experiments_of(session, [row.id for row in rows])
-    shown = read_experiments(session, experiments)
     progress = tallies(session, [row.id for row in experiments])
-    return tuple(_study(row, [each for each in shown if each.study == row.id], progress) for row in rows)
+    shown: dict[str | None, list[ExperimentRead]] = defaultdict(list)
+    for each in _read(session, experiments, progress):
+        shown[each.study].append(each)
+    return tuple(_study(row, shown[row.id], progress) for row in rows)
 
 
 def read_repetition(row: RepetitionRow) -> RepetitionRead:
@@ -96,7 +102,7 @@ def _experiment(
     )
 
 
-def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: dict[str, Tally]) -> StudyRead:
+def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: Mapping[str, Tally]) -> StudyRead:
     return StudyRead(
         id=row.id,
         name=row.name,
