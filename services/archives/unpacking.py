@@ -29,19 +29,26 @@ def main(paths: list[str]) -> int:
     for limit, most in MOST.items():
         with suppress(ValueError, OSError):  # the system does not know this limit, or has a lower one already
             resource.setrlimit(limit, (most, most))
+    for number, (source, target) in enumerate(zip(paths[::2], paths[1::2], strict=True), 1):
+        if not convert(source, target):
+            return number
+    return 0
+
+
+def convert(source: str, target: str) -> bool:
+    """Write each row of one file as a line of JSON; whether that could be done."""
     import pyarrow as arrow  # within the limits
     from pyarrow import parquet
 
     arrow.set_cpu_count(1)
-    for number, (source, target) in enumerate(zip(paths[::2], paths[1::2], strict=True), 1):
-        try:
-            with parquet.ParquetFile(source) as file, open(target, "x") as lines:
-                for batch in file.iter_batches(_AT_ONCE, use_threads=False):
-                    for row in batch.to_pylist():
-                        lines.write(json.dumps(row, default=_plain, allow_nan=False) + "\n")
-        except (arrow.ArrowException, ValueError, TypeError, KeyError, OSError, MemoryError, RecursionError):
-            return number
-    return 0
+    try:
+        with parquet.ParquetFile(source) as file, open(target, "x") as lines:
+            for batch in file.iter_batches(_AT_ONCE, use_threads=False):
+                for row in batch.to_pylist():
+                    lines.write(json.dumps(row, default=_plain, allow_nan=False) + "\n")
+    except (arrow.ArrowException, ValueError, TypeError, KeyError, OSError, MemoryError, RecursionError):
+        return False
+    return True
 
 
 def _plain(value: Any) -> str:  # noqa: ANN401 - whatever Parquet has
