@@ -17,7 +17,7 @@ from sqlalchemy import insert
 from schemas.lifecycle import State
 from schemas.spec import StudySpec
 from services import execution, experiments, reports
-from services.archives import export_experiment, export_study, import_archive
+from services.archives import export_experiment, export_study, import_archive, opening, unpacking
 from services.core.arrays import frozen
 from services.core.errors import NotFound
 from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
@@ -26,7 +26,7 @@ from services.store.models import ExperimentRow, RepetitionRow, SimulatorRow
 from services.store.portable import EXPORTED
 from tests.experiments import AWKWARD, run, some_log, toy
 
-EVERY = settings(deadline=None, max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
+EVERY = settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 FITNESS = FINITE | st.just(nan)
@@ -34,6 +34,7 @@ ERROR = st.floats(0, allow_nan=False, allow_infinity=False) | st.just(inf)
 COST = st.builds(Cost, st.integers(0, 2**40), st.just(0), st.integers(0, 2**40))
 GENOME = st.lists(FINITE, min_size=1, max_size=9).map(frozen)
 SIMULATOR = st.builds(Simulator, st.lists(FINITE, min_size=2, max_size=2).map(frozen), ERROR)
+TOY_STUDY = {"robot": "toy_function", "budget": "smoke", "iterations": 2, "repetitions": 2}
 NAME = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1, max_size=200)
 
 
@@ -109,9 +110,19 @@ def test_an_experiment_goes_to_the_other_kind_of_database_and_back(store, other)
     assert shown(store, submitted) == before
 
 
+@pytest.fixture
+def unpacked_here(monkeypatch):
+    """Parquet is read in this process, without its limits, which saves a second each time."""
+
+    def read(files):
+        assert all(unpacking.convert(str(each), str(opening._lines_of(each))) for each in files)
+
+    monkeypatch.setattr(opening, "_read_parquet", read)
+
+
 @EVERY
 @given(st.data())
-def test_whatever_numbers_and_names_go_there_and_back(store, other, data):
+def test_whatever_numbers_and_names_go_there_and_back(store, other, unpacked_here, data):
     forget(store)
     forget(other)
     submitted = finished(store, data.draw(logs()), repetitions=1, name=data.draw(NAME))
@@ -126,7 +137,7 @@ def test_whatever_numbers_and_names_go_there_and_back(store, other, data):
 def test_a_study_goes_there_with_all_that_is_its_own(store, other):
     study = experiments.submit_study(
         store,
-        StudySpec.model_validate({"robot": "toy_function", "budget": "smoke", "strategies": ["random", "direct"]}),
+        StudySpec.model_validate(TOY_STUDY | {"strategies": ["random", "direct"]}),
     )
     finished(store)
     direct = study.experiments[1].id
@@ -156,9 +167,7 @@ def _fitting(step, tunables):
 
 
 def test_an_experiment_of_a_study_goes_on_its_own(store, other):
-    study = experiments.submit_study(
-        store, StudySpec.model_validate({"robot": "toy_function", "budget": "smoke", "strategies": ["random"]})
-    )
+    study = experiments.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["random"]}))
     (experiment,) = (each.id for each in study.experiments)
 
     import_archive(other, BytesIO(exported(export_experiment(store, experiment))))
@@ -203,7 +212,7 @@ def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(sto
 
 @pytest.mark.parametrize("ended", [False, True])
 def test_reality_is_hidden_until_its_study_has_ended(store, other, ended):
-    spec = {"robot": "toy_function", "budget": "smoke", "strategies": ["direct", "random"], "repetitions": 1}
+    spec = TOY_STUDY | {"strategies": ["direct", "random"], "repetitions": 1}
     truth = {"reality": {"parameters": {"static_friction": 0.98765}}, "tunables": ["static_friction", "restitution"]}
     study = experiments.submit_study(store, StudySpec.model_validate(spec | truth))
     (claim,) = execution.claim(store, "me", 1)
@@ -226,11 +235,11 @@ def test_reality_is_hidden_until_its_study_has_ended(store, other, ended):
 
 
 def test_an_export_is_of_one_moment_while_a_supervisor_writes(store, other):
-    submitted = experiments.submit_experiment(store, toy(repetitions=30)).id
-    for claim in execution.claim(store, "me", 30):
+    submitted = experiments.submit_experiment(store, toy(repetitions=6)).id
+    for claim in execution.claim(store, "me", 6):
         run(store, claim)
         archive = export_experiment(store, submitted)
-        if claim.number % 10 == 9:
+        if claim.number == 3:
             stored = import_archive(other, archive.file)  # which refuses rows that are no whole logs
             assert experiments.read_experiment(other, stored.experiments[0]).progress.completed == claim.number + 1
         archive.file.close()
