@@ -39,6 +39,8 @@ NEXT_TO_NOTHING, A_PAGE = IN_A_STUDY, 50 * IN_A_STUDY
 
 SPEC = json.dumps({"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "repetitions": 2})
 PATIENCE_S = 60.0
+KEPT_ALIVE_S = 2.0
+"""Longer than two and a half times that, and the server closes a connection on which nothing happens."""
 
 Path_ = Callable[[int], str]
 """The address of a request, in a database with so many experiments."""
@@ -131,6 +133,8 @@ class Load:
         return time.monotonic() < self._end
 
     def _ask(self, connection: HTTPConnection, kind: str, method: str, path: str, body: str | None = None) -> None:
+        if self._pause_s > KEPT_ALIVE_S:
+            connection.close()  # the service did so already; the next request opens it again
         begun = time.perf_counter()
         try:
             connection.request(method, path, body, {"Content-Type": "application/json"} if body else {})
