@@ -13,7 +13,7 @@ MANIFEST, CURVES = "manifest.json", "curves.json"
 
 Row = dict[str, Any]
 
-_AT_ONCE = 5_000
+_AT_ONCE = 1_000
 
 
 class Hashed:
