@@ -16,9 +16,6 @@ Row = dict[str, Any]
 LONGEST_LINE = 8 * 2**20
 """Characters of one row."""
 
-MOST = 2**48
-"""The largest whole number: ten thousand of them add up within 64 bits."""
-
 _ID = re.compile(r"[A-Za-z0-9]{1,32}")
 _IDS = {"id", "study_id", "experiment_id", EXPERIMENT}
 
@@ -102,9 +99,9 @@ def _text(column: Column, value: object) -> str:
     return value
 
 
-def _whole(_: Column, value: object) -> int:
-    if type(value) is not int or not 0 <= value <= MOST:
-        msg = f"is no whole number from 0 to {MOST}"
+def _whole(column: Column, value: object) -> int:
+    if type(value) is not int or not 0 <= value <= column.greatest:
+        msg = f"is no whole number from 0 to {column.greatest}"
         raise ValueError(msg)
     return value
 

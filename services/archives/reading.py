@@ -121,7 +121,7 @@ def _checked_spec(row: Row) -> Row:
         msg = f"{place} is no spec"
         raise InvalidArchive(msg) from error
     left_out = [name for name in ("name", "iterations", "repetitions", "engine") if getattr(spec, name) is None]
-    unknown = [each.name for each in spec.tunables if each.name not in tunables]
+    unknown = [name for name in (*truth, *(each.name for each in spec.tunables)) if name not in tunables]
     unknown += [spec.robot.name] if spec.robot.name not in robots else []
     if left_out or unknown or spec.reality.engine is None or spec.strategy.name != row["strategy"]:
         msg = f"{place} is not resolved, or names what is not installed here: {', '.join([*left_out, *unknown])[:200]}"
@@ -164,7 +164,7 @@ def _store(session: Session, manifest: Manifest, tables: dict[str, Path], owners
         for table in EXPORTED:
             incoming = _rows(table, tables, manifest)
             archives.insert_rows(session, table, (_arriving(table, row, arrival, study) for row in incoming))
-    except (archives.Refused, KeyError) as error:
+    except (*archives.Refused, KeyError) as error:
         msg = "its rows contradict each other: one is there twice, or belongs to what is not there"
         raise InvalidArchive(msg) from error
     _check_logs(session, list(found.values()))

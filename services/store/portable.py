@@ -14,7 +14,7 @@ from enum import StrEnum
 from functools import cache
 from typing import Any, get_args, get_type_hints
 
-from sqlalchemy import JSON, Boolean, Float, Integer, String, Table
+from sqlalchemy import JSON, BigInteger, Boolean, Float, Integer, String, Table
 from sqlalchemy import Column as TableColumn
 from sqlalchemy.orm import Mapper
 
@@ -59,6 +59,7 @@ class Column:
         required: a row without it cannot be stored: it has no default.
         nullable: it may be null.
         longest: characters of a text; None for any number of them.
+        greatest: of whole numbers.
         choices: the only permitted texts, if there are such.
     """
 
@@ -67,7 +68,12 @@ class Column:
     required: bool
     nullable: bool = False
     longest: int | None = None
+    greatest: int = 2**31 - 1
     choices: tuple[str, ...] = ()
+
+
+MOST = 2**48
+"""The greatest of a large whole number: ten thousand of them add up within 64 bits."""
 
 
 def table_of(name: str) -> Table:
@@ -107,7 +113,8 @@ def _column(table: str, column: TableColumn[Any]) -> Column:
     kind = _kind(table, column)
     choices = tuple(getattr(column.type, "enums", ()))
     longest = column.type.length if isinstance(column.type, String) and not choices else None
-    return Column(column.name, kind, required, bool(column.nullable), longest, choices)
+    greatest = MOST if isinstance(column.type, BigInteger) else 2**31 - 1
+    return Column(column.name, kind, required, bool(column.nullable), longest, greatest, choices)
 
 
 def _kind(table: str, column: TableColumn[Any]) -> Kind:

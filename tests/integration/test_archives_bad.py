@@ -202,6 +202,8 @@ def in_spec(**changes):
         ({"iterations": True}, "no whole number"),
         ({"iterations": 1.5}, "no whole number"),
         ({"iterations": 10**30}, "no whole number"),
+        ({"position": 2**31}, "no whole number"),
+        ({"rollouts": 2**48 + 1}, "no whole number"),
         ({"iterations": 1}, "does not fit its experiment"),
         ({"created_at": "yesterday"}, "created_at"),
         ({"created_at": "2012-11-05T09:00:00"}, "time zone"),
@@ -217,6 +219,10 @@ def in_spec(**changes):
         (
             {"spec": in_spec(reality={"engine": {"name": "analytic"}, "parameters": {"static_friction": "x"}})},
             "no spec",
+        ),
+        (
+            {"spec": in_spec(reality={"engine": {"name": "analytic"}, "parameters": {"x": None}})},
+            "not installed here: x",
         ),
         ({"spec": in_spec(reality=None)}, "no spec"),
         ({"spec_version": 99}, "version 99"),

@@ -7,7 +7,7 @@ from itertools import islice
 from typing import Any
 
 from sqlalchemy import ColumnElement, Select, Table, insert, select
-from sqlalchemy.exc import IntegrityError as Refused
+from sqlalchemy.exc import DataError, IntegrityError
 from sqlalchemy.orm import Session
 
 from services.store.clock import now
@@ -19,6 +19,9 @@ from services.store.repository.reads import without_truth
 __all__ = ["Refused", "free", "insert_rows", "moment", "rows"]
 
 Row = dict[str, Any]
+
+Refused = (IntegrityError, DataError)
+"""What a database says to rows that contradict each other, or that have no place in it."""
 
 _AT_ONCE = 1_000
 _REPETITIONS = table_of("repetition")
@@ -67,7 +70,8 @@ def insert_rows(session: Session, name: str, found: Iterable[Row]) -> int:
         found: checked, with the ids of experiments and studies as they are here.
 
     Raises:
-        Refused: a row is there twice, or what it belongs to is not there.
+        IntegrityError: a row is there twice, or what it belongs to is not there.
+        DataError: a value has no place in its column.
         KeyError: as well, if that is a repetition.
     """
     table, count, incoming = table_of(name), 0, iter(found)
