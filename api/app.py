@@ -11,6 +11,7 @@ from api.limits import BodyLimit, Streams
 from api.metrics import Measured, Metrics
 from api.pages import Headers
 from api.routes import (
+    archives,
     catalogue,
     curves,
     events,
@@ -40,6 +41,7 @@ TAGS = [
     {"name": "experiments", "description": "one strategy under one setting, repeated"},
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
     {"name": "events", "description": "what happens to experiments, as it happens"},
+    {"name": "archives", "description": "everything of an experiment or a study as one file, and back"},
     {"name": "sensitivity", "description": "what tunables do to fitness, checked before anything is tuned"},
     {"name": "catalogue", "description": "the plug-ins that a spec may name"},
     {"name": "health", "description": "for whoever keeps the service alive"},
@@ -84,6 +86,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
         events,
         curves,
         figures,
+        archives,
         sensitivity,
         catalogue,
         health,

@@ -6,12 +6,12 @@ import typer
 
 from api import display
 from api.client import ServiceError, ServiceUnreachable
-from api.commands import editing, history, life_cycle, reading, service, submitting, tokens
+from api.commands import editing, history, keeping, life_cycle, reading, service, submitting, tokens
 from api.commands.base import app
 from api.exits import CommandError, Exit, code_of
 from services.core.errors import GaplabError
 
-__all__ = ["app", "editing", "history", "life_cycle", "main", "reading", "service", "submitting", "tokens"]
+__all__ = ["app", "editing", "history", "keeping", "life_cycle", "main", "reading", "service", "submitting", "tokens"]
 
 
 def main() -> None:

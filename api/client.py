@@ -14,6 +14,7 @@ from typing import Any, Literal
 import httpx2
 from pydantic import BaseModel
 
+from api.clients.archives import Archives
 from api.clients.connection import Connection
 from api.clients.errors import ServiceError as ServiceError
 from api.clients.errors import ServiceUnreachable as ServiceUnreachable
@@ -35,7 +36,7 @@ NOT_CHECKED = {"name", "strategy", "strategies", "direct_repetitions", "priority
 """What a spec has beside the settings that a sensitivity check takes."""
 
 
-class Client(LifeCycle, History, Connection):
+class Client(LifeCycle, History, Archives, Connection):
     """A connection to a service.
 
     Args:

@@ -16,41 +16,50 @@ from services.settings import Limits, variable_of
 RETRY_AFTER_S = 10
 """Streams come and go with the pages that show them."""
 
+MOST_BYTES_OF = {"/import": 64 * 2**20}
+"""Of the addresses that take more than a spec."""
+
 
 class BodyLimit:
-    """Refuses a body over so many bytes with 413: by what its header announces, and by what really arrives."""
+    """Refuses a body over what its address takes with 413: by what its header announces, and by what really arrives."""
 
     def __init__(self, app: ASGIApp, most_bytes: int) -> None:
         self.app = app
         self._most = most_bytes
-        self._detail = (
-            f"The body has more than {most_bytes:,} bytes ({variable_of('body_bytes')}); a spec has a few hundred."
-        )
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request within the limit."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
+        most, detail = self._limit_of(scope["path"])
         announced = Headers(scope=scope).get("content-length", "")
-        if announced.isdecimal() and int(announced[:20]) > self._most:
-            refusal = response(problem(*FRAMEWORK[413], self._detail), {"Connection": "close"})
+        if announced.isdecimal() and int(announced[:20]) > most:
+            refusal = response(problem(*FRAMEWORK[413], detail), {"Connection": "close"})
             await refusal(scope, receive, send)
             return
-        await self.app(scope, self._counted(receive), send)
+        await self.app(scope, _counted(receive, most, detail), send)
 
-    def _counted(self, receive: Receive) -> Receive:
-        arrived = 0
+    def _limit_of(self, path: str) -> tuple[int, str]:
+        """In bytes, and in words."""
+        if path in MOST_BYTES_OF:
+            return MOST_BYTES_OF[path], f"The body has more than {MOST_BYTES_OF[path]:,} bytes."
+        which = variable_of("body_bytes")
+        return self._most, f"The body has more than {self._most:,} bytes ({which}); a spec has a few hundred."
 
-        async def count() -> Message:
-            nonlocal arrived
-            message = await receive()
-            arrived += len(message.get("body", b""))
-            if arrived > self._most:
-                raise HTTPException(413, self._detail)
-            return message
 
-        return count
+def _counted(receive: Receive, most: int, detail: str) -> Receive:
+    arrived = 0
+
+    async def count() -> Message:
+        nonlocal arrived
+        message = await receive()
+        arrived += len(message.get("body", b""))
+        if arrived > most:
+            raise HTTPException(413, detail)
+        return message
+
+    return count
 
 
 class Streams:

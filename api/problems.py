@@ -20,6 +20,7 @@ from services.core.errors import (
     EngineUnavailable,
     Forbidden,
     GaplabError,
+    InvalidArchive,
     InvalidSpec,
     KeyReused,
     LimitReached,
@@ -40,6 +41,7 @@ KINDS: dict[type[GaplabError], tuple[int, str, str]] = {
     LimitReached: (429, "limit-reached", "Too much is under way"),
     Unauthenticated: (401, "unauthenticated", "A token is needed"),
     Forbidden: (403, "forbidden", "The token does not permit this"),
+    InvalidArchive: (422, "invalid-archive", "This archive cannot be read"),
     StoreUnavailable: (503, "store-unavailable", "The database cannot be used now"),
     EngineUnavailable: (422, "engine-unavailable", "An engine is not installed here"),
 }

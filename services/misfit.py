@@ -4,10 +4,9 @@ from collections import defaultdict
 from math import inf, nan
 
 from schemas.misfit import MisfitRead
-from schemas.spec import ExperimentSpec
 from services.core.arrays import frozen
 from services.core.misfit import Tuning, misfit_point, remarks
-from services.resolution import is_direct, unit
+from services.resolution import is_direct, spec_of, unit
 from services.simulation import parameters_of
 from services.store.repository import experiments, results
 from services.store.repository.results import Best
@@ -24,7 +23,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         row = experiments.get_experiment(session, experiment_id)
         found = results.best_simulators(session, experiment_id)
         measured = results.measured(session, experiment_id)
-    spec = ExperimentSpec.model_validate(row.spec)
+    spec = spec_of(row.spec)
     tunings: dict[int, list[Tuning]] = defaultdict(list)
     for best in found:
         earlier = sum(iteration <= best.iteration for iteration in measured.get(best.repetition, ()))

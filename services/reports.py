@@ -7,15 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from schemas.curves import Comparison, Curve
-from schemas.spec import ExperimentSpec
 from services.core.arrays import FloatArray
 from services.core.curves import curve_points
 from services.core.errors import InvalidSpec, Violation
 from services.core.statistics import compare_all
-from services.resolution import is_direct, unit
+from services.resolution import is_direct, spec_of, unit
 from services.store.models import ExperimentRow
 from services.store.repository import experiments, results
-from services.store.session import Store
+from services.store.session import Session, Store
 
 COLUMNS = ("experiment", "name", "strategy", "repetition", "evaluations", "fitness")
 
@@ -35,7 +34,17 @@ def curves(store: Store, experiment_ids: Sequence[str]) -> tuple[Curve, ...]:
     Raises:
         NotFound: no such experiment as one of them.
     """
-    rows, values = _recorded(store, experiment_ids)
+    with store.reading() as session:
+        return curves_of(session, experiment_ids)
+
+
+def curves_of(session: Session, experiment_ids: Sequence[str]) -> tuple[Curve, ...]:
+    """The same, of the moment that the session reads.
+
+    Raises:
+        NotFound: no such experiment as one of them.
+    """
+    rows, values = _recorded(session, experiment_ids)
     return tuple(_curve(row, values[row.id]) for row in rows)
 
 
@@ -75,7 +84,8 @@ def compare(
     if len(set(experiment_ids)) < max(2, len(experiment_ids)):
         message = f"a comparison needs two or more experiments, each once, not {len(experiment_ids)}"
         raise InvalidSpec([Violation("experiment", list(experiment_ids), message)])
-    rows, values = _recorded(store, experiment_ids)
+    with store.reading() as session:
+        rows, values = _recorded(session, experiment_ids)
     last = max(1, *(row.iterations - 1 for row in rows))
     first = 1 if from_evaluations is None else from_evaluations
     final = last if to_evaluations is None else to_evaluations
@@ -101,11 +111,10 @@ def curves_csv(curves: Sequence[Curve]) -> str:
     return text.getvalue()
 
 
-def _recorded(store: Store, ids: Sequence[str]) -> tuple[tuple[ExperimentRow, ...], dict[str, FloatArray]]:
+def _recorded(session: Session, ids: Sequence[str]) -> tuple[tuple[ExperimentRow, ...], dict[str, FloatArray]]:
     """The experiments, and the recorded fitness of each: `(repetitions, iterations + 1)`, nan where it is not there."""
-    with store.reading() as session:
-        rows = experiments.get_experiments(session, ids)
-        found = results.recorded(session, ids)
+    rows = experiments.get_experiments(session, ids)
+    found = results.recorded(session, ids)
     values = {row.id: np.full((row.spec["repetitions"], row.iterations), np.nan) for row in rows}
     for experiment, repetition, iteration, fitness in found:
         values[experiment][repetition, iteration] = fitness
@@ -113,7 +122,7 @@ def _recorded(store: Store, ids: Sequence[str]) -> tuple[tuple[ExperimentRow, ..
 
 
 def _curve(row: ExperimentRow, values: FloatArray) -> Curve:
-    spec = ExperimentSpec.model_validate(row.spec)
+    spec = spec_of(row.spec)
     return Curve(
         experiment=row.id,
         name=row.name,
@@ -126,4 +135,4 @@ def _curve(row: ExperimentRow, values: FloatArray) -> Curve:
 
 
 def _is_direct(row: ExperimentRow) -> bool:
-    return is_direct(ExperimentSpec.model_validate(row.spec))
+    return is_direct(spec_of(row.spec))

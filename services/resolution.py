@@ -1,7 +1,7 @@
 """From what a user wrote to what is run: every default filled in, every impossibility refused, all of them at once."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from schemas.plugin import PluginRef, TunableRef
@@ -97,6 +97,13 @@ def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
     resolved = resolve_experiment(ExperimentSpec(**shared, strategy=PluginRef(name="random")))
     effort = {"points": spec.points, "evaluations": spec.evaluations}
     return Checked.model_validate({name: getattr(resolved, name) for name in ("robot", "engine", "tunables")} | effort)
+
+
+def spec_of(stored: Mapping[str, Any]) -> ExperimentSpec:
+    """The spec that is stored, to be read and not to be run: what is not known of its reality is left out."""
+    reality = stored["reality"]
+    known = {name: value for name, value in reality["parameters"].items() if value is not None}
+    return ExperimentSpec.model_validate({**stored, "reality": {**reality, "parameters": known}})
 
 
 def is_direct(spec: ExperimentSpec) -> bool:

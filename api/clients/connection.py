@@ -2,7 +2,8 @@
 
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self, TypeVar
 from uuid import uuid4
@@ -101,13 +102,21 @@ class Connection:
         json: object = None,
         headers: Mapping[str, str] | None = None,
     ) -> httpx2.Response:
+        with self._reached():
+            return self._successful(self._http.request(method, path, params=params, json=json, headers=headers))
+
+    @contextmanager
+    def _reached(self) -> Iterator[None]:
         try:
-            answer = self._http.request(method, path, params=params, json=json, headers=headers)
+            yield
         except (httpx2.TransportError, httpx2.InvalidURL) as error:
             msg = f"no service answers at {self.url} ({type(error).__name__}); start one with `gaplab serve`"
             raise ServiceUnreachable(msg) from error
+
+    def _successful(self, answer: httpx2.Response) -> httpx2.Response:
         if answer.is_success:
             return answer
+        answer.read()
         raise ServiceError(problem_of(answer))
 
     def _read(self, kind: type[T], answer: httpx2.Response) -> T:

@@ -11,6 +11,8 @@
     ├── Unauthenticated      no token, or one that admits nobody
     ├── Forbidden            the token's role does not permit it
     ├── StoreUnavailable     the database is unreachable, or its schema is not the one this version needs
+    ├── InvalidArchive       a file that is no archive of ours, or one that was damaged or made to harm
+    ├── Unsupported          another kind of database is needed for what was asked
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
     └── EngineError
         └── EngineUnavailable    the engine's library is not installed
@@ -103,6 +105,14 @@ class Forbidden(GaplabError):
 
 class StoreUnavailable(GaplabError):
     """The database cannot be used now."""
+
+
+class InvalidArchive(GaplabError):
+    """What was sent is no archive of experiments that can be read; the message says where it is wrong."""
+
+
+class Unsupported(GaplabError):
+    """This kind of database cannot do what was asked; the message says what can."""
 
 
 class ClusterUnusable(GaplabError):

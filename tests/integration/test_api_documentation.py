@@ -52,6 +52,9 @@ ENDPOINTS = {
     "GET /figures/curves",
     "POST /sensitivity",
     "GET /sensitivity/{id}",
+    "GET /experiments/{id}/export",
+    "GET /studies/{id}/export",
+    "POST /import",
     "GET /catalogue",
     "GET /livez",
     "GET /readyz",
@@ -156,7 +159,7 @@ def test_every_answer_has_an_example_that_fits_its_schema(document: dict[str, An
 def test_every_example_of_a_spec_is_accepted(document: dict[str, Any], sqlite_store: Store):
     api = TestClient(create_app(sqlite_store))
     for name, operation in operations(document):
-        if "requestBody" in operation and name.startswith("POST"):
+        if name.startswith("POST") and "application/json" in operation.get("requestBody", {}).get("content", {}):
             examples = operation["requestBody"]["content"]["application/json"]["examples"]
             method, path = name.split()
             for example in examples.values():
@@ -184,7 +187,7 @@ def test_real_answers_fit_their_documented_schema(document: dict[str, Any], sqli
     experiment = made["experiments"][0]
     ids = {"studies": made["id"], "experiments": experiment["id"], "sensitivity": experiment["sensitivity"]}
     for name, operation in operations(document):
-        if name.startswith("GET") and "{id}" in name:
+        if name.startswith("GET") and "{id}" in name and not name.endswith("/export"):
             path = name.split()[1].format(id=ids[name.split("/")[1]], number=0)
             schema = operation["responses"]["200"]["content"]["application/json"]["schema"]
             assert complaints(document, schema, api.get(path).json()) == [], name

@@ -17,6 +17,7 @@ ARROWS = {
     "services/core": (("schemas", "services.core"), {"numpy", "scipy", "pydantic", "cma"}),
     "services/engines": (("schemas", "services.core", "services.engines"), {"numpy", "pydantic"}),
     "services/store": (("schemas", "services.core", "services.store"), {"sqlalchemy", "psycopg"}),
+    "services/archives": (("schemas", "services"), {"pydantic", "pyarrow"}),
     "services/figures": (("schemas", "services.figures"), {"plotly", "matplotlib"}),
     "services": (("schemas", "services"), {"numpy"}),
     "workers": (("schemas", "services", "workers"), {"numpy", "ray"}),

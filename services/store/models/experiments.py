@@ -61,6 +61,8 @@ class ExperimentRow(Base):
         Index(None, "name", "id"),
         Index(None, "strategy", "id"),
         Index(None, "state", "id"),
+        Index(None, "state", "created_at", "position", "id"),
+        Index(None, "strategy", "created_at", "position", "id"),
     )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)

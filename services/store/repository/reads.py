@@ -1,6 +1,7 @@
 """Experiments, studies and repetitions as they are shown: rows, their progress, and nothing that is secret yet."""
 
-from collections.abc import Collection, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -21,27 +22,46 @@ def read_experiments(
     Reality's parameters are null until the experiment has ended, and with it all others of its study: they share one
     reality, and what one of them shows is known of all. `reveal` shows them nevertheless.
     """
-    ids = [row.id for row in rows]
-    progress, failed, warnings = tallies(session, ids), reasons(session, ids), warned(session, rows)
-    secret = open_studies(session, [row.study_id for row in rows if row.study_id])
+    return _read(session, rows, tallies(session, [row.id for row in rows]), reveal=reveal)
+
+
+def _read(
+    session: Session, rows: Sequence[ExperimentRow], progress: Mapping[str, Tally], *, reveal: bool
+) -> tuple[ExperimentRead, ...]:
+    failed, warnings = reasons(session, [row.id for row in rows]), warned(session, rows)
+    secret = frozenset() if reveal else hidden(session, rows)
     return tuple(
         _experiment(
             row,
             progress.get(row.id, Tally()),
             failed.get(row.id, ()),
             warnings.get(row.id, Warned()),
-            secret=not reveal and (not row.state.ended or row.study_id in secret),
+            secret=row.id in secret,
         )
         for row in rows
     )
 
 
+def hidden(session: Session, rows: Sequence[ExperimentRow]) -> frozenset[str]:
+    """The ids of those of these experiments whose reality's parameters may not be shown yet."""
+    going_on = open_studies(session, [row.study_id for row in rows if row.study_id])
+    return frozenset(row.id for row in rows if not row.state.ended or row.study_id in going_on)
+
+
+def without_truth(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """The spec with null in place of each of reality's parameters."""
+    reality = spec["reality"]
+    return {**spec, "reality": reality | {"parameters": dict.fromkeys(reality["parameters"])}}
+
+
 def read_studies(session: Session, rows: Sequence[StudyRow], *, reveal: bool = False) -> tuple[StudyRead, ...]:
     """The studies as they are shown, with their experiments."""
     experiments = experiments_of(session, [row.id for row in rows])
-    shown = read_experiments(session, experiments, reveal=reveal)
     progress = tallies(session, [row.id for row in experiments])
-    return tuple(_study(row, [each for each in shown if each.study == row.id], progress) for row in rows)
+    shown: dict[str | None, list[ExperimentRead]] = defaultdict(list)
+    for each in _read(session, experiments, progress, reveal=reveal):
+        shown[each.study].append(each)
+    return tuple(_study(row, shown[row.id], progress) for row in rows)
 
 
 def read_repetition(row: RepetitionRow) -> RepetitionRead:
@@ -84,7 +104,7 @@ def _experiment(
         edits=row.edits,
         strategy=row.strategy,
         state=row.state,
-        spec=_without_truth(row.spec) if secret else row.spec,
+        spec=without_truth(row.spec) if secret else row.spec,
         priority=-row.precedence,
         max_parallel=row.max_parallel,
         progress=tally.progress(),
@@ -97,7 +117,7 @@ def _experiment(
     )
 
 
-def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: dict[str, Tally]) -> StudyRead:
+def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: Mapping[str, Tally]) -> StudyRead:
     return StudyRead(
         id=row.id,
         name=row.name,
@@ -118,8 +138,3 @@ def _refusal(row: ExperimentRow, tally: Tally) -> tuple[str, ...]:
         f"its first steps were computed with {row.computed_with}, and a supervisor with {row.refused_by} does not go "
         f"on with it: start one with the same as at first, or accept the others (`gaplab accept-versions {row.id}`)",
     )
-
-
-def _without_truth(spec: dict[str, Any]) -> dict[str, Any]:
-    reality = spec["reality"]
-    return spec | {"reality": reality | {"parameters": dict.fromkeys(reality["parameters"])}}

@@ -92,6 +92,12 @@ def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, 
     return {each: mapping.log(iterations[each], measurements[each], simulators[each]) for each in repetitions}
 
 
+def is_whole(session: Session, repetition: RepetitionRow) -> bool:
+    """Whether the rows of the repetition tell of as many steps as it counts, in their order and without holes."""
+    (log,) = logs(session, [repetition.id]).values()
+    return [mapping.position(each) for each in log] == list(range(repetition.steps))
+
+
 def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, tuple[int, int]]:
     """How many steps the log of each claim that holds has, and checkpoints of the next; locked for the transaction."""
     by_key = {(each.repetition_id, each.epoch): each for each in claims}

@@ -1,0 +1,51 @@
+"""Keep what there is: archives of experiments, copies of the database."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from api.commands.base import Id, Url, app, connect
+from services.settings import Settings
+from services.store.backup import backup as copy
+
+
+@app.command()
+def export(
+    id: Id,  # noqa: A002 - as the API says
+    to: Annotated[
+        Path | None, typer.Option(help="file that must not be there yet; left out: gaplab-ID.zip", show_default=False)
+    ] = None,
+    url: Url = None,
+) -> None:
+    """Write everything of a study or an experiment into one archive of JSON and Parquet."""
+    file = to or Path(f"gaplab-{id}.zip")
+    with connect(url) as client:
+        try:
+            with file.open("xb") as target:
+                client.export(id, target)
+        except FileExistsError:
+            raise
+        except BaseException:
+            file.unlink(missing_ok=True)
+            raise
+    typer.echo(f"Wrote {file}.")
+
+
+@app.command("import")
+def import_(file: Annotated[Path, typer.Argument(help="an archive")], url: Url = None) -> None:
+    """Store what is in an archive; nothing of it is run."""
+    with connect(url) as client, file.open("rb") as source:
+        stored = client.import_(source)
+    typer.echo(stored.study or stored.experiments[0])
+    for old, new in stored.renamed.items():
+        typer.echo(f"{old} was taken here: it is {new} now", err=True)
+    for each in stored.called_off:
+        typer.echo(f"{each} had not ended: it is called off here", err=True)
+
+
+@app.command()
+def backup(file: Annotated[Path, typer.Argument(help="for the copy; must not be there yet")]) -> None:
+    """Copy the SQLite database of GAPLAB_DATABASE_URL, though the service writes to it, into a file to start from."""
+    size = copy(Settings.from_environment().database_url, file)
+    typer.echo(f"Wrote {file}: {size:,} bytes, checked.")

@@ -1,0 +1,183 @@
+"""A database as years of use leave it behind: studies with their results, written in bulk through the models."""
+
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from sqlalchemy import insert
+from sqlalchemy.orm import Session
+
+from schemas.lifecycle import State
+from schemas.records import MeasurementKind
+from schemas.spec import ExperimentSpec
+from services.resolution import expected_rollouts, resolve_experiment
+from services.store.models import (
+    Base,
+    ExperimentRow,
+    IterationRow,
+    MeasurementRow,
+    RepetitionRow,
+    SimulatorRow,
+    StudyRow,
+)
+from services.store.session import Store
+
+IN_A_STUDY = 7
+"""Experiments, as in the paper's Fig. 4."""
+
+REPETITIONS, SAMPLES = 4, 10
+"""Of an experiment, and of each of its repetitions: 10 000 experiments have 400 000 samples."""
+
+SPEC = {
+    "strategy": "simulated_fit",
+    "robot": "toy_function",
+    "iterations": SAMPLES,
+    "repetitions": REPETITIONS,
+    "budget": "smoke",
+}
+
+Row = dict[str, Any]
+
+_BEGINNING = datetime(2020, 1, 1, tzinfo=UTC)
+_AT_ONCE = 500
+
+
+def fill(store: Store, experiments: int) -> None:
+    """Add so many experiments, all of them COMPLETED, in studies of `IN_A_STUDY`; each has its 40 samples.
+
+    Args:
+        store: at head, without repetitions so far.
+        experiments: how many.
+    """
+    spec = resolve_experiment(ExperimentSpec.model_validate(SPEC))
+    stored, rollouts = spec.model_dump(mode="json"), expected_rollouts(spec)
+    rng = np.random.default_rng(0)
+    numbers = iter(range(experiments))
+    while some := list(islice(numbers, _AT_ONCE)):
+        with store.transaction() as session:
+            studies = sorted({each // IN_A_STUDY for each in some if each % IN_A_STUDY == 0})
+            _insert(session, StudyRow, [_study(each) for each in studies])
+            _insert(session, ExperimentRow, [_experiment(each, stored, rollouts) for each in some])
+            of_them = [(each, number) for each in some for number in range(REPETITIONS)]
+            _insert(session, RepetitionRow, [_repetition(*each, rollouts) for each in of_them])
+            cells = [(_id_of(*each), iteration) for each in of_them for iteration in range(SAMPLES + 1)]
+            _insert(session, IterationRow, [_iteration(*each, rng.random(3)) for each in cells])
+            _insert(session, MeasurementRow, [row for each in cells for row in _measurements(*each, rng.random(4))])
+            _insert(session, SimulatorRow, [_simulator(*each, rng.random(4)) for each in cells])
+    with store.transaction() as session:
+        if session.get_bind().dialect.name == "postgresql":  # its sequence does not know the ids that were given
+            session.connection().exec_driver_sql(
+                f"SELECT setval('repetition_id_seq', {max(1, experiments * REPETITIONS)})"
+            )
+        session.connection().exec_driver_sql("ANALYZE")
+
+
+def study_id(number: int) -> str:
+    """Of the study of that number."""
+    return f"study{number:06d}"
+
+
+def experiment_id(number: int) -> str:
+    """Of the experiment of that number."""
+    return f"experiment{number:06d}"
+
+
+def _insert(session: Session, model: type[Base], rows: list[Row]) -> None:
+    if rows:
+        session.execute(insert(model), rows)
+
+
+def _moment(number: int) -> datetime:
+    return _BEGINNING + timedelta(minutes=number)
+
+
+def _id_of(experiment: int, repetition: int) -> int:
+    return experiment * REPETITIONS + repetition + 1
+
+
+def _study(number: int) -> Row:
+    return {"id": study_id(number), "name": f"study {number}", "created_at": _moment(number * IN_A_STUDY)}
+
+
+def _experiment(number: int, spec: Row, rollouts: int) -> Row:
+    study, position = divmod(number, IN_A_STUDY)
+    created = _moment(study * IN_A_STUDY)
+    return {
+        "id": experiment_id(number),
+        "study_id": study_id(study),
+        "position": position,
+        "name": "simulated_fit",
+        "strategy": "simulated_fit",
+        "state": State.COMPLETED,
+        "spec": spec,
+        "iterations": SAMPLES + 1,
+        "rollouts": rollouts,
+        "created_at": created,
+        "started_at": created,
+        "ended_at": created + timedelta(seconds=30),
+    }
+
+
+def _repetition(experiment: int, number: int, rollouts: int) -> Row:
+    return {
+        "id": _id_of(experiment, number),
+        "experiment_id": experiment_id(experiment),
+        "number": number,
+        "state": State.COMPLETED,
+        "epoch": 1,
+        "attempts": 1,
+        "steps": 5 * SAMPLES + 3,
+        "iterations_done": SAMPLES + 1,
+        "rollouts_done": rollouts,
+        "seconds": 20.0,
+        "started_at": _moment(experiment),
+        "ended_at": _moment(experiment) + timedelta(seconds=20),
+    }
+
+
+def _iteration(repetition: int, number: int, chance: np.ndarray) -> Row:
+    genome, fitness, recorded = chance.tolist()
+    counts = {f"{phase}_{count}": 0 for phase in ("tuning", "transfer") for count in ("failures", "saved")}
+    return counts | {
+        "repetition_id": repetition,
+        "number": number,
+        "selected_genome": [genome] if number else None,
+        "selection_rollouts": 20 if number else None,
+        "selection_failures": 0 if number else None,
+        "selection_saved": 0 if number else None,
+        "tuning_rollouts": 20 * number,
+        "transferred_genome": [genome],
+        "simulated_fitness": fitness,
+        "transfer_rollouts": 20,
+        "recorded_fitness": recorded,
+        "seconds": 2.0,
+        "ended_at": _moment(repetition),
+    }
+
+
+def _measurements(repetition: int, iteration: int, chance: np.ndarray) -> Iterator[Row]:
+    for kind in MeasurementKind:
+        if iteration or kind is MeasurementKind.PROBE:
+            genome, fitness = (chance[:2] if kind is MeasurementKind.PROBE else chance[2:]).tolist()
+            yield {
+                "repetition_id": repetition,
+                "iteration": iteration,
+                "kind": kind,
+                "genome": [genome],
+                "fitness": fitness,
+                "measured_by": "analytic",
+                "measured_at": _moment(repetition),
+            }
+
+
+def _simulator(repetition: int, iteration: int, chance: np.ndarray) -> Row:
+    *parameters, error = chance.tolist()
+    return {
+        "repetition_id": repetition,
+        "iteration": iteration,
+        "rank": 0,
+        "parameters": parameters,
+        "squared_error": error,
+    }

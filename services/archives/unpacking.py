@@ -1,0 +1,62 @@
+"""Parquet to JSON Lines, in a process of its own: `python -I unpacking.py PARQUET LINES [PARQUET LINES]...`.
+
+A file that was made to harm a reader of Parquet, by eating memory, time or disk or by a crash, harms nothing else.
+"""
+
+import json
+import resource
+import sys
+from contextlib import suppress
+from datetime import UTC, datetime
+from typing import Any
+
+MOST: dict[int, int] = {
+    resource.RLIMIT_DATA: 2 * 2**30,
+    resource.RLIMIT_FSIZE: 2**30,
+    resource.RLIMIT_CPU: 300,
+    resource.RLIMIT_CORE: 0,
+}
+"""Bytes of memory, bytes of a file that is written, seconds, and bytes of what a crash leaves behind."""
+
+_AT_ONCE = 500
+
+
+def main(paths: list[str]) -> int:
+    """Write each row of each Parquet file as a line of JSON; the exit code: 0, or the number of the first bad file.
+
+    Nothing is said about what is wrong: it would come from the file.
+    """
+    for limit, most in MOST.items():
+        with suppress(ValueError, OSError):  # the system does not know this limit, or has a lower one already
+            resource.setrlimit(limit, (most, most))
+    for number, (source, target) in enumerate(zip(paths[::2], paths[1::2], strict=True), 1):
+        if not convert(source, target):
+            return number
+    return 0
+
+
+def convert(source: str, target: str) -> bool:
+    """Write each row of one file as a line of JSON; whether that could be done."""
+    import pyarrow as arrow  # within the limits
+    from pyarrow import parquet
+
+    arrow.set_cpu_count(1)
+    try:
+        with parquet.ParquetFile(source) as file, open(target, "x") as lines:
+            for batch in file.iter_batches(_AT_ONCE, use_threads=False):
+                for row in batch.to_pylist():
+                    lines.write(json.dumps(row, default=_plain, allow_nan=False) + "\n")
+    except (arrow.ArrowException, ValueError, TypeError, KeyError, OSError, MemoryError, RecursionError):
+        return False
+    return True
+
+
+def _plain(value: Any) -> str:  # noqa: ANN401 - whatever Parquet has
+    if isinstance(value, datetime) and value.tzinfo is not None:
+        return value.astimezone(UTC).isoformat()
+    msg = "no row of an archive has such a value"
+    raise TypeError(msg)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

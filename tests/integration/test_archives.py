@@ -1,0 +1,306 @@
+"""Out of one database and into another: the same to the last bit, whatever the databases and the numbers."""
+
+import json
+import tracemalloc
+from datetime import UTC, datetime, timedelta
+from io import BytesIO
+from math import copysign, inf, nan
+from zipfile import ZipFile
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from sqlalchemy import insert
+
+from schemas.lifecycle import State
+from schemas.spec import StudySpec
+from services import execution, experiments, reports
+from services.archives import export_experiment, export_study, import_archive, opening, unpacking
+from services.core.arrays import frozen
+from services.core.errors import NotFound
+from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
+from services.misfit import misfit
+from services.store.models import ExperimentRow, RepetitionRow, SimulatorRow
+from services.store.portable import EXPORTED
+from tests.experiments import AWKWARD, run, some_log, toy
+
+EVERY = settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+FITNESS = FINITE | st.just(nan)
+ERROR = st.floats(0, allow_nan=False, allow_infinity=False) | st.just(inf)
+COST = st.builds(Cost, st.integers(0, 2**40), st.just(0), st.integers(0, 2**40))
+GENOME = st.lists(FINITE, min_size=1, max_size=9).map(frozen)
+SIMULATOR = st.builds(Simulator, st.lists(FINITE, min_size=2, max_size=2).map(frozen), ERROR)
+TOY_STUDY = {"robot": "toy_function", "budget": "smoke", "iterations": 2, "repetitions": 2}
+NAME = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1, max_size=200)
+
+
+@st.composite
+def logs(draw):
+    """A whole log of a toy experiment with whatever numbers."""
+    return list(_steps(draw))
+
+
+def _steps(draw):
+    for iteration in range(3):
+        if iteration:
+            yield Selected(iteration, draw(GENOME), draw(COST))
+            yield Measured(iteration, Sample(draw(GENOME), draw(FITNESS)))
+        yield Tuned(iteration, tuple(draw(st.lists(SIMULATOR, min_size=1, max_size=4))), draw(COST))
+        yield Transferred(iteration, draw(GENOME), draw(FITNESS), draw(COST))
+        yield Probed(iteration, draw(FITNESS), draw(FITNESS))
+
+
+@pytest.fixture
+def other(request, store):
+    """A database of the other kind."""
+    with store.reading() as session:
+        kind = session.get_bind().dialect.name
+    return request.getfixturevalue("postgres_store" if kind == "sqlite" else "sqlite_store")
+
+
+def exported(archive):
+    with archive.file as file:
+        return file.read()
+
+
+def finished(store, log=None, **changes):
+    """The id of an experiment whose repetitions are all complete."""
+    submitted = experiments.submit_experiment(store, toy(**changes)).id
+    while claims := execution.claim(store, "me", 9):
+        for claim in claims:
+            run(store, claim, iter(log) if log else some_log())
+    return submitted
+
+
+def shown(store, experiment):
+    """Everything that the service shows of it, but for its sensitivity check, which is its tunables'."""
+    return (
+        experiments.read_experiment(store, experiment).model_dump(exclude={"sensitivity"}),
+        experiments.list_repetitions(store, experiment),
+        experiments.list_samples(store, experiment),
+        experiments.list_simulators(store, experiment),
+        reports.curve(store, experiment),
+        misfit(store, experiment),
+    )
+
+
+def forget(store):
+    """Remove what there is, as an import must find its ids free again."""
+    with store.transaction() as session:
+        for table in ("simulator", "measurement", "iteration", "repetition", "experiment", "study"):
+            session.connection().exec_driver_sql(f"DELETE FROM {table}")
+
+
+def test_an_experiment_goes_to_the_other_kind_of_database_and_back(store, other):
+    submitted = finished(store, reality={"parameters": {"static_friction": 0.9}})
+    before, archive = shown(store, submitted), exported(export_experiment(store, submitted))
+
+    there = import_archive(other, BytesIO(archive))
+    assert shown(other, submitted) == before
+    back = exported(export_experiment(other, submitted))
+    forget(store)
+    import_archive(store, BytesIO(back))
+
+    assert (there.experiments, there.renamed, there.called_off) == ((submitted,), {}, ())
+    assert back == archive == exported(export_experiment(store, submitted))
+    assert shown(store, submitted) == before
+
+
+@pytest.fixture
+def unpacked_here(monkeypatch):
+    """Parquet is read in this process, without its limits, which saves a second each time."""
+
+    def read(files):
+        assert all(unpacking.convert(str(each), str(opening._lines_of(each))) for each in files)
+
+    monkeypatch.setattr(opening, "_read_parquet", read)
+
+
+@EVERY
+@given(st.data())
+def test_whatever_numbers_and_names_go_there_and_back(store, other, unpacked_here, data):
+    forget(store)
+    forget(other)
+    submitted = finished(store, data.draw(logs()), repetitions=1, name=data.draw(NAME))
+    archive = exported(export_experiment(store, submitted))
+
+    import_archive(other, BytesIO(archive))
+
+    assert exported(export_experiment(other, submitted)) == archive
+    assert repr(shown(other, submitted)) == repr(shown(store, submitted))
+
+
+def test_a_study_goes_there_with_all_that_is_its_own(store, other):
+    study = experiments.submit_study(
+        store,
+        StudySpec.model_validate(TOY_STUDY | {"strategies": ["random", "direct"]}),
+    )
+    direct = study.experiments[1].id
+    while claims := execution.claim(store, "me", 99):
+        for claim in claims:
+            iterations = 0 if claim.experiment_id == direct else claim.spec.iterations
+            three = len(claim.spec.tunables)
+            log = [_fitting(step, three) for step in some_log(iterations)]
+            run(store, claim, iter(log))
+    finished(store)
+
+    archive = exported(export_study(store, study.id))
+    stored = import_archive(other, BytesIO(archive))
+
+    assert stored.study == study.id
+    assert stored.experiments == tuple(each.id for each in study.experiments)
+    assert len(experiments.list_experiments(other).items) == 2
+    assert reports.study_curves(other, study.id) == reports.study_curves(store, study.id)
+    assert exported(export_study(other, study.id)) == archive
+
+
+def _fitting(step, tunables):
+    """The same step for so many tunables."""
+    if not isinstance(step, Tuned):
+        return step
+    simulators = tuple(Simulator(frozen([0.5] * tunables), each.squared_error) for each in step.simulators)
+    return Tuned(step.iteration, simulators, step.cost)
+
+
+def test_an_experiment_of_a_study_goes_on_its_own(store, other):
+    study = experiments.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["random"]}))
+    (experiment,) = (each.id for each in study.experiments)
+
+    import_archive(other, BytesIO(exported(export_experiment(store, experiment))))
+
+    assert experiments.read_experiment(other, experiment).study is None
+    with pytest.raises(NotFound):
+        experiments.read_study(other, study.id)
+
+
+def test_ids_that_are_taken_become_new_ones_and_the_rest_is_the_same(store):
+    submitted = finished(store)
+    archive = exported(export_experiment(store, submitted))
+
+    stored = import_archive(store, BytesIO(archive))
+
+    (new,) = stored.experiments
+    assert stored.renamed == {submitted: new}
+    assert new != submitted
+    for first, second in zip(shown(store, submitted), shown(store, new), strict=True):
+        assert repr(first) == repr(second).replace(new, submitted)
+
+
+def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(store, other):
+    submitted = experiments.submit_experiment(store, toy()).id
+    first, second = execution.claim(store, "me", 2)
+    run(store, first)
+    for step in list(some_log())[:4]:
+        assert execution.record(store, second, step)
+
+    stored = import_archive(other, BytesIO(exported(export_experiment(store, submitted))))
+
+    assert stored.called_off == (submitted,)
+    assert experiments.read_experiment(other, submitted).state is State.CANCELLED
+    states = [each.state for each in experiments.list_repetitions(other, submitted)]
+    assert states == [State.COMPLETED, State.CANCELLED, State.CANCELLED]
+    assert execution.claim(other, "me", 9) == ()
+    assert execution.requeue_lost(other, stale_after_s=-1) == 0
+    assert reports.curve(other, submitted).points == reports.curve(store, submitted).points
+    assert experiments.list_samples(other, submitted) == experiments.list_samples(store, submitted)
+    assert experiments.read_experiment(store, submitted).state is State.RUNNING
+
+
+@pytest.mark.parametrize("ended", [False, True])
+def test_reality_is_hidden_until_its_study_has_ended(store, other, ended):
+    spec = TOY_STUDY | {"strategies": ["direct", "random"], "repetitions": 1}
+    truth = {"reality": {"parameters": {"static_friction": 0.98765}}, "tunables": ["static_friction", "restitution"]}
+    study = experiments.submit_study(store, StudySpec.model_validate(spec | truth))
+    (claim,) = execution.claim(store, "me", 1)
+    run(store, claim, some_log(0))
+    if ended:
+        experiments.cancel_experiment(store, study.experiments[1].id)
+
+    archives = [exported(export_study(store, study.id)), exported(export_experiment(store, study.experiments[0].id))]
+
+    for archive in archives:
+        with ZipFile(BytesIO(archive)) as opened:
+            everything = b"".join(opened.read(name) for name in opened.namelist())
+        assert (b"0.98765" in everything) is ended
+        stored = import_archive(other, BytesIO(archive))
+        first = stored.experiments[0]
+        found = experiments.read_experiment(other, first).spec["reality"]["parameters"]["static_friction"]
+        assert found == (0.98765 if ended else None)
+        assert reports.curve(other, first).points == reports.curve(store, study.experiments[0].id).points
+        assert misfit(other, first).points == ()
+
+
+def test_an_export_is_of_one_moment_while_a_supervisor_writes(store, other):
+    submitted = experiments.submit_experiment(store, toy(repetitions=6)).id
+    for claim in execution.claim(store, "me", 6):
+        run(store, claim)
+        archive = export_experiment(store, submitted)
+        if claim.number == 3:
+            stored = import_archive(other, archive.file)  # which refuses rows that are no whole logs
+            assert experiments.read_experiment(other, stored.experiments[0]).progress.completed == claim.number + 1
+        archive.file.close()
+
+
+def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store):
+    submitted = finished(sqlite_store)
+
+    with ZipFile(BytesIO(exported(export_experiment(sqlite_store, submitted)))) as opened:
+        measurements = pyarrow.parquet.read_table(BytesIO(opened.read("measurement.parquet"))).to_pylist()
+        (curve,) = json.loads(opened.read("curves.json"))
+        (row,) = map(json.loads, opened.read("experiment.jsonl").splitlines())
+        manifest = json.loads(opened.read("manifest.json"))
+
+    samples = experiments.list_samples(sqlite_store, submitted).items
+    assert len(measurements) == len(samples)
+    sample = next(each for each in measurements if each["kind"] == "sample")
+    assert np.array_equal(sample["genome"], AWKWARD)
+    assert copysign(1, sample["genome"][6]) == -1  # that zero is negative
+    assert curve["points"][0]["n"] == 3
+    assert row["spec"]["strategy"]["name"] == "simulated_fit"
+    assert {"owner", "heartbeat_at"}.isdisjoint(row)
+    assert {name.partition(".")[0] for name in manifest["members"]} == {*EXPORTED, "curves"}
+
+
+def test_no_lease_and_no_machine_is_in_an_archive(sqlite_store):
+    submitted = experiments.submit_experiment(sqlite_store, toy()).id
+    execution.claim(sqlite_store, "a-machine-of-mine:4711", 9)
+
+    assert b"a-machine-of-mine" not in exported(export_experiment(sqlite_store, submitted))
+
+
+def test_times_keep_their_microseconds(store, other):
+    submitted = finished(store)
+    moment = datetime(2012, 11, 5, 9, 0, 0, 123457, tzinfo=UTC)
+    with store.transaction() as session:
+        session.get(ExperimentRow, submitted).created_at = moment
+        session.get(ExperimentRow, submitted).ended_at = moment + timedelta(days=4000)
+
+    import_archive(other, BytesIO(exported(export_experiment(store, submitted))))
+
+    assert experiments.read_experiment(other, submitted).created_at == moment
+
+
+def test_memory_does_not_grow_with_what_is_exported(sqlite_store):
+    """Rows are never all there at once."""
+    submitted = finished(sqlite_store, repetitions=1)
+    with sqlite_store.transaction() as session:
+        (repetition,) = session.query(RepetitionRow).all()
+        many = [
+            {"repetition_id": repetition.id, "iteration": 0, "rank": rank, "parameters": [0.5] * 20}
+            for rank in range(10, 12_010)
+        ]
+        session.execute(insert(SimulatorRow), many)
+    export_experiment(sqlite_store, submitted).file.close()
+    del many
+
+    tracemalloc.start()
+    export_experiment(sqlite_store, submitted).file.close()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+
+    everything = 12_000 * 20 * 32  # bytes that its floats and lists would take
+    assert peak < everything / 2

@@ -1,0 +1,355 @@
+"""Archives that were damaged, or made to harm: each is refused in one sentence, and nothing of it is stored."""
+
+import json
+import shutil
+import zipfile
+from hashlib import sha256
+from io import BytesIO
+
+import pyarrow as arrow
+import pyarrow.parquet
+import pytest
+from fastapi.testclient import TestClient
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from api import limits
+from api.app import create_app
+from services import execution, experiments
+from services.archives import checking, export_experiment, import_archive, opening, reading, unpacking
+from services.core.errors import Conflict, InvalidArchive
+from services.store.session import Store
+from tests.experiments import run, toy
+
+
+@pytest.fixture(scope="module")
+def good(sqlite_template, tmp_path_factory):
+    """The members of an archive with which nothing is wrong."""
+    file = tmp_path_factory.mktemp("good") / "good.db"
+    shutil.copy(sqlite_template, file)
+    store = Store(f"sqlite:///{file}")
+    submitted = experiments.submit_experiment(store, toy(repetitions=2)).id
+    for claim in execution.claim(store, "me", 2):
+        run(store, claim)
+    with export_experiment(store, submitted).file as archive, zipfile.ZipFile(archive) as opened:
+        members = {name: opened.read(name) for name in opened.namelist()}
+    store.dispose()
+    return members
+
+
+@pytest.fixture
+def unpacked_here(monkeypatch):
+    """Parquet is read in this process, without its limits, which saves a second each time."""
+
+    def read(files):
+        for file in files:
+            if not unpacking.convert(str(file), str(opening._lines_of(file))):
+                raise InvalidArchive(f"{file.name} is no Parquet")
+
+    monkeypatch.setattr(opening, "_read_parquet", read)
+
+
+def packed(members, *, honest=True, compression=zipfile.ZIP_DEFLATED):
+    """A zip of the members, whose manifest tells the truth of them unless it is not to."""
+    members = dict(members)
+    if honest:
+        manifest = json.loads(members["manifest.json"])
+        for name, content in members.items():
+            if name in manifest["members"]:
+                manifest["members"][name] |= {"sha256": sha256(content).hexdigest(), "bytes": len(content)}
+                manifest["members"][name]["rows"] = rows_of(name, content)
+        members["manifest.json"] = json.dumps(manifest).encode()
+    file = BytesIO()
+    with zipfile.ZipFile(file, "w", compression) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return file.getvalue()
+
+
+def rows_of(name, content):
+    if name.endswith(".parquet"):
+        try:
+            return pyarrow.parquet.read_metadata(BytesIO(content)).num_rows
+        except arrow.ArrowInvalid:
+            return 0
+    return content.count(b"\n")
+
+
+def refused(store, archive, *what):
+    with pytest.raises(InvalidArchive) as refusal:
+        import_archive(store, BytesIO(archive))
+    assert experiments.list_experiments(store).items == ()
+    assert experiments.list_studies(store).items == ()
+    assert all(each in str(refusal.value) for each in what), refusal.value
+
+
+def with_row(good, **changes):
+    """The experiment's row with other values; a callable makes one of the old."""
+    row = json.loads(good["experiment.jsonl"])
+    for name, value in changes.items():
+        row[name] = value(row[name]) if callable(value) else value
+    return good | {"experiment.jsonl": json.dumps(row).encode() + b"\n"}
+
+
+def with_table(good, table, change):
+    """A table with its rows changed."""
+    rows = pyarrow.parquet.read_table(BytesIO(good[f"{table}.parquet"]))
+    changed = arrow.Table.from_pylist(change(rows.to_pylist()), rows.schema)
+    file = BytesIO()
+    pyarrow.parquet.write_table(changed, file)
+    return good | {f"{table}.parquet": file.getvalue()}
+
+
+def set_in(rows, place, **values):
+    rows[place] |= values
+    return rows
+
+
+def test_the_good_one_is_good(sqlite_store, good):
+    stored = import_archive(sqlite_store, BytesIO(packed(good)))
+
+    assert experiments.read_experiment(sqlite_store, stored.experiments[0]).progress.completed == 2
+
+
+@pytest.mark.parametrize("archive", [b"", b"no zip", b"PK\x03\x04" + bytes(100), b"PK\x05\x06" + b"\xff" * 18])
+def test_what_is_no_zip(sqlite_store, archive):
+    refused(sqlite_store, archive, "zip")
+
+
+@pytest.mark.parametrize("name", ["../../../etc/passwd", "/etc/passwd", "C:\\x", "event.parquet", "a/experiment.jsonl"])
+def test_a_member_with_another_name(sqlite_store, good, name):
+    refused(sqlite_store, packed(good | {name: b"x"}), "a member is called", "there may be")
+
+
+def test_a_member_twice(sqlite_store, good):
+    file = BytesIO(packed(good))
+    with pytest.warns(UserWarning, match="Duplicate"), zipfile.ZipFile(file, "a") as archive:
+        archive.writestr("experiment.jsonl", b"{}")
+    refused(sqlite_store, file.getvalue(), "experiment.jsonl is there twice")
+
+
+def test_another_compression(sqlite_store, good):
+    refused(sqlite_store, packed(good, compression=zipfile.ZIP_BZIP2), "compressed in another way")
+
+
+def test_more_than_is_permitted_when_it_is_unpacked(sqlite_store, good, monkeypatch):
+    monkeypatch.setattr(opening, "MOST_BYTES", 1_000_000)
+    bomb = packed(good | {"curves.json": bytes(2_000_000)})
+    assert len(bomb) < 100_000
+
+    refused(sqlite_store, bomb, "unpacked it has 2,0", "1,000,000 are permitted")
+
+
+def test_more_than_its_directory_says(sqlite_store, good):
+    content = good | {"curves.json": bytes(2_000_000)}
+    archive = packed(content).replace((2_000_000).to_bytes(4, "little"), (100).to_bytes(4, "little"))
+
+    refused(sqlite_store, archive)
+
+
+@pytest.mark.parametrize("name", ["experiment.jsonl", "measurement.parquet", "curves.json"])
+def test_a_member_that_was_changed(sqlite_store, good, name):
+    refused(sqlite_store, packed(good | {name: good[name] + b" "}, honest=False), name, "damaged or changed")
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "simulator.parquet", "experiment.jsonl"])
+def test_a_member_that_is_missing(sqlite_store, good, name):
+    left = {each: content for each, content in good.items() if each != name}
+
+    refused(sqlite_store, packed(left, honest=False), name)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"format": 2}, "its format is 2"),
+        ({"format": "1"}, "format"),
+        ({"format": float("nan")}, "format"),
+        ({"kind": "everything"}, "kind"),
+        ({"kind": "study"}, "are not those of the study"),
+        ({"id": "another"}, "another"),
+        ({"members": {}}, "but not in both"),
+        ({"surprise": 1}, "surprise"),
+    ],
+)
+def test_a_manifest_that_is_none(sqlite_store, good, change, said, unpacked_here):
+    manifest = json.dumps(json.loads(good["manifest.json"]) | change).encode()
+
+    refused(sqlite_store, packed(good | {"manifest.json": manifest}, honest=False), said)
+
+
+@pytest.mark.parametrize("manifest", [b"", b"[]", b"{" * 50_000, b"[" * 90_000, b"\xff", b" " * 200_000])
+def test_a_manifest_that_is_no_json(sqlite_store, good, manifest):
+    refused(sqlite_store, packed(good | {"manifest.json": manifest}, honest=False), "manifest.json")
+
+
+def in_spec(**changes):
+    return lambda spec: spec | changes
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"id": "../x"}, "no id"),
+        ({"id": None}, "id is null"),
+        ({"id": "x" * 33}, "33 characters"),
+        ({"name": "x" * 201}, "201 characters"),
+        ({"name": "a\0b"}, "NUL"),
+        ({"name": "\ud800"}, "a text that is none"),
+        ({"name": 5}, "no text"),
+        ({"state": "ADMIN"}, "it may be QUEUED"),
+        ({"iterations": -1}, "no whole number"),
+        ({"iterations": True}, "no whole number"),
+        ({"iterations": 1.5}, "no whole number"),
+        ({"iterations": 10**30}, "no whole number"),
+        ({"position": 2**31}, "no whole number"),
+        ({"rollouts": 2**48 + 1}, "no whole number"),
+        ({"iterations": 1}, "does not fit its experiment"),
+        ({"created_at": "yesterday"}, "created_at"),
+        ({"created_at": "2012-11-05T09:00:00"}, "time zone"),
+        ({"created_at": "0001-01-01T00:00:00+14:00"}, "created_at"),
+        ({"study_id": "a1"}, "are not those"),
+        ({"spec": []}, "no spec"),
+        ({"spec": "text"}, "neither an object"),
+        ({"spec": in_spec(repetitions=1)}, "does not fit its experiment"),
+        ({"spec": in_spec(repetitions=None)}, "not resolved"),
+        ({"spec": in_spec(robot={"name": "/etc/passwd"})}, "not resolved"),
+        ({"spec": in_spec(strategy={"name": "random"})}, "not resolved"),
+        ({"spec": in_spec(tunables=[{"name": "static_friction"}])}, "does not fit its experiment"),
+        (
+            {"spec": in_spec(reality={"engine": {"name": "analytic"}, "parameters": {"static_friction": "x"}})},
+            "no spec",
+        ),
+        (
+            {"spec": in_spec(reality={"engine": {"name": "analytic"}, "parameters": {"x": None}})},
+            "not installed here: x",
+        ),
+        ({"spec": in_spec(reality=None)}, "no spec"),
+        ({"spec_version": 99}, "version 99"),
+    ],
+)
+def test_an_experiment_that_cannot_be(sqlite_store, good, changes, said, unpacked_here):
+    refused(sqlite_store, packed(with_row(good, **changes)), said)
+
+
+@pytest.mark.parametrize("token", [b"NaN", b"Infinity", b"-Infinity", b"1e999", b"[" * 3000, b"9" * 5000, b"'x'"])
+def test_a_number_or_a_value_that_json_has_not(sqlite_store, good, token, unpacked_here):
+    bad = good["experiment.jsonl"].replace(b'"iterations": 3', b'"iterations": ' + token)
+    assert bad != good["experiment.jsonl"]
+
+    refused(sqlite_store, packed(good | {"experiment.jsonl": bad}), "experiment, row 1")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"{}\n", "lacks id"),
+        (b"5\n", "no JSON object"),
+        (b"\xff\n", "not JSON"),
+        (b'{"id": "a", "password": 1}\n', "does not know: password"),
+        (b"", "its experiment is not"),
+    ],
+)
+def test_rows_that_are_none(sqlite_store, good, content, said, unpacked_here):
+    refused(sqlite_store, packed(good | {"experiment.jsonl": content}), said)
+
+
+def test_a_row_without_an_end(sqlite_store, good, monkeypatch, unpacked_here):
+    monkeypatch.setattr(checking, "LONGEST_LINE", 1_000)
+
+    refused(sqlite_store, packed(good | {"experiment.jsonl": b" " * 2_000}), "more than 1,000 characters")
+
+
+@pytest.mark.parametrize(
+    ("table", "change", "said"),
+    [
+        ("measurement", lambda rows: [*rows, rows[0]], "there twice"),
+        ("measurement", lambda rows: rows[1:], "no log of 13 steps"),
+        ("measurement", lambda rows: set_in(rows, 0, fitness=float("nan")), "measurement.parquet"),
+        ("measurement", lambda rows: set_in(rows, 0, fitness=float("inf")), "measurement.parquet"),
+        ("measurement", lambda rows: set_in(rows, 0, kind="rumour"), "sample, probe"),
+        ("measurement", lambda rows: set_in(rows, 0, genome=None), "genome is null"),
+        ("measurement", lambda rows: set_in(rows, 0, genome=[None]), "no finite number"),
+        ("measurement", lambda rows: set_in(rows, 0, experiment="another"), "does not fit"),
+        ("measurement", lambda rows: set_in(rows, 0, repetition=2), "does not fit"),
+        ("measurement", lambda rows: set_in(rows, 0, repetition=-1), "no whole number"),
+        ("simulator", lambda rows: set_in(rows, 0, parameters=[0.5]), "does not fit"),
+        ("iteration", lambda rows: rows[:-1], "contradict"),
+        ("iteration", lambda rows: set_in(rows, 0, number=3), "does not fit"),
+        ("repetition", lambda rows: rows[:1], "contradict"),
+        ("repetition", lambda rows: set_in(rows, 0, steps=12), "no log of 12 steps"),
+        ("repetition", lambda rows: set_in(rows, 0, error="x\0"), "NUL"),
+        ("repetition", lambda rows: [*rows, set_in(rows[:1], 0, number=0)[0]], "contradict"),
+    ],
+)
+def test_results_that_cannot_be(store, good, table, change, said, unpacked_here):
+    refused(store, packed(with_table(good, table, change)), said)
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1" * 100, bytes(1000)])
+def test_what_is_no_parquet(sqlite_store, good, content):
+    refused(sqlite_store, packed(good | {"simulator.parquet": content}), "simulator.parquet is no Parquet")
+
+
+def test_a_reader_of_parquet_that_is_killed(sqlite_store, good, monkeypatch, tmp_path):
+    suicide = tmp_path / "suicide.py"
+    suicide.write_text("import os; os.kill(os.getpid(), 9)")
+    monkeypatch.setattr(opening, "_UNPACKING", suicide)
+
+    refused(sqlite_store, packed(good), "a member is no Parquet")
+
+
+def test_a_small_file_of_parquet_that_becomes_a_large_row(sqlite_store, good):
+    bomb = with_table(good, "measurement", lambda rows: set_in(rows, 0, genome=[0.5] * 2_500_000))
+    assert len(bomb["measurement.parquet"]) < 100_000
+
+    refused(sqlite_store, packed(bomb), "measurement", "more than 8,388,608 characters")
+
+
+@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_whichever_bytes_are_damaged(sqlite_store, good, unpacked_here, data):
+    archive = bytearray(packed(good))
+    for _ in range(data.draw(st.integers(1, 4))):
+        place = data.draw(st.integers(0, len(archive) - 1) | st.integers(len(archive) - 900, len(archive) - 1))
+        archive[place] = data.draw(st.integers(0, 255))
+    try:
+        import_archive(sqlite_store, BytesIO(archive))
+    except InvalidArchive:
+        return
+    stored = experiments.list_experiments(sqlite_store).items
+    assert all(each.progress.completed == 2 for each in stored)  # what was damaged means nothing, like a date
+
+
+def test_too_many_at_once_are_asked_to_wait(sqlite_store, good):
+    taken = [reading._TURNS.acquire(blocking=False) for _ in range(reading.AT_ONCE)]
+    try:
+        with pytest.raises(Conflict, match="try again"):
+            import_archive(sqlite_store, BytesIO(packed(good)))
+    finally:
+        for _ in taken:
+            reading._TURNS.release()
+
+    assert all(taken)
+    assert import_archive(sqlite_store, BytesIO(packed(good))).experiments
+
+
+def test_over_http_it_is_a_problem(sqlite_store, good):
+    api = TestClient(create_app(sqlite_store))
+
+    answer = api.post("/import", content=packed(good | {"../x": b""}))
+
+    assert answer.status_code == 422
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert answer.json()["type"] == "urn:gaplab:problem:invalid-archive"
+    assert "../x" in answer.json()["detail"]
+
+
+def test_an_archive_may_be_larger_than_a_spec_but_not_as_large_as_it_likes(sqlite_store, monkeypatch):
+    api = TestClient(create_app(sqlite_store))
+    monkeypatch.setitem(limits.MOST_BYTES_OF, "/import", 2_000_000)
+
+    assert api.post("/experiments", content=bytes(1_500_000)).status_code == 413
+    assert api.post("/import", content=bytes(1_500_000)).status_code == 422
+    assert api.post("/import", content=bytes(2_000_001)).status_code == 413
+    assert api.post("/import", content=iter([bytes(1_500_000)] * 2)).status_code == 413

@@ -1,0 +1,98 @@
+"""Archives over HTTP and by the command."""
+
+from io import BytesIO
+from zipfile import ZipFile
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from services import execution, experiments
+from services.store.session import Store
+from tests.experiments import run, toy
+from tests.integration.test_cli import Gaplab, gaplab, service, url  # noqa: F401 - fixtures
+
+
+@pytest.fixture
+def api(sqlite_store: Store) -> TestClient:
+    return TestClient(create_app(sqlite_store))
+
+
+@pytest.fixture
+def submitted(sqlite_store: Store) -> str:
+    """An experiment that is complete."""
+    found = experiments.submit_experiment(sqlite_store, toy()).id
+    for claim in execution.claim(sqlite_store, "me", 9):
+        run(sqlite_store, claim)
+    return found
+
+
+def test_an_export_says_what_it_is_and_how_large(api: TestClient, submitted: str):
+    answer = api.get(f"/experiments/{submitted}/export")
+
+    assert answer.status_code == 200
+    assert answer.headers["content-type"] == "application/zip"
+    assert answer.headers["content-disposition"] == f'attachment; filename="gaplab-{submitted}.zip"'
+    assert int(answer.headers["content-length"]) == len(answer.content)
+    assert ZipFile(BytesIO(answer.content)).testzip() is None
+
+
+def test_an_import_leads_to_what_it_stored(api: TestClient, submitted: str):
+    archive = api.get(f"/experiments/{submitted}/export").content
+
+    answer = api.post("/import", content=archive)
+
+    (new,) = answer.json()["experiments"]
+    assert answer.status_code == 201
+    assert answer.json()["renamed"] == {submitted: new}
+    assert answer.headers["location"] == f"/experiments/{new}"
+    first, second = (api.get(f"/experiments/{each}/samples").json() for each in (submitted, new))
+    assert first == second
+
+
+def test_a_study_goes_the_same_way(api: TestClient):
+    study = api.post("/studies", json={"robot": "toy_function", "budget": "smoke", "strategies": ["random"]}).json()
+
+    answer = api.post("/import", content=api.get(f"/studies/{study['id']}/export").content)
+
+    assert answer.headers["location"] == f"/studies/{answer.json()['study']}"
+    assert answer.json()["called_off"] == answer.json()["experiments"]
+    assert api.get(answer.headers["location"]).json()["state"] == "CANCELLED"
+
+
+@pytest.mark.parametrize("path", ["/experiments/none/export", "/studies/none/export"])
+def test_what_there_is_not_cannot_be_exported(api: TestClient, path: str):
+    assert api.get(path).status_code == 404
+
+
+def test_the_command_writes_an_archive_and_reads_it(gaplab: Gaplab, submitted: str, tmp_path):  # noqa: F811
+    file = tmp_path / "archive.zip"
+
+    written = gaplab("export", submitted, "--to", str(file))
+    read = gaplab("import", str(file))
+
+    assert (written.code, read.code) == (0, 0)
+    assert str(file) in written.out
+    assert f"{submitted} was taken here" in read.err
+    assert gaplab("show", read.out.strip()).code == 0
+
+
+def test_the_command_overwrites_no_file_and_leaves_no_half(gaplab: Gaplab, submitted: str, tmp_path):  # noqa: F811
+    (tmp_path / "precious.zip").write_text("precious")
+
+    taken = gaplab("export", submitted, "--to", str(tmp_path / "precious.zip"))
+    unknown = gaplab("export", "none", "--to", str(tmp_path / "none.zip"))
+
+    assert (taken.code, unknown.code) == (7, 4)
+    assert [each.name for each in tmp_path.iterdir()] == ["precious.zip"]
+    assert (tmp_path / "precious.zip").read_text() == "precious"
+
+
+def test_the_command_says_what_is_wrong_with_an_archive(gaplab: Gaplab, tmp_path):  # noqa: F811
+    (tmp_path / "bad.zip").write_text("no zip")
+
+    said = gaplab("import", str(tmp_path / "bad.zip"))
+
+    assert said.code == 5
+    assert "no zip that can be read" in said.err
+    assert gaplab("import", str(tmp_path / "none.zip")).code == 7

@@ -1,0 +1,132 @@
+"""A copy of a database that is in use: it is whole, it is of one moment, and it goes on computing."""
+
+import sqlite3
+import sys
+from threading import Event, Thread
+
+import pytest
+
+from api.cli import main
+from schemas.lifecycle import State
+from services import execution, experiments, reports
+from services.core.errors import StoreUnavailable, Unsupported
+from services.core.loop import repetition
+from services.simulation import setting
+from services.store.backup import backup
+from services.store.session import Store
+from tests.experiments import toy
+
+
+def work(store):
+    """A supervisor of one: steps are recorded as they are computed, until nothing is queued."""
+    while claims := execution.claim(store, "me", 1):
+        for claim in claims:
+            for step in repetition(setting(claim.spec, claim.number), claim.log):
+                assert execution.record(store, claim, step)
+            assert execution.complete(store, claim)
+
+
+def test_copies_made_while_a_supervisor_writes_go_on_to_the_same_end(sqlite_url, tmp_path):
+    store = Store(sqlite_url)
+    submitted = experiments.submit_experiment(store, toy(repetitions=2)).id
+    worker = Thread(target=work, args=(store,))
+    worker.start()
+    copies = []
+    while worker.is_alive() or not copies:
+        copies.append(tmp_path / f"copy_{len(copies)}.db")
+        backup(sqlite_url, copies[-1])
+    worker.join()
+    end = reports.curve(store, submitted)
+    store.dispose()
+
+    assert end.state is State.COMPLETED
+    for file in {copies[0], copies[len(copies) // 2]}:
+        with sqlite3.connect(file) as connection:
+            assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+        connection.close()
+        copy = Store(f"sqlite:///{file}")
+        copy.check()
+        execution.requeue_lost(copy, stale_after_s=-1)
+        work(copy)
+        assert reports.curve(copy, submitted) == end
+        copy.dispose()
+
+
+def test_a_copy_waits_for_whoever_writes_and_has_all_of_it_or_nothing(sqlite_url, tmp_path):
+    store = Store(sqlite_url)
+    half_way, made = Event(), []
+
+    def copy():
+        half_way.wait()
+        made.append(backup(sqlite_url, tmp_path / "copy.db"))
+
+    copying = Thread(target=copy)
+    copying.start()
+    experiments.submit_experiment(store, toy())
+    with store.transaction() as session:
+        session.connection().exec_driver_sql("UPDATE experiment SET name = 'written'")
+        half_way.set()
+    copying.join()
+    store.dispose()
+
+    copied = Store(f"sqlite:///{tmp_path / 'copy.db'}")
+    names = [each.name for each in experiments.list_experiments(copied).items]
+    copied.dispose()
+    assert names in (["written"], ["simulated_fit"])
+    assert made == [(tmp_path / "copy.db").stat().st_size]
+
+
+def test_only_the_owner_may_read_a_copy_and_nothing_else_is_left(sqlite_url, tmp_path):
+    backup(sqlite_url, tmp_path / "copy.db")
+
+    assert (tmp_path / "copy.db").stat().st_mode & 0o777 == 0o600
+    assert [each.name for each in tmp_path.iterdir()] == ["copy.db"]
+
+
+def test_a_file_that_is_there_stays_as_it_is(sqlite_url, tmp_path):
+    file = tmp_path / "precious.db"
+    file.write_text("precious")
+
+    with pytest.raises(FileExistsError):
+        backup(sqlite_url, file)
+
+    assert file.read_text() == "precious"
+
+
+def test_without_a_database_none_is_made(tmp_path):
+    with pytest.raises(StoreUnavailable, match="no database"):
+        backup(f"sqlite:///{tmp_path / 'none.db'}", tmp_path / "copy.db")
+
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_no_database_is_not_copied(tmp_path):
+    (tmp_path / "text.db").write_text("this is no database" * 100)
+
+    with pytest.raises(StoreUnavailable, match="not a database"):
+        backup(f"sqlite:///{tmp_path / 'text.db'}", tmp_path / "copy.db")
+
+    assert [each.name for each in tmp_path.iterdir()] == ["text.db"]
+
+
+def test_of_postgres_it_says_what_copies_one(tmp_path):
+    with pytest.raises(Unsupported, match="pg_dump --format=custom") as refusal:
+        backup("postgresql://me:secret@127.0.0.1/gaplab", tmp_path / "copy")
+
+    assert "secret" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(("existing", "code"), [(False, 0), (True, 7)])
+def test_the_command_copies_the_database_of_the_environment(sqlite_url, tmp_path, monkeypatch, capsys, existing, code):
+    file = tmp_path / "copy.db"
+    if existing:
+        file.touch()
+    monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
+    monkeypatch.setattr(sys, "argv", ["gaplab", "backup", str(file)])
+
+    with pytest.raises(SystemExit) as end:
+        main()
+
+    assert end.value.code == code
+    said = capsys.readouterr()
+    assert str(file) in (said.out if code == 0 else said.err)

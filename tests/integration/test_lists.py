@@ -1,0 +1,100 @@
+"""Lists and curves cost what they show, not what is stored."""
+
+from contextlib import contextmanager
+
+import pytest
+from sqlalchemy import event
+
+from benchmarks.filling import IN_A_STUDY, experiment_id, fill, study_id
+from schemas.lifecycle import State
+from services import execution, experiments, reports
+from services.archives import export_study, import_archive
+from tests.experiments import toy
+
+READS = {
+    "experiments": lambda store: experiments.list_experiments(store, limit=5),
+    "experiments of a study": lambda store: experiments.list_experiments(store, study=study_id(0)),
+    "experiments in a state": lambda store: experiments.list_experiments(store, state=State.COMPLETED),
+    "studies": lambda store: experiments.list_studies(store, limit=2),
+    "an experiment": lambda store: experiments.read_experiment(store, experiment_id(0)),
+    "samples": lambda store: experiments.list_samples(store, experiment_id(0)),
+    "a curve": lambda store: reports.curve(store, experiment_id(0)),
+    "a study's curves": lambda store: reports.study_curves(store, study_id(0)),
+}
+
+
+@contextmanager
+def statements(store):
+    """Those that the store executes meanwhile, each with its parameters."""
+    found = []
+    with store.reading() as session:
+        engine = session.get_bind().engine
+
+    def note(connection, cursor, statement, parameters, context, many):
+        found.append((statement, parameters))
+
+    event.listen(engine, "before_cursor_execute", note)
+    yield found
+    event.remove(engine, "before_cursor_execute", note)
+
+
+def asked(store):
+    counts = {}
+    for name, read in READS.items():
+        with statements(store) as found:
+            read(store)
+        counts[name] = len(found)
+    return counts
+
+
+def test_what_benchmarks_fill_a_database_with_is_what_the_service_stores(store, tmp_path):
+    fill(store, 2 * IN_A_STUDY)
+
+    with export_study(store, study_id(1)).file as archive:
+        assert len(import_archive(store, archive).experiments) == IN_A_STUDY  # whole logs, or it would be refused
+    shown = experiments.list_experiments(store, study=study_id(0)).items
+    assert {each.state for each in shown} == {State.COMPLETED}
+    assert all(each.progress.iterations_done == each.progress.iterations == 44 for each in shown)
+    assert [point.n for point in reports.curve(store, experiment_id(3)).points] == [4] * 11
+    submitted = experiments.submit_experiment(store, toy())
+    assert {each.experiment_id for each in execution.claim(store, "me", 9)} == {submitted.id}
+
+
+def test_no_list_asks_more_often_when_it_shows_more(store):
+    fill(store, 1)
+    few = asked(store)
+    with store.transaction() as session:
+        for table in ("simulator", "measurement", "iteration", "repetition", "experiment", "study"):
+            session.connection().exec_driver_sql(f"DELETE FROM {table}")
+    fill(store, 3 * IN_A_STUDY)
+
+    assert asked(store) == few
+
+
+def test_every_read_finds_its_rows_by_an_index(sqlite_store):
+    fill(sqlite_store, 12 * IN_A_STUDY)
+    with statements(sqlite_store) as found:
+        for read in READS.values():
+            read(sqlite_store)
+
+    with sqlite_store.reading() as session:
+        for statement, parameters in found:
+            if statement.startswith("SELECT"):
+                plan = session.connection().exec_driver_sql(f"EXPLAIN QUERY PLAN {statement}", parameters)
+                steps = [step for *_, step in plan]
+                assert not [step for step in steps if step.startswith("SCAN") and "INDEX" not in step], statement
+
+
+@pytest.mark.parametrize("filters", [{}, {"state": State.RUNNING}, {"strategy": "informative"}])
+def test_a_page_of_experiments_is_read_in_its_order_and_not_sorted(sqlite_store, filters):
+    fill(sqlite_store, IN_A_STUDY)
+    with statements(sqlite_store) as found:
+        experiments.list_experiments(sqlite_store, **filters)
+    page, parameters = next(each for each in found if "FROM experiment" in each[0] and "LIMIT" in each[0])
+
+    with sqlite_store.reading() as session:
+        steps = [step for *_, step in session.connection().exec_driver_sql(f"EXPLAIN QUERY PLAN {page}", parameters)]
+
+    assert len(steps) == 1
+    assert "created_at_position_id" in steps[0]
+    assert ("SEARCH" in steps[0]) is bool(filters)
