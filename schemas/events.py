@@ -17,6 +17,7 @@ class EventKind(StrEnum):
     """What can happen. Those of a repetition have its number; those of a step have the iteration in their body."""
 
     SUBMITTED = "submitted"
+    IMPORTED = "imported"
     STARTED = "started"
     PAUSING = "pausing"
     PAUSED = "paused"

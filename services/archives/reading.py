@@ -15,8 +15,10 @@ from typing import IO, Any
 from pydantic import ValidationError
 
 from schemas.archives import ImportRead, Manifest
+from schemas.events import EventKind
 from schemas.lifecycle import State
-from schemas.spec import ExperimentSpec
+from schemas.provenance import Provenance
+from schemas.spec import ExperimentSpec, Schedule
 from services.archives.checking import checked
 from services.archives.opening import open_archive
 from services.core.errors import Conflict, InvalidArchive
@@ -25,7 +27,8 @@ from services.core.tunables import tunables
 from services.resolution import spec_of
 from services.store.models import SPEC_VERSION, ExperimentRow, RepetitionRow, StudyRow
 from services.store.portable import EXPERIMENT, EXPORTED, REPETITION
-from services.store.repository import archives, experiments, steps
+from services.store.repository import archives, experiments, provenance, steps
+from services.store.repository.events import note
 from services.store.session import Session, Store
 
 Row = dict[str, Any]
@@ -131,13 +134,16 @@ def _checked_spec(row: Row) -> Row:
 
 def _whole(spec: ExperimentSpec, truth: Row) -> Row:
     """As it is stored; what is not known of its reality is null."""
-    stored = spec.model_dump(mode="json")
+    stored = spec.model_dump(mode="json", exclude=set(Schedule.model_fields))
     return stored | {"reality": stored["reality"] | {"parameters": truth | stored["reality"]["parameters"]}}
 
 
 def _check_place(table: str, row: Row, owners: dict[str, Row]) -> None:
     """Refuse a row that belongs to nothing, or that lies outside of what its experiment is."""
     if table == "study":
+        return
+    if table == "provenance":
+        _check_provenance(row)
         return
     owner = owners.get(str(row["id"] if table == "experiment" else row.get(EXPERIMENT) or row.get("experiment_id")))
     number = row.get(REPETITION, row["number"] if table == "repetition" else None)
@@ -149,6 +155,18 @@ def _check_place(table: str, row: Row, owners: dict[str, Row]) -> None:
         or (table == "simulator" and len(row["parameters"]) != len(owner["spec"]["tunables"]))
     ):
         msg = f"a row of {table} does not fit its experiment: {str(row)[:200]}"
+        raise InvalidArchive(msg)
+
+
+def _check_provenance(row: Row) -> None:
+    """Refuse facts that are none, or that go by the name of others."""
+    try:
+        facts = Provenance.model_validate(row["facts"])
+    except ValidationError as error:
+        msg = f"the facts of provenance {row['id']!r} are none"
+        raise InvalidArchive(msg) from error
+    if provenance.id_of(facts) != row["id"]:
+        msg = f"provenance {row['id']!r} has facts that go by another name"
         raise InvalidArchive(msg)
 
 
@@ -168,6 +186,8 @@ def _store(session: Session, manifest: Manifest, tables: dict[str, Path], owners
         msg = "its rows contradict each other: one is there twice, or belongs to what is not there"
         raise InvalidArchive(msg) from error
     _check_logs(session, list(found.values()))
+    for each in found.values():
+        note(session, EventKind.IMPORTED, each)
     return ImportRead(
         study=study,
         experiments=tuple(found.values()),
@@ -185,7 +205,7 @@ def _arriving(table: str, row: Row, arrival: Arrival, study: str | None) -> Row:
         if not State(row["state"]).ended:
             arrival.called_off.append(row["id"])
         row["spec"] = arrival.owners[row["id"]]["spec"]
-        row |= {"id": arrival.ids[row["id"]], "study_id": study}
+        row |= {"id": arrival.ids[row["id"]], "study_id": study, "running": 0, "claimable": False}
     for name in {EXPERIMENT, "experiment_id"} & set(row):
         row[name] = None if row[name] is None else arrival.ids[row[name]]
     if "study_id" in row:

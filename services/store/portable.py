@@ -21,15 +21,36 @@ from sqlalchemy.orm import Mapper
 from services.store.clock import UtcDateTime
 from services.store.models import Base
 
-EXPORTED = ("study", "experiment", "repetition", "iteration", "measurement", "simulator")
+EXPORTED = (
+    "provenance",
+    "study",
+    "experiment",
+    "experiment_provenance",
+    "repetition",
+    "iteration",
+    "measurement",
+    "simulator",
+)
 """Each after those that it refers to: the order in which they are read back."""
 
 LEFT_OUT: Mapping[str, str] = {
+    "attempt": "names machines and processes there",
+    "checkpoint": "is of a step under way, which ends where it is computed",
+    "event": "is numbered among all events there; it tells of what the other tables have",
+    "event_counter": "numbers the events there",
+    "idempotency": "is of requests to the service there",
+    "supervisor": "works there",
+    "token": "lets people in there",
     "sensitivity": "follows from what is tuned, and is shared by all experiments that tune the same",
 }
 """With the reason."""
 
 COLUMNS_LEFT_OUT: Mapping[tuple[str, str], str] = {
+    ("experiment", "token_id"): "names a token there",
+    ("experiment", "sensitivity_id"): "names a check there",
+    ("experiment", "running"): "counts leases, of which an archive has none",
+    ("experiment", "claimable"): "is of an experiment that somebody may go on with",
+    ("repetition", "checkpoints"): "counts what is left out",
     ("repetition", "owner"): "names a machine and a process there",
     ("repetition", "heartbeat_at"): "is of a lease, which nobody holds in an archive",
 }

@@ -11,8 +11,9 @@ from sqlalchemy.exc import DataError, IntegrityError
 from sqlalchemy.orm import Session
 
 from services.store.clock import now
-from services.store.models import ExperimentRow, RepetitionRow, StudyRow
+from services.store.models import ExperimentProvenanceRow, ExperimentRow, ProvenanceRow, RepetitionRow, StudyRow
 from services.store.portable import COLUMNS_LEFT_OUT, EXPERIMENT, REPETITION, columns_of, table_of
+from services.store.repository import provenance
 from services.store.repository.experiments import new_id
 from services.store.repository.reads import without_truth
 
@@ -41,6 +42,14 @@ def rows(
         hidden: those whose reality's parameters are null.
     """
     cut_off = {"study_id": None} if study is None else {}
+    if name == "provenance":  # experiments have them in common
+        used = select(ExperimentProvenanceRow.provenance_id).where(
+            ExperimentProvenanceRow.experiment_id.in_(experiments)
+        )
+        columns = [table_of(name).c[each.name] for each in columns_of(name)]
+        found = session.execute(select(*columns).where(ProvenanceRow.id.in_(used)).order_by(ProvenanceRow.id))
+        yield from map(dict, found.mappings())
+        return
     for owner in ([study] if study else []) if name == "study" else experiments:
         found = session.execute(_query(name, owner), execution_options={"yield_per": _AT_ONCE})
         for each in found.mappings():
@@ -78,7 +87,10 @@ def insert_rows(session: Session, name: str, found: Iterable[Row]) -> int:
     numbered = "repetition_id" in table.c
     while some := list(islice(incoming, _AT_ONCE)):
         values = _numbered(session, some) if numbered else some
-        session.execute(insert(table), values)
+        if name == "provenance":
+            provenance.insert_unless_there(session, values)
+        else:
+            session.execute(insert(table), values)
         count += len(some)
     return count
 

@@ -51,8 +51,7 @@ def record(session: Session, under: Provenance, claims: Sequence[Claim]) -> None
         return
     id_, insert = id_of(under), _INSERT[session.get_bind().dialect.name]
     specs = {each.experiment_id: each.spec.model_dump(mode="json") for each in claims}
-    facts = {"id": id_, "facts": under.model_dump(mode="json")}
-    session.execute(insert(ProvenanceRow).values(facts).on_conflict_do_nothing())
+    insert_unless_there(session, [{"id": id_, "facts": under.model_dump(mode="json")}])
     uses = [{"experiment_id": each, "provenance_id": id_} for each in specs]
     session.execute(insert(ExperimentProvenanceRow).values(uses).on_conflict_do_nothing())
     for experiment, spec in specs.items():
@@ -62,6 +61,12 @@ def record(session: Session, under: Provenance, claims: Sequence[Claim]) -> None
     for each in claims:
         told = {"epoch": each.epoch, "steps": len(each.log), "provenance": id_}
         note(session, EventKind.REPETITION_CLAIMED, each.experiment_id, each.number, **told)
+
+
+def insert_unless_there(session: Session, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Add these provenances; one that is there has the same facts."""
+    insert = _INSERT[session.get_bind().dialect.name]
+    session.execute(insert(ProvenanceRow).on_conflict_do_nothing(), [dict(each) for each in rows])
 
 
 def refuse(session: Session, under: Provenance) -> int:
