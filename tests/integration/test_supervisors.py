@@ -36,16 +36,16 @@ def ray_of_our_own():
         yield
 
 
-def spec(repetitions, controller_evaluations=4_000):
-    """A second or two of work in each repetition."""
-    budget = {"controller_evaluations": controller_evaluations, "selection_evaluations": 500}
+def spec(repetitions, controller_evaluations=400):
+    """Work enough in each repetition for something to happen meanwhile."""
+    budget = {"controller_evaluations": controller_evaluations, "selection_evaluations": 60}
     return ExperimentSpec.model_validate(
         {
             "strategy": "simulated_fit_and_informative",
             "robot": "toy_function",
             "iterations": 2,
             "repetitions": repetitions,
-            "budget": budget | {"simulator_evaluations": 100},
+            "budget": budget | {"simulator_evaluations": 60},
         }
     )
 
