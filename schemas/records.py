@@ -30,7 +30,7 @@ class Progress(Frozen):
     failed: int
     iterations: int = Field(description="of all repetitions, number 0 included")
     iterations_done: int
-    rollouts: int = Field(description="budgeted in all; at the end, done plus saved")
+    rollouts: int = Field(description="budgeted in all; at the end, done plus saved, unless it was stopped")
     rollouts_done: int
     rollouts_failed: int = Field(description="physics failures (nan) among those done; they never win")
     rollouts_saved: int = Field(description="budgeted, but sure to change nothing, so not simulated")
