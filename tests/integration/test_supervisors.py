@@ -36,7 +36,7 @@ def ray_of_our_own():
         yield
 
 
-def spec(repetitions, controller_evaluations=400):
+def spec(repetitions, controller_evaluations=200):
     """Work enough in each repetition for something to happen meanwhile."""
     budget = {"controller_evaluations": controller_evaluations, "selection_evaluations": 60}
     return ExperimentSpec.model_validate(
