@@ -18,7 +18,8 @@ def study_with_results(store, recorded=(1.0, 2.0)):
         "strategies": ["simulated_fit", "direct"],
     }
     study = experiments.submit_study(store, StudySpec.model_validate(spec))
-    first, second, *direct = execution.claim(store, "me", 9)
+    claims = execution.claim(store, "me", 9)
+    first, second, *direct = sorted(claims, key=lambda each: (each.spec.strategy.name == "direct", each.number))
     run(store, first, some_log(recorded=recorded[0]))
     for step in list(some_log(recorded=recorded[1]))[:8]:
         execution.record(store, second, step)
