@@ -89,7 +89,9 @@ class Supervisor:
             self._wind_down()
         finally:
             self._hand_back(self._runs)
-            with suppress(StoreUnavailable):  # then its lease will run out
+            with suppress(StoreUnavailable):  # then their leases will run out
+                execution.hand_back_unheard(self._store, self._owner, ())
+            with suppress(StoreUnavailable):
                 self._checks.hand_back()
             with suppress(StoreUnavailable):  # then it is taken for lost, which it nearly is
                 supervisors.end(self._store, self._owner)

@@ -11,10 +11,12 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.mark.parametrize("database", ["SQLite", "Postgres"])
 def test_no_kill_leaves_a_trace_in_the_results(database, postgres, folder):
+    place = folder / f"kill-{database}"  # in memory, and apart from other tests' files
+    place.mkdir()
     command = [sys.executable, "-W", "error", "-m", "benchmarks.kill_matrix", "--kills", "1", "--only", database]
 
     done = subprocess.run(
-        [*command, "--postgres", postgres.url("postgres"), "--folder", str(folder)],
+        [*command, "--postgres", postgres.url("postgres"), "--folder", str(place)],
         cwd=ROOT,
         capture_output=True,
         text=True,
