@@ -1,5 +1,6 @@
 """What endpoints are given: the store, ids that can be ids, and the query parameters that several share."""
 
+import logging
 import re
 from typing import Annotated, TypeVar
 
@@ -15,6 +16,8 @@ from services.core.errors import NotFound
 from services.store.session import Store
 
 R = TypeVar("R", bound=Frozen)
+
+logger = logging.getLogger(__name__)
 
 
 IdempotencyKey = Annotated[
@@ -87,6 +90,7 @@ class Revealing(Parameters):
         """
         if self.reveal:
             demand(caller, Role.ADMIN, "to reveal reality's parameters")
+            logger.warning("reality is revealed to token %s", caller.token)
         return self.reveal
 
 

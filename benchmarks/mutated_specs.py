@@ -182,8 +182,8 @@ def main() -> int:
     statuses = ", ".join(f"{number:,} × {status}" for status, number in sorted(found.statuses.items()))
     print(
         f"{given.count:,} mutated specs: {statuses}; otherwise: {len(found.wrong)}; "
-        f"later than {WITHIN_S:g} s: {found.late}, slowest {found.slowest_s:.2f} s, "
-        f"mean {1000 * found.seconds / given.count:.1f} ms"
+        f"later than {WITHIN_S:g} s: {found.late}; "
+        f"slowest {found.slowest_s:.2f} s, mean {1000 * found.seconds / given.count:.1f} ms"
     )
     print(*found.wrong[:10], sep="\n")
     return int(bool(found.wrong or found.late))

@@ -122,6 +122,7 @@ def test_only_an_admin_may_have_it_revealed_and_no_one_where_there_are_no_tokens
         assert api.get(f"{place}?reveal=true", headers=runner).status_code == 403
         assert tells(api.get(f"{place}?reveal=true", headers=admin).text)
         assert not tells(api.get(place, headers=admin).text)
+    assert log.text.count("reality is revealed to token") == len(places)
     assert not tells(log.text)
 
 

@@ -40,7 +40,8 @@ def listening():
 with cluster(Settings(workers=1)):
     address = ray.get_runtime_context().gcs_address
     print("AT", address, *sorted(set(listening())))
-    stranger = f"from ray._raylet import GcsClient; GcsClient({address!r}).internal_kv_keys(b'', None); print('IN')"
+    asking = f"GcsClient(address={address!r}).internal_kv_keys(b'', None); print('IN')"
+    stranger = f"from ray._raylet import GcsClient; {asking}"
     without = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
     for home in ({"RAY_AUTH_MODE": "disabled"}, {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": "0" * 64}):
         tried = subprocess.run([sys.executable, "-c", stranger], env=without | home, capture_output=True, text=True)
