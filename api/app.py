@@ -6,7 +6,7 @@ from fastapi import FastAPI
 
 from api import documentation, problems
 from api.limits import BodyLimit
-from api.routes import archives, catalogue, curves, experiments, figures, health, sensitivity, studies
+from api.routes import archives, catalogue, curves, experiments, figures, health, life_cycle, sensitivity, studies
 from services.store.session import Store
 
 DESCRIPTION = """
@@ -47,7 +47,7 @@ def create_app(store: Store) -> FastAPI:
     app.state.store = store
     app.add_middleware(BodyLimit)
     problems.install(app)
-    for module in (studies, experiments, curves, figures, archives, sensitivity, catalogue, health):
+    for module in (studies, experiments, life_cycle, curves, figures, archives, sensitivity, catalogue, health):
         app.include_router(module.router)
     documentation.install(app)
     return app

@@ -12,12 +12,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Literal, Self, TypeVar
-from urllib.parse import quote
 
 import httpx2
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from api.clients.archives import Archives
+from api.clients.life_cycle import LifeCycle, part
 from schemas.curves import Comparison, Curve
 from schemas.misfit import MisfitRead
 from schemas.plugin import Catalogue
@@ -31,7 +31,7 @@ T = TypeVar("T")
 Spec = ExperimentSpec | StudySpec | Mapping[str, Any]
 FigureFormat = Literal["html", "svg"]
 
-NOT_CHECKED = {"name", "strategy", "strategies", "direct_repetitions"}
+NOT_CHECKED = {"name", "strategy", "strategies", "direct_repetitions", "priority", "max_parallel"}
 """What a spec has beside the settings that a sensitivity check takes."""
 
 LOOPBACK = {"127.0.0.1", "localhost", "::1"}
@@ -50,7 +50,7 @@ class ServiceUnreachable(Exception):
     """Nothing answers at the service's address."""
 
 
-class Client(Archives):
+class Client(Archives, LifeCycle):
     """A connection to a service.
 
     Args:
@@ -99,11 +99,11 @@ class Client(Archives):
 
     def experiment(self, id: str) -> ExperimentRead:  # noqa: A002 - as the API says
         """An experiment."""
-        return self._read(ExperimentRead, self._get(f"/experiments/{_part(id)}"))
+        return self._read(ExperimentRead, self._get(f"/experiments/{part(id)}"))
 
     def study(self, id: str) -> StudyRead:  # noqa: A002 - as the API says
         """A study."""
-        return self._read(StudyRead, self._get(f"/studies/{_part(id)}"))
+        return self._read(StudyRead, self._get(f"/studies/{part(id)}"))
 
     def find(self, id: str) -> ExperimentRead | StudyRead:  # noqa: A002 - as the API says
         """The study of this id, or the experiment."""
@@ -124,11 +124,11 @@ class Client(Archives):
 
     def repetitions(self, id: str) -> tuple[RepetitionRead, ...]:  # noqa: A002 - as the API says
         """The repetitions of an experiment."""
-        return self._read(tuple[RepetitionRead, ...], self._get(f"/experiments/{_part(id)}/repetitions"))
+        return self._read(tuple[RepetitionRead, ...], self._get(f"/experiments/{part(id)}/repetitions"))
 
     def misfit(self, id: str) -> MisfitRead:  # noqa: A002 - as the API says
         """How far an experiment's tuned simulators are from reality, and from each other."""
-        return self._read(MisfitRead, self._get(f"/experiments/{_part(id)}/misfit"))
+        return self._read(MisfitRead, self._get(f"/experiments/{part(id)}/misfit"))
 
     def check(self, spec: Spec | SensitivitySpec, *, every_s: float = 0.5) -> SensitivityRead:
         """What the tunables of a spec do to fitness: queued if that is not known yet, and waited for."""
@@ -136,12 +136,8 @@ class Client(Archives):
         check = self._read(SensitivityRead, self._request("POST", "/sensitivity", json=body))
         while not check.state.ended:
             time.sleep(every_s)
-            check = self._read(SensitivityRead, self._get(f"/sensitivity/{_part(check.id)}"))
+            check = self._read(SensitivityRead, self._get(f"/sensitivity/{part(check.id)}"))
         return check
-
-    def cancel(self, id: str) -> ExperimentRead:  # noqa: A002 - as the API says
-        """Call an experiment off."""
-        return self._read(ExperimentRead, self._request("POST", f"/experiments/{_part(id)}/cancel"))
 
     def watch(self, id: str, *, every_s: float = 1.0, patience_s: float = 60.0) -> Iterator[ExperimentRead | StudyRead]:  # noqa: A002
         """A study or an experiment again and again, until it has ended; the last one is what it ended as.
@@ -225,11 +221,6 @@ class Client(Archives):
 
 def _body(spec: BaseModel | Mapping[str, Any]) -> dict[str, Any]:
     return spec.model_dump(mode="json", exclude_unset=True) if isinstance(spec, BaseModel) else dict(spec)
-
-
-def _part(id: str) -> str:  # noqa: A002 - as the API says
-    """The id as one part of an address, whatever it is; servers decode a slash before they look for parts."""
-    return quote(id.replace("/", "%2F"), safe="").replace(".", "%2E") or "%20"
 
 
 def _for_good(error: Exception) -> bool:

@@ -7,7 +7,6 @@ on where it was; run again after it has finished, it starts anew beside the old 
 
 import json
 import signal
-import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,14 +19,13 @@ from api import display
 from api.client import Client, ServiceError
 from api.exits import CommandError, Exit
 from api.findings import findings
-from api.launch import end, start
+from api.own import own_service
 from api.watch import follow
 from schemas.lifecycle import State
 from schemas.records import ExperimentRead, StudyRead
 
 SPECS = Path(__file__).parent.parent / "examples"
 STUDIES = ("toy", "quadruped")
-START_WITHIN_S = 120.0
 
 
 def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
@@ -45,7 +43,9 @@ def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
     try:
-        with _interruptible(), _service(folder, console) as client:
+        database, log = _database(folder), folder / "service.log"
+        with _interruptible(), own_service(database, log) as client:
+            console.print(f"Service: {client.url}, database {database}, log {log}", highlight=False)
             for name, spec in specs.items():
                 _run_study(name, spec, client, folder, console)
     except KeyboardInterrupt:
@@ -102,27 +102,6 @@ def _say_where(folder: Path, console: Console, seconds: float) -> None:
 
 
 @contextmanager
-def _service(folder: Path, console: Console) -> Iterator[Client]:
-    """The real service as a process of its own, ended in order at the end."""
-    port, log = _free_port(), folder / "service.log"
-    environment = {"GAPLAB_DATABASE_URL": _database(folder), "GAPLAB_PORT": str(port), "GAPLAB_HOST": "127.0.0.1"}
-    with log.open("ab") as output:
-        process = start("api.cli", "serve", environment=environment, log=output)
-        try:
-            with Client(f"http://127.0.0.1:{port}") as client:
-                deadline = time.monotonic() + START_WITHIN_S
-                while not client.ready():
-                    if process.poll() is not None or time.monotonic() > deadline:
-                        msg = f"the service does not start: {_last_line(log)} ({log} says more)"
-                        raise CommandError(msg, Exit.FAILED)
-                    time.sleep(0.2)
-                console.print(f"Service: {client.url}, database {_database(folder)}, log {log}", highlight=False)
-                yield client
-        finally:
-            end(process)
-
-
-@contextmanager
 def _interruptible() -> Iterator[None]:
     """Let SIGTERM end the demo as Ctrl-C does: in order."""
 
@@ -172,15 +151,3 @@ def _resumed(name: str, spec: dict[str, object], client: Client, folder: Path) -
 
 def _database(folder: Path) -> str:
     return f"sqlite:///{folder / 'gaplab.db'}"
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-    return port
-
-
-def _last_line(log: Path) -> str:
-    lines = log.read_text("utf-8", "replace").strip().splitlines()
-    return lines[-1] if lines else "it says nothing"

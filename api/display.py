@@ -19,6 +19,9 @@ from schemas.sensitivity import SensitivityRead
 COLORS = {
     State.QUEUED: "dim",
     State.RUNNING: "cyan",
+    State.PAUSING: "magenta",
+    State.PAUSED: "magenta",
+    State.STOPPING: "cyan",
     State.COMPLETED: "green",
     State.FAILED: "bold red",
     State.CANCELLED: "yellow",

@@ -6,9 +6,10 @@ from typing import Any
 from pydantic import BaseModel
 
 from schemas.curves import Comparison, Curve, CurvePoint, Test
-from schemas.lifecycle import State
+from schemas.lifecycle import Ending, State
 from schemas.misfit import MisfitPoint, MisfitRead, Spread, TunedSpread
 from schemas.records import (
+    AttemptRead,
     ExperimentRead,
     MeasurementKind,
     Page,
@@ -110,6 +111,15 @@ STUDY = StudyRead(
 
 REPETITION = RepetitionRead(
     number=0, state=State.RUNNING, iterations_done=4, rollouts_done=116_000, attempts=1, started_at=_CREATED
+)
+
+ATTEMPT = AttemptRead(
+    number=1,
+    owner="lab-3:4711:9f2c61d0",
+    started_at=_CREATED,
+    ended_at=_CREATED + timedelta(minutes=3),
+    ending=Ending.LOST,
+    reason="its worker was not heard of for 30 s",
 )
 
 SAMPLE = SampleRead(

@@ -14,12 +14,12 @@ import migrations
 from benchmarks.measure import Row
 from schemas.spec import ExperimentSpec
 from services import experiments
-from services.core.loop import repetition
-from services.execution import Claim, TimedStep
+from services.execution import Claim, Delivered
 from services.resolution import resolve_experiment
 from services.settings import Settings
 from services.simulation import setting
 from services.store.session import Store
+from workers.checkpoints import recorded
 from workers.cluster import cluster
 from workers.repetition import batches
 from workers.supervisor import Run, Supervisor
@@ -38,12 +38,12 @@ SPEC = ExperimentSpec.model_validate(
 )
 """Every kind of step, with the largest to store: 20 simulators in each tuning."""
 
-Batches = tuple[tuple[TimedStep, ...], ...]
+Batches = tuple[tuple[Delivered, ...], ...]
 
 
 def simulated() -> Batches:
     """One repetition's steps, in the batches in which they travel; every simulated repetition has the same."""
-    return tuple(batches(repetition(setting(resolve_experiment(SPEC), 0))))
+    return tuple(batches(recorded(setting(resolve_experiment(SPEC), 0), (), ())))
 
 
 class WithoutRay(Supervisor):
@@ -75,7 +75,7 @@ class ThroughRay(Supervisor):
 
 
 @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-def _deliver(delivered: Batches) -> Iterator[tuple[TimedStep, ...]]:
+def _deliver(delivered: Batches) -> Iterator[tuple[Delivered, ...]]:
     yield from (batch for batch in delivered)  # a generator, as Ray wants it
 
 

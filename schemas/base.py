@@ -22,5 +22,8 @@ Real = Annotated[float, Field(strict=True)]
 Seed = Annotated[int, Field(strict=True, ge=0, lt=SEED_LIMIT)]
 """A seed of 64 bits."""
 
+Priority = Annotated[int, Field(strict=True, ge=-10, le=10)]
+"""What is computed first: the higher; a whole number."""
+
 Label = Annotated[str, Field(min_length=1, max_length=200)]
 """A name that people give to their studies and experiments."""

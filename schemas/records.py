@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 from pydantic import Field
 
 from schemas.base import Frozen
-from schemas.lifecycle import State
+from schemas.lifecycle import Ending, State
 
 T = TypeVar("T")
 
@@ -46,6 +46,8 @@ class ExperimentRead(Frozen):
     strategy: str
     state: State
     spec: dict[str, Any]
+    priority: int = Field(default=0, description="the higher is computed first")
+    max_parallel: int | None = Field(default=None, description="repetitions that run at once; null: any number")
     progress: Progress
     reasons: tuple[str, ...] = Field(default=(), description="why repetitions failed, each reason once")
     sensitivity: str | None = Field(default=None, description="id of the check of what its tunables do to fitness")
@@ -77,6 +79,17 @@ class RepetitionRead(Frozen):
     error: str | None = None
     started_at: datetime | None = None
     ended_at: datetime | None = None
+
+
+class AttemptRead(Frozen):
+    """One lease of a repetition: who had it, from when to when, and how it ended."""
+
+    number: int = Field(description="from 1; the epoch that every write of this attempt carried")
+    owner: str = Field(description="the supervisor")
+    started_at: datetime
+    ended_at: datetime | None = Field(default=None, description="null: it runs, or waits for its core")
+    ending: Ending | None = None
+    reason: str | None = Field(default=None, description="why it failed or was lost")
 
 
 class MeasurementKind(StrEnum):

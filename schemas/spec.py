@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from schemas.base import Count, Frozen, Label, Real, Seed
+from schemas.base import Count, Frozen, Label, Priority, Real, Seed
 from schemas.plugin import PluginRef, TunableRef
 
 BudgetName = Literal["smoke", "desk", "paper"]
@@ -71,15 +71,24 @@ class Settings(Frozen):
     seed: Seed = 0
 
 
-class ExperimentSpec(Settings):
+class Schedule(Frozen):
+    """How soon an experiment has its turn. It changes no number, so it is not stored with what makes the results."""
+
+    priority: Priority = Field(default=0, description="the higher is computed first")
+    max_parallel: Annotated[Count, Field(le=10_000)] | None = Field(
+        default=None, description="repetitions of an experiment that run at once; null: as many as have a core"
+    )
+
+
+class ExperimentSpec(Settings, Schedule):
     """One strategy under one setting, repeated."""
 
     name: Label | None = None
     strategy: PluginRef
 
 
-class StudySpec(Settings):
-    """Experiments to be compared: one for each strategy, all else equal.
+class StudySpec(Settings, Schedule):
+    """Experiments to be compared: one for each strategy, all else equal; the schedule is that of each of them.
 
     `direct` is the baseline, evolution in reality itself; the paper repeats it 100 times where it repeats the
     strategies 40 times.

@@ -4,6 +4,9 @@ A claim is a lease. Its holder sends a heartbeat every 5 to 10 seconds, and is t
 carries the claim and is refused once the lease has gone on to another, or the experiment was cancelled: False, or
 absence from `heartbeat`'s answer, tells the holder to drop the repetition.
 
+What a person asks for is obeyed here, so that no holder can forget it: the first delivery after a pause or a stop is
+stored, and is the last of its lease.
+
 All of them raise StoreUnavailable while the database cannot be used; each may then be tried again.
 """
 
@@ -11,16 +14,18 @@ from collections.abc import Iterable
 from datetime import timedelta
 
 from services.core.types import Step
+from services.store.lease import Checkpoint as Checkpoint
 from services.store.lease import Claim as Claim
+from services.store.lease import Delivered as Delivered
 from services.store.lease import TimedStep as TimedStep
-from services.store.repository import leases, steps
+from services.store.repository import giving_way, leases
 from services.store.session import Store
 
 STALE_AFTER_S = 30.0
 
 
 def claim(store: Store, owner: str, limit: int) -> tuple[Claim, ...]:
-    """Up to `limit` queued repetitions for the owner to run, of the oldest experiments first, each with its log."""
+    """Up to `limit` queued repetitions for the owner to run, in the order of turns, each with its log."""
     return store.write(lambda session: leases.claim(session, owner, limit)) if limit > 0 else ()
 
 
@@ -42,7 +47,8 @@ def record(store: Store, claim: Claim, step: Step, *, seconds: float = 0.0) -> b
         seconds: of work that it took.
 
     Returns:
-        Whether the claim still holds; if not, nothing was written.
+        Whether the claim still holds. If not, nothing was written, unless the experiment was asked to pause or stop:
+        then the step was, as the last one.
 
     Raises:
         Conflict: the step is not the next one: some before it are missing.
@@ -50,19 +56,22 @@ def record(store: Store, claim: Claim, step: Step, *, seconds: float = 0.0) -> b
     return bool(record_all(store, [(claim, (TimedStep(step, seconds),))]))
 
 
-def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[TimedStep]]]) -> tuple[Claim, ...]:
+def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[Delivered]]]) -> tuple[Claim, ...]:
     """Append steps to the logs of many repetitions in one transaction, each as `record` does.
 
+    A checkpoint is kept until its step is there; the next claim has it. One whose step is there already is left out.
+
     Returns:
-        The claims that still hold; of the others nothing was written.
+        The claims that still hold; of the others nothing was written, but for those whose experiment was asked to pause
+        or stop.
 
     Raises:
         Conflict: as `record`; then nothing at all was written.
     """
-    gathered: dict[Claim, list[TimedStep]] = {}
-    for claim, timed in deliveries:
-        gathered.setdefault(claim, []).extend(timed)
-    return store.write(lambda session: steps.record(session, gathered)) if gathered else ()
+    gathered: dict[Claim, list[Delivered]] = {}
+    for claim, delivered in deliveries:
+        gathered.setdefault(claim, []).extend(delivered)
+    return store.write(lambda session: giving_way.record(session, gathered)) if gathered else ()
 
 
 def complete(store: Store, claim: Claim) -> bool:
@@ -108,7 +117,25 @@ def hand_back(store: Store, claim: Claim) -> bool:
 
     False if the claim holds no more.
     """
-    return store.write(lambda session: leases.hand_back(session, claim))
+    return bool(store.write(lambda session: giving_way.hand_back(session, [claim])))
+
+
+def give_way(store: Store, waiting: Iterable[Claim]) -> tuple[Claim, ...]:
+    """Hand back those of the claims that had better not begin: asked to pause or stop, or it is another's turn.
+
+    Args:
+        store: of the claims.
+        waiting: claims whose repetition waits for a core; one that runs is never interrupted for another.
+
+    Returns:
+        Those that were handed back; `claim` gives them out again in their turn.
+    """
+    held = tuple(waiting)
+    if not held:
+        return ()
+    with store.reading() as session:
+        unwanted = giving_way.unwanted(session, held)
+    return store.write(lambda session: giving_way.hand_back(session, unwanted)) if unwanted else ()
 
 
 def requeue_lost(store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:

@@ -6,11 +6,20 @@ All of them raise StoreUnavailable while the database cannot be used.
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from schemas.lifecycle import State
-from schemas.records import ExperimentRead, MeasurementKind, Page, RepetitionRead, SampleRead, SimulatorRead, StudyRead
+from schemas.lifecycle import State, Verb
+from schemas.records import (
+    AttemptRead,
+    ExperimentRead,
+    MeasurementKind,
+    Page,
+    RepetitionRead,
+    SampleRead,
+    SimulatorRead,
+    StudyRead,
+)
 from schemas.spec import ExperimentSpec, StudySpec
 from services.resolution import expected_rollouts, is_direct, resolve_experiment, resolve_study
-from services.store.repository import experiments, reads, results, sensitivity
+from services.store.repository import attempts, experiments, reads, results, sensitivity, verbs
 from services.store.repository.experiments import Extent
 from services.store.session import Store
 
@@ -25,7 +34,7 @@ def submit_experiment(store: Store, spec: ExperimentSpec) -> ExperimentRead:
     """
     resolved = resolve_experiment(spec)
     with store.transaction() as session:
-        row = experiments.insert_experiment(session, resolved, _extent(resolved))
+        row = experiments.insert_experiment(session, resolved, extent_of(resolved))
         sensitivity.queue_for(session, [row])
         return reads.read_experiments(session, [row])[0]
 
@@ -40,7 +49,7 @@ def submit_study(store: Store, spec: StudySpec) -> StudyRead:
     with store.transaction() as session:
         study = experiments.insert_study(session, spec.name or "study")
         rows = [
-            experiments.insert_experiment(session, each, _extent(each), study=study, position=position)
+            experiments.insert_experiment(session, each, extent_of(each), study=study, position=position)
             for position, each in enumerate(resolved)
         ]
         sensitivity.queue_for(session, rows)
@@ -160,6 +169,17 @@ def list_simulators(
     return Page(items=rows[:limit], next=_next(rows, limit, results.cursor_of))
 
 
+def list_attempts(store: Store, experiment_id: str, repetition: int) -> tuple[AttemptRead, ...]:
+    """The attempts at a repetition: who had it, from when to when, and how it ended.
+
+    Raises:
+        NotFound: no such experiment, or no such repetition of it.
+    """
+    with store.reading() as session:
+        experiments.get_experiment(session, experiment_id)
+        return attempts.attempts_of(session, experiment_id, repetition)
+
+
 def cancel_experiment(store: Store, experiment_id: str) -> ExperimentRead:
     """Call the experiment off; what is stored stays, and a running repetition is refused at its next write.
 
@@ -167,10 +187,13 @@ def cancel_experiment(store: Store, experiment_id: str) -> ExperimentRead:
         NotFound: no such experiment.
         Conflict: it has ended.
     """
-    return store.write(lambda session: reads.read_experiments(session, [experiments.cancel(session, experiment_id)])[0])
+    return store.write(
+        lambda session: reads.read_experiments(session, [verbs.ask(session, experiment_id, Verb.CANCEL)])[0]
+    )
 
 
-def _extent(spec: ExperimentSpec) -> Extent:
+def extent_of(spec: ExperimentSpec) -> Extent:
+    """How much one repetition of a resolved spec is."""
     samples = 0 if is_direct(spec) else spec.iterations or 0
     return Extent(iterations=samples + 1, rollouts=expected_rollouts(spec))
 

@@ -6,11 +6,10 @@ from time import perf_counter
 
 import ray
 
-from schemas.spec import ExperimentSpec
-from services.core.loop import repetition
-from services.core.types import Measured, Probed, Step
-from services.execution import TimedStep
+from services.core.types import Measured, Probed
+from services.execution import Checkpoint, Claim, Delivered
 from services.simulation import setting
+from workers.checkpoints import recorded
 from workers.nodes import Versions, check_here
 from workers.pool import Pool
 
@@ -19,10 +18,8 @@ BATCH_S = 0.2
 
 
 @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-def run(
-    spec: ExperimentSpec, number: int, log: tuple[Step, ...], expected: Versions
-) -> Iterator[tuple[TimedStep, ...]]:
-    """The steps that follow the log, in batches, as they are computed.
+def run(claim: Claim, expected: Versions, checkpoint_s: float) -> Iterator[tuple[Delivered, ...]]:
+    """The steps that follow the claim's log, in batches, as they are computed; the first batch says that it has begun.
 
     It is never retried by Ray: a repetition goes on from its stored log, not from its beginning. The engine stays warm
     in the worker process from one task to the next.
@@ -31,22 +28,26 @@ def run(
         ClusterUnusable: this node has not the versions that are expected.
     """
     check_here(expected)
-    alone = setting(spec, number)
-    pool = Pool(spec, alone.simulate, alone.batch(), expected)
-    yield from batches(repetition(replace(alone, simulate=pool, batch=pool.batch), log))
+    yield ()
+    alone = setting(claim.spec, claim.number)
+    pool = Pool(claim.spec, alone.simulate, alone.batch(), expected)
+    spread = replace(alone, simulate=pool, batch=pool.batch)
+    yield from batches(recorded(spread, claim.log, claim.checkpoints, checkpoint_s))
 
 
-def batches(steps: Iterator[Step]) -> Iterator[tuple[TimedStep, ...]]:
-    """The steps with the time that each took; a batch ends with an answer of reality, or when it is old enough."""
-    batch: list[TimedStep] = []
-    begun = last = perf_counter()
-    for step in steps:
-        now = perf_counter()
-        batch.append(TimedStep(step, now - last))
-        last = now
-        if isinstance(step, Measured | Probed) or now - begun >= BATCH_S:
+def batches(delivered: Iterator[Delivered]) -> Iterator[tuple[Delivered, ...]]:
+    """The same in batches; one ends with an answer of reality or a checkpoint, or when it is old enough."""
+    batch: list[Delivered] = []
+    begun = perf_counter()
+    for each in delivered:
+        batch.append(each)
+        if _waits_for_nothing(each) or perf_counter() - begun >= BATCH_S:
             yield tuple(batch)
             batch = []
-            begun = last = perf_counter()
+            begun = perf_counter()
     if batch:
         yield tuple(batch)
+
+
+def _waits_for_nothing(delivered: Delivered) -> bool:
+    return isinstance(delivered, Checkpoint) or isinstance(delivered.step, Measured | Probed)

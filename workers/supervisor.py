@@ -8,21 +8,20 @@ import os
 import socket
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
 from secrets import token_hex
 from threading import Event
 from time import monotonic
 
 import ray
-from ray import ObjectRefGenerator
-from ray.exceptions import RayError, RayTaskError
 
 from services import execution
-from services.core.errors import ClusterUnusable, StoreUnavailable
-from services.execution import Claim, TimedStep
+from services.core.errors import StoreUnavailable
+from services.execution import Claim
 from services.store.session import Store
 from workers import repetition
+from workers.checkpoints import CHECKPOINT_S
 from workers.nodes import Versions
+from workers.run import Run as Run
 from workers.sensitivity import Checks
 
 HEARTBEAT_S = 5.0
@@ -34,51 +33,10 @@ WAIT_S = 0.2
 RETRY_S = 1.0
 """How long it waits for a database that cannot be used now."""
 
+GRACE_S = 15.0
+"""How long it waits, when it is told to stop, for repetitions to deliver what they have done since the last time."""
+
 log = logging.getLogger("gaplab.supervisor")
-
-
-@dataclass(eq=False)
-class Run:
-    """A claimed repetition on its way.
-
-    Attributes:
-        claim: the right to it.
-        stream: batches of steps, as the task computes them.
-        received: steps that are not yet stored.
-        ended: the task is over; nothing more will be received.
-        failed: why its code raised.
-        lost: why its worker is gone.
-    """
-
-    claim: Claim
-    stream: ObjectRefGenerator
-    received: list[TimedStep] = field(default_factory=list)
-    ended: bool = False
-    failed: str | None = None
-    lost: str | None = None
-
-    def receive(self) -> None:
-        """Take what the stream has ready: a batch, its end, or why there will be no end."""
-        try:
-            self.received += ray.get(next(self.stream))
-        except StopIteration:
-            self.ended = True
-        except RayTaskError as error:
-            if isinstance(error.cause, ClusterUnusable):
-                raise error.cause from error
-            self.failed = f"{type(error.cause).__name__}: {error.cause}"
-        except RayError as error:
-            self.lost = f"the worker was lost: {type(error).__name__}"
-
-    @property
-    def over(self) -> bool:
-        """Whether the stream has nothing more to give."""
-        return self.ended or self.failed is not None or self.lost is not None
-
-    @property
-    def name(self) -> str:
-        """The experiment and the number, for the log."""
-        return f"{self.claim.experiment_id}/{self.claim.number}"
 
 
 class Supervisor:
@@ -88,12 +46,21 @@ class Supervisor:
         store: the database.
         capacity: how many repetitions to have at Ray at once, as things are when it is asked.
         versions: that a node must have to run them.
+        checkpoint_s: between the checkpoints of a step that takes long.
     """
 
-    def __init__(self, store: Store, capacity: Callable[[], int], versions: Versions | None = None) -> None:
+    def __init__(
+        self,
+        store: Store,
+        capacity: Callable[[], int],
+        versions: Versions | None = None,
+        *,
+        checkpoint_s: float = CHECKPOINT_S,
+    ) -> None:
         self._store = store
         self._capacity = capacity
         self._versions = versions or {}
+        self._checkpoint_s = checkpoint_s
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
         self._runs: list[Run] = []
         self._checks = Checks(store, self._owner)
@@ -106,7 +73,7 @@ class Supervisor:
         return bool(self._runs)
 
     def serve(self, stop: Event) -> None:
-        """Work until told to stop; then give the unfinished repetitions back to whoever comes next.
+        """Work until told to stop; then give the unfinished repetitions back, each after one more delivery of its own.
 
         Raises:
             ClusterUnusable: a node would compute other numbers; this ends the work as well.
@@ -118,8 +85,11 @@ class Supervisor:
                 except StoreUnavailable as error:
                     log.warning("waiting: %s", error)
                     stop.wait(RETRY_S)
+            self._wind_down()
         finally:
-            self._hand_back()
+            self._hand_back(self._runs)
+            with suppress(StoreUnavailable):  # then its lease will run out
+                self._checks.hand_back()
 
     def step(self) -> None:
         """One round: heartbeat, claim, receive, store; sensitivity checks before repetitions.
@@ -150,12 +120,15 @@ class Supervisor:
         if monotonic() - self._looked < WAIT_S:
             return
         self._looked = monotonic()
+        waiting = [run.claim for run in self._runs if not (run.begun or run.over)]
+        if given := set(execution.give_way(self._store, waiting)):
+            self._drop_all_but([run.claim for run in self._runs if run.claim not in given])
         for claim in execution.claim(self._store, self._owner, self._capacity() - len(self._runs)):
             self._runs.append(self._launch(claim))
             log.info("%s: on from step %d", self._runs[-1].name, len(claim.log))
 
     def _launch(self, claim: Claim) -> Run:
-        return Run(claim, repetition.run.remote(claim.spec, claim.number, claim.log, self._versions))
+        return Run(claim, repetition.run.remote(claim, self._versions, self._checkpoint_s))
 
     def _receive(self) -> None:
         streams = {run.stream: run for run in self._runs if not run.over}
@@ -195,19 +168,37 @@ class Supervisor:
         self._looked = -WAIT_S  # cores are free: look for work at once
 
     def _drop_all_but(self, held: list[Claim] | tuple[Claim, ...]) -> None:
-        """Stop the runs whose claim holds no more: cancelled, or taken over."""
+        """Stop the runs whose claim holds no more: cancelled, paused, stopped, given back, or taken over."""
         keys = {(claim.repetition_id, claim.epoch) for claim in held}
         for run in [each for each in self._runs if (each.claim.repetition_id, each.claim.epoch) not in keys]:
-            ray.cancel(run.stream, force=True)
+            run.cancel()
             self._runs.remove(run)
             log.info("%s: dropped, it is no longer ours", run.name)
 
-    def _hand_back(self) -> None:
-        for run in self._runs:
+    def _wind_down(self) -> None:
+        """Hand each repetition back once its step is stored, or a checkpoint of it; what waits for a core, now."""
+        until = monotonic() + GRACE_S
+        self._hand_back([run for run in self._runs if not run.begun])
+        while self._runs and monotonic() < until:
+            try:
+                self._heartbeat()
+                self._receive()
+                delivered = [run for run in self._runs if run.received]
+                self._store_received()
+                self._end()
+            except StoreUnavailable as error:
+                log.warning("waiting: %s", error)
+                Event().wait(RETRY_S)
+            else:
+                self._hand_back([run for run in delivered if run in self._runs])
+
+    def _hand_back(self, runs: list[Run]) -> None:
+        for run in list(runs):
+            run.cancel()
+            self._runs.remove(run)
             try:
                 execution.hand_back(self._store, run.claim)
             except StoreUnavailable as error:
                 log.warning("%s: its lease will run out: %s", run.name, error)
-        self._runs = []
-        with suppress(StoreUnavailable):  # then its lease will run out
-            self._checks.hand_back()
+            else:
+                log.info("%s: handed back", run.name)

@@ -1,1 +1,1 @@
-"""Parts of the Python client, each about one thing; `api.client` puts them together."""
+"""Parts of the client, each about one subject."""

@@ -1,4 +1,4 @@
-"""Submit experiments and studies, and call them off."""
+"""Submit experiments and studies."""
 
 from typing import Annotated
 
@@ -6,7 +6,7 @@ import typer
 
 from api import display
 from api.client import Client
-from api.commands.base import Id, Url, app, connect, experiments_of, print_warnings
+from api.commands.base import Url, app, connect, experiments_of, print_warnings
 from api.exits import CommandError, Exit
 from api.files import read_spec
 from api.watch import follow
@@ -27,17 +27,6 @@ def submit(
         console.print(submitted.id, markup=False)
         if watch:
             _finish(_watched(client, submitted.id))
-
-
-@app.command()
-def cancel(id: Id, url: Url = None) -> None:  # noqa: A002 - as the API says
-    """Call an experiment off, or all of a study that has not ended; what is stored stays."""
-    with connect(url) as client:
-        found = client.find(id)
-        running = [each for each in experiments_of(found) if not each.state.ended]
-        for each in running or experiments_of(found)[:1]:
-            client.cancel(each.id)
-        typer.echo(f"Cancelled {found.name}.")
 
 
 def _watched(client: Client, id: str) -> ExperimentRead | StudyRead:  # noqa: A002 - as the API says

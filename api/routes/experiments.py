@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Query, Request, Response
+from fastapi import APIRouter, Body, Path, Query, Request, Response
 from pydantic import Field
 
 from api import examples
@@ -10,7 +10,15 @@ from api.dependencies import Id, Paging, StoreDep
 from api.problems import documented
 from schemas.lifecycle import State
 from schemas.misfit import MisfitRead
-from schemas.records import ExperimentRead, MeasurementKind, Page, RepetitionRead, SampleRead, SimulatorRead
+from schemas.records import (
+    AttemptRead,
+    ExperimentRead,
+    MeasurementKind,
+    Page,
+    RepetitionRead,
+    SampleRead,
+    SimulatorRead,
+)
 from schemas.spec import ExperimentSpec
 from services import experiments
 from services.misfit import misfit
@@ -144,16 +152,15 @@ def read_misfit(id: Id, store: StoreDep) -> MisfitRead:  # noqa: A002 - the addr
     return misfit(store, id)
 
 
-@router.post(
-    "/{id}/cancel",
-    summary="Cancel an experiment",
-    responses={
-        200: examples.shown(
-            examples.EXPERIMENT.model_copy(update={"state": State.CANCELLED}), "Called off; what is stored stays"
-        ),
-        **documented(404, 409),
-    },
+@router.get(
+    "/{id}/repetitions/{number}/attempts",
+    summary="List the attempts at a repetition",
+    responses={200: examples.shown([examples.ATTEMPT], "In their order"), **documented(404, 422)},
 )
-def cancel_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
-    """Call an experiment off; what is stored stays. One that has ended cannot be."""
-    return experiments.cancel_experiment(store, id)
+def list_attempts(
+    id: Id,  # noqa: A002 - the address says {id}
+    number: Annotated[int, Path(ge=0, le=1_000_000)],
+    store: StoreDep,
+) -> tuple[AttemptRead, ...]:
+    """Who had the repetition, from when to when, how it ended, and why. One that was lost is queued again."""
+    return experiments.list_attempts(store, id, number)

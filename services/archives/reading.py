@@ -15,7 +15,7 @@ from typing import IO, Any
 from pydantic import ValidationError
 
 from schemas.archives import ImportRead, Manifest
-from schemas.lifecycle import State
+from schemas.lifecycle import Ending, State
 from schemas.spec import ExperimentSpec
 from services.archives.checking import checked
 from services.archives.opening import open_archive
@@ -26,6 +26,7 @@ from services.resolution import spec_of
 from services.store.models import SPEC_VERSION, ExperimentRow, RepetitionRow, StudyRow
 from services.store.portable import EXPERIMENT, EXPORTED, REPETITION
 from services.store.repository import archives, experiments, steps
+from services.store.repository.settling import settle
 from services.store.session import Session, Store
 
 Row = dict[str, Any]
@@ -168,6 +169,7 @@ def _store(session: Session, manifest: Manifest, tables: dict[str, Path], owners
         msg = "its rows contradict each other: one is there twice, or belongs to what is not there"
         raise InvalidArchive(msg) from error
     _check_logs(session, list(found.values()))
+    settle(session, found.values())
     return ImportRead(
         study=study,
         experiments=tuple(found.values()),
@@ -192,6 +194,8 @@ def _arriving(table: str, row: Row, arrival: Arrival, study: str | None) -> Row:
         row["study_id"] = study
     if table in {"experiment", "repetition"} and not State(row["state"]).ended:
         row |= {"state": State.CANCELLED, "ended_at": arrival.now}
+    if table == "attempt" and row.get("ended_at") is None:
+        row |= {"ending": Ending.CANCELLED, "ended_at": arrival.now}
     return row
 
 

@@ -11,6 +11,24 @@ from schemas.plugin import PluginRead
 from services.core.registry import Plugin
 from services.core.world import Motion, Trajectory, World
 
+ALL_FIELDS = frozenset(
+    {
+        "material.static_friction",
+        "material.dynamic_friction",
+        "material.restitution",
+        "body.mass_kg",
+        "body.shape",
+        "motor.position_gain",
+        "motor.max_torque_nm",
+        "motor.max_speed_rad_s",
+        "start_height_m",
+        "gravity_m_s2",
+        "time_step_s",
+        "solver_iterations",
+    }
+)
+"""What there is to honour in a World, for an engine that honours it all."""
+
 
 class Engine(Plugin):
     """A physics engine.

@@ -1,10 +1,28 @@
 """A repetition, or a sensitivity check, in the hands of one supervisor, and what it delivers."""
 
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from schemas.sensitivity import Checked
 from schemas.spec import ExperimentSpec
 from services.core.types import Step
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A part of what simulators answered in the step under way, so that it need not be simulated again.
+
+    Attributes:
+        step: the place of the step in the log.
+        part: its number within the step, from 0.
+        answers: as `services.core.recall` packs them.
+        seconds: of work that they took.
+    """
+
+    step: int
+    part: int
+    answers: bytes
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -18,6 +36,7 @@ class Claim:
         number: of the repetition within its experiment, from 0.
         spec: resolved.
         log: the steps recorded so far, from which to go on.
+        checkpoints: of the step that comes next, if it was under way before.
     """
 
     repetition_id: int
@@ -26,6 +45,7 @@ class Claim:
     number: int
     spec: ExperimentSpec = field(compare=False)
     log: tuple[Step, ...] = field(default=(), compare=False)
+    checkpoints: tuple[Checkpoint, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True)
@@ -34,6 +54,10 @@ class TimedStep:
 
     step: Step
     seconds: float
+
+
+Delivered: TypeAlias = TimedStep | Checkpoint
+"""What a worker gives, in its order."""
 
 
 @dataclass(frozen=True)

@@ -138,6 +138,19 @@ class TestEveryOptimizer:
         assert len(np.unique(found.genomes, axis=0)) == 9
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", sorted(optimizers))
+@pytest.mark.parametrize("size", [1, 2])
+def test_spaces_of_one_and_two_genes_are_searched_too(name, size):
+    space = Space.box([0.0] * size, [1.0] * size)
+
+    found = maximise(
+        optimizers[name](), space, lambda genomes, _: -((genomes - 0.3) ** 2).sum(axis=1), 400, np.random.default_rng(0)
+    )
+
+    assert found.fitness[0] > -1e-3
+
+
 def test_the_papers_evolution_adds_one_newcomer_at_a_time():
     hill = Hill()
 

@@ -64,7 +64,7 @@ def test_no_list_asks_more_often_when_it_shows_more(store):
     fill(store, 1)
     few = asked(store)
     with store.transaction() as session:
-        for table in ("simulator", "measurement", "iteration", "repetition", "experiment", "study"):
+        for table in ("attempt", "simulator", "measurement", "iteration", "repetition", "experiment", "study"):
             session.connection().exec_driver_sql(f"DELETE FROM {table}")
     fill(store, 3 * IN_A_STUDY)
 

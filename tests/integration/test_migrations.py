@@ -72,6 +72,7 @@ def test_every_constraint_has_the_name_that_the_models_give_it(store_url):
         ("repetition", "ck_repetition_state"),
         ("measurement", "ck_measurement_kind"),
         ("sensitivity", "ck_sensitivity_state"),
+        ("attempt", "ck_attempt_ending"),
     }
 
 

@@ -26,6 +26,7 @@ from tests.fakes import flat
 from tests.processes import processes_of_ray
 from workers import repetition as task
 from workers import sensitivity as checking
+from workers.checkpoints import recorded
 from workers.cluster import cluster
 from workers.supervisor import Supervisor
 
@@ -54,7 +55,7 @@ def toy(**changes):
 
 def long_toy():
     """Some seconds of work in each repetition."""
-    return toy(repetitions=2, budget={"controller_evaluations": 20_000, "selection_evaluations": 3_000}, iterations=1)
+    return toy(repetitions=2, budget={"controller_evaluations": 5_000, "selection_evaluations": 1_000}, iterations=1)
 
 
 def run(supervisor, store, experiment, until=lambda: False):
@@ -106,11 +107,11 @@ def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store):
 
 def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others_go_on(sqlite_store, monkeypatch):
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-    def raising(spec, number, log, expected):
-        if number == 1:
+    def raising(claim, expected, checkpoint_s):
+        if claim.number == 1:
             msg = "the second one is broken"
             raise ZeroDivisionError(msg)
-        yield from task.batches(repetition(setting(spec, number), log))
+        yield from task.batches(recorded(setting(claim.spec, claim.number), claim.log, ()))
 
     monkeypatch.setattr(task, "run", raising)
     experiment = experiments.submit_experiment(sqlite_store, toy()).id

@@ -104,6 +104,7 @@ class CmaEs(Optimizer):
             "popsize": self._size(space),
             "randn": Draws(),
             "seed": np.nan,
+            "CMA_mirrors": 0,  # they are remembered from one call to the next
             "tolx": CONVERGED,
             "tolfun": 0,
             "tolfunhist": 0,

@@ -12,7 +12,7 @@ from pydantic import Field
 from schemas.base import Frozen
 from services.core.errors import EngineUnavailable
 from services.core.world import Material, Motion, Trajectory, World
-from services.engines.base import Engine
+from services.engines.base import ALL_FIELDS, Engine
 from services.engines.mujoco.scene import Scene
 from services.engines.stepping import WarmScenes
 
@@ -38,22 +38,7 @@ class MuJoCo(Engine):
     install = "pip install 'gaplab[mujoco]'"
     Options = MuJoCoOptions
     options: MuJoCoOptions
-    honours = frozenset(
-        {
-            "material.static_friction",
-            "material.dynamic_friction",
-            "material.restitution",
-            "body.mass_kg",
-            "body.shape",
-            "motor.position_gain",
-            "motor.max_torque_nm",
-            "motor.max_speed_rad_s",
-            "start_height_m",
-            "gravity_m_s2",
-            "time_step_s",
-            "solver_iterations",
-        }
-    )
+    honours = ALL_FIELDS
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)

@@ -11,7 +11,7 @@ import numpy as np
 from schemas.base import Frozen
 from services.core.errors import EngineUnavailable
 from services.core.world import Material, Motion, Trajectory, World
-from services.engines.base import Engine
+from services.engines.base import ALL_FIELDS, Engine
 from services.engines.physx.scene import Scene
 from services.engines.stepping import WarmScenes, plausible, watch
 
@@ -27,22 +27,7 @@ class PhysX(Engine):
     source = "PhysX 5.3.1 through SAPIEN, https://sapien.ucsd.edu, version 3.0.3; docs/engines.md"
     library = "sapien"
     install = "pip install 'gaplab[physx]'"
-    honours = frozenset(
-        {
-            "material.static_friction",
-            "material.dynamic_friction",
-            "material.restitution",
-            "body.mass_kg",
-            "body.shape",
-            "motor.position_gain",
-            "motor.max_torque_nm",
-            "motor.max_speed_rad_s",
-            "start_height_m",
-            "gravity_m_s2",
-            "time_step_s",
-            "solver_iterations",
-        }
-    )
+    honours = ALL_FIELDS
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)

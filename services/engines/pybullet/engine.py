@@ -10,7 +10,7 @@ from schemas.base import Frozen
 from services.core.arrays import FloatArray
 from services.core.errors import EngineUnavailable
 from services.core.world import Material, Motion, Trajectory, World
-from services.engines.base import Engine
+from services.engines.base import ALL_FIELDS, Engine
 from services.engines.pybullet.scene import Scene
 from services.engines.pybullet.stick_slip import StickSlip
 from services.engines.stepping import WarmScenes, plausible, watch
@@ -27,22 +27,7 @@ class PyBullet(Engine):
     source = "https://pybullet.org, version 3.2.7"
     library = "pybullet"
     install = "pip install 'pybullet>=3.2.7' (it has wheels for Python up to 3.11)"
-    honours = frozenset(
-        {
-            "material.static_friction",
-            "material.dynamic_friction",
-            "material.restitution",
-            "body.mass_kg",
-            "body.shape",
-            "motor.position_gain",
-            "motor.max_torque_nm",
-            "motor.max_speed_rad_s",
-            "start_height_m",
-            "gravity_m_s2",
-            "time_step_s",
-            "solver_iterations",
-        }
-    )
+    honours = ALL_FIELDS
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)

@@ -1,7 +1,9 @@
 """The tables.
 
     study ──< experiment ──< repetition ──< iteration ──< measurement
-                                                     └──< simulator
+                                    │                └──< simulator
+                                    ├──< attempt
+                                    └──< checkpoint, of the step under way
     sensitivity, named after what it checks, which many experiments have in common
 
 What is plotted or filtered is a column; vectors are JSON arrays, in which floats round-trip exactly. Neither a database
@@ -11,9 +13,11 @@ The tallies in `repetition` (steps, rollouts, seconds) are kept in the transacti
 that progress is a sum over repetitions and never reads results.
 """
 
+from services.store.models.attempts import AttemptRow as AttemptRow
 from services.store.models.base import REVISION as REVISION
 from services.store.models.base import SPEC_VERSION as SPEC_VERSION
 from services.store.models.base import Base as Base
+from services.store.models.checkpoints import CheckpointRow as CheckpointRow
 from services.store.models.experiments import ExperimentRow as ExperimentRow
 from services.store.models.experiments import RepetitionRow as RepetitionRow
 from services.store.models.experiments import StudyRow as StudyRow

@@ -1,12 +1,13 @@
 """What all tables have in common."""
 
 from datetime import datetime
+from enum import StrEnum
 from typing import Any, ClassVar
 
 from sqlalchemy import JSON, Double, Enum, MetaData
 from sqlalchemy.orm import DeclarativeBase
 
-from schemas.lifecycle import State
+from schemas.lifecycle import Ending, State
 from schemas.records import MeasurementKind
 from services.store.clock import UtcDateTime
 
@@ -15,6 +16,18 @@ REVISION = "0007"
 
 SPEC_VERSION = 1
 """Of the specs that are stored now."""
+
+
+def _words(kind: type[StrEnum], name: str) -> Enum:
+    """A text that a named constraint holds to the values of an enumeration."""
+    return Enum(
+        kind,
+        native_enum=False,
+        create_constraint=True,
+        length=16,
+        name=name,
+        values_callable=lambda members: [each.value for each in members],
+    )
 
 
 class Base(DeclarativeBase):
@@ -36,12 +49,6 @@ class Base(DeclarativeBase):
         list[dict[str, Any]]: JSON(none_as_null=True),
         dict[str, Any]: JSON(none_as_null=True),
         State: Enum(State, native_enum=False, create_constraint=True, length=16, name="state"),
-        MeasurementKind: Enum(
-            MeasurementKind,
-            native_enum=False,
-            create_constraint=True,
-            length=16,
-            name="kind",
-            values_callable=lambda kinds: [each.value for each in kinds],
-        ),
+        MeasurementKind: _words(MeasurementKind, "kind"),
+        Ending: _words(Ending, "ending"),
     }

@@ -33,8 +33,13 @@ class ExperimentRow(Base):
 
     Attributes:
         position: within its study.
+        spec: what makes its results.
         iterations: of one repetition, number 0 included.
         rollouts: expected of one repetition.
+        precedence: its priority, negated: the least has its turn first, so that one index is in the order of turns.
+        max_parallel: repetitions that run at once; NULL for any number.
+        running: repetitions that somebody has claimed.
+        claimable: whether one more may be claimed now. Both are kept by `repository/settling.py`.
     """
 
     __tablename__ = "experiment"
@@ -42,6 +47,7 @@ class ExperimentRow(Base):
         Index(None, "created_at", "position", "id"),
         Index(None, "state", "created_at", "position", "id"),
         Index(None, "strategy", "created_at", "position", "id"),
+        Index("ix_experiment_turn", "claimable", "precedence", "running", "created_at", "position", "id"),
     )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
@@ -54,6 +60,10 @@ class ExperimentRow(Base):
     spec_version: Mapped[int] = mapped_column(default=SPEC_VERSION)
     iterations: Mapped[int]
     rollouts: Mapped[int] = mapped_column(BigInteger)
+    precedence: Mapped[int] = mapped_column(default=0)
+    max_parallel: Mapped[int | None]
+    running: Mapped[int] = mapped_column(default=0)
+    claimable: Mapped[bool] = mapped_column(default=True)
     created_at: Mapped[datetime]
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]
@@ -67,13 +77,18 @@ class RepetitionRow(Base):
         epoch: of the lease; every write of a holder carries it, and a write with an old one changes nothing.
         heartbeat_at: when the holder was last heard of.
         attempts: times that it was claimed.
-        losses: times that its worker was lost since a step was last recorded.
+        losses: times that its worker was lost since a step, or a part of one, was last recorded.
         steps: recorded so far; the position that the next step takes in the log.
+        checkpoints: parts of that next step that are stored.
         seconds: of work in the recorded steps.
     """
 
     __tablename__ = "repetition"
-    __table_args__ = (UniqueConstraint("experiment_id", "number"), Index(None, "state", "heartbeat_at"))
+    __table_args__ = (
+        UniqueConstraint("experiment_id", "number"),
+        Index(None, "state", "heartbeat_at"),
+        Index(None, "experiment_id", "state", "number"),
+    )
 
     id: Mapped[int] = mapped_column(primary_key=True)
     experiment_id: Mapped[str] = mapped_column(ForeignKey("experiment.id"))
@@ -86,6 +101,7 @@ class RepetitionRow(Base):
     losses: Mapped[int] = mapped_column(default=0)
     error: Mapped[str | None] = mapped_column(Text)
     steps: Mapped[int] = mapped_column(default=0)
+    checkpoints: Mapped[int] = mapped_column(default=0, server_default="0")
     iterations_done: Mapped[int] = mapped_column(default=0)
     rollouts_done: Mapped[int] = mapped_column(BigInteger, default=0)
     rollouts_failed: Mapped[int] = mapped_column(BigInteger, default=0)

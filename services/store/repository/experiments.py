@@ -1,4 +1,4 @@
-"""Experiments and studies: inserted, found, listed, cancelled."""
+"""Experiments and studies: inserted, found, listed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,18 +6,17 @@ from datetime import datetime
 from secrets import choice
 from typing import TypeVar
 
-from sqlalchemy import insert, select, tuple_, update
+from sqlalchemy import insert, select, tuple_
 from sqlalchemy.orm import Session
 
-from schemas.lifecycle import State
-from schemas.spec import ExperimentSpec
-from services.core.errors import Conflict, NotFound
+from schemas.lifecycle import OPEN, State
+from schemas.spec import ExperimentSpec, Schedule
+from services.core.errors import NotFound
 from services.store.clock import now
 from services.store.cursor import decode, encode
 from services.store.models import ExperimentRow, RepetitionRow, StudyRow
 
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
-_OPEN = (State.QUEUED, State.RUNNING)
 
 
 @dataclass(frozen=True)
@@ -64,16 +63,24 @@ def insert_experiment(
         position=position,
         name=_plain(spec.name or spec.strategy.name),
         strategy=spec.strategy.name,
-        spec=spec.model_dump(mode="json"),
+        spec=spec.model_dump(mode="json", exclude=set(Schedule.model_fields)),
         iterations=extent.iterations,
         rollouts=extent.rollouts,
+        precedence=-spec.priority,
+        max_parallel=spec.max_parallel,
         created_at=study.created_at if study else _moment(session),
     )
     session.add(experiment)
     session.flush()
-    numbers = range(spec.repetitions or 0)
-    session.execute(insert(RepetitionRow), [{"experiment_id": experiment.id, "number": each} for each in numbers])
+    insert_repetitions(session, experiment.id, range(spec.repetitions or 0))
     return experiment
+
+
+def insert_repetitions(session: Session, experiment_id: str, numbers: range) -> None:
+    """Repetitions of these numbers, QUEUED."""
+    rows = [{"experiment_id": experiment_id, "number": each} for each in numbers]
+    if rows:
+        session.execute(insert(RepetitionRow), rows)
 
 
 def get_experiment(session: Session, experiment_id: str) -> ExperimentRow:
@@ -123,7 +130,7 @@ def experiments_of(session: Session, studies: Sequence[str]) -> tuple[Experiment
 def open_studies(session: Session, studies: Sequence[str]) -> frozenset[str]:
     """Those of these studies in which an experiment has not ended."""
     row = ExperimentRow
-    found = session.scalars(select(row.study_id).where(row.study_id.in_(studies), row.state.in_(_OPEN)).distinct())
+    found = session.scalars(select(row.study_id).where(row.study_id.in_(studies), row.state.in_(OPEN)).distinct())
     return frozenset(each for each in found if each is not None)
 
 
@@ -168,27 +175,6 @@ def repetitions_of(session: Session, experiment_id: str) -> tuple[RepetitionRow,
     """The repetitions of an experiment, by number."""
     row = RepetitionRow
     return tuple(session.scalars(select(row).where(row.experiment_id == experiment_id).order_by(row.number)))
-
-
-def cancel(session: Session, experiment_id: str) -> ExperimentRow:
-    """The experiment called off: its queued repetitions never start, and its running ones cannot write any more.
-
-    Raises:
-        NotFound: no such experiment.
-        Conflict: it has ended.
-    """
-    experiment = get_experiment(session, experiment_id)
-    lock(session, [experiment_id])
-    session.refresh(experiment)
-    if experiment.state.ended:
-        msg = f"experiment {experiment_id!r} has ended: it is {experiment.state}, nothing is left to cancel"
-        raise Conflict(msg)
-    ended = {"state": State.CANCELLED, "ended_at": now()}
-    row = RepetitionRow
-    session.execute(update(row).where(row.experiment_id == experiment_id, row.state.in_(_OPEN)).values(ended))
-    session.execute(update(ExperimentRow).where(ExperimentRow.id == experiment_id).values(ended))
-    session.refresh(experiment)
-    return experiment
 
 
 def lock(session: Session, experiments: Sequence[str]) -> None:

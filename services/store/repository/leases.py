@@ -7,39 +7,31 @@ next epoch, so that a holder who wakes up late cannot write.
 from collections.abc import Sequence
 from datetime import datetime, timedelta
 
-from sqlalchemy import ColumnElement, case, func, select, tuple_, update
+from sqlalchemy import ColumnElement, case, func, select, update
 from sqlalchemy.orm import Session
 
-from schemas.lifecycle import State
+from schemas.lifecycle import Ending, State
 from schemas.spec import ExperimentSpec
 from services.core.errors import Conflict
 from services.store.clock import now
 from services.store.lease import Claim
 from services.store.models import ExperimentRow, RepetitionRow
+from services.store.repository import attempts, checkpoints
 from services.store.repository.experiments import lock
-from services.store.repository.steps import logs, mine
+from services.store.repository.settling import settle
+from services.store.repository.steps import any_of, logs, mine
+from services.store.repository.turns import next_repetitions
 
 MAX_LOSSES = 5
 """A repetition that loses its worker so often without recording a step in between is what kills them."""
 
-_OPEN = (State.QUEUED, State.RUNNING)
-
 
 def claim(session: Session, owner: str, limit: int) -> tuple[Claim, ...]:
-    """Up to `limit` queued repetitions, of the oldest experiments first; RUNNING from now on, and the owner's."""
-    experiments = _oldest_with_queued(session, limit)
-    if not experiments:
+    """Up to `limit` queued repetitions, whose turn it is; RUNNING from now on, and the owner's."""
+    ids = next_repetitions(session, limit)
+    if not ids:
         return ()
-    lock(session, experiments)
     row = RepetitionRow
-    queued = (
-        select(row.id)
-        .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
-        .where(row.experiment_id.in_(experiments), row.state == State.QUEUED)
-        .order_by(ExperimentRow.created_at, ExperimentRow.position, ExperimentRow.id, row.number)
-        .limit(limit)
-    )
-    ids = session.scalars(queued).all()
     session.execute(
         update(row)
         .where(row.id.in_(ids), row.state == State.QUEUED)
@@ -52,8 +44,10 @@ def claim(session: Session, owner: str, limit: int) -> tuple[Claim, ...]:
             started_at=func.coalesce(row.started_at, now()),
         )
     )
-    _start(session, experiments, ids)
-    return _claims(session, ids)
+    attempts.begin(session, ids)
+    claims = _claims(session, ids)
+    _start(session, sorted({each.experiment_id for each in claims}))
+    return claims
 
 
 def heartbeat(session: Session, claims: Sequence[Claim]) -> tuple[Claim, ...]:
@@ -61,7 +55,7 @@ def heartbeat(session: Session, claims: Sequence[Claim]) -> tuple[Claim, ...]:
     row = RepetitionRow
     alive = session.execute(
         update(row)
-        .where(_any_of(claims), row.state == State.RUNNING)
+        .where(any_of(claims), row.state == State.RUNNING)
         .values(heartbeat_at=now())
         .returning(row.id, row.epoch)
     )
@@ -81,13 +75,13 @@ def complete(session: Session, claims: Sequence[Claim]) -> tuple[Claim, ...]:
     row = RepetitionRow
     ended = session.execute(
         update(row)
-        .where(_any_of(claims), row.state == State.RUNNING)
+        .where(any_of(claims), row.state == State.RUNNING)
         .values(state=State.COMPLETED, error=None, ended_at=now())
         .returning(row.id)
     )
     held = set(ended.scalars())
-    for experiment in experiments:
-        _settle(session, experiment)
+    attempts.end(session, sorted(held), Ending.COMPLETED)
+    settle(session, experiments)
     return tuple(each for each in claims if each.repetition_id in held)
 
 
@@ -96,23 +90,16 @@ def fail(session: Session, claim: Claim, reason: str) -> bool:
     lock(session, [claim.experiment_id])
     row = RepetitionRow
     values = {"state": State.FAILED, "error": plain(reason), "ended_at": now()}
-    ended = session.execute(update(row).where(mine(claim)).values(values).returning(row.id)).first()
-    _settle(session, claim.experiment_id)
-    return ended is not None
+    ended = session.scalars(update(row).where(mine(claim)).values(values).returning(row.id)).all()
+    attempts.end(session, ended, Ending.FAILED, plain(reason))
+    settle(session, [claim.experiment_id])
+    return bool(ended)
 
 
 def release(session: Session, claim: Claim, reason: str) -> bool:
     """The repetition QUEUED again, for its worker was lost; False if the claim holds no more."""
     lock(session, [claim.experiment_id])
     return bool(_give_back(session, mine(claim), [claim.experiment_id], plain(reason)))
-
-
-def hand_back(session: Session, claim: Claim) -> bool:
-    """The repetition QUEUED again as if it had not been claimed; False if the claim holds no more."""
-    lock(session, [claim.experiment_id])
-    row = RepetitionRow
-    values = {"state": State.QUEUED, "owner": None, "attempts": row.attempts - 1}
-    return session.execute(update(row).where(mine(claim)).values(values).returning(row.id)).first() is not None
 
 
 def requeue_lost(session: Session, stale_after: timedelta) -> int:
@@ -127,42 +114,28 @@ def requeue_lost(session: Session, stale_after: timedelta) -> int:
     return _give_back(session, stale, experiments, f"its worker was not heard of for {stale_after.total_seconds():g} s")
 
 
-def _oldest_with_queued(session: Session, limit: int) -> Sequence[str]:
+def _start(session: Session, experiments: Sequence[str]) -> None:
+    """These experiments run, since now unless they have before."""
     row = ExperimentRow
-    queued = select(RepetitionRow.experiment_id).where(RepetitionRow.state == State.QUEUED)
-    return session.scalars(
-        select(row.id)
-        .where(row.id.in_(queued), row.state.in_(_OPEN))
-        .order_by(row.created_at, row.position, row.id)
-        .limit(limit)
-    ).all()
-
-
-def _start(session: Session, experiments: Sequence[str], repetitions: Sequence[int]) -> None:
-    """Move the experiments of these repetitions to RUNNING, unless they are."""
-    row = ExperimentRow
-    of_these = select(RepetitionRow.experiment_id).where(RepetitionRow.id.in_(repetitions))
-    session.execute(
-        update(row)
-        .where(row.id.in_(experiments), row.id.in_(of_these), row.state == State.QUEUED)
-        .values(state=State.RUNNING, started_at=now())
-    )
+    session.execute(update(row).where(row.id.in_(experiments)).values(started_at=func.coalesce(row.started_at, now())))
+    settle(session, experiments)
 
 
 def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
+    """The claims to these repetitions, in their order."""
     row = RepetitionRow
     found = session.execute(
         select(row.id, row.epoch, row.experiment_id, row.number, ExperimentRow.spec)
         .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
         .where(row.id.in_(ids))
-        .order_by(ExperimentRow.created_at, ExperimentRow.position, ExperimentRow.id, row.number)
     ).all()
     specs = {experiment: ExperimentSpec.model_validate(spec) for _, _, experiment, _, spec in found}
-    past = logs(session, ids)
-    return tuple(
-        Claim(repetition, epoch, experiment, number, specs[experiment], past[repetition])
+    past, begun = logs(session, ids), checkpoints.stored(session, ids)
+    claims = {
+        repetition: Claim(repetition, epoch, experiment, number, specs[experiment], past[repetition], begun[repetition])
         for repetition, epoch, experiment, number, _ in found
-    )
+    }
+    return tuple(claims[each] for each in ids)
 
 
 def _give_back(session: Session, which: ColumnElement[bool], experiments: Sequence[str], reason: str) -> int:
@@ -170,7 +143,7 @@ def _give_back(session: Session, which: ColumnElement[bool], experiments: Sequen
     row = RepetitionRow
     hopeless = row.losses + 1 >= MAX_LOSSES
     failed = f"lost {MAX_LOSSES} times without a step in between; the last time {reason}"
-    moved = session.execute(
+    moved = session.scalars(
         update(row)
         .where(which)
         .values(
@@ -182,14 +155,9 @@ def _give_back(session: Session, which: ColumnElement[bool], experiments: Sequen
         )
         .returning(row.id)
     ).all()
-    for experiment in experiments:
-        _settle(session, experiment)
+    attempts.end(session, moved, Ending.LOST, reason)
+    settle(session, experiments)
     return len(moved)
-
-
-def _any_of(claims: Sequence[Claim]) -> ColumnElement[bool]:
-    row = RepetitionRow
-    return tuple_(row.id, row.epoch).in_([(each.repetition_id, each.epoch) for each in claims])
 
 
 def _refuse_unfinished(session: Session, claims: Sequence[Claim]) -> None:
@@ -197,7 +165,7 @@ def _refuse_unfinished(session: Session, claims: Sequence[Claim]) -> None:
     unfinished = session.execute(
         select(row.number, row.experiment_id, ExperimentRow.iterations - row.iterations_done)
         .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
-        .where(_any_of(claims), row.state == State.RUNNING, ExperimentRow.iterations != row.iterations_done)
+        .where(any_of(claims), row.state == State.RUNNING, ExperimentRow.iterations != row.iterations_done)
     ).first()
     if unfinished is not None:
         number, experiment, missing = unfinished
@@ -208,17 +176,3 @@ def _refuse_unfinished(session: Session, claims: Sequence[Claim]) -> None:
 def plain(reason: str) -> str:
     """The reason in characters that any database stores, whatever the message of an exception had."""
     return reason.encode(errors="replace").decode().replace("\0", "?")
-
-
-def _settle(session: Session, experiment: str) -> None:
-    """End the experiment when its last repetition has ended; it is locked."""
-    row = RepetitionRow
-    states = set(session.scalars(select(row.state).where(row.experiment_id == experiment).distinct()))
-    if states & set(_OPEN):
-        return
-    state = State.COMPLETED if State.COMPLETED in states else State.FAILED
-    session.execute(
-        update(ExperimentRow)
-        .where(ExperimentRow.id == experiment, ExperimentRow.state == State.RUNNING)
-        .values(state=state, ended_at=now())
-    )

@@ -75,11 +75,18 @@ def read_repetition(row: RepetitionRow) -> RepetitionRead:
 
 
 def state_of(states: Collection[State]) -> State:
-    """The state of experiments taken together: once all have ended, COMPLETED if one is, else FAILED if one is."""
-    if all(each.ended for each in states):
+    """The state of experiments taken together: once all have ended, COMPLETED if one is, else FAILED if one is.
+
+    Before, the state of those that have not, if they have one in common; else RUNNING, for some may go on.
+    """
+    left = {each for each in states if not each.ended}
+    if not left:
         ends = (State.COMPLETED, State.FAILED, State.CANCELLED)
         return next((end for end in ends if end in states), State.COMPLETED)
-    return State.QUEUED if all(each is State.QUEUED for each in states) else State.RUNNING
+    (first, *others) = left
+    if others or (first is State.QUEUED and left != set(states)):
+        return State.RUNNING
+    return first
 
 
 def _experiment(
@@ -92,6 +99,8 @@ def _experiment(
         strategy=row.strategy,
         state=row.state,
         spec=without_truth(row.spec) if secret else row.spec,
+        priority=-row.precedence,
+        max_parallel=row.max_parallel,
         progress=tally.progress(),
         reasons=failed,
         sensitivity=warned.check,

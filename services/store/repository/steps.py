@@ -12,8 +12,9 @@ from services.core.errors import Conflict
 from services.core.types import Probed, Step
 from services.store import mapping
 from services.store.clock import now
-from services.store.lease import Claim, TimedStep
+from services.store.lease import Checkpoint, Claim, Delivered, TimedStep
 from services.store.models import IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
+from services.store.repository import checkpoints
 from services.store.repository.batch import Batch
 
 _REPETITION = cast("Table", RepetitionRow.__table__)
@@ -28,6 +29,7 @@ _ADVANCE = (
     )
     .values(
         steps=bindparam("to_steps"),
+        checkpoints=0,
         losses=0,
         heartbeat_at=now(),
         iterations_done=_REPETITION.c.iterations_done + bindparam("more_iterations"),
@@ -48,18 +50,24 @@ def mine(claim: Claim) -> ColumnElement[bool]:
     return and_(row.id == claim.repetition_id, row.epoch == claim.epoch, row.state == State.RUNNING)
 
 
-def record(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]) -> tuple[Claim, ...]:
+def any_of(claims: Sequence[Claim]) -> ColumnElement[bool]:
+    """That a lease is one of these claims'; with `state = RUNNING`, that it still holds."""
+    row = RepetitionRow
+    return tuple_(row.id, row.epoch).in_([(each.repetition_id, each.epoch) for each in claims])
+
+
+def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -> tuple[Claim, ...]:
     """Append the steps to the logs of their repetitions; the claims that still hold, which alone were written.
 
     The row of a repetition is guard and counter at once: it moves on if the claim holds and its next step is the first
-    that is new, and whoever does not move it writes nothing.
+    that is new, and whoever does not move it writes nothing. Checkpoints are kept until their step is appended.
 
     Raises:
         Conflict: steps before a delivered one are missing.
     """
     lengths = _lengths(session, deliveries)
-    fresh = {claim: _new(claim, lengths[claim], steps) for claim, steps in deliveries.items() if claim in lengths}
-    moving = [_move(claim, lengths[claim], steps) for claim, steps in fresh.items() if steps]
+    fresh = {claim: _new(claim, lengths[claim][0], each) for claim, each in deliveries.items() if claim in lengths}
+    moving = [_move(claim, lengths[claim][0], steps) for claim, steps in fresh.items() if steps]
     if moving and session.connection().execute(_ADVANCE, moving).rowcount != len(moving):
         msg = "a log moved on although it was locked"
         raise Conflict(msg)
@@ -68,6 +76,10 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]) ->
         for each in steps:
             batch.add(claim, each)
     batch.write(session)
+    checkpoints.forget(session, [claim.repetition_id for claim, steps in fresh.items() if steps and lengths[claim][1]])
+    checkpoints.write(
+        session, {claim: _parts(deliveries[claim], *lengths[claim], len(fresh[claim])) for claim in fresh}
+    )
     return tuple(fresh)
 
 
@@ -85,23 +97,25 @@ def is_whole(session: Session, repetition: RepetitionRow) -> bool:
     return [mapping.position(each) for each in log] == list(range(repetition.steps))
 
 
-def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, int]:
-    """How many steps the log of each claim that holds has; nobody else moves them on until the transaction ends."""
+def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, tuple[int, int]]:
+    """How many steps the log of each claim that holds has, and checkpoints of the next; locked for the transaction."""
     by_key = {(each.repetition_id, each.epoch): each for each in claims}
     row = RepetitionRow
     found = session.execute(
-        select(row.id, row.epoch, row.steps)
+        select(row.id, row.epoch, row.steps, row.checkpoints)
         .where(tuple_(row.id, row.epoch).in_(list(by_key)), row.state == State.RUNNING)
         .order_by(row.id)
         .with_for_update()
     )
-    return {by_key[repetition, epoch]: steps for repetition, epoch, steps in found}
+    return {by_key[repetition, epoch]: (steps, parts) for repetition, epoch, steps, parts in found}
 
 
-def _new(claim: Claim, length: int, steps: Iterable[TimedStep]) -> list[TimedStep]:
+def _new(claim: Claim, length: int, delivered: Iterable[Delivered]) -> list[TimedStep]:
     """The steps that the log does not have yet: those after its first `length`."""
     found: list[TimedStep] = []
-    for each in steps:
+    for each in delivered:
+        if isinstance(each, Checkpoint):
+            continue
         place, following = mapping.position(each.step), length + len(found)
         if place > following:
             msg = f"step {place} of repetition {claim.number} cannot be recorded: the log has {following} steps"
@@ -109,6 +123,12 @@ def _new(claim: Claim, length: int, steps: Iterable[TimedStep]) -> list[TimedSte
         if place == following:
             found.append(each)
     return found
+
+
+def _parts(delivered: Iterable[Delivered], length: int, parts: int, new: int) -> list[Checkpoint]:
+    """The delivered checkpoints of the step that is under way once the log has its new steps."""
+    found = [each for each in delivered if isinstance(each, Checkpoint)]
+    return checkpoints.fresh(found, length + new, 0 if new else parts)
 
 
 def _move(claim: Claim, length: int, steps: Sequence[TimedStep]) -> dict[str, Any]:

@@ -1,0 +1,46 @@
+"""Rollouts that a whole study at desk budgets is spared, none of which could have changed a number."""
+
+from benchmarks.measure import Row
+from schemas.spec import ExperimentSpec
+from services.core.loop import repetition
+from services.core.strategies import strategies
+from services.core.types import Cost, Selected, Transferred, Tuned
+from services.resolution import resolve_experiment
+from services.simulation import setting
+
+REPETITIONS = 3
+
+
+def costs() -> list[tuple[type, Cost]]:
+    """The kind and the cost of every step of six strategies on the toy function."""
+    specs = [
+        resolve_experiment(ExperimentSpec.model_validate({"strategy": name, "robot": "toy_function", "budget": "desk"}))
+        for name, each in strategies.items()
+        if not each.in_reality
+    ]
+    return [
+        (type(step), step.cost)
+        for spec in specs
+        for number in range(REPETITIONS)
+        for step in repetition(setting(spec, number))
+        if isinstance(step, Selected | Tuned | Transferred)
+    ]
+
+
+def rows() -> list[Row]:
+    """How many times as many rollouts there would have been, in tuning and in all."""
+    found = costs()
+    return [
+        _row("rollouts of tuning, toy at desk budgets", [cost for kind, cost in found if kind is Tuned], "aim 2"),
+        _row("rollouts of all phases", [cost for _, cost in found], "aim 1.4"),
+    ]
+
+
+def _row(figure: str, found: list[Cost], target: str) -> Row:
+    done, saved = sum(each.rollouts for each in found), sum(each.saved for each in found)
+    return Row(figure, f"{done:,} simulated, {saved:,} saved", (done + saved) / done, "without saving", target)
+
+
+if __name__ == "__main__":
+    for row in rows():
+        print(row.figure, row.value, row.ratio)

@@ -1,0 +1,90 @@
+"""What people ask of experiments and studies: pause, resume, stop, cancel, extend, another turn.
+
+`schemas.lifecycle` says what each means and when it is permitted. Each function is one transaction, and raises
+StoreUnavailable while the database cannot be used.
+"""
+
+from collections.abc import Iterator
+
+from schemas.lifecycle import Verb
+from schemas.records import ExperimentRead, StudyRead
+from schemas.schedule import ExtensionSpec, ScheduleChange
+from schemas.spec import ExperimentSpec
+from services.core.errors import InvalidSpec, Violation
+from services.experiments import extent_of
+from services.resolution import is_direct
+from services.store.repository import reads, verbs
+from services.store.repository.experiments import Extent
+from services.store.session import Store
+
+
+def ask_experiment(store: Store, experiment_id: str, verb: Verb) -> ExperimentRead:
+    """Pause, resume, stop or cancel an experiment; as it is from now on.
+
+    Raises:
+        NotFound: no such experiment.
+        Conflict: its state does not permit the verb.
+    """
+    return store.write(lambda session: reads.read_experiments(session, [verbs.ask(session, experiment_id, verb)])[0])
+
+
+def ask_study(store: Store, study_id: str, verb: Verb) -> StudyRead:
+    """Pause, resume, stop or cancel all experiments of a study that permit it.
+
+    Raises:
+        NotFound: no such study.
+        Conflict: none of its experiments permits it.
+    """
+    return store.write(lambda session: reads.read_studies(session, [verbs.ask_study(session, study_id, verb)])[0])
+
+
+def extend_experiment(store: Store, experiment_id: str, extension: ExtensionSpec) -> ExperimentRead:
+    """Make a COMPLETED experiment as large as one that was submitted with these totals; what is there stands.
+
+    With the totals that it has, one that was stopped is brought to its end.
+
+    Raises:
+        NotFound: no such experiment.
+        Conflict: it is not COMPLETED, or it is as large already.
+        InvalidSpec: less than there is, or iterations for the direct baseline.
+    """
+    return store.write(
+        lambda session: reads.read_experiments(
+            session, [verbs.extend(session, experiment_id, lambda spec: _larger(spec, extension))]
+        )[0]
+    )
+
+
+def schedule_experiment(store: Store, experiment_id: str, change: ScheduleChange) -> ExperimentRead:
+    """Give an experiment another priority, or another number of repetitions that run at once; only what is named.
+
+    Raises:
+        NotFound: no such experiment.
+    """
+    changes = change.model_dump(exclude_unset=True)
+    return store.write(
+        lambda session: reads.read_experiments(session, [verbs.schedule(session, experiment_id, changes)])[0]
+    )
+
+
+def _larger(spec: ExperimentSpec, extension: ExtensionSpec) -> tuple[ExperimentSpec, Extent]:
+    if violations := list(_violations(spec, extension)):
+        raise InvalidSpec(violations)
+    larger = spec.model_copy(update=extension.model_dump(exclude_none=True))
+    return larger, extent_of(larger)
+
+
+def _violations(spec: ExperimentSpec, extension: ExtensionSpec) -> Iterator[Violation]:
+    wanted = extension.model_dump(exclude_none=True)
+    if not wanted:
+        yield Violation(
+            "", {}, "name the total of iterations, of repetitions, or of both", ["iterations", "repetitions"]
+        )
+    if extension.iterations is not None and is_direct(spec):
+        message = "the direct baseline has no iterations: it evolves in reality itself; extend its repetitions"
+        yield Violation("/iterations", extension.iterations, message)
+    for name, total in wanted.items():
+        there = getattr(spec, name)
+        if total < there:
+            message = f"it has {there} {name} already, and {total} is a total, not what is added"
+            yield Violation(f"/{name}", total, message, f"at least {there}")

@@ -1,0 +1,29 @@
+"""Who had a repetition, and what became of it."""
+
+from datetime import datetime
+
+from sqlalchemy import ForeignKey, String, Text
+from sqlalchemy.orm import Mapped, mapped_column
+
+from schemas.lifecycle import Ending
+from services.store.models.base import Base
+
+
+class AttemptRow(Base):
+    """One lease of a repetition. The one that has not ended is the one that holds; there is at most one.
+
+    Attributes:
+        epoch: of the lease, which numbers the attempts of a repetition from 1.
+        ended_at, ending: NULL while it holds.
+        reason: why it failed or was lost.
+    """
+
+    __tablename__ = "attempt"
+
+    repetition_id: Mapped[int] = mapped_column(ForeignKey("repetition.id"), primary_key=True)
+    epoch: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    owner: Mapped[str] = mapped_column(String(200))
+    started_at: Mapped[datetime]
+    ended_at: Mapped[datetime | None]
+    ending: Mapped[Ending | None]
+    reason: Mapped[str | None] = mapped_column(Text)

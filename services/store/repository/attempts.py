@@ -1,0 +1,53 @@
+"""Attempts: a row for each lease of a repetition, written in the transaction that moves the lease."""
+
+from collections.abc import Sequence
+
+from sqlalchemy import insert, select, update
+from sqlalchemy.orm import Session
+
+from schemas.lifecycle import Ending
+from schemas.records import AttemptRead
+from services.core.errors import NotFound
+from services.store.clock import now
+from services.store.models import AttemptRow, RepetitionRow
+
+
+def begin(session: Session, repetitions: Sequence[int]) -> None:
+    """These repetitions were claimed: their owner's attempt begins."""
+    row = RepetitionRow
+    claimed = select(row.id, row.epoch, row.owner, now()).where(row.id.in_(repetitions))
+    session.execute(insert(AttemptRow).from_select(["repetition_id", "epoch", "owner", "started_at"], claimed))
+
+
+def end(session: Session, repetitions: Sequence[int], ending: Ending, reason: str | None = None) -> None:
+    """The attempts at these repetitions that go on are over."""
+    row = AttemptRow
+    session.execute(
+        update(row)
+        .where(row.repetition_id.in_(repetitions), row.ended_at.is_(None))
+        .values(ended_at=now(), ending=ending, reason=reason)
+    )
+
+
+def attempts_of(session: Session, experiment: str, number: int) -> tuple[AttemptRead, ...]:
+    """The attempts at a repetition of an experiment, by number.
+
+    Raises:
+        NotFound: the experiment has no such repetition.
+    """
+    repetition = select(RepetitionRow.id).filter_by(experiment_id=experiment, number=number)
+    if (id_ := session.scalar(repetition)) is None:
+        msg = f"experiment {experiment!r} has no repetition {number}"
+        raise NotFound(msg)
+    row = AttemptRow
+    return tuple(
+        AttemptRead(
+            number=each.epoch,
+            owner=each.owner,
+            started_at=each.started_at,
+            ended_at=each.ended_at,
+            ending=each.ending,
+            reason=each.reason,
+        )
+        for each in session.scalars(select(row).where(row.repetition_id == id_).order_by(row.epoch))
+    )

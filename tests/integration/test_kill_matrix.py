@@ -1,0 +1,26 @@
+"""Killed at any named point, the next process ends with the results of one that was never killed."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize("database", ["SQLite", "Postgres"])
+def test_no_kill_leaves_a_trace_in_the_results(database, postgres, folder):
+    command = [sys.executable, "-W", "error", "-m", "benchmarks.kill_matrix", "--kills", "1", "--only", database]
+
+    done = subprocess.run(
+        [*command, "--postgres", postgres.url("postgres"), "--folder", str(folder)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+    print(done.stdout)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "22 of 22" in done.stdout

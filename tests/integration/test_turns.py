@@ -1,0 +1,117 @@
+"""Whose turn it is, on both databases: priority, then fairness, then age; and who gives way."""
+
+from sqlalchemy import text
+
+from schemas.schedule import ScheduleChange
+from services import execution, experiments, life_cycle
+from services.store.repository import turns
+from tests.experiments import run, toy
+
+
+def submitted(store, **changes):
+    return experiments.submit_experiment(store, toy(**changes)).id
+
+
+def claimed(store, limit):
+    """Experiment and number of each, in the order in which they are given out."""
+    return [(each.experiment_id, each.number) for each in execution.claim(store, "me", limit)]
+
+
+def test_experiments_take_turns_and_their_repetitions_come_in_order(store):
+    first, second = submitted(store), submitted(store, repetitions=2)
+
+    found = [*claimed(store, 3), *claimed(store, 9)]
+
+    assert found == [(first, 0), (second, 0), (first, 1), (second, 1), (first, 2)]
+    assert claimed(store, 9) == []
+
+
+def test_who_has_the_fewest_running_is_next(store):
+    large = submitted(store, repetitions=9)
+    claims = execution.claim(store, "me", 4)
+    small = submitted(store, repetitions=2)
+
+    at_once = claimed(store, 3)
+    for each in claims:
+        run(store, each)
+    later = claimed(store, 1)
+
+    assert at_once == [(small, 0), (small, 1), (large, 4)]
+    assert later == [(large, 5)]
+
+
+def test_the_higher_priority_comes_first_whatever_runs(store):
+    usual, urgent, idle = (submitted(store, priority=each) for each in (0, 10, -10))
+
+    found = claimed(store, 9)
+
+    assert found == [(each, number) for each in (urgent, usual, idle) for number in range(3)]
+
+
+def test_no_more_than_max_parallel_run_at_once(store):
+    narrow = submitted(store, max_parallel=2, repetitions=4)
+    claims = execution.claim(store, "me", 9)
+    wide = submitted(store, repetitions=1)
+
+    meanwhile = claimed(store, 9)
+    run(store, claims[0])
+
+    assert [each.number for each in claims] == [0, 1]
+    assert meanwhile == [(wide, 0)]
+    assert claimed(store, 9) == [(narrow, 2)]
+
+
+def test_the_schedule_can_be_changed_and_is_shown_and_the_spec_is_as_it_was(store):
+    first, second = submitted(store, max_parallel=1), submitted(store)
+    spec = experiments.read_experiment(store, second).spec
+
+    changed = life_cycle.schedule_experiment(store, second, ScheduleChange(priority=3))
+    free = life_cycle.schedule_experiment(store, first, ScheduleChange(max_parallel=None))
+
+    assert (changed.priority, changed.max_parallel, changed.spec) == (3, None, spec)
+    assert (free.priority, free.max_parallel) == (0, None)
+    assert claimed(store, 5) == [*((second, n) for n in range(3)), (first, 0), (first, 1)]
+
+
+def test_two_experiments_that_differ_only_in_their_schedule_have_one_spec(store):
+    plain, hurried = submitted(store), submitted(store, priority=9, max_parallel=2)
+
+    assert experiments.read_experiment(store, plain).spec == experiments.read_experiment(store, hurried).spec
+
+
+def test_what_waits_for_a_core_gives_way_to_who_has_less(store):
+    large = submitted(store, repetitions=9)
+    running, *waiting = execution.claim(store, "me", 4)
+    assert execution.give_way(store, waiting) == ()
+    small = submitted(store, repetitions=1)
+
+    given = execution.give_way(store, waiting)
+
+    assert given == tuple(waiting)
+    assert not execution.complete(store, waiting[0])
+    assert execution.heartbeat(store, [running]) == (running,)
+    assert claimed(store, 3) == [(small, 0), (large, 1), (large, 2)]
+    assert [each.attempts for each in experiments.list_repetitions(store, large)][:4] == [1, 1, 1, 0]
+
+
+def test_nobody_gives_way_for_what_would_be_no_fairer(store):
+    submitted(store, repetitions=9)
+    submitted(store, repetitions=9)
+    waiting = execution.claim(store, "me", 3)
+
+    assert execution.give_way(store, waiting) == ()
+
+
+def test_the_next_turn_is_found_by_an_index(store):
+    submitted(store)
+    with store.reading() as session:
+        dialect = session.connection().dialect.name
+        if dialect == "postgresql":
+            session.execute(text("SET LOCAL enable_seqscan = off"))
+        query = turns.next_experiments(5).compile(session.connection(), compile_kwargs={"literal_binds": True})
+        plan = session.execute(text(f"EXPLAIN {'QUERY PLAN ' if dialect == 'sqlite' else ''}{query}")).all()
+
+    said = " ".join(str(each) for each in plan)
+    assert "ix_experiment_turn" in said
+    assert "TEMP B-TREE" not in said
+    assert "Sort" not in said
