@@ -127,12 +127,12 @@ def _checked_spec(row: Row) -> Row:
     if left_out or unknown or spec.reality.engine is None or spec.strategy.name != row["strategy"]:
         msg = f"{place} is not resolved, or names what is not installed here: {', '.join([*left_out, *unknown])[:200]}"
         raise InvalidArchive(msg)
-    return _whole(spec, truth)
+    return _whole(spec, truth, row["spec"])
 
 
-def _whole(spec: ExperimentSpec, truth: Row) -> Row:
-    """As it is stored; what is not known of its reality is null."""
-    stored = spec.model_dump(mode="json")
+def _whole(spec: ExperimentSpec, truth: Row, given: Row) -> Row:
+    """As it is stored, with what was given and no more; what is not known of its reality is null."""
+    stored = {name: value for name, value in spec.model_dump(mode="json").items() if name in given}
     return stored | {"reality": stored["reality"] | {"parameters": truth | stored["reality"]["parameters"]}}
 
 
