@@ -15,11 +15,12 @@ serve: .venv/installed  ## the service on http://127.0.0.1:8000, with its worker
 test: .venv/installed-dev  ## all tests, on SQLite and on a real Postgres
 	$(BIN)/python -m pytest
 
-lint: .venv/installed-dev  ## style, types and the arrows between the layers
+lint: .venv/installed-dev  ## style, types, dependencies and the arrows between the layers
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	$(BIN)/python -m pytest tests/unit/test_architecture.py
+	$(BIN)/python -m pip check --disable-pip-version-check
+	$(BIN)/python -m pytest tests/unit/test_architecture.py tests/unit/test_dependencies.py
 
 bench: .venv/installed-dev  ## the table of speeds, as ratios within one run
 	$(BIN)/python -m benchmarks

@@ -4,6 +4,7 @@ import sys
 
 from api.exits import CommandError
 from api.server import listen, serve_api
+from services import logs
 from services.core.errors import GaplabError
 from services.settings import Settings
 
@@ -12,6 +13,7 @@ def main() -> None:
     """Serve by the settings of the environment."""
     try:
         settings = Settings.from_environment()
+        logs.configure()
         serve_api(settings, listen(settings.host, settings.port))
     except (CommandError, GaplabError, ValueError) as error:
         sys.exit(f"gaplab: {error}")

@@ -5,8 +5,26 @@ from importlib.metadata import version
 from fastapi import FastAPI
 
 from api import documentation, problems
-from api.limits import BodyLimit
-from api.routes import archives, catalogue, curves, experiments, figures, health, life_cycle, sensitivity, studies
+from api.access import Access
+from api.feed import Feed
+from api.limits import BodyLimit, Streams
+from api.metrics import Measured, Metrics
+from api.pages import Headers
+from api.routes import (
+    archives,
+    catalogue,
+    curves,
+    events,
+    experiments,
+    figures,
+    health,
+    life_cycle,
+    metrics,
+    provenance,
+    sensitivity,
+    studies,
+)
+from services.settings import Limits, Settings
 from services.store.session import Store
 
 DESCRIPTION = """
@@ -22,6 +40,7 @@ TAGS = [
     {"name": "studies", "description": "experiments that belong together to be compared"},
     {"name": "experiments", "description": "one strategy under one setting, repeated"},
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
+    {"name": "events", "description": "what happens to experiments, as it happens"},
     {"name": "archives", "description": "everything of an experiment or a study as one file, and back"},
     {"name": "sensitivity", "description": "what tunables do to fitness, checked before anything is tuned"},
     {"name": "catalogue", "description": "the plug-ins that a spec may name"},
@@ -29,10 +48,15 @@ TAGS = [
 ]
 
 
-def create_app(store: Store) -> FastAPI:
+def create_app(store: Store, settings: Settings | None = None, limits: Limits | None = None) -> FastAPI:
     """The application over a database, which it neither migrates nor closes.
 
     It never touches Ray: it inserts what is asked for and reads what there is.
+
+    Args:
+        store: the database.
+        settings: of the process that serves; left out where the app is asked within this process.
+        limits: left out: as they are by default.
     """
     app = FastAPI(
         title="gaplab",
@@ -45,9 +69,29 @@ def create_app(store: Store) -> FastAPI:
         license_info={"name": "MIT", "identifier": "MIT"},
     )
     app.state.store = store
-    app.add_middleware(BodyLimit)
+    app.state.feed = Feed(store)
+    app.state.metrics = Metrics(store, app.state.feed)
+    limits = limits or Limits()
+    app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
+    app.add_middleware(BodyLimit, most_bytes=limits.body_bytes)
+    app.add_middleware(Access, settings=settings)
+    app.add_middleware(Headers)
+    app.add_middleware(Measured, metrics=app.state.metrics)
     problems.install(app)
-    for module in (studies, experiments, life_cycle, curves, figures, archives, sensitivity, catalogue, health):
+    for module in (
+        studies,
+        experiments,
+        life_cycle,
+        provenance,
+        events,
+        curves,
+        figures,
+        archives,
+        sensitivity,
+        catalogue,
+        health,
+        metrics,
+    ):
         app.include_router(module.router)
     documentation.install(app)
     return app

@@ -6,12 +6,12 @@ import typer
 
 from api import display
 from api.client import ServiceError, ServiceUnreachable
-from api.commands import keeping, life_cycle, reading, service, submitting
+from api.commands import editing, history, keeping, life_cycle, reading, service, submitting, tokens
 from api.commands.base import app
 from api.exits import CommandError, Exit, code_of
 from services.core.errors import GaplabError
 
-__all__ = ["app", "keeping", "life_cycle", "main", "reading", "service", "submitting"]
+__all__ = ["app", "editing", "history", "keeping", "life_cycle", "main", "reading", "service", "submitting", "tokens"]
 
 
 def main() -> None:

@@ -9,24 +9,25 @@ with Client("http://127.0.0.1:8000") as gaplab:
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from types import TracebackType
-from typing import Any, Literal, Self, TypeVar
+from typing import Any, Literal
 
 import httpx2
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import BaseModel
 
 from api.clients.archives import Archives
+from api.clients.connection import Connection
+from api.clients.errors import ServiceError as ServiceError
+from api.clients.errors import ServiceUnreachable as ServiceUnreachable
+from api.clients.errors import is_for_good
+from api.clients.history import History
 from api.clients.life_cycle import LifeCycle, part
 from schemas.curves import Comparison, Curve
+from schemas.editing import Edit
 from schemas.misfit import MisfitRead
 from schemas.plugin import Catalogue
-from schemas.problems import Problem
 from schemas.records import ExperimentRead, Page, RepetitionRead, StudyRead
 from schemas.sensitivity import SensitivityRead, SensitivitySpec
 from schemas.spec import ExperimentSpec, StudySpec
-
-T = TypeVar("T")
 
 Spec = ExperimentSpec | StudySpec | Mapping[str, Any]
 FigureFormat = Literal["html", "svg"]
@@ -34,68 +35,25 @@ FigureFormat = Literal["html", "svg"]
 NOT_CHECKED = {"name", "strategy", "strategies", "direct_repetitions", "priority", "max_parallel"}
 """What a spec has beside the settings that a sensitivity check takes."""
 
-LOOPBACK = {"127.0.0.1", "localhost", "::1"}
-"""This machine: no proxy of the environment leads to it."""
 
-
-class ServiceError(Exception):
-    """The service refused or failed; `problem` is its answer, and the message is the problem's detail."""
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-        super().__init__(problem.detail)
-
-
-class ServiceUnreachable(Exception):
-    """Nothing answers at the service's address."""
-
-
-class Client(Archives, LifeCycle):
+class Client(LifeCycle, History, Archives, Connection):
     """A connection to a service.
 
     Args:
         url: of the service.
+        token: to show; left out: GAPLAB_TOKEN, or none.
         timeout_s: for which an answer is waited.
         transport: instead of the network, for tests.
 
     Every method raises ServiceError with the service's problem, or ServiceUnreachable.
     """
 
-    def __init__(self, url: str, *, timeout_s: float = 60.0, transport: httpx2.BaseTransport | None = None) -> None:
-        self.url = url
-        try:
-            here = httpx2.URL(url).host in LOOPBACK
-            self._http = httpx2.Client(base_url=url, timeout=timeout_s, transport=transport, trust_env=not here)
-        except httpx2.InvalidURL as error:
-            msg = f"{url!r} is no address of a service: {error}"
-            raise ServiceUnreachable(msg) from error
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._http.close()
-
-    def ready(self) -> bool:
-        """Whether the service answers and its database can be used."""
-        try:
-            self._get("/readyz")
-        except (ServiceError, ServiceUnreachable):
-            return False
-        return True
-
     def submit(self, spec: Spec) -> ExperimentRead | StudyRead:
         """Queue an experiment if the spec names a `strategy`, else a study; it is checked by the service."""
         body = _body(spec)
         if "strategy" in body and "strategies" not in body:
-            return self._read(ExperimentRead, self._request("POST", "/experiments", json=body))
-        return self._read(StudyRead, self._request("POST", "/studies", json=body))
+            return self._read(ExperimentRead, self._create("/experiments", body))
+        return self._read(StudyRead, self._create("/studies", body))
 
     def experiment(self, id: str) -> ExperimentRead:  # noqa: A002 - as the API says
         """An experiment."""
@@ -115,12 +73,23 @@ class Client(Archives, LifeCycle):
         return self.experiment(id)
 
     def experiments(self, **filters: str | int | None) -> Page[ExperimentRead]:
-        """Experiments, the newest first; filters as in the API: limit, cursor, study, state, strategy."""
+        """Experiments, the newest first; filters as in the API: limit, cursor, study, state, strategy, text, sort."""
         return self._read(Page[ExperimentRead], self._get("/experiments", **filters))
 
-    def studies(self, *, limit: int = 50, cursor: str | None = None) -> Page[StudyRead]:
-        """Studies, the newest first."""
-        return self._read(Page[StudyRead], self._get("/studies", limit=limit, cursor=cursor))
+    def studies(self, **filters: str | int | None) -> Page[StudyRead]:
+        """Studies, the newest first; filters as in the API: limit, cursor, state, strategy, text, sort."""
+        return self._read(Page[StudyRead], self._get("/studies", **filters))
+
+    def edit(self, id: str, edit: Edit) -> ExperimentRead | StudyRead:  # noqa: A002 - as the API says
+        """A study or an experiment with a new name or notes, whatever they were before."""
+        found = self.find(id)
+        kind, noun = (StudyRead, "studies") if isinstance(found, StudyRead) else (ExperimentRead, "experiments")
+        body, headers = edit.model_dump(exclude_unset=True), {"If-Match": "*"}
+        return self._read(kind, self._request("PATCH", f"/{noun}/{part(id)}", json=body, headers=headers))
+
+    def reveal(self, id: str) -> ExperimentRead:  # noqa: A002 - as the API says
+        """An experiment with reality's parameters, ended or not; wants an admin's token."""
+        return self._read(ExperimentRead, self._get(f"/experiments/{part(id)}", reveal="true"))
 
     def repetitions(self, id: str) -> tuple[RepetitionRead, ...]:  # noqa: A002 - as the API says
         """The repetitions of an experiment."""
@@ -133,7 +102,7 @@ class Client(Archives, LifeCycle):
     def check(self, spec: Spec | SensitivitySpec, *, every_s: float = 0.5) -> SensitivityRead:
         """What the tunables of a spec do to fitness: queued if that is not known yet, and waited for."""
         body = {name: value for name, value in _body(spec).items() if name not in NOT_CHECKED}
-        check = self._read(SensitivityRead, self._request("POST", "/sensitivity", json=body))
+        check = self._read(SensitivityRead, self._create("/sensitivity", body))
         while not check.state.ended:
             time.sleep(every_s)
             check = self._read(SensitivityRead, self._get(f"/sensitivity/{part(check.id)}"))
@@ -153,7 +122,7 @@ class Client(Archives, LifeCycle):
             try:
                 current = again(id)
             except (ServiceError, ServiceUnreachable) as error:
-                if _for_good(error) or time.monotonic() - heard_at > patience_s:
+                if is_for_good(error) or time.monotonic() - heard_at > patience_s:
                     raise
                 continue
             heard_at = time.monotonic()
@@ -187,49 +156,6 @@ class Client(Archives, LifeCycle):
         found = [self.find(each) for each in ids]
         return [one.id for each in found for one in (each.experiments if isinstance(each, StudyRead) else (each,))]
 
-    def _get(self, path: str, **parameters: str | int | Sequence[str] | None) -> httpx2.Response:
-        given = {name: value for name, value in parameters.items() if value is not None}
-        return self._request("GET", path, params=given)
-
-    def _request(
-        self, method: str, path: str, *, params: Mapping[str, Any] | None = None, json: object = None
-    ) -> httpx2.Response:
-        with self._reached():
-            return self._successful(self._http.request(method, path, params=params, json=json))
-
-    @contextmanager
-    def _reached(self) -> Iterator[None]:
-        try:
-            yield
-        except (httpx2.TransportError, httpx2.InvalidURL) as error:
-            msg = f"no service answers at {self.url} ({type(error).__name__}); start one with `gaplab serve`"
-            raise ServiceUnreachable(msg) from error
-
-    def _successful(self, answer: httpx2.Response) -> httpx2.Response:
-        if answer.is_success:
-            return answer
-        answer.read()
-        raise ServiceError(_problem(answer))
-
-    def _read(self, kind: type[T], answer: httpx2.Response) -> T:
-        try:
-            return TypeAdapter(kind).validate_json(answer.content)
-        except ValidationError as error:
-            msg = f"what answers at {self.url} is no gaplab of this version"
-            raise ServiceUnreachable(msg) from error
-
 
 def _body(spec: BaseModel | Mapping[str, Any]) -> dict[str, Any]:
     return spec.model_dump(mode="json", exclude_unset=True) if isinstance(spec, BaseModel) else dict(spec)
-
-
-def _for_good(error: Exception) -> bool:
-    return isinstance(error, ServiceError) and error.problem.status < 500
-
-
-def _problem(answer: httpx2.Response) -> Problem:
-    try:
-        return Problem.model_validate_json(answer.content)
-    except ValidationError:
-        detail = f"{answer.url} answers {answer.status_code} and no problem; is it a gaplab?"
-        return Problem(type="about:blank", title="Not understood", status=answer.status_code, detail=detail)

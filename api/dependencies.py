@@ -1,13 +1,32 @@
 """What endpoints are given: the store, ids that can be ids, and the query parameters that several share."""
 
 import re
-from typing import Annotated
+from typing import Annotated, TypeVar
 
-from fastapi import Depends, Request
+from fastapi import Depends, Header, Request, Response
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from starlette.datastructures import URLPath
 
+from schemas.access import Role
+from schemas.base import Frozen
+from services.access import Caller, demand
+from services.admission import Admission, Once
 from services.core.errors import NotFound
 from services.store.session import Store
+
+R = TypeVar("R", bound=Frozen)
+
+
+IdempotencyKey = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=255,
+        pattern=r"^[!-~]+$",
+        description="any text of the sender's choice: the same request with the same key is done once, within a week",
+    ),
+]
 
 
 def _store(request: Request) -> Store:
@@ -25,7 +44,20 @@ def _plausible(text: str) -> str:
     return text
 
 
+def _caller(request: Request) -> Caller:
+    """Who asks, as `api.access` found out."""
+    caller: Caller = request.state.caller
+    return caller
+
+
+def _admission(request: Request, key: IdempotencyKey = None) -> Admission:
+    """Who submits, within which limits, and under which key."""
+    return Admission(_caller(request).token, request.app.state.limits, key)
+
+
 StoreDep = Annotated[Store, Depends(_store)]
+CallerDep = Annotated[Caller, Depends(_caller)]
+AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]
 
 
@@ -39,4 +71,28 @@ class Paging(Parameters):
     """Which part of a list."""
 
     limit: int = Field(default=50, ge=1, le=500, description="how many at most")
-    cursor: str | None = Field(default=None, max_length=500, description="`next` of the part before")
+    cursor: str | None = Field(default=None, max_length=2_000, description="`next` of the part before")
+
+
+class Revealing(Parameters):
+    """Whether reality's parameters are shown before the end."""
+
+    reveal: bool = Field(default=False, description="show reality's parameters already; wants an admin's token")
+
+    def permitted(self, caller: Caller) -> bool:
+        """What was asked for.
+
+        Raises:
+            Forbidden: it is more than the caller may see.
+        """
+        if self.reveal:
+            demand(caller, Role.ADMIN, "to reveal reality's parameters")
+        return self.reveal
+
+
+def created(once: Once[R], response: Response, location: URLPath) -> R:
+    """The answer to what was submitted, with where it is, and whether it was submitted before."""
+    response.headers["Location"] = str(location)
+    if once.replayed:
+        response.headers["Idempotent-Replayed"] = "true"
+    return once.answer

@@ -7,6 +7,9 @@ from fastapi.openapi.docs import get_redoc_html, get_swagger_ui_html
 from fastapi.responses import HTMLResponse, RedirectResponse
 from fastapi.staticfiles import StaticFiles
 
+from api.access import OPEN
+from api.pages import page
+from api.problems import documented
 from schemas.problems import Problem
 
 ASSETS = "/assets/docs"
@@ -26,24 +29,32 @@ def _landing() -> RedirectResponse:
 
 
 def _docs() -> HTMLResponse:
-    return get_swagger_ui_html(
-        openapi_url="openapi.json",
-        title="gaplab",
-        swagger_js_url=f".{ASSETS}/swagger-ui-bundle.js",
-        swagger_css_url=f".{ASSETS}/swagger-ui.css",
-        swagger_favicon_url=f".{ASSETS}/favicon.png",
-        swagger_ui_parameters={"displayRequestDuration": True, "tryItOutEnabled": True},
+    return _page(
+        get_swagger_ui_html(
+            openapi_url="openapi.json",
+            title="gaplab",
+            swagger_js_url=f".{ASSETS}/swagger-ui-bundle.js",
+            swagger_css_url=f".{ASSETS}/swagger-ui.css",
+            swagger_favicon_url=f".{ASSETS}/favicon.png",
+            swagger_ui_parameters={"displayRequestDuration": True, "tryItOutEnabled": True},
+        )
     )
 
 
 def _redoc() -> HTMLResponse:
-    return get_redoc_html(
-        openapi_url="openapi.json",
-        title="gaplab",
-        redoc_js_url=f".{ASSETS}/redoc.standalone.js",
-        redoc_favicon_url=f".{ASSETS}/favicon.png",
-        with_google_fonts=False,
+    return _page(
+        get_redoc_html(
+            openapi_url="openapi.json",
+            title="gaplab",
+            redoc_js_url=f".{ASSETS}/redoc.standalone.js",
+            redoc_favicon_url=f".{ASSETS}/favicon.png",
+            with_google_fonts=False,
+        )
     )
+
+
+def _page(made: HTMLResponse) -> HTMLResponse:
+    return page(bytes(made.body).decode())
 
 
 def _describe_problems(app: FastAPI) -> None:
@@ -57,14 +68,26 @@ def _describe_problems(app: FastAPI) -> None:
             problem = Problem.model_json_schema(ref_template="#/components/schemas/{model}", mode="serialization")
             schemas |= problem.pop("$defs") | {"Problem": problem}
             _drop_foreign_errors(document)
+            _describe_access(document)
         assert app.openapi_schema is not None
         return app.openapi_schema
 
     app.openapi = openapi  # type: ignore[method-assign]
 
 
+def _describe_access(document: dict[str, Any]) -> None:
+    """Say which token each endpoint wants, and what happens without."""
+    about = "made by `gaplab token create`; on loopback none is needed until the first is made"
+    document["components"]["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer", "description": about}}
+    for path, operations in document["paths"].items():
+        for operation in operations.values():
+            operation["security"] = [] if path in OPEN else [{"token": []}, {}]
+            if path not in OPEN:
+                operation["responses"] |= {str(status): each for status, each in documented(401, 403).items()}
+
+
 def _drop_foreign_errors(document: dict[str, Any]) -> None:
-    """The framework promises its own shape of 422 for every parameter; no answer of ours has it."""
+    """Say 422 where a query, a header or a body can be wrong, in our own shape; an id is never wrong, only unknown."""
     for foreign in ("HTTPValidationError", "ValidationError"):
         document["components"]["schemas"].pop(foreign, None)
     for operations in document["paths"].values():
@@ -72,3 +95,5 @@ def _drop_foreign_errors(document: dict[str, Any]) -> None:
             answers = operation["responses"]
             if "application/json" in answers.get("422", {}).get("content", {}):
                 del answers["422"]
+            if "requestBody" in operation or any(each["in"] != "path" for each in operation.get("parameters", ())):
+                answers |= {str(status): each for status, each in documented(422).items()}

@@ -57,6 +57,14 @@ STUDY_SPECS: dict[str, Any] = {
     },
 }
 
+EDITS: dict[str, Any] = {
+    "another name": {"summary": "What it is called from now on", "value": {"name": "half the weight"}},
+    "notes": {
+        "summary": "What people should know about it",
+        "value": {"notes": "stopped early: the bounds were wrong"},
+    },
+}
+
 SENSITIVITY_SPECS: dict[str, Any] = {
     "the least": {
         "summary": "The quadruped and its three coefficients, as the paper has them; about 800 rollouts",

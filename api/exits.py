@@ -16,16 +16,25 @@ class Exit(IntEnum):
     INVALID = 5
     CONFLICT = 6
     FILE = 7
+    DENIED = 8
     INTERRUPTED = 130
 
 
 EXPLAINED = (
     "Exit codes: 0 done; 1 the service or what was watched failed; 2 wrong use of the command; 3 no service answers; "
     "4 no such id; 5 invalid spec or request; 6 its state forbids it; 7 a file cannot be read or written, or is not "
-    "JSON; 130 interrupted."
+    "JSON; 8 the token does not permit it, or there is none; 130 interrupted."
 )
 
-BY_STATUS = {404: Exit.NOT_FOUND, 409: Exit.CONFLICT, 413: Exit.INVALID, 422: Exit.INVALID}
+BY_STATUS = {
+    401: Exit.DENIED,
+    403: Exit.DENIED,
+    404: Exit.NOT_FOUND,
+    409: Exit.CONFLICT,
+    412: Exit.CONFLICT,
+    413: Exit.INVALID,
+    422: Exit.INVALID,
+}
 
 
 class CommandError(Exception):

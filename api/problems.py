@@ -1,8 +1,9 @@
 """What goes wrong, as RFC 9457 problem details. The HTTP status of each error stands here and nowhere else."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from http import HTTPStatus
+from typing import Any
 from uuid import uuid4
 
 from fastapi import FastAPI, Request
@@ -13,13 +14,19 @@ from starlette.exceptions import HTTPException
 from api.violations import MOST_ERRORS, explain, finite, without_consequences
 from schemas.problems import Problem, SpecError
 from services.core.errors import (
+    Changed,
+    ConditionMissing,
     Conflict,
     EngineUnavailable,
+    Forbidden,
     GaplabError,
     InvalidArchive,
     InvalidSpec,
+    KeyReused,
+    LimitReached,
     NotFound,
     StoreUnavailable,
+    Unauthenticated,
 )
 
 MEDIA_TYPE = "application/problem+json"
@@ -28,6 +35,12 @@ KINDS: dict[type[GaplabError], tuple[int, str, str]] = {
     InvalidSpec: (422, "invalid-spec", "This cannot be run as it is"),
     NotFound: (404, "not-found", "There is no such thing"),
     Conflict: (409, "conflict", "Its present state forbids it"),
+    Changed: (412, "changed", "It was changed meanwhile"),
+    ConditionMissing: (428, "condition-missing", "The change must say what it starts from"),
+    KeyReused: (422, "key-reused", "The idempotency key is taken"),
+    LimitReached: (429, "limit-reached", "Too much is under way"),
+    Unauthenticated: (401, "unauthenticated", "A token is needed"),
+    Forbidden: (403, "forbidden", "The token does not permit this"),
     InvalidArchive: (422, "invalid-archive", "This archive cannot be read"),
     StoreUnavailable: (503, "store-unavailable", "The database cannot be used now"),
     EngineUnavailable: (422, "engine-unavailable", "An engine is not installed here"),
@@ -40,6 +53,7 @@ FRAMEWORK: dict[int, tuple[int, str, str]] = {
     404: (404, "not-found", "There is no such address"),
     405: (405, "method-not-allowed", "This address does not take that method"),
     413: (413, "body-too-large", "The body is too large"),
+    415: (415, "not-json", "The body is not sent as JSON"),
 }
 
 DETAILS: dict[int, str] = {
@@ -53,7 +67,7 @@ logger = logging.getLogger(__name__)
 
 def install(app: FastAPI) -> None:
     """Let every error of the app leave as a problem, the framework's own included."""
-    app.add_exception_handler(GaplabError, _of_gaplab)
+    app.add_exception_handler(GaplabError, of_gaplab)
     app.add_exception_handler(RequestValidationError, _of_validation)
     app.add_exception_handler(HTTPException, _of_framework)
     app.add_exception_handler(Exception, _of_accident)
@@ -81,7 +95,8 @@ def documented(*statuses: int) -> dict[int | str, dict[str, object]]:
     }
 
 
-def _of_gaplab(request: Request, error: Exception) -> JSONResponse:
+def of_gaplab(request: Request, error: Exception) -> JSONResponse:
+    """The answer to a request that gaplab refused."""
     kind = next((KINDS[each] for each in type(error).__mro__ if each in KINDS), None)
     if kind is None:
         return _of_accident(request, error)
@@ -92,8 +107,21 @@ def _of_gaplab(request: Request, error: Exception) -> JSONResponse:
         else kind
     )
     detail = _sentence(errors, len(errors)) if errors else _readable(error)
-    headers = {"Retry-After": "5"} if kind[0] == HTTPStatus.SERVICE_UNAVAILABLE else None
-    return response(problem(*kind, detail, errors), headers)
+    return response(problem(*kind, detail, errors), _headers(request, error))
+
+
+def _headers(request: Request, error: Exception) -> dict[str, str]:
+    match error:
+        case StoreUnavailable():
+            return {"Retry-After": "5"}
+        case LimitReached(retry_after_s=int(seconds)):
+            return {"Retry-After": str(seconds)}
+        case Unauthenticated():
+            shown = ', error="invalid_token"' if "authorization" in request.headers else ""
+            return {"WWW-Authenticate": f'Bearer realm="gaplab"{shown}'}
+        case Forbidden():
+            return {"WWW-Authenticate": 'Bearer realm="gaplab", error="insufficient_scope"'}
+    return {}
 
 
 def _violations(error: InvalidSpec) -> list[SpecError]:
@@ -116,9 +144,16 @@ def _of_validation(request: Request, error: Exception) -> JSONResponse:
         where, what = found[0]["loc"][-1], found[0]["ctx"]["error"]
         return response(problem(*FRAMEWORK[400], f"The body is not JSON: {what} at character {where}."))
     errors = [explain(each, error.body, request) for each in found[:MOST_ERRORS]]
+    if _is_not_json(found):
+        return response(problem(*FRAMEWORK[415], _sentence(errors, len(found)), errors))
     in_body = all(each["loc"][0] == "body" for each in found)
     kind = KINDS[InvalidSpec] if in_body else INVALID_REQUEST
     return response(problem(*kind, _sentence(errors, len(found)), errors))
+
+
+def _is_not_json(found: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether there is a body that its header calls something else, so that nobody parsed it."""
+    return any(each["loc"] == ("body",) and isinstance(each["input"], bytes) for each in found)
 
 
 def _sentence(errors: Sequence[SpecError], count: int) -> str:

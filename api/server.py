@@ -8,8 +8,12 @@ import uvicorn
 
 from api.app import create_app
 from api.exits import CommandError, Exit
-from services.settings import Settings
+from services.access import demand_token_beyond_loopback
+from services.settings import Limits, Settings
 from services.store.session import Store
+
+GRACE_S = 5
+"""How long requests that are under way may take when the service ends."""
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -31,14 +35,48 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def serve_api(settings: Settings, listener: socket.socket) -> None:
-    """Serve until told to stop (SIGINT, SIGTERM); requests under way are answered first. Then the process exits."""
+    """Serve until told to stop (SIGINT, SIGTERM); requests under way are answered first. Then the process exits.
+
+    Raises:
+        Unauthenticated: the host is more than loopback, and no token lets anyone in.
+        StoreUnavailable: the database cannot tell.
+    """
     end_in_order()
-    store = Store(settings.database_url)
+    refuse_strangers(settings)
+    store, limits = Store(settings.database_url), Limits.from_environment()
     try:
-        config = uvicorn.Config(create_app(store), log_level="warning", server_header=False)
-        uvicorn.Server(config).run([listener])
+        config = uvicorn.Config(
+            create_app(store, settings, limits),
+            log_config=None,
+            server_header=False,
+            timeout_graceful_shutdown=GRACE_S,
+        )
+        Server(config).run([listener])
     finally:
         store.dispose()
+
+
+def refuse_strangers(settings: Settings) -> None:
+    """Do nothing if only this machine reaches the host, or a token lets someone in.
+
+    Raises:
+        Unauthenticated: neither; the message has the command that makes one.
+        StoreUnavailable: the database cannot tell.
+    """
+    store = Store(settings.database_url)
+    try:
+        demand_token_beyond_loopback(store, settings.host)
+    finally:
+        store.dispose()
+
+
+class Server(uvicorn.Server):
+    """Uvicorn, that ends event streams when it is told to stop: it would wait for them for ever."""
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End the streams, answer the requests under way, and close."""
+        self.config.app.state.feed.close()
+        await super().shutdown(sockets)
 
 
 def end_in_order() -> None:

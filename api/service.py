@@ -5,20 +5,28 @@ The supervisor is a process of its own. The two meet in the database only, so ei
 
 import logging
 import re
-import sys
 from collections.abc import Mapping
 from threading import Event, Thread
 from time import monotonic
 
 from api.launch import end, start
-from api.server import end_in_order, listen, serve_api
+from api.server import end_in_order, listen, refuse_strangers, serve_api
+from services import logs
 from services.core.errors import StoreUnavailable
 from services.settings import Settings
+
+log = logging.getLogger("gaplab.service")
 
 LONG_LIFE_S = 60.0
 """A supervisor that lived so long did not fail at its start; it is started again at once."""
 
 LONGEST_PAUSE_S = 60.0
+
+GRACE_S = 24.0
+"""How long the supervisor may take to end: its repetitions deliver once more, and Ray ends.
+
+With the time that the API's last requests have, the service is gone half a minute after it was told to be.
+"""
 
 
 def serve(settings: Settings, *, workers: bool = True) -> None:
@@ -31,13 +39,15 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
     Raises:
         CommandError: the address is taken.
         StoreUnavailable: the database cannot be migrated.
+        Unauthenticated: the host is more than loopback, and no token lets anyone in.
     """
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    logging.getLogger("alembic").setLevel(logging.WARNING)
+    logs.configure()
     end_in_order()
     listener = listen(settings.host, settings.port)
     migrate(settings.database_url)
-    say(f"gaplab serves on http://{settings.host}:{settings.port} (/docs lists what it answers to; Ctrl-C ends it)")
+    refuse_strangers(settings)
+    address = f"http://{settings.host}:{settings.port}"
+    log.info("gaplab serves on %s (/docs lists what it answers to; Ctrl-C ends it)", address)
     keeper = Keeper(environment_of(settings)) if workers else None
     try:
         if keeper:
@@ -108,7 +118,7 @@ class Keeper:
             if self._stopping.is_set():
                 return
             pause_s = 1.0 if monotonic() - began > LONG_LIFE_S else min(2 * pause_s, LONGEST_PAUSE_S)
-            say(f"the supervisor ended by itself (exit code {code}); another starts in {pause_s:.0f} s")
+            log.warning("the supervisor ended by itself (exit code %s); another starts in %.0f s", code, pause_s)
             self._stopping.wait(pause_s)
 
     def _live(self) -> int:
@@ -116,11 +126,5 @@ class Keeper:
         process = start(self._module, "serve", environment=self._environment)
         while process.poll() is None and not self._stopping.wait(0.2):
             pass
-        end(process)
+        end(process, patience_s=GRACE_S)
         return process.returncode
-
-
-def say(sentence: str) -> None:
-    """Tell whoever reads the terminal or the log."""
-    sys.stderr.write(sentence + "\n")
-    sys.stderr.flush()

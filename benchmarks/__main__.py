@@ -7,7 +7,7 @@ import platform
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import curves, mujoco, overhead, physics, physx, pool, savings, service, supervisor
+from benchmarks import curves, mujoco, overhead, physics, physx, pool, savings, service, supervisor, turns
 from benchmarks.measure import Row
 from services.engines.mujoco import MuJoCo
 from services.engines.physx import PhysX
@@ -30,6 +30,7 @@ def main() -> None:
         ("pool", lambda: pool.rows(max(2, rounds // 2))),
         ("supervisor", supervisor.rows),
         ("savings", savings.rows),
+        ("turns", turns.rows),
         ("overhead", overhead.rows),
         ("curves", curves.rows),
     ):

@@ -30,7 +30,7 @@ class Progress(Frozen):
     failed: int
     iterations: int = Field(description="of all repetitions, number 0 included")
     iterations_done: int
-    rollouts: int = Field(description="budgeted in all; at the end, done plus saved")
+    rollouts: int = Field(description="budgeted in all; at the end, done plus saved, unless it was stopped")
     rollouts_done: int
     rollouts_failed: int = Field(description="physics failures (nan) among those done; they never win")
     rollouts_saved: int = Field(description="budgeted, but sure to change nothing, so not simulated")
@@ -43,6 +43,8 @@ class ExperimentRead(Frozen):
     id: str
     study: str | None = None
     name: str
+    notes: str | None = Field(default=None, description="of people, about it")
+    edits: int = Field(default=0, description="how often its name or notes were changed")
     strategy: str
     state: State
     spec: dict[str, Any]
@@ -51,7 +53,9 @@ class ExperimentRead(Frozen):
     progress: Progress
     reasons: tuple[str, ...] = Field(default=(), description="why repetitions failed, each reason once")
     sensitivity: str | None = Field(default=None, description="id of the check of what its tunables do to fitness")
-    warnings: tuple[str, ...] = Field(default=(), description="what that check found amiss: useless or rough tunables")
+    warnings: tuple[str, ...] = Field(
+        default=(), description="what that check found amiss, and versions that keep it from going on"
+    )
     created_at: datetime
     started_at: datetime | None = None
     ended_at: datetime | None = None
@@ -62,6 +66,8 @@ class StudyRead(Frozen):
 
     id: str
     name: str
+    notes: str | None = Field(default=None, description="of people, about it")
+    edits: int = Field(default=0, description="how often its name or notes were changed")
     state: State
     experiments: tuple[ExperimentRead, ...]
     progress: Progress

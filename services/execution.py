@@ -13,20 +13,31 @@ All of them raise StoreUnavailable while the database cannot be used; each may t
 from collections.abc import Iterable
 from datetime import timedelta
 
+from schemas.provenance import Provenance
 from services.core.types import Step
 from services.store.lease import Checkpoint as Checkpoint
 from services.store.lease import Claim as Claim
 from services.store.lease import Delivered as Delivered
 from services.store.lease import TimedStep as TimedStep
-from services.store.repository import giving_way, leases
+from services.store.repository import giving_way, leases, unheard
 from services.store.session import Store
+from services.versions import provenance
 
 STALE_AFTER_S = 30.0
 
 
-def claim(store: Store, owner: str, limit: int) -> tuple[Claim, ...]:
-    """Up to `limit` queued repetitions for the owner to run, in the order of turns, each with its log."""
-    return store.write(lambda session: leases.claim(session, owner, limit)) if limit > 0 else ()
+def claim(store: Store, owner: str, limit: int, under: Provenance | None = None) -> tuple[Claim, ...]:
+    """Up to `limit` queued repetitions for the owner to run, in the order of turns, each with its log.
+
+    Args:
+        store: where they are queued.
+        owner: who runs them.
+        limit: how many at most.
+        under: what they are to be computed with; this process's own if left out. An experiment that was begun under
+            other engine versions, another architecture or another version of the spec is left alone.
+    """
+    own = under or provenance()
+    return store.write(lambda session: leases.claim(session, owner, limit, own)) if limit > 0 else ()
 
 
 def heartbeat(store: Store, claims: Iterable[Claim]) -> tuple[Claim, ...]:
@@ -120,12 +131,13 @@ def hand_back(store: Store, claim: Claim) -> bool:
     return bool(store.write(lambda session: giving_way.hand_back(session, [claim])))
 
 
-def give_way(store: Store, waiting: Iterable[Claim]) -> tuple[Claim, ...]:
+def give_way(store: Store, waiting: Iterable[Claim], under: Provenance | None = None) -> tuple[Claim, ...]:
     """Hand back those of the claims that had better not begin: asked to pause or stop, or it is another's turn.
 
     Args:
         store: of the claims.
         waiting: claims whose repetition waits for a core; one that runs is never interrupted for another.
+        under: as of `claim`.
 
     Returns:
         Those that were handed back; `claim` gives them out again in their turn.
@@ -134,8 +146,23 @@ def give_way(store: Store, waiting: Iterable[Claim]) -> tuple[Claim, ...]:
     if not held:
         return ()
     with store.reading() as session:
-        unwanted = giving_way.unwanted(session, held)
+        unwanted = giving_way.unwanted(session, held, under or provenance())
     return store.write(lambda session: giving_way.hand_back(session, unwanted)) if unwanted else ()
+
+
+def hand_back_unheard(store: Store, owner: str, claims: Iterable[Claim]) -> int:
+    """Hand back what the owner was given and does not know of, since `claim` did its work and could not say so.
+
+    Args:
+        store: of the claims.
+        owner: who asks.
+        claims: all that the owner knows of.
+
+    Returns:
+        How many there were.
+    """
+    held = tuple(claims)
+    return store.write(lambda session: unheard.hand_back(session, owner, held))
 
 
 def requeue_lost(store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:

@@ -6,7 +6,7 @@ All of them raise StoreUnavailable while the database cannot be used.
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from schemas.lifecycle import State, Verb
+from schemas.lifecycle import Verb
 from schemas.records import (
     AttemptRead,
     ExperimentRead,
@@ -18,10 +18,13 @@ from schemas.records import (
     StudyRead,
 )
 from schemas.spec import ExperimentSpec, StudySpec
+from services.admission import FREELY, Admission, Once, check_extent, check_load, once
+from services.listing import list_experiments as list_experiments
+from services.listing import list_studies as list_studies
 from services.resolution import expected_rollouts, is_direct, resolve_experiment, resolve_study
 from services.store.repository import attempts, experiments, reads, results, sensitivity, verbs
 from services.store.repository.experiments import Extent
-from services.store.session import Store
+from services.store.session import Session, Store
 
 R = TypeVar("R")
 
@@ -32,11 +35,27 @@ def submit_experiment(store: Store, spec: ExperimentSpec) -> ExperimentRead:
     Raises:
         InvalidSpec: with everything that is wrong with it.
     """
+    return admit_experiment(store, spec, FREELY).answer
+
+
+def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) -> Once[ExperimentRead]:
+    """Submit it within limits, and once for each idempotency key.
+
+    Raises:
+        InvalidSpec: with everything that is wrong with it.
+        LimitReached: there is no room for it now.
+        KeyReused: the key stands for another request.
+    """
     resolved = resolve_experiment(spec)
-    with store.transaction() as session:
-        row = experiments.insert_experiment(session, resolved, extent_of(resolved))
+    check_extent([resolved], admitted.limits)
+
+    def create(session: Session) -> ExperimentRead:
+        check_load(session, [resolved], admitted)
+        row = experiments.insert_experiment(session, resolved, extent_of(resolved), token=admitted.token)
         sensitivity.queue_for(session, [row])
         return reads.read_experiments(session, [row])[0]
+
+    return once(store, admitted, spec, ExperimentRead, create)
 
 
 def submit_study(store: Store, spec: StudySpec) -> StudyRead:
@@ -45,71 +64,55 @@ def submit_study(store: Store, spec: StudySpec) -> StudyRead:
     Raises:
         InvalidSpec: with everything that is wrong with it.
     """
+    return admit_study(store, spec, FREELY).answer
+
+
+def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[StudyRead]:
+    """Submit it within limits, and once for each idempotency key.
+
+    Raises:
+        InvalidSpec: with everything that is wrong with it.
+        LimitReached: there is no room for it now.
+        KeyReused: the key stands for another request.
+    """
     resolved = resolve_study(spec)
-    with store.transaction() as session:
+    check_extent(resolved, admitted.limits)
+
+    def create(session: Session) -> StudyRead:
+        check_load(session, resolved, admitted)
         study = experiments.insert_study(session, spec.name or "study")
         rows = [
-            experiments.insert_experiment(session, each, extent_of(each), study=study, position=position)
+            experiments.insert_experiment(
+                session, each, extent_of(each), study=study, position=position, token=admitted.token
+            )
             for position, each in enumerate(resolved)
         ]
         sensitivity.queue_for(session, rows)
         return reads.read_studies(session, [study])[0]
 
+    return once(store, admitted, spec, StudyRead, create)
 
-def read_experiment(store: Store, experiment_id: str) -> ExperimentRead:
-    """The experiment with its progress.
+
+def read_experiment(store: Store, experiment_id: str, *, reveal: bool = False) -> ExperimentRead:
+    """The experiment with its progress; reality's parameters are null until it has ended, or with `reveal`.
 
     Raises:
         NotFound: no such experiment.
     """
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
-        return reads.read_experiments(session, [row])[0]
+        return reads.read_experiments(session, [row], reveal=reveal)[0]
 
 
-def list_experiments(
-    store: Store,
-    *,
-    limit: int = 50,
-    cursor: str | None = None,
-    study: str | None = None,
-    state: State | None = None,
-    strategy: str | None = None,
-) -> Page[ExperimentRead]:
-    """A page of experiments, newest first; what is submitted meanwhile shifts no later page.
-
-    Raises:
-        InvalidSpec: a cursor that no page gave.
-    """
-    with store.reading() as session:
-        rows = experiments.page_of_experiments(
-            session, limit=limit + 1, cursor=cursor, study=study, state=state, strategy=strategy
-        )
-        shown = reads.read_experiments(session, rows[:limit])
-    return Page(items=shown, next=_next(rows, limit, experiments.cursor_of))
-
-
-def read_study(store: Store, study_id: str) -> StudyRead:
-    """The study with its experiments and their progress.
+def read_study(store: Store, study_id: str, *, reveal: bool = False) -> StudyRead:
+    """The study with its experiments and their progress; `reveal` as of an experiment.
 
     Raises:
         NotFound: no such study.
     """
     with store.reading() as session:
         row = experiments.get_study(session, study_id)
-        return reads.read_studies(session, [row])[0]
-
-
-def list_studies(store: Store, *, limit: int = 50, cursor: str | None = None) -> Page[StudyRead]:
-    """A page of studies, newest first.
-
-    Raises:
-        InvalidSpec: a cursor that no page gave.
-    """
-    with store.reading() as session:
-        rows = experiments.page_of_studies(session, limit=limit + 1, cursor=cursor)
-        shown = reads.read_studies(session, rows[:limit])
-    return Page(items=shown, next=_next(rows, limit, experiments.cursor_of))
+        return reads.read_studies(session, [row], reveal=reveal)[0]
 
 
 def list_repetitions(store: Store, experiment_id: str) -> tuple[RepetitionRead, ...]:

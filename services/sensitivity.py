@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from datetime import timedelta
 
 from schemas.sensitivity import Checked, Sensitivity, SensitivityRead, SensitivitySpec
+from services.admission import FREELY, Admission, Once, once
 from services.core.robots import robots
 from services.core.sensitivity import Effort
 from services.execution import STALE_AFTER_S
@@ -24,8 +25,18 @@ def submit(store: Store, spec: SensitivitySpec) -> SensitivityRead:
     Raises:
         InvalidSpec: with everything that is wrong with them.
     """
+    return admit(store, spec, FREELY).answer
+
+
+def admit(store: Store, spec: SensitivitySpec, admitted: Admission) -> Once[SensitivityRead]:
+    """Submit the check, once for each idempotency key.
+
+    Raises:
+        InvalidSpec: with everything that is wrong with them.
+        KeyReused: the key stands for another request.
+    """
     checked = resolve_sensitivity(spec)
-    return store.write(lambda session: _read(sensitivity.queue(session, checked)))
+    return once(store, admitted, spec, SensitivityRead, lambda session: _read(sensitivity.queue(session, checked)))
 
 
 def read(store: Store, id: str) -> SensitivityRead:  # noqa: A002 - as the API says

@@ -1,7 +1,7 @@
 """What the environment may say, read once by a main."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 
 
 @dataclass(frozen=True)
@@ -15,6 +15,7 @@ class Settings:
         host: that the API binds. `GAPLAB_HOST`; loopback.
         port: that the API binds. `GAPLAB_PORT`; 8000.
         url: where the command finds the service. `GAPLAB_URL`; host and port.
+        token: that the command shows to the service. `GAPLAB_TOKEN`; none.
     """
 
     database_url: str = "sqlite:///gaplab.db"
@@ -23,6 +24,7 @@ class Settings:
     host: str = "127.0.0.1"
     port: int = 8000
     url: str = "http://127.0.0.1:8000"
+    token: str | None = field(default=None, repr=False)
 
     @classmethod
     def from_environment(cls) -> "Settings":
@@ -40,7 +42,53 @@ class Settings:
             host=host,
             port=port or cls.port,
             url=get("GAPLAB_URL", f"http://{host}:{port}"),
+            token=get("GAPLAB_TOKEN") or None,
         )
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much the API lets in. Each is `GAPLAB_MAX_…` in the environment: `GAPLAB_MAX_BODY_BYTES` and so on.
+
+    What is said of a token holds as well for all who need none, taken together.
+
+    Attributes:
+        body_bytes: of one request.
+        iterations: of one experiment.
+        repetitions: of one submission: of all experiments of a study together.
+        experiments_per_token: that have not ended.
+        experiments: that have not ended, of all.
+        rollouts_per_token: budgeted and not yet done, of experiments that have not ended.
+        rollouts: the same, of all.
+        streams_per_token: of events, open at once at one API process.
+        streams: the same, of all.
+    """
+
+    body_bytes: int = 1_000_000
+    iterations: int = 1_000
+    repetitions: int = 10_000
+    experiments_per_token: int = 1_000
+    experiments: int = 5_000
+    rollouts_per_token: int = 100_000_000_000
+    rollouts: int = 1_000_000_000_000
+    streams_per_token: int = 20
+    streams: int = 200
+
+    @classmethod
+    def from_environment(cls) -> "Limits":
+        """The limits that the process was started with.
+
+        Raises:
+            ValueError: a number that is none, with the name of its variable.
+        """
+        defaults = cls()
+        names = [each.name for each in fields(cls)]
+        return cls(**{name: _number(variable_of(name), None) or getattr(defaults, name) for name in names})
+
+
+def variable_of(limit: str) -> str:
+    """The variable of the environment that sets the limit."""
+    return f"GAPLAB_MAX_{limit.upper()}"
 
 
 def _number(variable: str, default: int | None) -> int | None:

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from threading import Event
 
+from services import logs
 from services.core.errors import ClusterUnusable, StoreUnavailable
 from services.settings import Settings
 from services.store.session import Store
@@ -14,12 +15,12 @@ from services.store.session import Store
 
 def serve(settings: Settings) -> int:
     """Work until SIGTERM or SIGINT; 1 if there is no cluster to work on."""
-    if settings.ray_address:  # of itself, Ray shows its token to a cluster that it started, but to no other
-        os.environ.setdefault("RAY_AUTH_MODE", "token")
+    choose_authentication(settings)
     from workers.cluster import cluster  # Ray takes a second to import
     from workers.supervisor import Supervisor
 
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    logs.adopt("ray")
+    logs.configure()
     store, stop = Store(settings.database_url), Event()
     try:
         with cluster(settings) as joined:
@@ -33,6 +34,17 @@ def serve(settings: Settings) -> int:
     finally:
         store.dispose()
     return 0
+
+
+def choose_authentication(settings: Settings) -> None:
+    """A Ray of our own asks for a token whatever the environment says, and a cluster is shown one unless that says no.
+
+    Ray reads it when it is imported. Of itself it shows its token to a cluster that it started, but to no other.
+    """
+    if settings.ray_address:
+        os.environ.setdefault("RAY_AUTH_MODE", "token")
+    else:
+        os.environ["RAY_AUTH_MODE"] = "token"
 
 
 def check(settings: Settings) -> int:

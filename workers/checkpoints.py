@@ -1,6 +1,5 @@
 """A repetition that tells how far it has got while a step is under way."""
 
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from queue import SimpleQueue
@@ -110,6 +109,10 @@ class Recorder:
         self._part, self._last, self._answers = self._part + 1, now, []
 
 
+class _Unwanted(Exception):
+    """Nobody takes what is emitted any more."""
+
+
 def _aside(compute: Callable[[Emit], None]) -> Iterator[Delivered]:
     """What is emitted in a thread of its own: a checkpoint comes from the depths of a step, where nothing can yield.
 
@@ -121,12 +124,14 @@ def _aside(compute: Callable[[Emit], None]) -> Iterator[Delivered]:
 
     def emit(item: Delivered) -> None:
         if unwanted.is_set():
-            sys.exit()  # ends the thread alone
+            raise _Unwanted
         items.put(item)
 
     def run() -> None:
         try:
             compute(emit)
+        except _Unwanted:
+            return
         except Exception as error:  # noqa: BLE001 - it is raised again where the items are taken
             raised.append(error)
         items.put(None)

@@ -1,11 +1,13 @@
 """Ray itself: started on this machine, or joined where it runs."""
 
 import logging
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import ray
+from ray._private import ray_constants
 from ray.exceptions import RayError
 
 from services.core.errors import ClusterUnusable
@@ -46,8 +48,10 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
         settings: `ray_address` names an existing cluster; `workers` limits the cores.
 
     Raises:
-        ClusterUnusable: it cannot be joined, or a node has other versions than this process.
+        ClusterUnusable: it cannot be joined, a node has other versions than this process, or a Ray of our own would
+            ask nobody for a token.
     """
+    logging.getLogger("ray").setLevel(logging.ERROR)
     try:
         if settings.ray_address:
             _join(settings.ray_address)
@@ -60,20 +64,39 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
 
 
 def _start(cores: int | None) -> None:
-    ray.init(
-        address="local",  # not whatever else may run on this machine
-        num_cpus=cores,
-        include_dashboard=False,
-        log_to_driver=False,
-        logging_level=logging.ERROR,
-        object_store_memory=OBJECT_STORE_BYTES,
-        _node_ip_address="127.0.0.1",
-    )
+    if os.environ.get("RAY_AUTH_MODE") == "disabled":  # Ray reads it when it is imported
+        msg = "RAY_AUTH_MODE is 'disabled': who reaches a Ray without a token can run any code; leave it out"
+        raise ClusterUnusable(msg)
+    with _on_loopback():
+        ray.init(
+            address="local",  # not whatever else may run on this machine
+            num_cpus=cores,
+            include_dashboard=False,
+            log_to_driver=False,
+            configure_logging=False,
+            object_store_memory=OBJECT_STORE_BYTES,
+            _node_ip_address="127.0.0.1",
+        )
+
+
+@contextmanager
+def _on_loopback() -> Iterator[None]:
+    """Within it, a Ray that starts takes loopback for its address, as it does by itself on a Mac.
+
+    On Linux it replaces 127.0.0.1 by an address that other machines reach, and listens there: what it offers for that
+    is a setting, RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER, which it reads into this constant when it is imported.
+    """
+    before = ray_constants.ENABLE_RAY_CLUSTER
+    ray_constants.ENABLE_RAY_CLUSTER = False
+    try:
+        yield
+    finally:
+        ray_constants.ENABLE_RAY_CLUSTER = before
 
 
 def _join(address: str) -> None:
     try:
-        ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
+        ray.init(address=address, log_to_driver=False, configure_logging=False)
     except (ConnectionError, ValueError, RuntimeError, RayError) as error:  # away; no node here; versions; token
         msg = f"the Ray cluster at {address} cannot be joined (docs/scale.md says how): {error}"
         raise ClusterUnusable(msg) from error

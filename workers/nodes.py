@@ -1,36 +1,17 @@
 """What the nodes of a cluster must have in common, so that a repetition has the same numbers on each of them."""
 
 import platform
-from functools import cache
-from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 import ray
 from ray.exceptions import RayError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from services.core.errors import ClusterUnusable
-from services.engines import engines
+from services.versions import Versions as Versions
+from services.versions import versions as versions
 
-CODE = ("schemas", "services", "workers")
-LIBRARIES = ("numpy", "scipy", "cma")
 ANSWER_S = 60.0
 """How long a node may take to start a process and to say what it has."""
-
-Versions = dict[str, str]
-
-
-@cache
-def versions() -> Versions:
-    """What numbers depend on, as it is here: this code, Python, the libraries, the engines, the kind of processor."""
-    needed = (*LIBRARIES, *(each.library for each in engines.values() if each.library))
-    return {
-        "gaplab": f"{_version('gaplab')} ({_digest()})",
-        "Python": platform.python_version(),
-        "machine": platform.machine(),
-        **{name: _version(name) for name in needed},
-    }
 
 
 def check_here(expected: Versions) -> None:
@@ -72,21 +53,6 @@ def _compare(node: str, found: Versions, expected: Versions) -> None:
         theirs, ours = (", ".join(f"{name} {has.get(name, 'none')}" for name in wrong) for has in (found, expected))
         msg = f"the node {node} has {theirs} where the supervisor has {ours}: install the same on all nodes"
         raise ClusterUnusable(msg)
-
-
-def _version(distribution: str) -> str:
-    try:
-        return version(distribution)
-    except PackageNotFoundError:
-        return "none"
-
-
-def _digest() -> str:
-    """Eight letters that change with the code: a version alone does not say which commit is checked out."""
-    root, digest = Path(__file__).parents[1], sha256()
-    for path in sorted(path for top in CODE for path in (root / top).rglob("*.py")):
-        digest.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
-    return digest.hexdigest()[:8]
 
 
 def _last_line(error: Exception) -> str:

@@ -56,6 +56,6 @@ class Run:
         return self.ended or self.failed is not None or self.lost is not None
 
     @property
-    def name(self) -> str:
+    def place(self) -> dict[str, str | int]:
         """The experiment and the number, for the log."""
-        return f"{self.claim.experiment_id}/{self.claim.number}"
+        return {"experiment": self.claim.experiment_id, "repetition": self.claim.number}

@@ -14,7 +14,7 @@ from time import monotonic
 
 import ray
 
-from services import execution
+from services import execution, supervisors
 from services.core.errors import StoreUnavailable
 from services.execution import Claim
 from services.store.session import Store
@@ -66,6 +66,7 @@ class Supervisor:
         self._checks = Checks(store, self._owner)
         self._beat = -HEARTBEAT_S
         self._looked = -WAIT_S
+        self._unsure = False
 
     @property
     def busy(self) -> bool:
@@ -90,6 +91,8 @@ class Supervisor:
             self._hand_back(self._runs)
             with suppress(StoreUnavailable):  # then its lease will run out
                 self._checks.hand_back()
+            with suppress(StoreUnavailable):  # then it is taken for lost, which it nearly is
+                supervisors.end(self._store, self._owner)
 
     def step(self) -> None:
         """One round: heartbeat, claim, receive, store; sensitivity checks before repetitions.
@@ -108,6 +111,7 @@ class Supervisor:
     def _heartbeat(self) -> None:
         if monotonic() - self._beat < HEARTBEAT_S:
             return
+        supervisors.heartbeat(self._store, self._owner)
         held = execution.heartbeat(self._store, [run.claim for run in self._runs])
         self._drop_all_but(held)
         self._checks.heartbeat()
@@ -123,9 +127,14 @@ class Supervisor:
         waiting = [run.claim for run in self._runs if not (run.begun or run.over)]
         if given := set(execution.give_way(self._store, waiting)):
             self._drop_all_but([run.claim for run in self._runs if run.claim not in given])
-        for claim in execution.claim(self._store, self._owner, self._capacity() - len(self._runs)):
+        if self._unsure:
+            execution.hand_back_unheard(self._store, self._owner, [run.claim for run in self._runs])
+        self._unsure = True
+        claims = execution.claim(self._store, self._owner, self._capacity() - len(self._runs))
+        self._unsure = False
+        for claim in claims:
             self._runs.append(self._launch(claim))
-            log.info("%s: on from step %d", self._runs[-1].name, len(claim.log))
+            log.info("on from step %d", len(claim.log), extra=self._runs[-1].place)
 
     def _launch(self, claim: Claim) -> Run:
         return Run(claim, repetition.run.remote(claim, self._versions, self._checkpoint_s))
@@ -158,12 +167,12 @@ class Supervisor:
         for run in over:
             if run.failed is not None:
                 execution.fail(self._store, run.claim, run.failed)
-                log.error("%s: failed: %s", run.name, run.failed)
+                log.error("failed: %s", run.failed, extra=run.place)
             elif run.lost is not None:
                 execution.release(self._store, run.claim, run.lost)
-                log.warning("%s: queued again: %s", run.name, run.lost)
+                log.warning("queued again: %s", run.lost, extra=run.place)
             else:
-                log.info("%s: completed", run.name)
+                log.info("completed", extra=run.place)
             self._runs.remove(run)
         self._looked = -WAIT_S  # cores are free: look for work at once
 
@@ -173,7 +182,7 @@ class Supervisor:
         for run in [each for each in self._runs if (each.claim.repetition_id, each.claim.epoch) not in keys]:
             run.cancel()
             self._runs.remove(run)
-            log.info("%s: dropped, it is no longer ours", run.name)
+            log.info("dropped, it is no longer ours", extra=run.place)
 
     def _wind_down(self) -> None:
         """Hand each repetition back once its step is stored, or a checkpoint of it; what waits for a core, now."""
@@ -199,6 +208,6 @@ class Supervisor:
             try:
                 execution.hand_back(self._store, run.claim)
             except StoreUnavailable as error:
-                log.warning("%s: its lease will run out: %s", run.name, error)
+                log.warning("its lease will run out: %s", error, extra=run.place)
             else:
-                log.info("%s: handed back", run.name)
+                log.info("handed back", extra=run.place)

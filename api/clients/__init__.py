@@ -1,1 +1,1 @@
-"""Parts of the client, each about one subject."""
+"""What the Python client is put together from; `api.client` is what programs import."""

@@ -27,7 +27,8 @@ Url = Annotated[
 
 def connect(url: str | None) -> Client:
     """A client of the service there."""
-    return Client(url or Settings.from_environment().url)
+    settings = Settings.from_environment()
+    return Client(url or settings.url, token=settings.token)
 
 
 def experiments_of(found: ExperimentRead | StudyRead) -> tuple[ExperimentRead, ...]:

@@ -8,6 +8,7 @@ from rich.console import Console
 
 from api import display
 from api.commands.base import Id, Url, app, connect, experiments_of, print_warnings
+from api.commands.history import print_provenance
 from api.exits import CommandError, Exit
 from api.files import read_spec
 from schemas.lifecycle import State
@@ -43,6 +44,7 @@ def show(id: Id, url: Url = None) -> None:  # noqa: A002 - as the API says
             console.print(display.overview(found.experiments))
         else:
             console.print(display.repetitions(client.repetitions(id)))
+            print_provenance(client.provenance(id), console)
             _print_misfit(client.misfit(id), console)
             console.print_json(data=found.spec)
         print_warnings(experiments_of(found))

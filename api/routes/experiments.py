@@ -1,13 +1,14 @@
 """Experiments: one strategy under one setting, repeated."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Body, Path, Query, Request, Response
 from pydantic import Field
 
-from api import examples
-from api.dependencies import Id, Paging, StoreDep
+from api import conditional, examples, links
+from api.dependencies import AdmissionDep, CallerDep, Id, Paging, Revealing, StoreDep, created
 from api.problems import documented
+from schemas.editing import Edit
 from schemas.lifecycle import State
 from schemas.misfit import MisfitRead
 from schemas.records import (
@@ -20,7 +21,8 @@ from schemas.records import (
     SimulatorRead,
 )
 from schemas.spec import ExperimentSpec
-from services import experiments
+from services import editing, experiments
+from services.listing import Which
 from services.misfit import misfit
 
 router = APIRouter(prefix="/experiments", tags=["experiments"])
@@ -36,6 +38,10 @@ class ExperimentFilter(Paging):
     study: Id | None = Field(default=None, description="only of this study")
     state: State | None = Field(default=None, description="only in this state")
     strategy: str | None = Field(default=None, max_length=100, pattern=r"^\w+$", description="only of this strategy")
+    text: str | None = Field(default=None, max_length=200, description="only with this in the name or the id")
+    sort: Literal["created_at", "-created_at", "name", "-name", "strategy", "-strategy", "state", "-state"] = Field(
+        default="-created_at", description="a minus turns the order round"
+    )
 
 
 class SampleFilter(Paging):
@@ -59,20 +65,21 @@ class SimulatorFilter(Paging):
     status_code=202,
     summary="Submit an experiment",
     responses={
-        202: examples.shown(examples.EXPERIMENT, "It is queued, and exists at `Location`"),
-        **documented(413, 422),
+        202: examples.shown(examples.EXPERIMENT, "It is queued, and exists at `Location`")
+        | links.leading_to(*links.FROM_EXPERIMENT),
+        **documented(413, 415, 422, 429),
     },
 )
 def submit_experiment(
     spec: Annotated[ExperimentSpec, Body(openapi_examples=examples.EXPERIMENT_SPECS)],
     store: StoreDep,
+    admitted: AdmissionDep,
     request: Request,
     response: Response,
 ) -> ExperimentRead:
     """Queue an experiment. Whatever is left out is the paper's."""
-    experiment = experiments.submit_experiment(store, spec)
-    response.headers["Location"] = str(request.app.url_path_for("read_experiment", id=experiment.id))
-    return experiment
+    done = experiments.admit_experiment(store, spec, admitted)
+    return created(done, response, request.app.url_path_for("read_experiment", id=done.answer.id))
 
 
 @router.get(
@@ -81,18 +88,53 @@ def submit_experiment(
     responses={200: examples.shown(examples.page(examples.EXPERIMENT), "The newest first"), **documented(404, 422)},
 )
 def list_experiments(store: StoreDep, which: Annotated[ExperimentFilter, Query()]) -> Page[ExperimentRead]:
-    """The experiments, the newest first."""
-    return experiments.list_experiments(store, **which.model_dump())
+    """The experiments, the newest first unless sorted otherwise. A cursor is good only for the list that gave it."""
+    wanted = Which(**which.model_dump(exclude={"limit", "cursor"}))
+    return experiments.list_experiments(store, wanted, limit=which.limit, cursor=which.cursor)
 
 
 @router.get(
     "/{id}",
     summary="Look at an experiment",
-    responses={200: examples.shown(examples.EXPERIMENT, "State, progress, time left"), **documented(404)},
+    response_model=ExperimentRead,
+    responses={
+        200: examples.shown(examples.EXPERIMENT, "State, progress, time left") | {"headers": conditional.HEADERS},
+        **conditional.NOT_MODIFIED,
+        **documented(404, 422),
+    },
 )
-def read_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
+def read_experiment(
+    id: Id,  # noqa: A002 - the address says {id}
+    store: StoreDep,
+    caller: CallerDep,
+    request: Request,
+    query: Annotated[Revealing, Query()],
+) -> Response:
     """An experiment with its resolved spec; reality's parameters are null until it has ended."""
-    return experiments.read_experiment(store, id)
+    shown = experiments.read_experiment(store, id, reveal=query.permitted(caller))
+    return conditional.tagged(request, shown, shown.edits)
+
+
+@router.patch(
+    "/{id}",
+    summary="Edit an experiment",
+    response_model=ExperimentRead,
+    responses={
+        200: examples.shown(examples.EXPERIMENT, "As it is now") | {"headers": conditional.HEADERS},
+        **documented(404, 412, 413, 415, 422, 428),
+    },
+)
+def edit_experiment(
+    id: Id,  # noqa: A002 - the address says {id}
+    edit: Annotated[Edit, Body(openapi_examples=examples.EDITS)],
+    store: StoreDep,
+    request: Request,
+    if_match: conditional.IfMatch = None,
+) -> Response:
+    """Give it another name or notes. `If-Match` names the `ETag` that was looked at; progress does not outdate it."""
+    expected = conditional.starting_from(if_match)
+    shown = editing.edit_experiment(store, id, edit, starting_from=expected)
+    return conditional.tagged(request, shown, shown.edits)
 
 
 @router.get(

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import Field, model_validator
 
 from api.dependencies import Id, Parameters, StoreDep
+from api.pages import page
 from api.problems import documented
 from services import experiments, reports
 from services.figures.definition import Band, Figure, curves_figure
@@ -56,7 +57,8 @@ class FigureQuery(Parameters):
 )
 def draw_curves(store: StoreDep, query: Annotated[FigureQuery, Query()]) -> Response:
     """The paper's Fig. 4 for any studies and experiments: curves with their bands, the direct baseline with its SD."""
-    return Response(RENDERERS[query.format](_figure(store, query)), media_type=MEDIA_TYPES[query.format])
+    drawn = RENDERERS[query.format](_figure(store, query))
+    return page(drawn) if query.format == "html" else Response(drawn, media_type=MEDIA_TYPES[query.format])
 
 
 def _figure(store: Store, query: FigureQuery) -> Figure:

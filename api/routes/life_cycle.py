@@ -96,7 +96,7 @@ def extend_experiment(
 
 
 @router.patch(
-    "/experiments/{id}",
+    "/experiments/{id}/schedule",
     tags=["experiments"],
     summary="Change an experiment's turn",
     responses={200: _experiment(State.QUEUED, "With its new schedule"), **documented(404, 413, 422)},

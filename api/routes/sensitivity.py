@@ -4,8 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
-from api import examples
-from api.dependencies import Id, StoreDep
+from api import examples, links
+from api.dependencies import AdmissionDep, Id, StoreDep, created
 from api.problems import documented
 from schemas.sensitivity import SensitivityRead, SensitivitySpec
 from services import sensitivity
@@ -18,13 +18,15 @@ router = APIRouter(prefix="/sensitivity", tags=["sensitivity"])
     status_code=202,
     summary="Check what tunables do",
     responses={
-        202: examples.shown(examples.SENSITIVITY, "It is queued or known, and exists at `Location`"),
-        **documented(413, 422),
+        202: examples.shown(examples.SENSITIVITY, "It is queued or known, and exists at `Location`")
+        | links.leading_to(*links.FROM_CHECK),
+        **documented(413, 415, 422),
     },
 )
 def submit_sensitivity(
     spec: Annotated[SensitivitySpec, Body(openapi_examples=examples.SENSITIVITY_SPECS)],
     store: StoreDep,
+    admitted: AdmissionDep,
     request: Request,
     response: Response,
 ) -> SensitivityRead:
@@ -33,9 +35,8 @@ def submit_sensitivity(
     Only robot, engine and tunables matter to it, and what was checked once is not checked again. Every experiment has
     such a check queued with it.
     """
-    check = sensitivity.submit(store, spec)
-    response.headers["Location"] = str(request.app.url_path_for("read_sensitivity", id=check.id))
-    return check
+    done = sensitivity.admit(store, spec, admitted)
+    return created(done, response, request.app.url_path_for("read_sensitivity", id=done.answer.id))
 
 
 @router.get(

@@ -1,35 +1,54 @@
 """Studies: experiments that belong together to be compared."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Body, Query, Request, Response
+from pydantic import Field
 
-from api import examples
-from api.dependencies import Id, Paging, StoreDep
+from api import conditional, examples, links
+from api.dependencies import AdmissionDep, CallerDep, Id, Paging, Revealing, StoreDep, created
 from api.problems import documented
+from schemas.editing import Edit
+from schemas.lifecycle import State
 from schemas.records import Page, StudyRead
 from schemas.spec import StudySpec
-from services import experiments
+from services import editing, experiments
+from services.listing import Which
 
 router = APIRouter(prefix="/studies", tags=["studies"])
+
+
+class StudyFilter(Paging):
+    """Which studies are listed."""
+
+    state: State | None = Field(default=None, description="only in this state, its experiments taken together")
+    strategy: str | None = Field(default=None, max_length=100, pattern=r"^\w+$", description="only with this strategy")
+    text: str | None = Field(default=None, max_length=200, description="only with this in the name or the id")
+    sort: Literal["created_at", "-created_at", "name", "-name"] = Field(
+        default="-created_at", description="a minus turns the order round"
+    )
 
 
 @router.post(
     "",
     status_code=202,
     summary="Submit a study",
-    responses={202: examples.shown(examples.STUDY, "It is queued, and exists at `Location`"), **documented(413, 422)},
+    responses={
+        202: examples.shown(examples.STUDY, "It is queued, and exists at `Location`")
+        | links.leading_to(*links.FROM_STUDY),
+        **documented(413, 415, 422, 429),
+    },
 )
 def submit_study(
     spec: Annotated[StudySpec, Body(openapi_examples=examples.STUDY_SPECS)],
     store: StoreDep,
+    admitted: AdmissionDep,
     request: Request,
     response: Response,
 ) -> StudyRead:
     """Queue one experiment for each strategy, all else equal. Whatever is left out is the paper's."""
-    study = experiments.submit_study(store, spec)
-    response.headers["Location"] = str(request.app.url_path_for("read_study", id=study.id))
-    return study
+    done = experiments.admit_study(store, spec, admitted)
+    return created(done, response, request.app.url_path_for("read_study", id=done.answer.id))
 
 
 @router.get(
@@ -37,16 +56,51 @@ def submit_study(
     summary="List the studies",
     responses={200: examples.shown(examples.page(examples.STUDY), "The newest first"), **documented(422)},
 )
-def list_studies(store: StoreDep, paging: Annotated[Paging, Query()]) -> Page[StudyRead]:
-    """The studies, the newest first."""
-    return experiments.list_studies(store, limit=paging.limit, cursor=paging.cursor)
+def list_studies(store: StoreDep, which: Annotated[StudyFilter, Query()]) -> Page[StudyRead]:
+    """The studies, the newest first unless sorted otherwise. A cursor is good only for the list that gave it."""
+    wanted = Which(**which.model_dump(exclude={"limit", "cursor"}))
+    return experiments.list_studies(store, wanted, limit=which.limit, cursor=which.cursor)
 
 
 @router.get(
     "/{id}",
     summary="Look at a study",
-    responses={200: examples.shown(examples.STUDY, "The study with its experiments"), **documented(404)},
+    response_model=StudyRead,
+    responses={
+        200: examples.shown(examples.STUDY, "The study with its experiments") | {"headers": conditional.HEADERS},
+        **conditional.NOT_MODIFIED,
+        **documented(404, 422),
+    },
 )
-def read_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the address says {id}
+def read_study(
+    id: Id,  # noqa: A002 - the address says {id}
+    store: StoreDep,
+    caller: CallerDep,
+    request: Request,
+    query: Annotated[Revealing, Query()],
+) -> Response:
     """A study with its experiments, their states and progress, and the time left."""
-    return experiments.read_study(store, id)
+    shown = experiments.read_study(store, id, reveal=query.permitted(caller))
+    return conditional.tagged(request, shown, shown.edits)
+
+
+@router.patch(
+    "/{id}",
+    summary="Edit a study",
+    response_model=StudyRead,
+    responses={
+        200: examples.shown(examples.STUDY, "As it is now") | {"headers": conditional.HEADERS},
+        **documented(404, 412, 413, 415, 422, 428),
+    },
+)
+def edit_study(
+    id: Id,  # noqa: A002 - the address says {id}
+    edit: Annotated[Edit, Body(openapi_examples=examples.EDITS)],
+    store: StoreDep,
+    request: Request,
+    if_match: conditional.IfMatch = None,
+) -> Response:
+    """Give it another name or notes. `If-Match` names the `ETag` that was looked at; progress does not outdate it."""
+    expected = conditional.starting_from(if_match)
+    shown = editing.edit_study(store, id, edit, starting_from=expected)
+    return conditional.tagged(request, shown, shown.edits)

@@ -4,6 +4,12 @@
     ├── InvalidSpec          what was asked for cannot be done; carries every violation with its place in the spec
     ├── NotFound             no such study, experiment or plug-in
     ├── Conflict             not now: the state forbids it
+    │   └── Changed              somebody else changed it since it was looked at
+    ├── ConditionMissing     a change that does not say which state it starts from
+    ├── KeyReused            an idempotency key that stands for something else already
+    ├── LimitReached         not now: too much is under way
+    ├── Unauthenticated      no token, or one that admits nobody
+    ├── Forbidden            the token's role does not permit it
     ├── StoreUnavailable     the database is unreachable, or its schema is not the one this version needs
     ├── InvalidArchive       a file that is no archive of ours, or one that was damaged or made to harm
     ├── Unsupported          another kind of database is needed for what was asked
@@ -63,6 +69,38 @@ class NotFound(GaplabError):
 
 class Conflict(GaplabError):
     """The present state forbids what was asked."""
+
+
+class Changed(Conflict):
+    """It is not what it was when the sender of the change looked at it."""
+
+
+class ConditionMissing(GaplabError):
+    """A change does not say which state it starts from."""
+
+
+class KeyReused(GaplabError):
+    """An idempotency key stands for another request already."""
+
+
+class LimitReached(GaplabError):
+    """Too much is under way; the message names the limit.
+
+    Attributes:
+        retry_after_s: when it may be worth trying again; None where nobody knows.
+    """
+
+    def __init__(self, message: str, retry_after_s: int | None = None) -> None:
+        self.retry_after_s = retry_after_s
+        super().__init__(message)
+
+
+class Unauthenticated(GaplabError):
+    """No token was shown, or one that admits nobody."""
+
+
+class Forbidden(GaplabError):
+    """The role of the token does not permit this."""
 
 
 class StoreUnavailable(GaplabError):

@@ -13,23 +13,27 @@ from services.core.errors import InvalidSpec, Violation
 
 Column = InstrumentedAttribute[Any] | ColumnElement[Any]
 
-_LONGEST = 200
+_LONGEST = 2_000
+"""The name of an experiment may be part of a cursor."""
 
 
-def encode(*key: str | int | datetime) -> str:
-    """The cursor of a key."""
-    plain = [part.isoformat() if isinstance(part, datetime) else part for part in key]
-    return urlsafe_b64encode(json.dumps(plain).encode()).decode().rstrip("=")
+def encode(*key: str | int | datetime, bound_to: str = "") -> str:
+    """The cursor of a key, good only for the list that `bound_to` describes."""
+    plain = [bound_to] + [part.isoformat() if isinstance(part, datetime) else part for part in key]
+    return urlsafe_b64encode(json.dumps(plain, ensure_ascii=False).encode()).decode().rstrip("=")
 
 
-def decode(cursor: str, columns: Sequence[Column]) -> Tuple:
+def decode(cursor: str, columns: Sequence[Column], bound_to: str = "") -> Tuple:
     """The key of a cursor, to be compared with the columns that it was encoded from.
 
     Raises:
-        InvalidSpec: no answer of ours had this cursor; its pointer is `cursor`.
+        InvalidSpec: no answer of ours had this cursor, or one to another list; its pointer is `cursor`.
     """
     try:
-        parts = json.loads(urlsafe_b64decode(cursor[:_LONGEST] + "=" * (-len(cursor) % 4)))
+        bound, *parts = json.loads(urlsafe_b64decode(cursor[:_LONGEST] + "=" * (-len(cursor) % 4)))
+        if bound != bound_to:
+            message = "this cursor is of a list with other filters or another order; leave it out to start anew"
+            raise InvalidSpec([Violation("cursor", cursor, message)])
         return tuple_(*(_part(part, column) for part, column in zip(parts, columns, strict=True)))
     except (ValueError, TypeError, OverflowError) as error:
         message = "this is no cursor that the service gave out; leave it out to start anew"
@@ -41,6 +45,11 @@ def _part(part: object, column: Column) -> ColumnElement[Any]:
     value = datetime.fromisoformat(str(part)).astimezone(UTC) if kind is datetime else part
     if type(value) is not kind:
         raise TypeError(part)
-    if (isinstance(value, int) and abs(value) >= 2**31) or (isinstance(value, str) and not value.isalnum()):
+    if (isinstance(value, int) and abs(value) >= 2**31) or (isinstance(value, str) and not _storable(value)):
         raise ValueError(part)
     return literal(value, column.type)
+
+
+def _storable(text: str) -> bool:
+    """Whether the databases take it: Postgres refuses NULs, and neither takes halves of characters."""
+    return "\0" not in text and bool(text.encode())

@@ -28,6 +28,8 @@ may be back after a power loss, and takes the last transaction with it. Source: 
 def open_engine(url: str, *, enforce_foreign_keys: bool = True) -> Engine:
     """The engine of a SQLite or Postgres URL; nothing is connected yet.
 
+    Its errors carry no values: a spec among them would tell the log what reality hides.
+
     Args:
         url: SQLAlchemy URL; Postgres without a driver gets psycopg 3.
         enforce_foreign_keys: in SQLite; a migration that rebuilds tables must not.
@@ -38,8 +40,10 @@ def open_engine(url: str, *, enforce_foreign_keys: bool = True) -> Engine:
     parsed = _parse(url)
     if parsed.get_backend_name() == "postgresql":
         patience = {"connect_timeout": CONNECT_S}
-        return create_engine(parsed, pool_pre_ping=True, pool_size=10, max_overflow=20, connect_args=patience)
-    engine = create_engine(parsed, pool_pre_ping=True, connect_args={"timeout": PATIENCE_S})
+        return create_engine(
+            parsed, pool_pre_ping=True, pool_size=10, max_overflow=20, connect_args=patience, hide_parameters=True
+        )
+    engine = create_engine(parsed, pool_pre_ping=True, connect_args={"timeout": PATIENCE_S}, hide_parameters=True)
     _prepare_sqlite(engine, enforce_foreign_keys=enforce_foreign_keys)
     return engine
 

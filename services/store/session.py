@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
-from sqlalchemy import text
+from sqlalchemy import event, text
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session as Session
 from sqlalchemy.orm import sessionmaker
@@ -14,6 +14,7 @@ from services.core.errors import StoreUnavailable
 from services.store import troubles
 from services.store.engine import WRITES, open_engine
 from services.store.models import REVISION
+from services.store.repository import events
 
 T = TypeVar("T")
 
@@ -24,12 +25,18 @@ class Store:
     """One database, SQLite or Postgres; safe to share between threads, and opened without connecting.
 
     It recovers by itself: a connection that died is replaced at its next use.
+
+    Attributes:
+        errors: times that the database could not be used, since the store was opened.
+        retries: transactions that Postgres gave up for others, and that were run anew.
     """
 
     def __init__(self, url: str) -> None:
+        self.errors = self.retries = 0
         self._engine = open_engine(url)
         snapshot = {"isolation_level": "REPEATABLE READ"} if self._engine.name == "postgresql" else {}
         self._writer = sessionmaker(self._engine.execution_options(**{WRITES: True}), expire_on_commit=False)
+        event.listen(self._writer, "before_commit", events.write)
         self._reader = sessionmaker(self._engine.execution_options(**snapshot), expire_on_commit=False)
 
     @contextmanager
@@ -39,7 +46,7 @@ class Store:
         Raises:
             StoreUnavailable: the database cannot be used now.
         """
-        with troubles.named(), self._writer.begin() as session:
+        with self._named(), self._writer.begin() as session:
             yield session
 
     @contextmanager
@@ -49,7 +56,7 @@ class Store:
         Raises:
             StoreUnavailable: the database cannot be used now.
         """
-        with troubles.named(), self._reader.begin() as session:
+        with self._named(), self._reader.begin() as session:
             yield session
 
     def write(self, work: Callable[[Session], T]) -> T:
@@ -64,8 +71,9 @@ class Store:
                     return work(session)
             except DBAPIError as error:
                 if not troubles.is_clash(error):
-                    with troubles.named():
+                    with self._named():
                         raise
+            self.retries += 1
             time.sleep(0.01 * 2**attempt)
         with self.transaction() as session:
             return work(session)
@@ -82,6 +90,16 @@ class Store:
             found = ", ".join(revisions) or "none"
             msg = f"the database is at revision {found}, this version needs {REVISION}: run `python -m migrations`"
             raise StoreUnavailable(msg)
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Within it, troubles of the database are named, and counted."""
+        try:
+            with troubles.named():
+                yield
+        except StoreUnavailable:
+            self.errors += 1
+            raise
 
     def dispose(self) -> None:
         """Close the idle connections; the store may be used again."""

@@ -40,9 +40,9 @@ class Service:
         wait_until(self._answers, 60, lambda: self._log.read_text())
         return self
 
-    def stop(self):
+    def stop(self, how=signal.SIGINT):
         """In order, as Ctrl-C does."""
-        self._process.send_signal(signal.SIGINT)
+        self._process.send_signal(how)
         assert self._process.wait(40) == 0, self._log.read_text()
 
     def kill(self):

@@ -241,6 +241,42 @@ def test_cancelling_keeps_what_is_stored(store: Store, api: TestClient):
     assert api.get(f"/experiments/{made['id']}/curve").json()["points"][0]["n"] == 1
 
 
+def test_the_verbs_of_an_experiment_and_of_a_study(api: TestClient):
+    study = api.post("/studies", json={"robot": "toy_function", "budget": "smoke"}).json()
+    first = study["experiments"][0]["id"]
+
+    answers = [api.post(f"/experiments/{first}/{verb}") for verb in ("pause", "pause", "resume", "stop", "resume")]
+    answers += [api.post(f"/studies/{study['id']}/{verb}") for verb in ("pause", "resume", "stop", "cancel")]
+
+    assert [each.status_code for each in answers] == [200, 409, 200, 200, 409, 200, 200, 200, 409]
+    states = [each.json().get("state") for each in answers]
+    assert states == ["PAUSED", None, "QUEUED", "CANCELLED", None, "PAUSED", "RUNNING", "CANCELLED", None]
+    assert (
+        answers[1]
+        .json()["detail"]
+        .endswith("is PAUSED and cannot be paused; what can be done with it: resume, stop, cancel")
+    )
+
+
+def test_an_experiment_is_extended_to_totals_and_given_another_turn(store: Store, api: TestClient):
+    made = api.post("/experiments", json=TOY | {"max_parallel": 1}).json()
+    too_early = api.post(f"/experiments/{made['id']}/extend", json={"repetitions": 50})
+    while claims := execution.claim(store, "test", limit=1):
+        run(store, claims[0])
+
+    less = api.post(f"/experiments/{made['id']}/extend", json={"iterations": 1})
+    more = api.post(f"/experiments/{made['id']}/extend", json={"repetitions": 50})
+    turn = api.patch(f"/experiments/{made['id']}", json={"priority": 3})
+    attempts = api.get(f"/experiments/{made['id']}/repetitions/0/attempts").json()
+
+    assert [each.status_code for each in (too_early, less, more, turn)] == [409, 422, 202, 200]
+    assert less.json()["errors"][0]["pointer"] == "/iterations"
+    assert (more.json()["state"], more.json()["progress"]["repetitions"]) == ("QUEUED", 50)
+    assert (turn.json()["priority"], turn.json()["max_parallel"]) == (3, 1)
+    assert [each["ending"] for each in attempts] == ["completed"]
+    assert api.get(f"/experiments/{made['id']}/repetitions/99/attempts").status_code == 404
+
+
 def test_the_catalogue_lists_every_plug_in_with_the_schema_of_its_options(lite: TestClient):
     found = lite.get("/catalogue").json()
 

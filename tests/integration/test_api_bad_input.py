@@ -10,10 +10,11 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api.app import create_app
-from api.limits import MOST_BYTES
 from services.core.errors import StoreUnavailable
+from services.settings import Limits
 from services.store.session import Store
 
+MOST_BYTES = Limits().body_bytes
 LEAST = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke"}
 JSON = {"content-type": "application/json"}
 
@@ -192,7 +193,7 @@ def test_json_that_is_no_object_is_refused(api: TestClient, body: str):
 def test_a_body_without_its_content_type_is_refused_with_the_header_that_it_needs(api: TestClient):
     answer = api.post("/experiments", content=json.dumps(LEAST), headers={"content-type": "text/plain"})
 
-    assert "Content-Type: application/json" in only_error(answer)["message"]
+    assert "Content-Type: application/json" in problem(answer, 415)["errors"][0]["message"]
 
 
 def test_text_that_is_no_unicode_is_answered_with_text_that_is(api: TestClient):
@@ -329,7 +330,7 @@ def test_a_database_that_was_never_migrated_is_not_ready(tmp_path: Any):
 def test_an_accident_inside_leaks_nothing_but_a_number_to_find_it_by(
     api: TestClient, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ):
-    def fail(*_: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise RuntimeError("the password is swordfish")
 
     monkeypatch.setattr("services.experiments.read_study", fail)

@@ -1,5 +1,6 @@
 """The processes of the service: what is started is ended, what dies is started again, and trouble is a sentence."""
 
+import json
 import os
 import re
 import signal
@@ -16,10 +17,13 @@ from api import service
 from api.client import Client
 from api.exits import CommandError
 from api.launch import end, start
-from api.server import listen
+from api.server import listen, refuse_strangers
 from api.service import Keeper, environment_of, migrate
-from services.core.errors import StoreUnavailable
+from schemas.access import Role
+from services.access import create_token, revoke_token
+from services.core.errors import StoreUnavailable, Unauthenticated
 from services.settings import Settings
+from services.store.session import Store
 
 
 def within(seconds: float, condition: Callable[[], object]) -> bool:
@@ -66,9 +70,47 @@ def test_a_service_migrates_its_database_answers_and_ends_in_order(tmp_path: Pat
     said, _ = process.communicate(timeout=20)
 
     assert process.returncode == 0, said
-    assert said.startswith(f"gaplab serves on http://127.0.0.1:{port}")
+    assert json.loads(said)["message"].startswith(f"gaplab serves on http://127.0.0.1:{port}")
     assert said.count("\n") == 1
     assert (tmp_path / "new.db").stat().st_size > 0
+
+
+@pytest.mark.parametrize("module", ["api.cli", "api"])
+def test_beyond_loopback_a_service_without_a_token_does_not_start_and_says_how_to_make_one(
+    tmp_path: Path, port: int, module: str
+):
+    environment = {"GAPLAB_DATABASE_URL": f"sqlite:///{tmp_path / 'new.db'}", "GAPLAB_HOST": "0.0.0.0"}
+    migrate(environment["GAPLAB_DATABASE_URL"])
+    arguments = ["serve", "--no-workers"] if module == "api.cli" else []
+
+    refused = subprocess.run(
+        [sys.executable, "-m", module, *arguments],
+        env=os.environ | environment | {"GAPLAB_PORT": str(port)},
+        capture_output=True,
+        text=True,
+        timeout=180,
+        check=False,
+    )
+
+    assert refused.returncode == 1
+    assert refused.stderr.startswith("gaplab: 0.0.0.0 is more than loopback")
+    assert "gaplab token create" in refused.stderr
+    assert refused.stderr.count("\n") == 1
+
+
+def test_a_host_is_refused_until_a_token_lets_someone_in(store_url: str):
+    store, strangers = Store(store_url), Settings(database_url=store_url, host="0.0.0.0")
+    with pytest.raises(Unauthenticated, match="token create"):
+        refuse_strangers(strangers)
+    token = create_token(store, Role.READER).token.id
+
+    refuse_strangers(strangers)
+    revoke_token(store, token)
+
+    with pytest.raises(Unauthenticated):
+        refuse_strangers(strangers)
+    refuse_strangers(Settings(database_url=store_url))
+    store.dispose()
 
 
 def test_a_port_that_is_taken_is_a_sentence(tmp_path: Path):
@@ -99,22 +141,15 @@ def test_a_database_that_cannot_be_migrated_is_a_sentence_without_its_password(u
 
 
 def test_a_supervisor_that_dies_is_started_again_and_it_is_said(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ):
     monkeypatch.setattr(service, "LONGEST_PAUSE_S", 0.1)
     keeper = Keeper({}, module="this")
 
     keeper.start()
-    said = ""
-
-    def twice() -> bool:
-        nonlocal said
-        said += "".join(capfd.readouterr())
-        return said.count("another starts") >= 2
-
-    assert within(20, twice)
+    assert within(20, lambda: caplog.text.count("another starts") >= 2)
     keeper.stop()
-    assert "ended by itself (exit code 0)" in said
+    assert "ended by itself (exit code 0)" in caplog.text
 
 
 def test_a_keeper_that_is_stopped_ends_its_supervisor(tmp_path: Path):

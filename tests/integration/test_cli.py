@@ -187,6 +187,19 @@ def test_a_cancelled_study_has_no_experiment_left_to_run(gaplab: Gaplab):
     assert second.code == Exit.CONFLICT
 
 
+def test_the_verbs_say_what_it_is_now_and_forbidden_ones_are_a_sentence(gaplab: Gaplab, sqlite_store: Store):
+    id = submitted(gaplab)  # noqa: A001
+
+    said = [gaplab(verb, id) for verb in ("pause", "resume", "resume")]
+    finish(sqlite_store)
+    said += [gaplab("extend", id, "--iterations", "4"), gaplab("extend", id, "--repetitions", "3")]
+
+    assert [each.out.rpartition(" is ")[2].strip() for each in said] == ["PAUSED.", "QUEUED.", "", "QUEUED.", ""]
+    assert [each.code for each in said] == [0, 0, Exit.CONFLICT, 0, Exit.CONFLICT]
+    assert said[2].err.endswith("is QUEUED and cannot be resumed; what can be done with it: pause, stop, cancel\n")
+    assert gaplab("stop", id).out.endswith("is COMPLETED.\n")
+
+
 def test_the_catalogue_lists_every_kind_of_plug_in(gaplab: Gaplab):
     said = gaplab("catalogue").out
 

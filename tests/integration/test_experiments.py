@@ -10,6 +10,7 @@ from schemas.records import MeasurementKind
 from schemas.spec import StudySpec
 from services import execution, experiments
 from services.core.errors import Conflict, InvalidSpec, NotFound
+from services.listing import Which
 from services.resolution import expected_rollouts, resolve_experiment
 from tests.experiments import AWKWARD, run, some_log, toy
 
@@ -142,7 +143,7 @@ def test_a_list_is_filtered_by_study_state_and_strategy(store):
     experiments.cancel_experiment(store, alone.id)
 
     def found(**filters):
-        return {each.id for each in experiments.list_experiments(store, **filters).items}
+        return {each.id for each in experiments.list_experiments(store, Which(**filters)).items}
 
     assert found(study=study.id) == {each.id for each in study.experiments}
     assert found(state=State.CANCELLED) == {alone.id}
@@ -254,7 +255,7 @@ def test_realitys_parameters_are_hidden_while_any_experiment_of_the_study_can_le
     experiments.cancel_experiment(store, second.id)
 
     assert str(SECRET) not in study.model_dump_json() + meanwhile.model_dump_json()
-    assert str(SECRET) not in experiments.list_experiments(store, state=State.QUEUED).model_dump_json()
+    assert str(SECRET) not in experiments.list_experiments(store, Which(state=State.QUEUED)).model_dump_json()
     assert experiments.read_experiment(store, first.id).spec["reality"]["parameters"]["static_friction"] == SECRET
 
 

@@ -21,6 +21,6 @@ def test_no_kill_leaves_a_trace_in_the_results(database, postgres, folder):
         check=False,
     )
 
-    print(done.stdout)
+    sys.stdout.write(done.stdout)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "22 of 22" in done.stdout

@@ -73,6 +73,7 @@ def test_every_constraint_has_the_name_that_the_models_give_it(store_url):
         ("measurement", "ck_measurement_kind"),
         ("sensitivity", "ck_sensitivity_state"),
         ("attempt", "ck_attempt_ending"),
+        ("token", "ck_token_role"),
     }
 
 
@@ -143,3 +144,30 @@ def test_a_store_at_another_revision_is_unavailable(store_url):
         store.check()
 
     store.dispose()
+
+
+def test_what_ran_and_waited_before_there_were_turns_has_its_turn(database_url):
+    engine = open_engine(database_url, enforce_foreign_keys=False).execution_options(**{WRITES: True})
+    experiment = "INSERT INTO experiment VALUES ('{}', NULL, 0, 'x', 'random', '{}', '{{}}', 1, 3, 9, '{}', NULL, NULL)"
+    repetition = (
+        "INSERT INTO repetition (experiment_id, number, state, owner, epoch, started_at, attempts, losses, steps, "
+        "iterations_done, rollouts_done, rollouts_failed, rollouts_saved, seconds) "
+        "VALUES ('{}', {}, '{}', 'me', 4, '2012-11-05 09:00:00.000000', 1, 0, 0, 0, 0, 0, 0, 0)"
+    )
+    with engine.begin() as connection:
+        command.upgrade(migrations.configuration(connection), "0002")
+        for id_, state in (("old", "RUNNING"), ("over", "COMPLETED")):
+            connection.exec_driver_sql(experiment.format(id_, state, "2012-11-05 09:00:00.000000"))
+        for number, state in enumerate(("COMPLETED", "RUNNING", "QUEUED")):
+            connection.exec_driver_sql(repetition.format("old", number, state))
+
+    migrations.upgrade(database_url)
+
+    with engine.connect() as connection:
+        turns = connection.exec_driver_sql(
+            "SELECT id, running, claimable, precedence FROM experiment ORDER BY id"
+        ).all()
+        attempts = connection.exec_driver_sql("SELECT epoch, owner, ending FROM attempt").all()
+    engine.dispose()
+    assert [tuple(each) for each in turns] == [("old", 1, True, 0), ("over", 0, False, 0)]
+    assert [tuple(each) for each in attempts] == [(4, "me", None)]

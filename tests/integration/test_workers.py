@@ -20,7 +20,7 @@ from services.core.sensitivity import Effort, check
 from services.resolution import resolve_experiment
 from services.settings import Settings
 from services.simulation import setting, subject
-from services.store.models import RepetitionRow
+from services.store.models import CheckpointRow, RepetitionRow
 from services.store.repository.steps import logs
 from tests.fakes import flat
 from tests.processes import processes_of_ray
@@ -55,7 +55,7 @@ def toy(**changes):
 
 def long_toy():
     """Some seconds of work in each repetition."""
-    return toy(repetitions=2, budget={"controller_evaluations": 5_000, "selection_evaluations": 1_000}, iterations=1)
+    return toy(repetitions=2, budget={"controller_evaluations": 3_000, "selection_evaluations": 300}, iterations=1)
 
 
 def run(supervisor, store, experiment, until=lambda: False):
@@ -184,6 +184,54 @@ def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_sto
 
     assert experiments.read_experiment(sqlite_store, experiment).state is State.COMPLETED
     assert stored(sqlite_store, experiment) == expected(toy())
+
+
+def long_steps():
+    """A step of some seconds, twice."""
+    budget = {"controller_evaluations": 4_000, "selection_evaluations": 20, "simulator_evaluations": 20}
+    return toy(strategy="random", repetitions=1, budget=budget, iterations=1)
+
+
+def parts_stored(store):
+    with store.reading() as session:
+        return session.query(CheckpointRow).count()
+
+
+def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(sqlite_store, monkeypatch):
+    claim, checkpoints = execution.claim, []
+
+    def watched(store, owner, limit):
+        claims = claim(store, owner, limit)
+        checkpoints.extend(len(each.checkpoints) for each in claims)
+        return claims
+
+    monkeypatch.setattr(execution, "claim", watched)
+    experiment = experiments.submit_experiment(sqlite_store, long_steps()).id
+    supervisor = Supervisor(sqlite_store, lambda: 1, checkpoint_s=0.05)
+    run(supervisor, sqlite_store, experiment, until=lambda: parts_stored(sqlite_store) > 1)
+
+    for pid in processes_of_ray("run"):
+        os.kill(pid, signal.SIGKILL)
+    run(supervisor, sqlite_store, experiment)
+
+    assert checkpoints[0] == 0
+    assert checkpoints[1] > 1
+    assert stored(sqlite_store, experiment) == expected(long_steps())
+    assert parts_stored(sqlite_store) == 0
+
+
+def test_told_to_stop_in_the_middle_of_a_step_it_hands_over_what_the_step_has(sqlite_store):
+    experiment = experiments.submit_experiment(sqlite_store, long_steps()).id
+    first, stop = Supervisor(sqlite_store, lambda: 1, checkpoint_s=0.05), Event()
+    run(first, sqlite_store, experiment, until=lambda: parts_stored(sqlite_store))
+    stop.set()
+
+    first.serve(stop)
+
+    (left,) = experiments.list_repetitions(sqlite_store, experiment)
+    assert (left.state, left.attempts) == (State.QUEUED, 0)
+    run(Supervisor(sqlite_store, lambda: 1), sqlite_store, experiment)
+    assert stored(sqlite_store, experiment) == expected(long_steps())
 
 
 def checked(store, check, supervisor):

@@ -23,7 +23,18 @@ ARROWS = {
     "workers": (("schemas", "services", "workers"), {"numpy", "ray"}),
     "api": (
         ("schemas", "services", "api", "migrations"),
-        {"fastapi", "starlette", "uvicorn", "typer", "rich", "httpx2", "pydantic", "fastapi_offline"},
+        {
+            "fastapi",
+            "starlette",
+            "uvicorn",
+            "typer",
+            "rich",
+            "httpx2",
+            "pydantic",
+            "fastapi_offline",
+            "anyio",
+            "prometheus_client",
+        },
     ),
     "migrations": (
         ("services.core.errors", "services.settings", "services.store", "migrations"),

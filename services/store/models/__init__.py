@@ -5,6 +5,10 @@
                                     ├──< attempt
                                     └──< checkpoint, of the step under way
     sensitivity, named after what it checks, which many experiments have in common
+    provenance, named after its facts, which many experiments have in common: experiment_provenance
+    event, numbered by event_counter
+    supervisor
+    token, who may ask;  idempotency, which requests were answered already
 
 What is plotted or filtered is a column; vectors are JSON arrays, in which floats round-trip exactly. Neither a database
 nor JSON has nan or infinity: a fitness of nan and a squared error of infinity are NULL.
@@ -13,14 +17,21 @@ The tallies in `repetition` (steps, rollouts, seconds) are kept in the transacti
 that progress is a sum over repetitions and never reads results.
 """
 
+from services.store.models.access import IdempotencyRow as IdempotencyRow
+from services.store.models.access import TokenRow as TokenRow
 from services.store.models.attempts import AttemptRow as AttemptRow
 from services.store.models.base import REVISION as REVISION
 from services.store.models.base import SPEC_VERSION as SPEC_VERSION
 from services.store.models.base import Base as Base
 from services.store.models.checkpoints import CheckpointRow as CheckpointRow
+from services.store.models.events import EventCounterRow as EventCounterRow
+from services.store.models.events import EventRow as EventRow
 from services.store.models.experiments import ExperimentRow as ExperimentRow
 from services.store.models.experiments import RepetitionRow as RepetitionRow
 from services.store.models.experiments import StudyRow as StudyRow
+from services.store.models.provenance import ExperimentProvenanceRow as ExperimentProvenanceRow
+from services.store.models.provenance import ProvenanceRow as ProvenanceRow
+from services.store.models.provenance import SupervisorRow as SupervisorRow
 from services.store.models.results import IterationRow as IterationRow
 from services.store.models.results import MeasurementRow as MeasurementRow
 from services.store.models.results import SimulatorRow as SimulatorRow

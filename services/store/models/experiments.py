@@ -18,13 +18,19 @@ from services.store.models.base import SPEC_VERSION, Base
 
 
 class StudyRow(Base):
-    """Experiments that belong together to be compared."""
+    """Experiments that belong together to be compared.
+
+    Attributes:
+        notes, edits: as of an experiment.
+    """
 
     __tablename__ = "study"
-    __table_args__ = (Index(None, "created_at", "id"),)
+    __table_args__ = (Index(None, "created_at", "id"), Index(None, "name", "id"))
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     name: Mapped[str] = mapped_column(String(200))
+    notes: Mapped[str | None] = mapped_column(Text)
+    edits: Mapped[int] = mapped_column(default=0, server_default="0")
     created_at: Mapped[datetime]
 
 
@@ -40,14 +46,23 @@ class ExperimentRow(Base):
         max_parallel: repetitions that run at once; NULL for any number.
         running: repetitions that somebody has claimed.
         claimable: whether one more may be claimed now. Both are kept by `repository/settling.py`.
+        computed_with: engines, machine and version of the spec, as its first steps had them.
+        refused_by: what a supervisor has that did not go on with it, for it is not the same.
+        sensitivity_id: of the check of what it tunes.
+        token_id: of the token that submitted it; NULL where none is needed.
+        notes: of people, about it.
+        edits: how often people changed its name or notes.
     """
 
     __tablename__ = "experiment"
     __table_args__ = (
         Index(None, "created_at", "position", "id"),
+        Index("ix_experiment_turn", "claimable", "precedence", "running", "created_at", "position", "id"),
+        Index(None, "name", "id"),
+        Index(None, "strategy", "id"),
+        Index(None, "state", "id"),
         Index(None, "state", "created_at", "position", "id"),
         Index(None, "strategy", "created_at", "position", "id"),
-        Index("ix_experiment_turn", "claimable", "precedence", "running", "created_at", "position", "id"),
     )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
@@ -64,6 +79,12 @@ class ExperimentRow(Base):
     max_parallel: Mapped[int | None]
     running: Mapped[int] = mapped_column(default=0)
     claimable: Mapped[bool] = mapped_column(default=True)
+    computed_with: Mapped[str | None] = mapped_column(String(300))
+    refused_by: Mapped[str | None] = mapped_column(String(300))
+    sensitivity_id: Mapped[str | None] = mapped_column(String(32), index=True)
+    token_id: Mapped[str | None] = mapped_column(String(32))
+    notes: Mapped[str | None] = mapped_column(Text)
+    edits: Mapped[int] = mapped_column(default=0, server_default="0")
     created_at: Mapped[datetime]
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]
@@ -81,6 +102,7 @@ class RepetitionRow(Base):
         steps: recorded so far; the position that the next step takes in the log.
         checkpoints: parts of that next step that are stored.
         seconds: of work in the recorded steps.
+        provenance_id: under what it was claimed the last time.
     """
 
     __tablename__ = "repetition"
@@ -107,5 +129,6 @@ class RepetitionRow(Base):
     rollouts_failed: Mapped[int] = mapped_column(BigInteger, default=0)
     rollouts_saved: Mapped[int] = mapped_column(BigInteger, default=0)
     seconds: Mapped[float] = mapped_column(default=0.0)
+    provenance_id: Mapped[str | None] = mapped_column(String(32))
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]

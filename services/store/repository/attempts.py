@@ -5,11 +5,23 @@ from collections.abc import Sequence
 from sqlalchemy import insert, select, update
 from sqlalchemy.orm import Session
 
-from schemas.lifecycle import Ending
+from schemas.events import EventKind
+from schemas.lifecycle import Ending, State
 from schemas.records import AttemptRead
 from services.core.errors import NotFound
 from services.store.clock import now
 from services.store.models import AttemptRow, RepetitionRow
+from services.store.repository.events import note
+
+_TOLD = {
+    Ending.COMPLETED: EventKind.REPETITION_COMPLETED,
+    Ending.PAUSED: EventKind.REPETITION_PAUSED,
+    Ending.STOPPED: EventKind.REPETITION_STOPPED,
+    Ending.CANCELLED: EventKind.REPETITION_CANCELLED,
+    Ending.HANDED_BACK: EventKind.REPETITION_HANDED_BACK,
+    Ending.LOST: EventKind.REPETITION_LOST,
+    Ending.FAILED: EventKind.REPETITION_FAILED,
+}
 
 
 def begin(session: Session, repetitions: Sequence[int]) -> None:
@@ -20,13 +32,18 @@ def begin(session: Session, repetitions: Sequence[int]) -> None:
 
 
 def end(session: Session, repetitions: Sequence[int], ending: Ending, reason: str | None = None) -> None:
-    """The attempts at these repetitions that go on are over."""
-    row = AttemptRow
-    session.execute(
+    """The attempts at these repetitions that go on are over, which is an event of each."""
+    row, repetition = AttemptRow, RepetitionRow
+    ended = session.scalars(
         update(row)
         .where(row.repetition_id.in_(repetitions), row.ended_at.is_(None))
         .values(ended_at=now(), ending=ending, reason=reason)
-    )
+        .returning(row.repetition_id)
+    ).all()
+    found = select(repetition.experiment_id, repetition.number, repetition.state).where(repetition.id.in_(ended))
+    for experiment, number, state in session.execute(found.order_by(repetition.id)):
+        kind = EventKind.REPETITION_FAILED if state is State.FAILED else _TOLD[ending]
+        note(session, kind, experiment, number, **({"reason": reason} if reason else {}))
 
 
 def attempts_of(session: Session, experiment: str, number: int) -> tuple[AttemptRead, ...]:

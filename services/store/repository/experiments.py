@@ -6,15 +6,16 @@ from datetime import datetime
 from secrets import choice
 from typing import TypeVar
 
-from sqlalchemy import insert, select, tuple_
+from sqlalchemy import event, insert, select
 from sqlalchemy.orm import Session
 
-from schemas.lifecycle import OPEN, State
+from schemas.events import EventKind
+from schemas.lifecycle import OPEN
 from schemas.spec import ExperimentSpec, Schedule
-from services.core.errors import NotFound
+from services.core.errors import NotFound, StoreUnavailable
 from services.store.clock import now
-from services.store.cursor import decode, encode
-from services.store.models import ExperimentRow, RepetitionRow, StudyRow
+from services.store.models import SPEC_VERSION, ExperimentRow, RepetitionRow, StudyRow
+from services.store.repository.events import note
 
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 
@@ -46,7 +47,13 @@ def insert_study(session: Session, name: str) -> StudyRow:
 
 
 def insert_experiment(
-    session: Session, spec: ExperimentSpec, extent: Extent, *, study: StudyRow | None = None, position: int = 0
+    session: Session,
+    spec: ExperimentSpec,
+    extent: Extent,
+    *,
+    study: StudyRow | None = None,
+    position: int = 0,
+    token: str | None = None,
 ) -> ExperimentRow:
     """An experiment with its repetitions, all QUEUED.
 
@@ -56,6 +63,7 @@ def insert_experiment(
         extent: of each of its repetitions.
         study: that it belongs to.
         position: within the study.
+        token: id of the token that submitted it.
     """
     experiment = ExperimentRow(
         id=new_id(),
@@ -68,11 +76,13 @@ def insert_experiment(
         rollouts=extent.rollouts,
         precedence=-spec.priority,
         max_parallel=spec.max_parallel,
+        token_id=token,
         created_at=study.created_at if study else _moment(session),
     )
     session.add(experiment)
     session.flush()
     insert_repetitions(session, experiment.id, range(spec.repetitions or 0))
+    note(session, EventKind.SUBMITTED, experiment.id, name=experiment.name, repetitions=spec.repetitions)
     return experiment
 
 
@@ -134,43 +144,6 @@ def open_studies(session: Session, studies: Sequence[str]) -> frozenset[str]:
     return frozenset(each for each in found if each is not None)
 
 
-def page_of_experiments(
-    session: Session, *, limit: int, cursor: str | None, study: str | None, state: State | None, strategy: str | None
-) -> tuple[ExperimentRow, ...]:
-    """Up to `limit` experiments, newest first.
-
-    Raises:
-        InvalidSpec: a cursor that is none.
-    """
-    row = ExperimentRow
-    key = (row.created_at, row.position, row.id)
-    query = select(row).order_by(*(each.desc() for each in key)).limit(limit)
-    wanted = {row.study_id: _plain(study), row.state: state, row.strategy: _plain(strategy)}
-    query = query.where(*(column == value for column, value in wanted.items() if value is not None))
-    if cursor is not None:
-        query = query.where(tuple_(*key) < decode(cursor, key))
-    return tuple(session.scalars(query))
-
-
-def page_of_studies(session: Session, *, limit: int, cursor: str | None) -> tuple[StudyRow, ...]:
-    """Up to `limit` studies, newest first.
-
-    Raises:
-        InvalidSpec: a cursor that is none.
-    """
-    key = (StudyRow.created_at, StudyRow.id)
-    query = select(StudyRow).order_by(*(each.desc() for each in key)).limit(limit)
-    if cursor is not None:
-        query = query.where(tuple_(*key) < decode(cursor, key))
-    return tuple(session.scalars(query))
-
-
-def cursor_of(row: ExperimentRow | StudyRow) -> str:
-    """The cursor of the page that follows the row."""
-    position = (row.position,) if isinstance(row, ExperimentRow) else ()
-    return encode(row.created_at, *position, row.id)
-
-
 def repetitions_of(session: Session, experiment_id: str) -> tuple[RepetitionRow, ...]:
     """The repetitions of an experiment, by number."""
     row = RepetitionRow
@@ -184,6 +157,15 @@ def lock(session: Session, experiments: Sequence[str]) -> None:
     """
     row = ExperimentRow
     session.execute(select(row.id).where(row.id.in_(experiments)).order_by(row.id).with_for_update())
+
+
+@event.listens_for(ExperimentRow, "load")
+def _refuse_newer(row: ExperimentRow, _: object) -> None:
+    """A spec of a later version may mean something else than what it seems to: it is not read at all."""
+    if row.spec_version > SPEC_VERSION:
+        msg = f"the spec of experiment {row.id!r} is of version {row.spec_version}, and this gaplab reads up to "
+        msg += f"{SPEC_VERSION}: use a later gaplab with this database"
+        raise StoreUnavailable(msg)
 
 
 T = TypeVar("T", str, str | None)

@@ -6,11 +6,13 @@ from sqlalchemy import case, literal, select, update
 from sqlalchemy.orm import Session
 
 from schemas.lifecycle import ASKED, Ending, State
+from schemas.provenance import Provenance
 from services.store.clock import now
 from services.store.lease import Claim, Delivered
 from services.store.models import ExperimentRow, RepetitionRow
 from services.store.repository import attempts, steps
 from services.store.repository.experiments import lock
+from services.store.repository.provenance import permitted
 from services.store.repository.settling import settle
 from services.store.repository.steps import any_of
 from services.store.repository.turns import ahead
@@ -35,11 +37,17 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
     return tuple(each for each in held if each not in leaving)
 
 
-def unwanted(session: Session, waiting: Sequence[Claim]) -> tuple[Claim, ...]:
-    """Those of the claims, none of which has begun its work, that had better be given back now."""
+def unwanted(session: Session, waiting: Sequence[Claim], under: Provenance) -> tuple[Claim, ...]:
+    """Those of the claims, none of which has begun its work, that had better be given back now.
+
+    Args:
+        session: of a transaction.
+        waiting: the claims.
+        under: what their holder computes with, and so whatever it would claim in their place.
+    """
     row, experiments = ExperimentRow, sorted({each.experiment_id for each in waiting})
     over = session.scalars(select(row.id).where(row.id.in_(experiments), row.state.in_(ASKED))).all()
-    gone = {*over, *ahead(session, experiments)}
+    gone = {*over, *ahead(session, experiments, permitted(under))}
     return tuple(each for each in waiting if each.experiment_id in gone)
 
 

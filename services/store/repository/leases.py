@@ -11,12 +11,13 @@ from sqlalchemy import ColumnElement, case, func, select, update
 from sqlalchemy.orm import Session
 
 from schemas.lifecycle import Ending, State
+from schemas.provenance import Provenance
 from schemas.spec import ExperimentSpec
 from services.core.errors import Conflict
 from services.store.clock import now
 from services.store.lease import Claim
 from services.store.models import ExperimentRow, RepetitionRow
-from services.store.repository import attempts, checkpoints
+from services.store.repository import attempts, checkpoints, provenance
 from services.store.repository.experiments import lock
 from services.store.repository.settling import settle
 from services.store.repository.steps import any_of, logs, mine
@@ -26,9 +27,14 @@ MAX_LOSSES = 5
 """A repetition that loses its worker so often without recording a step in between is what kills them."""
 
 
-def claim(session: Session, owner: str, limit: int) -> tuple[Claim, ...]:
-    """Up to `limit` queued repetitions, whose turn it is; RUNNING from now on, and the owner's."""
-    ids = next_repetitions(session, limit)
+def claim(session: Session, owner: str, limit: int, under: Provenance) -> tuple[Claim, ...]:
+    """Up to `limit` queued repetitions, whose turn it is; RUNNING from now on, and the owner's.
+
+    Experiments that were computed with something else than what it is under are left alone, and say so.
+    """
+    ids = next_repetitions(session, limit, provenance.permitted(under))
+    if len(ids) < limit:
+        provenance.refuse(session, under)
     if not ids:
         return ()
     row = RepetitionRow
@@ -47,6 +53,7 @@ def claim(session: Session, owner: str, limit: int) -> tuple[Claim, ...]:
     attempts.begin(session, ids)
     claims = _claims(session, ids)
     _start(session, sorted({each.experiment_id for each in claims}))
+    provenance.record(session, under, claims)
     return claims
 
 

@@ -14,18 +14,22 @@ from services.store.repository.progress import Tally, reasons, tallies
 from services.store.repository.sensitivity import Warned, warned
 
 
-def read_experiments(session: Session, rows: Sequence[ExperimentRow]) -> tuple[ExperimentRead, ...]:
+def read_experiments(
+    session: Session, rows: Sequence[ExperimentRow], *, reveal: bool = False
+) -> tuple[ExperimentRead, ...]:
     """The experiments as they are shown, with their progress.
 
     Reality's parameters are null until the experiment has ended, and with it all others of its study: they share one
-    reality, and what one of them shows is known of all.
+    reality, and what one of them shows is known of all. `reveal` shows them nevertheless.
     """
-    return _read(session, rows, tallies(session, [row.id for row in rows]))
+    return _read(session, rows, tallies(session, [row.id for row in rows]), reveal=reveal)
 
 
-def _read(session: Session, rows: Sequence[ExperimentRow], progress: Mapping[str, Tally]) -> tuple[ExperimentRead, ...]:
+def _read(
+    session: Session, rows: Sequence[ExperimentRow], progress: Mapping[str, Tally], *, reveal: bool
+) -> tuple[ExperimentRead, ...]:
     failed, warnings = reasons(session, [row.id for row in rows]), warned(session, rows)
-    secret = hidden(session, rows)
+    secret = frozenset() if reveal else hidden(session, rows)
     return tuple(
         _experiment(
             row,
@@ -50,12 +54,12 @@ def without_truth(spec: Mapping[str, Any]) -> dict[str, Any]:
     return {**spec, "reality": reality | {"parameters": dict.fromkeys(reality["parameters"])}}
 
 
-def read_studies(session: Session, rows: Sequence[StudyRow]) -> tuple[StudyRead, ...]:
+def read_studies(session: Session, rows: Sequence[StudyRow], *, reveal: bool = False) -> tuple[StudyRead, ...]:
     """The studies as they are shown, with their experiments."""
     experiments = experiments_of(session, [row.id for row in rows])
     progress = tallies(session, [row.id for row in experiments])
     shown: dict[str | None, list[ExperimentRead]] = defaultdict(list)
-    for each in _read(session, experiments, progress):
+    for each in _read(session, experiments, progress, reveal=reveal):
         shown[each.study].append(each)
     return tuple(_study(row, shown[row.id], progress) for row in rows)
 
@@ -96,6 +100,8 @@ def _experiment(
         id=row.id,
         study=row.study_id,
         name=row.name,
+        notes=row.notes,
+        edits=row.edits,
         strategy=row.strategy,
         state=row.state,
         spec=without_truth(row.spec) if secret else row.spec,
@@ -104,7 +110,7 @@ def _experiment(
         progress=tally.progress(),
         reasons=failed,
         sensitivity=warned.check,
-        warnings=warned.warnings,
+        warnings=(*warned.warnings, *_refusal(row, tally)),
         created_at=row.created_at,
         started_at=row.started_at,
         ended_at=row.ended_at,
@@ -115,8 +121,20 @@ def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: Mappi
     return StudyRead(
         id=row.id,
         name=row.name,
+        notes=row.notes,
+        edits=row.edits,
         state=state_of([each.state for each in experiments]),
         experiments=tuple(experiments),
         progress=sum((progress[each.id] for each in experiments), Tally()).progress(),
         created_at=row.created_at,
+    )
+
+
+def _refusal(row: ExperimentRow, tally: Tally) -> tuple[str, ...]:
+    """Why it does not go on, if that is for a supervisor's versions."""
+    if row.refused_by is None or row.state.ended or tally.running:
+        return ()
+    return (
+        f"its first steps were computed with {row.computed_with}, and a supervisor with {row.refused_by} does not go "
+        f"on with it: start one with the same as at first, or accept the others (`gaplab accept-versions {row.id}`)",
     )

@@ -11,6 +11,7 @@ from sqlalchemy import ColumnElement, and_, case, func, select, update
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
+from schemas.events import EventKind
 from schemas.lifecycle import State
 from schemas.sensitivity import Checked, Sensitivity
 from services.core.errors import NotFound
@@ -19,6 +20,7 @@ from services.store.clock import now
 from services.store.lease import CheckClaim
 from services.store.mapping import checked
 from services.store.models import ExperimentRow, SensitivityRow
+from services.store.repository.events import note
 from services.store.repository.leases import MAX_LOSSES, plain
 
 _Insert: TypeAlias = Callable[..., postgresql.Insert | sqlite.Insert]
@@ -58,8 +60,14 @@ def queue(session: Session, spec: Checked) -> SensitivityRow:
 
 def queue_for(session: Session, experiments: Iterable[ExperimentRow]) -> None:
     """The check of what these experiments tune, as `queue` does; they have it in common, and may all tune nothing."""
-    for each in [row for row in experiments if row.iterations > 1][:1]:
-        queue(session, checked(each.spec))
+    tuning = [row for row in experiments if row.iterations > 1]
+    for each in tuning[:1]:
+        check = queue(session, checked(each.spec))
+        for row in tuning:
+            row.sensitivity_id = check.id
+        session.flush()
+        if check.state.ended:
+            _tell(session, check.id)
 
 
 def get(session: Session, id_: str) -> SensitivityRow:
@@ -177,4 +185,17 @@ def _give_back(session: Session, which: ColumnElement[bool], reason: str) -> int
 
 def _move(session: Session, which: ColumnElement[bool], **values: Any) -> int:  # noqa: ANN401 - columns have many types
     row = SensitivityRow
-    return len(session.execute(update(row).where(which).values(values).returning(row.id)).all())
+    moved = session.execute(update(row).where(which).values(values).returning(row.id, row.state)).all()
+    for id_, state in moved:
+        if state.ended:
+            _tell(session, id_)
+    return len(moved)
+
+
+def _tell(session: Session, id_: str) -> None:
+    """Every experiment whose check this is that the check has ended, and what it found."""
+    check = get(session, id_)
+    told = {"sensitivity": id_, "state": check.state.value, "warnings": list(warnings(check))}
+    of_it = select(ExperimentRow.id).where(ExperimentRow.sensitivity_id == id_).order_by(ExperimentRow.id)
+    for experiment in session.scalars(of_it):
+        note(session, EventKind.SENSITIVITY_ENDED, experiment, **told)

@@ -6,11 +6,22 @@ from typing import Any
 from sqlalchemy import case, func, select, update
 from sqlalchemy.orm import Session
 
+from schemas.events import EventKind
 from schemas.lifecycle import State
 from services.store.clock import now
 from services.store.models import ExperimentRow, RepetitionRow
+from services.store.repository.events import note
 
 _MAY_START = (State.QUEUED, State.RUNNING)
+
+_TOLD = {
+    State.RUNNING: EventKind.STARTED,
+    State.PAUSED: EventKind.PAUSED,
+    State.COMPLETED: EventKind.COMPLETED,
+    State.FAILED: EventKind.FAILED,
+    State.CANCELLED: EventKind.CANCELLED,
+}
+"""What an experiment moves to of itself; the other moves are asked for."""
 
 
 def settle(session: Session, experiments: Iterable[str]) -> None:
@@ -37,6 +48,7 @@ def _settle(session: Session, experiment: str) -> None:
     }
     if following is not state:
         values |= {"state": following} | ({"ended_at": now()} if following.ended else {})
+        note(session, _TOLD[following], experiment)
     session.execute(update(row).where(row.id == experiment).values(values))
 
 

@@ -14,7 +14,7 @@ from services.store import mapping
 from services.store.clock import now
 from services.store.lease import Checkpoint, Claim, Delivered, TimedStep
 from services.store.models import IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
-from services.store.repository import checkpoints
+from services.store.repository import checkpoints, events
 from services.store.repository.batch import Batch
 
 _REPETITION = cast("Table", RepetitionRow.__table__)
@@ -80,6 +80,7 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
     checkpoints.write(
         session, {claim: _parts(deliveries[claim], *lengths[claim], len(fresh[claim])) for claim in fresh}
     )
+    events.note_steps(session, fresh)
     return tuple(fresh)
 
 

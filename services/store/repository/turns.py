@@ -6,7 +6,7 @@ Fair means: whoever has the fewest repetitions running, those counted that were 
 from collections.abc import Sequence
 from heapq import heapify, heappop, heapreplace
 
-from sqlalchemy import Select, func, select
+from sqlalchemy import ColumnElement, Select, func, select
 from sqlalchemy.orm import Session
 
 from schemas.lifecycle import State
@@ -17,9 +17,9 @@ _ROW = ExperimentRow
 _ORDER = (_ROW.precedence, _ROW.running, _ROW.created_at, _ROW.position, _ROW.id)
 
 
-def next_repetitions(session: Session, limit: int) -> tuple[int, ...]:
-    """Up to `limit` queued repetitions, in the order of turns, of experiments that are locked from now on."""
-    experiments = session.scalars(next_experiments(limit)).all()
+def next_repetitions(session: Session, limit: int, permitted: ColumnElement[bool]) -> tuple[int, ...]:
+    """Up to `limit` queued repetitions, in the order of turns, of permitted experiments; locked from now on."""
+    experiments = session.scalars(next_experiments(limit).where(permitted)).all()
     if not experiments:
         return ()
     lock(session, experiments)
@@ -33,9 +33,13 @@ def next_experiments(limit: int) -> Select[str]:
     return select(_ROW.id).where(_ROW.claimable.is_(True)).order_by(*_ORDER).limit(limit)
 
 
-def ahead(session: Session, experiments: Sequence[str]) -> frozenset[str]:
-    """Those of these experiments of which one claimed repetition less, and one more of another, would be fairer."""
-    first = select(_ROW.precedence, _ROW.running).where(_ROW.claimable.is_(True)).order_by(*_ORDER).limit(1)
+def ahead(session: Session, experiments: Sequence[str], permitted: ColumnElement[bool]) -> frozenset[str]:
+    """Those of these experiments of which one claimed repetition less, and one more of another, would be fairer.
+
+    The other one is permitted to whoever has claimed them.
+    """
+    waits = _ROW.claimable.is_(True) & permitted
+    first = select(_ROW.precedence, _ROW.running).where(waits).order_by(*_ORDER).limit(1)
     if (waiting := session.execute(first).first()) is None:
         return frozenset()
     held = select(_ROW.id, _ROW.precedence, _ROW.running).where(_ROW.id.in_(experiments))

@@ -6,12 +6,14 @@ from typing import Any
 from sqlalchemy import update
 from sqlalchemy.orm import Session
 
+from schemas.events import EventKind
 from schemas.lifecycle import OPEN, PERMITTED, Ending, State, Verb
 from schemas.spec import ExperimentSpec
 from services.core.errors import Conflict
 from services.store.clock import now
 from services.store.models import ExperimentRow, RepetitionRow, StudyRow
 from services.store.repository import attempts, checkpoints
+from services.store.repository.events import note
 from services.store.repository.experiments import (
     Extent,
     experiments_of,
@@ -22,6 +24,13 @@ from services.store.repository.experiments import (
     repetitions_of,
 )
 from services.store.repository.settling import settle
+
+_TOLD = {
+    Verb.PAUSE: EventKind.PAUSING,
+    Verb.RESUME: EventKind.RESUMED,
+    Verb.STOP: EventKind.STOPPING,
+    Verb.CANCEL: EventKind.CANCELLED,
+}
 
 _DONE = {
     Verb.PAUSE: "paused",
@@ -40,8 +49,7 @@ def ask(session: Session, experiment_id: str, verb: Verb) -> ExperimentRow:
         Conflict: its state does not permit the verb.
     """
     experiment = _locked(session, experiment_id, verb)
-    _OBEY[verb](session, experiment)
-    session.refresh(experiment)
+    _obey(session, experiment, verb)
     return experiment
 
 
@@ -63,8 +71,7 @@ def ask_study(session: Session, study_id: str, verb: Verb) -> StudyRow:
         msg = f"no experiment of study {study_id!r} can be {_DONE[verb]}: they are {states}; permitted is {wanted}"
         raise Conflict(msg)
     for row in able:
-        _OBEY[verb](session, row)
-        session.refresh(row)
+        _obey(session, row, verb)
     return study
 
 
@@ -104,6 +111,7 @@ def extend(
     insert_repetitions(session, experiment.id, range(there, total))
     stored = experiment.spec | {"iterations": spec.iterations, "repetitions": total}
     values = {"spec": stored, "iterations": extent.iterations, "rollouts": extent.rollouts}
+    note(session, EventKind.EXTENDED, experiment.id, iterations=spec.iterations, repetitions=total)
     _move(session, experiment, state=State.QUEUED, ended_at=None, **values)
     session.refresh(experiment)
     return experiment
@@ -143,6 +151,12 @@ def _locked(session: Session, experiment_id: str, verb: Verb) -> ExperimentRow:
         )
         raise Conflict(msg)
     return experiment
+
+
+def _obey(session: Session, experiment: ExperimentRow, verb: Verb) -> None:
+    note(session, _TOLD[verb], experiment.id)
+    _OBEY[verb](session, experiment)
+    session.refresh(experiment)
 
 
 def _pause(session: Session, experiment: ExperimentRow) -> None:

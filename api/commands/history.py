@@ -1,0 +1,61 @@
+"""What happened, and under what."""
+
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from api import display
+from api.commands.base import Id, Url, app, connect
+from schemas.events import EventKind, EventRead
+from schemas.provenance import ProvenanceRead
+from schemas.records import StudyRead
+
+
+@app.command()
+def events(
+    id: Annotated[str | None, typer.Argument(metavar="[ID]", help="of a study or an experiment")] = None,  # noqa: A002
+    follow: Annotated[bool, typer.Option("--follow", help="go on with what happens, for ever")] = False,
+    kind: Annotated[list[EventKind] | None, typer.Option(help="only of this kind; repeat it for several")] = None,
+    after: Annotated[int, typer.Option(min=0, help="number of the last event that is known")] = 0,
+    url: Url = None,
+) -> None:
+    """Print what happened to an experiment, a study, or all of them: a line an event."""
+    console = display.console()
+    with connect(url) as client:
+        found = client.find(id) if id else None
+        of = {"study" if isinstance(found, StudyRead) else "experiment": found.id} if found else {}
+        kinds = [each.value for each in kind or []]
+        for each in client.events(follow=follow, kind=kinds, after=after, **of):
+            console.print(_line(each), soft_wrap=True)
+
+
+@app.command("accept-versions")
+def accept_versions(id: Id, url: Url = None) -> None:  # noqa: A002 - as the API says
+    """Let an experiment go on under other engine versions than it was begun with."""
+    with connect(url) as client:
+        found = client.accept_versions(id)
+    typer.echo(f"{found.id} goes on under the versions of the next supervisor.")
+
+
+def print_provenance(found: ProvenanceRead, console: Console) -> None:
+    """Under what an experiment was computed, a line each time that it changed."""
+    for each in found.uses:
+        under = each.provenance
+        commit = f", commit {under.commit[:8]}{' and changes' if under.dirty else ''}" if under.commit else ""
+        engines = ", ".join(f"{name} ({library})" for name, library in under.engines.items())
+        software = f"gaplab {under.gaplab}{commit}, Python {under.python}, {engines}"
+        console.print(f"computed with {software}; {under.processor}, {under.system}", markup=False, soft_wrap=True)
+
+
+def _line(event: EventRead) -> str:
+    """An event in a line."""
+    where = event.experiment if event.repetition is None else f"{event.experiment}/{event.repetition}"
+    told = ", ".join(f"{name} {_short(value)}" for name, value in event.body.items())
+    when = event.at.astimezone().strftime("%Y-%m-%d %H:%M:%S")
+    return f"{event.number:>7} {when} {where} [bold]{event.kind}[/] {escape(told)}".rstrip()
+
+
+def _short(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else "none" if value is None else str(value)

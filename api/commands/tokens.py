@@ -1,0 +1,71 @@
+"""Make, list and revoke tokens. These commands work on the database itself, so that the first needs none."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from typing import Annotated
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from api import display
+from api.commands.base import app
+from schemas.access import Role
+from services import access
+from services.settings import Settings
+from services.store.session import Store
+
+tokens = typer.Typer(
+    help="Tokens that the service lets in; on the database of GAPLAB_DATABASE_URL.", no_args_is_help=True
+)
+app.add_typer(tokens, name="token")
+
+
+@tokens.command()
+def create(
+    role: Annotated[Role, typer.Option(help="what it permits: reading; running too; revealing reality too")],
+    name: Annotated[str | None, typer.Option(help="of whoever will use it", show_default=False)] = None,
+) -> None:
+    """Make a token, and print it this once: only its digest is stored."""
+    from api.service import migrate
+
+    migrate(Settings.from_environment().database_url)
+    with _store() as store:
+        made = access.create_token(store, role, name)
+    typer.echo(f"{made.token.id} ({made.token.name}, {role.value}); this is shown once, for GAPLAB_TOKEN:", err=True)
+    typer.echo(made.secret)
+
+
+@tokens.command("list")
+def list_() -> None:
+    """List the tokens, without their secrets."""
+    with _store() as store:
+        found = access.list_tokens(store)
+    table = Table("id", "name", "role", "made", "last used", "revoked", box=SIMPLE_HEAD)
+    for each in found:
+        moments = map(_minute, (each.created_at, each.last_used_at, each.revoked_at))
+        table.add_row(each.id, each.name.replace("[", r"\["), each.role.value, *moments)
+    display.console().print(table if found else "No tokens yet; `gaplab token create` makes one.")
+
+
+@tokens.command()
+def revoke(id: Annotated[str, typer.Argument(metavar="ID", help="as listed")]) -> None:  # noqa: A002 - as listed
+    """Revoke a token; it admits nobody from the next request on."""
+    with _store() as store:
+        access.revoke_token(store, id)
+    typer.echo(f"Revoked {id}.")
+
+
+@contextmanager
+def _store() -> Iterator[Store]:
+    store = Store(Settings.from_environment().database_url)
+    try:
+        store.check()
+        yield store
+    finally:
+        store.dispose()
+
+
+def _minute(moment: datetime | None) -> str:
+    return moment.strftime("%Y-%m-%d %H:%M") if moment else ""

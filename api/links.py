@@ -1,0 +1,23 @@
+"""Where an answer leads, as links of the OpenAPI document: generated clients and tests follow them."""
+
+from typing import Any
+
+FROM_EXPERIMENT = (
+    "read_experiment",
+    "list_repetitions",
+    "list_samples",
+    "list_simulators",
+    "read_misfit",
+    "read_curve",
+    "edit_experiment",
+    "cancel_experiment",
+)
+FROM_STUDY = ("read_study", "read_study_curves", "edit_study")
+FROM_CHECK = ("read_sensitivity",)
+
+
+def leading_to(*operations: str) -> dict[str, Any]:
+    """The part of a documented answer that says which operations take its id."""
+    return {
+        "links": {each: {"operationId": each, "parameters": {"path.id": "$response.body#/id"}} for each in operations}
+    }

@@ -1,0 +1,71 @@
+"""How long a claim takes when 10 000 experiments of 40 repetitions wait, and when only one does: SQLite, Postgres."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
+from sqlalchemy import insert, text
+
+import migrations
+from benchmarks.measure import Row
+from benchmarks.supervisor import postgres
+from schemas.spec import ExperimentSpec
+from services import execution, experiments
+from services.store.clock import now
+from services.store.models import ExperimentRow, RepetitionRow
+from services.store.session import Store
+
+WAITING = 10_000
+REPETITIONS = 40
+CLAIMS = 20
+"""Timed; the median counts."""
+
+SPEC = ExperimentSpec.model_validate({"strategy": "random", "robot": "toy_function", "budget": "smoke"})
+
+
+def fill(store: Store, count: int) -> None:
+    """One experiment that is submitted, and so many like it."""
+    like = experiments.submit_experiment(store, SPEC).id
+    if not count:
+        return
+    with store.transaction() as session:
+        spec = session.get_one(ExperimentRow, like).spec
+        ids = [f"bench{each}" for each in range(count)]
+        common = {"position": 0, "name": "x", "strategy": "random", "spec": spec, "iterations": 3, "rollouts": 100}
+        session.execute(insert(ExperimentRow).values(created_at=now()), [{"id": each} | common for each in ids])
+        for number in range(REPETITIONS):
+            session.execute(insert(RepetitionRow), [{"experiment_id": each, "number": number} for each in ids])
+        session.execute(text("ANALYZE"))  # as Postgres does by itself within a minute
+
+
+def milliseconds(store: Store) -> Sequence[float]:
+    """Of claims of four repetitions, after each of which they are handed back; sorted."""
+    measured = []
+    for _ in range(CLAIMS):
+        begun = perf_counter()
+        claims = execution.claim(store, "bench", 4)
+        measured.append(1000 * (perf_counter() - begun))
+        for each in claims:
+            execution.hand_back(store, each)
+    return sorted(measured)
+
+
+def rows() -> list[Row]:
+    """The median of a claim."""
+    measured = []
+    with TemporaryDirectory() as folder, postgres(Path(folder)) as server:
+        for database, url in (("SQLite", f"sqlite:///{Path(folder) / 'bench.db'}"), ("Postgres", server)):
+            migrations.upgrade(url)
+            store = Store(url)
+            for more in (0, WAITING):
+                fill(store, more)
+                median = milliseconds(store)[CLAIMS // 2]
+                measured.append(Row(f"a claim of 4 while {more + 1} experiments wait, {database}", f"{median:.1f} ms"))
+            store.dispose()
+    return measured
+
+
+if __name__ == "__main__":
+    for row in rows():
+        print(row.figure, row.value)

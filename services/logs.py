@@ -1,0 +1,104 @@
+"""Logs of every process of the service: lines for people in a terminal, JSON lines for programs anywhere else.
+
+A record tells of which experiment and repetition it is by `extra=`. Nothing that is secret gets through, whoever logs
+it: what looks like a token, a password or an Authorization header is left out of messages and tracebacks alike.
+"""
+
+import json
+import logging
+import re
+import sys
+from datetime import UTC, datetime
+from typing import Any, TextIO
+
+HIDDEN = "…"
+
+_NAME = r"[\w-]*(?:token|password|passwd|secret|api_?key)[\w-]*"
+_SECRETS = (
+    (re.compile(r"(?i)(authorization\W{1,6})(?:(?:bearer|basic|token)\s+)?[^\s'\",;)}\]]+"), rf"\1{HIDDEN}"),
+    (re.compile(r"(?i)\b(bearer|basic)\s+[\w.~+/=-]{6,}"), rf"\1 {HIDDEN}"),
+    (re.compile(rf"(?i)({_NAME}['\"]?\s?[=:]\s?['\"]?)[^\s&'\",;)}}\]]+"), rf"\1{HIDDEN}"),
+    (re.compile(r"(://[^:/@\s]*):[^/\s]*@"), rf"\1:{HIDDEN}@"),
+)
+
+_PLACE = ("experiment", "repetition")
+_REQUEST = ("method", "path", "status")
+
+_ACCESS = "uvicorn.access"
+_PROBES = {"/livez", "/readyz", "/metrics"}
+_EXPERIMENT = re.compile(r"^/experiments/([\w-]{1,64})")
+
+
+def configure(stream: TextIO | None = None) -> None:
+    """Let this process log to the stream, or to standard error: in the form that suits who reads there."""
+    target = stream or sys.stderr
+    handler = logging.StreamHandler(target)
+    handler.setFormatter(Readable() if target.isatty() else Json())
+    handler.addFilter(_tell_of_requests)
+    logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
+    for noisy in ("alembic", "uvicorn.error", "httpx", "httpx2", "asyncio"):
+        logging.getLogger(noisy).setLevel(logging.WARNING)
+
+
+def adopt(name: str) -> None:
+    """Let a library that logs by handlers of its own log like the rest, and warnings only."""
+    logger = logging.getLogger(name)
+    logger.handlers.clear()
+    logger.propagate = True
+    logger.setLevel(logging.WARNING)
+
+
+def without_secrets(text: str) -> str:
+    """The text, with what looks like a secret left out."""
+    for pattern, replacement in _SECRETS:
+        text = pattern.sub(replacement, text)
+    return text
+
+
+class Readable(logging.Formatter):
+    """A line for people: when, how grave, who, of what, and the message."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The record as a line, and its traceback below."""
+        when = datetime.fromtimestamp(record.created).astimezone().strftime("%H:%M:%S")
+        place = "/".join(str(value) for name in _PLACE if (value := getattr(record, name, None)) is not None)
+        line = f"{when} {record.levelname:<7} {record.name}{f' {place}' if place else ''}: {record.getMessage()}"
+        trace = f"\n{self.formatException(record.exc_info)}" if record.exc_info else ""
+        return without_secrets(line + trace)
+
+
+class Json(logging.Formatter):
+    """A JSON object a line: at, level, logger, message, and experiment, repetition, request, exception where known."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The record as one line."""
+        found: dict[str, Any] = {
+            "at": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": without_secrets(record.getMessage()),
+        }
+        known = {name: getattr(record, name, None) for name in (*_PLACE, *_REQUEST)}
+        found |= {
+            name: without_secrets(value) if isinstance(value, str) else value
+            for name, value in known.items()
+            if value is not None
+        }
+        if record.exc_info:
+            found["exception"] = without_secrets(self.formatException(record.exc_info))
+        return json.dumps(found, ensure_ascii=False, default=str)
+
+
+def _tell_of_requests(record: logging.LogRecord) -> bool:
+    """Uvicorn's access log as the rest: its parts by name, no queries, and nothing of probes that found all well."""
+    if record.name != _ACCESS or not isinstance(record.args, tuple) or len(record.args) != 5:
+        return True
+    client, method, target, _, status = record.args
+    path = str(target).partition("?")[0]
+    if path in _PROBES and status == 200:
+        return False
+    record.msg, record.args = "%s %s %s from %s", (method, path, status, client)
+    record.method, record.path, record.status = method, path, status
+    if found := _EXPERIMENT.match(path):
+        record.experiment = found[1]
+    return True

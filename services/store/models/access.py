@@ -1,0 +1,59 @@
+"""Who may ask, and which requests were answered already."""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import Enum, Index, String
+from sqlalchemy.orm import Mapped, mapped_column
+
+from schemas.access import Role
+from services.store.models.base import Base
+
+
+class TokenRow(Base):
+    """A token; the secret itself is nowhere.
+
+    Attributes:
+        id: the public part of the token, by which it is found, listed and revoked.
+        digest: SHA-256 of the secret part, in hexadecimal.
+        last_used_at: to the minute.
+        revoked_at: it admits nobody since; the row stays, so that revoking the last token opens nothing.
+    """
+
+    __tablename__ = "token"
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    name: Mapped[str] = mapped_column(String(200))
+    role: Mapped[Role] = mapped_column(
+        Enum(
+            Role,
+            native_enum=False,
+            create_constraint=True,
+            length=16,
+            name="role",
+            values_callable=lambda roles: [each.value for each in roles],
+        )
+    )
+    digest: Mapped[str] = mapped_column(String(64))
+    created_at: Mapped[datetime]
+    last_used_at: Mapped[datetime | None]
+    revoked_at: Mapped[datetime | None]
+
+
+class IdempotencyRow(Base):
+    """A request that created something under a key of its sender's, with the answer that it got.
+
+    Attributes:
+        caller: id of the sender's token; empty where none is needed. Keys of one caller are not those of another.
+        digest: SHA-256 of what was asked: the endpoint and the body.
+        answer: as it was sent; NULL only within the transaction that makes it.
+    """
+
+    __tablename__ = "idempotency"
+    __table_args__ = (Index(None, "created_at"),)
+
+    caller: Mapped[str] = mapped_column(String(32), primary_key=True)
+    key: Mapped[str] = mapped_column(String(255), primary_key=True)
+    digest: Mapped[str] = mapped_column(String(64))
+    answer: Mapped[dict[str, Any] | None]
+    created_at: Mapped[datetime]

@@ -1,0 +1,40 @@
+"""Under what experiments were computed, and who computes."""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import ForeignKey, String
+from sqlalchemy.orm import Mapped, mapped_column
+
+from services.store.clock import now
+from services.store.models.base import Base
+
+
+class ProvenanceRow(Base):
+    """One distinct provenance; its id follows from the facts."""
+
+    __tablename__ = "provenance"
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    facts: Mapped[dict[str, Any]]
+    created_at: Mapped[datetime] = mapped_column(default=now())
+
+
+class ExperimentProvenanceRow(Base):
+    """That an experiment was computed under a provenance, and since when."""
+
+    __tablename__ = "experiment_provenance"
+
+    experiment_id: Mapped[str] = mapped_column(ForeignKey("experiment.id"), primary_key=True)
+    provenance_id: Mapped[str] = mapped_column(ForeignKey("provenance.id"), primary_key=True)
+    since: Mapped[datetime] = mapped_column(default=now())
+
+
+class SupervisorRow(Base):
+    """A supervisor that works, or was not heard of since it did."""
+
+    __tablename__ = "supervisor"
+
+    owner: Mapped[str] = mapped_column(String(200), primary_key=True)
+    started_at: Mapped[datetime] = mapped_column(default=now())
+    heartbeat_at: Mapped[datetime] = mapped_column(default=now())

@@ -1,0 +1,102 @@
+"""What numbers depend on, as it is where this runs: the code, Python, libraries, engines, the kind of processor."""
+
+import platform
+import subprocess
+from contextlib import suppress
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from schemas.provenance import Provenance
+from services.engines import engines
+from services.store.models import SPEC_VERSION
+
+CODE = ("schemas", "services", "workers")
+LIBRARIES = ("numpy", "scipy", "cma", "numba")
+DISTRIBUTIONS = {"mujoco": ("mujoco-core", "mujoco")}
+"""Of modules that need not come in a distribution of their name."""
+
+ROOT = Path(__file__).parents[1]
+GIT_S = 5.0
+"""How long git may take to say which commit this is; large folders on slow disks take a second."""
+
+Versions = dict[str, str]
+
+
+@cache
+def versions() -> Versions:
+    """What two processes must have in common to compute the same numbers."""
+    return {
+        "gaplab": f"{_version('gaplab')} ({_digest()})",
+        "Python": platform.python_version(),
+        "machine": platform.machine(),
+        **{name: _version(name) for name in LIBRARIES},
+        **{each.library: _version(each.library) for each in engines.values() if each.library},
+    }
+
+
+@cache
+def provenance() -> Provenance:
+    """What this process computes with, for whoever reads its results later."""
+    return Provenance(
+        gaplab=_version("gaplab"),
+        code=_digest(),
+        commit=_git("rev-parse", "HEAD"),
+        dirty=None if (changed := _git("status", "--porcelain", "--untracked-files=no")) is None else bool(changed),
+        python=platform.python_version(),
+        libraries={name: _version(name) for name in LIBRARIES},
+        engines={name: _engine(each.library) for name, each in sorted(engines.items())},
+        architecture=platform.machine(),
+        processor=_processor(),
+        system=platform.platform(),
+        spec_version=SPEC_VERSION,
+    )
+
+
+def _engine(library: str | None) -> str:
+    return f"{library} {_version(library)}" if library else "of gaplab's own"
+
+
+@cache
+def _version(module: str) -> str:
+    for name in DISTRIBUTIONS.get(module, (module,)):
+        with suppress(PackageNotFoundError):
+            return version(name)
+    return "none"
+
+
+@cache
+def _digest() -> str:
+    """Eight letters that change with the code: a version alone does not say which commit is checked out."""
+    digest = sha256()
+    for path in sorted(path for top in CODE for path in (ROOT / top).rglob("*.py")):
+        digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()[:8]
+
+
+def _git(*command: str) -> str | None:
+    """What git says of the folder of this code; None where there is no git, or the folder is no repository's top."""
+    if not (ROOT / ".git").exists():
+        return None
+    try:
+        run = subprocess.run(  # noqa: S603 - commands of ours
+            ["git", "-C", str(ROOT), *command],  # noqa: S607 - whichever git there is
+            capture_output=True,
+            text=True,
+            timeout=GIT_S,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return run.stdout.strip() if run.returncode == 0 else None
+
+
+def _processor() -> str:
+    """Its kind, as Linux names it; elsewhere, as Python does."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or "unknown"

@@ -1,0 +1,277 @@
+"""Tokens and roles: who is let in, to what, and what is never told."""
+
+import logging
+import re
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from api.cli import main
+from api.client import Client
+from api.clients.connection import ServiceError
+from schemas.access import Role
+from services import access
+from services.access import authenticate, create_token, is_loopback
+from services.core.errors import Forbidden, NotFound, Unauthenticated
+from services.settings import Settings
+from services.store.session import Store
+
+TOY = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "iterations": 1, "repetitions": 1}
+
+
+@pytest.fixture
+def api(store: Store) -> Iterator[TestClient]:
+    with TestClient(create_app(store)) as client:
+        yield client
+
+
+@pytest.fixture
+def lite(sqlite_store: Store) -> Iterator[TestClient]:
+    with TestClient(create_app(sqlite_store), raise_server_exceptions=False) as client:
+        yield client
+
+
+def bearer(store: Store, role: Role) -> dict[str, str]:
+    return {"Authorization": f"Bearer {create_token(store, role).secret}"}
+
+
+def test_on_loopback_all_is_open_until_a_token_is_made_and_stays_closed_after_the_last_is_revoked(
+    store: Store, api: TestClient
+):
+    before = api.post("/experiments", json=TOY).status_code
+    made = create_token(store, Role.READER)
+    refused = api.get("/experiments")
+    let_in = api.get("/experiments", headers={"Authorization": f"Bearer {made.secret}"}).status_code
+    access.revoke_token(store, made.token.id)
+    revoked = api.get("/experiments", headers={"Authorization": f"Bearer {made.secret}"})
+
+    assert (before, refused.status_code, let_in, revoked.status_code) == (202, 401, 200, 401)
+    assert refused.headers["www-authenticate"] == 'Bearer realm="gaplab"'
+    assert refused.headers["content-type"] == revoked.headers["content-type"] == "application/problem+json"
+    assert 'error="invalid_token"' in revoked.headers["www-authenticate"]
+    assert api.get("/experiments").status_code == 401
+
+
+def test_beyond_loopback_a_token_is_needed_even_where_none_was_ever_made(sqlite_store: Store):
+    api = TestClient(create_app(sqlite_store, Settings(host="0.0.0.0")))
+
+    assert api.get("/experiments").status_code == 401
+    assert [api.get(path).status_code for path in ("/livez", "/readyz")] == [200, 200]
+
+
+@pytest.mark.parametrize(
+    ("role", "permitted"),
+    [
+        (Role.READER, {"read"}),
+        (Role.RUNNER, {"read", "submit", "check", "edit", "cancel"}),
+        (Role.ADMIN, {"read", "submit", "check", "edit", "cancel", "reveal"}),
+    ],
+)
+def test_each_role_may_do_what_it_is_for_and_no_more(store: Store, api: TestClient, role: Role, permitted: set[str]):
+    made = api.post("/experiments", json=TOY).json()["id"]
+    headers = bearer(store, role)
+    answers = {
+        "read": api.get(f"/experiments/{made}", headers=headers),
+        "submit": api.post("/experiments", json=TOY, headers=headers),
+        "check": api.post("/sensitivity", json={"robot": "toy_function"}, headers=headers),
+        "edit": api.patch(f"/experiments/{made}", json={"name": "x"}, headers=headers | {"If-Match": "*"}),
+        "reveal": api.get(f"/experiments/{made}?reveal=true", headers=headers),
+        "cancel": api.post(f"/experiments/{made}/cancel", headers=headers),
+    }
+
+    assert {name for name, answer in answers.items() if answer.is_success} == permitted
+    for name in answers.keys() - permitted:
+        assert answers[name].status_code == 403
+        assert answers[name].json()["type"] == "urn:gaplab:problem:forbidden"
+        assert "insufficient_scope" in answers[name].headers["www-authenticate"]
+
+
+def test_every_route_wants_a_token_but_the_two_for_health(sqlite_store: Store, lite: TestClient):
+    create_token(sqlite_store, Role.ADMIN)
+    document = create_app(sqlite_store).openapi()
+    routes = [(method, path) for path, operations in document["paths"].items() for method in operations]
+    pages = [("get", path) for path in ("/", "/docs", "/redoc", "/openapi.json", "/assets/docs/swagger-ui.css", "/no")]
+
+    found = {path: lite.request(method, path.format(id="x")).status_code for method, path in [*routes, *pages]}
+
+    assert {path for path, status in found.items() if status != 401} == {"/livez", "/readyz"}
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Bearer",
+        "Bearer ",
+        "Bearer x",
+        "Basic dXNlcjpwYXNz",
+        "gaplab_abc_" + "0" * 64,
+        "Bearer gaplab_abc_" + "0" * 64,
+        "Bearer gaplab_" + "a" * 5000 + "_" + "0" * 64,
+        "Bearer \u00e9".encode("latin-1"),
+    ],
+)
+def test_what_is_no_token_lets_nobody_in_even_where_none_is_needed(lite: TestClient, header: str | bytes):
+    assert lite.get("/experiments", headers={"Authorization": header}).status_code == 401
+
+
+def test_a_token_with_another_secret_lets_nobody_in(store: Store):
+    made, other = (create_token(store, Role.ADMIN).secret for _ in range(2))
+    forged = made.rpartition("_")[0] + "_" + other.rpartition("_")[2]
+
+    with pytest.raises(Unauthenticated):
+        authenticate(store, forged, required=True)
+    assert authenticate(store, made, required=True).role is Role.ADMIN
+
+
+def test_a_secret_is_stored_nowhere_and_a_use_is_noted(store: Store):
+    made = create_token(store, Role.RUNNER, "ci")
+    unused = access.list_tokens(store)[0]
+
+    authenticate(store, made.secret, required=True)
+
+    used = access.list_tokens(store)[0]
+    assert (used.id, used.name, used.role, unused.last_used_at) == (made.token.id, "ci", Role.RUNNER, None)
+    assert used.last_used_at is not None
+    assert made.secret.rpartition("_")[2] not in repr(made) + used.model_dump_json()
+    with store.reading() as session:
+        from sqlalchemy import text
+
+        rows = session.execute(text("SELECT * FROM token")).all()
+    assert made.secret.rpartition("_")[2] not in str(rows)
+
+
+def test_secrets_have_256_bits_and_differ(sqlite_store: Store):
+    secrets = {create_token(sqlite_store, Role.READER).secret.rpartition("_")[2] for _ in range(20)}
+
+    assert len(secrets) == 20
+    assert all(re.fullmatch("[0-9a-f]{64}", each) for each in secrets)
+
+
+def test_an_unknown_token_cannot_be_revoked(store: Store):
+    with pytest.raises(NotFound):
+        access.revoke_token(store, "none\0such")
+
+
+def test_no_token_is_in_logs_answers_or_problems_whatever_happens(
+    sqlite_store: Store, lite: TestClient, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+):
+    caplog.set_level(logging.DEBUG)
+    headers = bearer(sqlite_store, Role.READER)
+    secret = headers["Authorization"].rpartition("_")[2]
+    said = [lite.get("/experiments", headers=headers), lite.post("/experiments", json=TOY, headers=headers)]
+    monkeypatch.setattr("services.experiments.list_experiments", lambda *_, **__: 1 / 0)
+    said.append(lite.get("/experiments", headers=headers))
+    said.append(lite.get("/experiments", headers={"Authorization": f"Bearer gaplab_x_{secret}"}))
+
+    assert [each.status_code for each in said] == [200, 403, 500, 401]
+    assert secret not in caplog.text
+    assert not any(secret in each.text + str(each.headers) for each in said)
+
+
+@pytest.mark.parametrize("headers", [{"host": "evil.example"}, {"origin": "http://evil.example"}, {"origin": "null"}])
+def test_without_tokens_no_page_of_another_site_is_served(sqlite_store: Store, headers: dict[str, str]):
+    api = TestClient(create_app(sqlite_store, Settings()), base_url="http://127.0.0.1:8000")
+
+    assert api.get("/experiments", headers=headers).status_code == 403
+    assert api.post("/experiments", json=TOY, headers=headers).status_code == 403
+    assert api.get("/experiments", headers={"origin": "http://127.0.0.1:8000"}).status_code == 200
+    assert api.get("/experiments", headers={"host": "localhost:8000"}).status_code == 200
+    assert api.get("/experiments", headers=headers | bearer(sqlite_store, Role.READER)).status_code == 200
+
+
+def test_other_origins_are_told_nothing_by_cors(lite: TestClient):
+    plain = lite.get("/experiments", headers={"origin": "http://evil.example"})
+    asked = lite.options(
+        "/experiments", headers={"origin": "http://evil.example", "access-control-request-method": "POST"}
+    )
+
+    assert asked.status_code == 405
+    assert not [name for name in (*plain.headers, *asked.headers) if name.startswith("access-control")]
+
+
+@pytest.mark.parametrize(
+    ("host", "expected"),
+    [
+        ("127.0.0.1", True),
+        ("127.8.8.8", True),
+        ("::1", True),
+        ("localhost", True),
+        ("0.0.0.0", False),
+        ("::", False),
+        ("192.168.1.2", False),
+        ("localhost.evil.example", False),
+        ("", False),
+    ],
+)
+def test_loopback_is_what_only_this_machine_reaches(host: str, expected: bool):
+    assert is_loopback(host) is expected
+
+
+def command(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *arguments: str
+) -> tuple[int, str, str]:
+    monkeypatch.setattr(sys, "argv", ["gaplab", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    said = capsys.readouterr()
+    return int(ended.value.code or 0), said.out, said.err
+
+
+def test_the_command_makes_lists_and_revokes_tokens_in_the_database_itself(
+    sqlite_url: str, sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
+    _, secret, about = command(monkeypatch, capsys, "token", "create", "--role", "runner", "--name", "night runs")
+    caller = authenticate(sqlite_store, secret.strip(), required=True)
+    _, listed, _ = command(monkeypatch, capsys, "token", "list")
+    code, _, _ = command(monkeypatch, capsys, "token", "revoke", caller.token or "")
+    _, after, _ = command(monkeypatch, capsys, "token", "list")
+
+    assert caller.role is Role.RUNNER
+    assert "once" in about
+    assert "night runs" in listed
+    assert secret.strip() not in listed + about
+    assert code == 0
+    assert len(re.findall(r"\d{4}-\d\d-\d\d", listed)) == 2
+    assert len(re.findall(r"\d{4}-\d\d-\d\d", after)) == 3
+    with pytest.raises(Unauthenticated):
+        authenticate(sqlite_store, secret.strip(), required=True)
+
+
+def test_a_first_token_can_be_made_before_the_database_was_ever_used(
+    tmp_path: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.setenv("GAPLAB_DATABASE_URL", f"sqlite:///{tmp_path / 'new.db'}")
+
+    code, secret, _ = command(monkeypatch, capsys, "token", "create", "--role", "admin")
+
+    assert code == 0
+    assert secret.startswith("gaplab_")
+
+
+@pytest.mark.parametrize("way", ["argument", "environment", "none"])
+def test_a_client_shows_its_token(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, way: str):
+    secret = create_token(sqlite_store, Role.READER).secret
+    monkeypatch.delenv("GAPLAB_TOKEN", raising=False)
+    if way == "environment":
+        monkeypatch.setenv("GAPLAB_TOKEN", secret)
+    transport = TestClient(create_app(sqlite_store))._transport  # what carries requests into the app itself
+
+    with Client("http://testserver", token=secret if way == "argument" else None, transport=transport) as client:
+        if way == "none":
+            with pytest.raises(ServiceError, match="GAPLAB_TOKEN") as refused:
+                client.experiments()
+            assert refused.value.problem.status == 401
+        else:
+            assert client.experiments().items == ()
+
+
+def test_only_an_admin_may_demand_what_an_admin_may():
+    for role in (Role.READER, Role.RUNNER):
+        with pytest.raises(Forbidden, match="an admin"):
+            access.demand(access.Caller("x", role), Role.ADMIN, "this")
+    access.demand(access.Caller("x", Role.ADMIN), Role.READER, "this")

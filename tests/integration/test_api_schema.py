@@ -1,0 +1,50 @@
+"""Schemathesis reads the OpenAPI document and asks everything that it permits, and what it does not.
+
+It takes the examples, the edges of every schema, random requests of both kinds, and follows the links of answers. All
+of its checks hold but one: that whatever fits the document is accepted. A document cannot say that a strategy must be
+one of the catalogue, or a cursor one that was given out; such requests are refused with 422.
+"""
+
+import os
+from collections import Counter
+
+import pytest
+import schemathesis
+from schemathesis.engine import from_schema
+from schemathesis.engine.events import EngineFinished, FatalError, NonFatalError, ScenarioFinished
+from schemathesis.schemas import BaseSchema
+
+from api.app import create_app
+from services.store.session import Store
+
+EXAMPLES = int(os.environ.get("SCHEMATHESIS_EXAMPLES", "5"))
+"""Random requests for each operation, and walks along links; more of them take longer and find more."""
+
+
+@pytest.fixture
+def document(store: Store) -> BaseSchema:
+    """The service, as its own document describes it."""
+    found = schemathesis.openapi.from_asgi("/openapi.json", create_app(store))
+    found.config.checks.update(excluded_check_names=["positive_data_acceptance"])
+    found.config.generation.update(max_examples=EXAMPLES, deterministic=True)
+    return found
+
+
+def test_whatever_is_asked_and_whatever_follows_is_answered_as_the_document_says(document: BaseSchema):
+    asked: Counter[str] = Counter()
+    followed: set[str] = set()
+    troubles = []
+    for event in from_schema(document).execute():
+        if isinstance(event, ScenarioFinished):
+            labels = [case.value.operation.label for case in event.recorder.cases.values()]
+            asked[event.phase.value] += len(labels)
+            followed |= set(labels) if event.phase.value.lower().startswith("stateful") else set()
+        if isinstance(event, NonFatalError | FatalError):
+            troubles.append(str(getattr(event, "value", None) or getattr(event, "exception", event)))
+        if isinstance(event, EngineFinished):
+            failures = [f"{each.title}: {each.message}" for each in event.failures]
+
+    assert troubles == []
+    assert failures == []
+    assert asked.total() > 500, asked
+    assert {"POST /experiments", "GET /experiments/{id}", "POST /experiments/{id}/cancel"} <= followed, asked

@@ -1,0 +1,197 @@
+"""Checkpoints of the step under way: made by the worker, kept by the store, and used once."""
+
+import time
+from threading import enumerate as threads
+
+import numpy as np
+import pytest
+
+from schemas.lifecycle import State
+from services import execution, experiments
+from services.core.errors import Conflict
+from services.core.loop import repetition
+from services.core.recall import unpack
+from services.execution import Checkpoint
+from services.store.models import CheckpointRow
+from services.store.repository.leases import MAX_LOSSES
+from tests.experiments import same, some_log, toy
+from tests.fakes import Recorder as Calls
+from tests.fakes import flat, paraboloid, small_setting
+from workers.checkpoints import Recorder, recorded
+
+
+def steps_of(told):
+    return [each for each in told if not isinstance(each, Checkpoint)]
+
+
+def test_a_repetition_told_at_any_moment_goes_on_from_there():
+    whole = [flat(step) for step in repetition(small_setting())]
+    told = list(recorded(small_setting(), (), (), 0.0))
+
+    for until in range(0, len(told), 7):
+        log = [each.step for each in steps_of(told[:until])]
+        checkpoints = [each for each in told[:until] if isinstance(each, Checkpoint) and each.step == len(log)]
+        assert [each.part for each in checkpoints] == list(range(len(checkpoints)))
+        rest = steps_of(recorded(small_setting(), log, checkpoints, 0.0))
+        assert [flat(step) for step in (*log, *(each.step for each in rest))] == whole
+        assert not rest or rest[0].seconds > sum(each.seconds for each in checkpoints)
+
+
+def test_what_a_checkpoint_has_is_not_simulated_again():
+    first, second = Calls(), Calls()
+    told = list(recorded(small_setting(simulate=first), (), (), 0.0))
+    checkpoints = [each for each in told if isinstance(each, Checkpoint) and each.step == 1]
+
+    next(recorded(small_setting(simulate=second), [told[0].step], checkpoints, 3600.0))
+
+    answered = sum(len(row) for each in checkpoints for _, row in unpack(each.answers))
+    assert answered == 40
+    assert second.rollouts == 0
+
+
+def test_short_steps_have_no_checkpoints():
+    assert not any(isinstance(each, Checkpoint) for each in recorded(small_setting(), (), (), 3600.0))
+
+
+def test_a_call_that_would_take_long_is_made_in_several():
+    def slow(genomes, parameters):
+        time.sleep(0.002 * len(genomes))
+        return paraboloid(genomes, parameters)
+
+    calls, told = Calls(slow), []
+    recorder = Recorder(calls, told.append, 0.02, 5)
+    genomes = np.random.default_rng(0).random((30, 2))
+
+    fitnesses = recorder(genomes, genomes[:2])
+
+    np.testing.assert_array_equal(fitnesses, paraboloid(genomes, genomes[:2]))
+    assert len(calls.calls) > 2
+    assert [(each.step, each.part) for each in told] == [(5, number) for number in range(len(told))]
+    assert told
+
+
+def test_what_a_repetition_raises_is_raised_where_its_steps_are_taken():
+    def broken(genomes, parameters):
+        msg = "broken"
+        raise ZeroDivisionError(msg)
+
+    steps = recorded(small_setting(simulate=broken), (), ())
+
+    next(steps)
+    with pytest.raises(ZeroDivisionError, match="broken"):
+        next(steps)
+
+
+def test_a_repetition_that_nobody_wants_ends():
+    steps = recorded(small_setting(iterations=100_000), (), ())
+    next(steps)
+
+    steps.close()
+
+    deadline = time.monotonic() + 180
+    while any(each.name == "repetition" for each in threads()):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def part(step, number, answers=b"answers", seconds=2.0):
+    return execution.Checkpoint(step, number, answers, seconds)
+
+
+def checkpoints_left(store):
+    with store.reading() as session:
+        return session.query(CheckpointRow).count()
+
+
+def test_checkpoints_of_the_step_under_way_are_handed_out_with_the_claim(store):
+    experiments.submit_experiment(store, toy())
+    (claim,) = execution.claim(store, "me", 1)
+    first = next(some_log())
+
+    assert execution.record_all(store, [(claim, [execution.TimedStep(first, 1.0), part(1, 0, b"a\0b"), part(1, 1)])])
+    assert execution.record_all(store, [(claim, [part(1, 2, b"")])])
+    execution.release(store, claim, "killed")
+
+    (claim,) = execution.claim(store, "me", 1)
+    assert same(claim.log, (first,))
+    assert claim.checkpoints == (part(1, 0, b"a\0b"), part(1, 1), part(1, 2, b""))
+
+
+def test_a_checkpoint_that_is_delivered_twice_is_stored_once(store):
+    experiments.submit_experiment(store, toy())
+    (claim,) = execution.claim(store, "me", 1)
+
+    for delivered in ([part(0, 0)], [part(0, 0)], [part(0, 0), part(0, 1)]):
+        assert execution.record_all(store, [(claim, delivered)])
+
+    assert checkpoints_left(store) == 2
+
+
+def test_checkpoints_are_gone_once_their_step_is_recorded(store):
+    experiments.submit_experiment(store, toy())
+    claims = execution.claim(store, "me", 2)
+    execution.record_all(store, [(claim, [part(0, 0), part(0, 1)]) for claim in claims])
+    first, second, *_ = [execution.TimedStep(each, 0.5) for each in some_log()]
+
+    execution.record_all(store, [(claims[0], [first, part(1, 0), second])])
+    execution.record_all(store, [(claims[0], [part(0, 1), part(1, 0)])])
+
+    assert checkpoints_left(store) == 2
+    execution.release(store, claims[1], "killed")
+    assert execution.claim(store, "me", 1)[0].checkpoints == (part(0, 0), part(0, 1))
+
+
+@pytest.mark.parametrize("wrong", [part(0, 1), part(1, 0)])
+def test_a_checkpoint_that_would_leave_a_hole_is_refused(store, wrong):
+    experiments.submit_experiment(store, toy())
+    (claim,) = execution.claim(store, "me", 1)
+
+    with pytest.raises(Conflict, match="next is part 0 of step 0"):
+        execution.record_all(store, [(claim, [wrong])])
+
+    assert checkpoints_left(store) == 0
+
+
+def test_a_late_checkpoint_of_a_holder_who_lost_the_lease_is_not_stored(store):
+    experiments.submit_experiment(store, toy())
+    (late,) = execution.claim(store, "me", 1)
+    execution.release(store, late, "killed")
+    execution.claim(store, "you", 1)
+
+    assert execution.record_all(store, [(late, [part(0, 0)])]) == ()
+
+    assert checkpoints_left(store) == 0
+
+
+def test_one_that_gets_on_within_a_step_may_be_lost_any_number_of_times(store):
+    submitted = experiments.submit_experiment(store, toy(repetitions=1))
+
+    for number in range(2 * MAX_LOSSES):
+        (claim,) = execution.claim(store, "me", 1)
+        execution.record_all(store, [(claim, [part(0, number)])])
+        execution.release(store, claim, "killed")
+
+    assert experiments.read_experiment(store, submitted.id).state is State.RUNNING
+
+
+def test_cancelling_forgets_checkpoints(store):
+    submitted = experiments.submit_experiment(store, toy())
+    (claim,) = execution.claim(store, "me", 1)
+    execution.record_all(store, [(claim, [part(0, 0)])])
+
+    experiments.cancel_experiment(store, submitted.id)
+
+    assert checkpoints_left(store) == 0
+
+
+def test_a_claim_that_timed_out_is_handed_back_and_those_that_are_known_stay(store):
+    submitted = experiments.submit_experiment(store, toy())
+    (known,) = execution.claim(store, "me", 1)
+    execution.claim(store, "me", 1)
+    (others,) = execution.claim(store, "you", 1)
+
+    assert execution.hand_back_unheard(store, "me", [known]) == 1
+
+    states = [(each.state, each.attempts) for each in experiments.list_repetitions(store, submitted.id)]
+    assert states == [(State.RUNNING, 1), (State.QUEUED, 0), (State.RUNNING, 1)]
+    assert execution.heartbeat(store, [known, others]) == (known, others)

@@ -1,0 +1,454 @@
+"""Events: what is told, in which order, and that a reader who resumes misses nothing."""
+
+import json
+import random
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from itertools import count
+
+import httpx2
+import pytest
+import uvicorn
+from fastapi.testclient import TestClient
+
+from api import feed as feeding
+from api.app import create_app
+from api.client import Client, ServiceError
+from api.feed import Feed
+from api.server import Server, listen
+from schemas.events import EventKind, EventRead
+from services import events, execution, experiments, provenance, sensitivity
+from services.core.errors import NotFound
+from services.events import Which
+from services.store.repository.events import note, write
+from services.store.repository.leases import MAX_LOSSES
+from services.store.session import Store
+from services.versions import provenance as own
+from tests.experiments import run, some_log, toy
+
+DEADLINE_S = 180
+OTHER = own().model_copy(update={"architecture": "riscv64"})
+
+
+def told(store: Store, which: Which | None = None, after: int = 0) -> tuple[EventRead, ...]:
+    return events.page(store, after, which or Which(), limit=1_000).items
+
+
+def kinds(store: Store, which: Which | None = None) -> list[str]:
+    return [each.kind.value for each in told(store, which)]
+
+
+def within(condition) -> bool:
+    deadline = time.monotonic() + DEADLINE_S
+    while not condition():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+def test_the_life_of_an_experiment_is_told_step_by_step(store):
+    id_ = experiments.submit_experiment(store, toy(repetitions=1, iterations=1)).id
+    (claim,) = execution.claim(store, "me", 1)
+    run(store, claim, some_log(1))
+
+    found = told(store)
+
+    steps = ["tuned", "transferred", "probed", "selected", "measured", "tuned", "transferred", "probed"]
+    assert [each.kind.value for each in found] == [
+        "submitted",
+        "started",
+        "repetition_claimed",
+        *steps,
+        "repetition_completed",
+        "completed",
+    ]
+    assert [each.number for each in found] == list(range(1, len(found) + 1))
+    assert {each.experiment for each in found} == {id_}
+    assert [each.repetition for each in found] == [None, None, *[0] * 10, None]
+    measured, probed = (next(each for each in found if each.kind == kind) for kind in ("measured", "probed"))
+    assert measured.body == {"iteration": 1, "fitness": None}
+    assert probed.body == {"iteration": 0, "fitness": 1.0, "recorded_fitness": 1.0}
+
+
+def everything_that_can_happen(store: Store) -> None:
+    experiments.submit_experiment(store, toy(repetitions=1))
+    (claim,) = execution.claim(store, "me", 1)
+    run(store, claim)
+    experiments.submit_experiment(store, toy(repetitions=2))
+    fails, waits = execution.claim(store, "me", 2)
+    execution.record(store, waits, next(some_log()))
+    execution.fail(store, fails, "it is broken")
+    execution.hand_back(store, waits)
+    execution.claim(store, "other", 1, OTHER)
+    provenance.accept_versions(store, waits.experiment_id)
+    for _ in range(MAX_LOSSES):
+        (waits,) = execution.claim(store, "me", 1)
+        execution.release(store, waits, "killed")
+    cancelled = experiments.submit_experiment(store, toy())
+    experiments.cancel_experiment(store, cancelled.id)
+    check = sensitivity.claim(store, "me")
+    assert check is not None
+    sensitivity.fail(store, check, "no legs")
+
+
+def test_every_kind_of_event_is_told_and_none_shows_where_reality_is(store):
+    with store.transaction() as session:
+        note(session, EventKind.SUBMITTED, "the first")  # so that numbers and ids differ
+
+    everything_that_can_happen(store)
+
+    found = told(store)
+    assert {each.kind for each in found} == set(EventKind)
+    assert [each.number for each in found] == list(range(1, len(found) + 1))
+    assert not any("parameters" in json.dumps(each.body) or "genome" in json.dumps(each.body) for each in found)
+    assert [each.body["reason"] for each in found if each.kind is EventKind.REPETITION_LOST] == ["killed"] * 4
+    lost = next(each for each in reversed(found) if each.kind is EventKind.REPETITION_FAILED)
+    assert lost.body["reason"].startswith("lost 5 times")
+
+
+def test_an_experiment_submitted_after_its_check_is_told_of_it_at_once(store):
+    experiments.submit_experiment(store, toy())
+    check = sensitivity.claim(store, "me")
+    sensitivity.complete(store, check, [])
+
+    later = experiments.submit_experiment(store, toy()).id
+
+    assert kinds(store, Which(experiment=later)) == ["submitted", "sensitivity_ended"]
+
+
+def test_a_step_that_is_delivered_twice_is_told_once(store):
+    experiments.submit_experiment(store, toy(repetitions=1))
+    (claim,) = execution.claim(store, "me", 1)
+
+    for step in some_log():
+        execution.record(store, claim, step)
+        execution.record(store, claim, step)
+
+    assert kinds(store, Which(kinds=frozenset({EventKind.PROBED}))) == ["probed"] * 3
+
+
+def test_what_is_rolled_back_was_never_told_and_leaves_no_hole(store):
+    experiments.submit_experiment(store, toy())
+
+    def fail(session) -> None:
+        note(session, EventKind.CANCELLED, "nobody")
+        write(session)
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        store.write(fail)
+    experiments.submit_experiment(store, toy())
+
+    assert [(each.number, each.kind.value) for each in told(store)] == [(1, "submitted"), (2, "submitted")]
+
+
+def test_a_number_is_seen_only_with_all_smaller_ones(postgres_store):
+    """The first transaction has its numbers and is slow to commit: the second, which begins later, waits for it."""
+    first_counted, let_go = threading.Event(), threading.Event()
+
+    def slow() -> None:
+        with postgres_store.transaction() as session:
+            note(session, EventKind.STARTED, "slow")
+            write(session)
+            first_counted.set()
+            assert let_go.wait(DEADLINE_S)
+
+    def quick() -> None:
+        with postgres_store.transaction() as session:
+            note(session, EventKind.STARTED, "quick")
+
+    with ThreadPoolExecutor(2) as pool:
+        slowly = pool.submit(slow)
+        assert first_counted.wait(DEADLINE_S)
+        quickly = pool.submit(quick)
+        time.sleep(0.3)
+        seen_meanwhile, done_meanwhile = told(postgres_store), quickly.done()
+        let_go.set()
+        slowly.result(DEADLINE_S)
+        quickly.result(DEADLINE_S)
+
+    assert (seen_meanwhile, done_meanwhile) == ((), False)
+    assert [(each.number, each.experiment) for each in told(postgres_store)] == [(1, "slow"), (2, "quick")]
+
+
+def write_many(store: Store, name: int) -> None:
+    """Transactions of one, two or three events, a fifth of which are rolled back."""
+    chance = random.Random(name)
+
+    def dawdle(session) -> None:
+        for part in range(chance.randint(1, 3)):
+            note(session, EventKind.PROBED, "some experiment", part=part)
+        time.sleep(chance.random() * 0.01)
+        if chance.random() < 0.2:
+            write(session)
+            raise ZeroDivisionError
+
+    for _ in range(25):
+        with suppress(ZeroDivisionError):
+            store.write(dawdle)
+
+
+def test_a_reader_that_resumes_among_many_writers_misses_nothing(store):
+    """Writers commit, roll back and dawdle; whoever reads meanwhile, a page after the other, sees every number once."""
+    over = threading.Event()
+
+    def read() -> list[int]:
+        seen: list[int] = []
+        while True:
+            ended = over.is_set()
+            page = events.page(store, seen[-1] if seen else 0, Which(), limit=7)
+            seen += [each.number for each in page.items]
+            if ended and not page.items:
+                return seen
+
+    with ThreadPoolExecutor(6) as pool:
+        readers = [pool.submit(read) for _ in range(2)]
+        list(pool.map(write_many, [store] * 4, range(4)))
+        over.set()
+        seen = [each.result(DEADLINE_S) for each in readers]
+
+    stored = [each.number for each in told(store)]
+    assert stored == list(range(1, len(stored) + 1))
+    assert len(stored) > 50
+    assert seen == [stored, stored]
+
+
+def test_supervisors_that_record_claim_and_end_at_once_do_not_wait_for_each_other_in_a_circle(postgres_store):
+    store = postgres_store
+    for _ in range(3):
+        experiments.submit_experiment(store, toy(repetitions=8))
+
+    def work(owner: str) -> int:
+        done = 0
+        while claims := execution.claim(store, owner, 2):
+            for claim in claims:
+                run(store, claim)
+                done += 1
+        return done
+
+    with ThreadPoolExecutor(4) as pool:
+        assert sum(pool.map(work, "abcd")) == 24
+
+    found = [each.number for each in events.page(store, 0, Which(), limit=1_000).items]
+    assert found == list(range(1, len(found) + 1))
+
+
+@contextmanager
+def served(store: Store, port: int = 0) -> Iterator[tuple[str, Feed]]:
+    """A service in a thread, ended as the real one is."""
+    app = create_app(store)
+    listener = listen("127.0.0.1", port)
+    server = Server(uvicorn.Config(app, log_level="critical"))
+    thread = threading.Thread(target=server.run, args=([listener],))
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{listener.getsockname()[1]}", app.state.feed
+    finally:
+        server.should_exit = True
+        thread.join(DEADLINE_S)
+        assert not thread.is_alive()
+
+
+def take(stream: Iterator[EventRead], many: int) -> list[EventRead]:
+    return [next(stream) for _ in range(many)]
+
+
+def test_a_stream_has_what_was_and_what_comes(store):
+    experiments.submit_experiment(store, toy(repetitions=1))
+    with served(store) as (url, feed), Client(url) as client:
+        stream = client.events()
+        first = take(stream, 1)
+        (claim,) = execution.claim(store, "me", 1)
+        run(store, claim)
+        rest = take(stream, 17)
+        assert feed.open == 1
+        stream.close()
+        assert within(lambda: feed.open == 0)
+
+    assert [each.number for each in (*first, *rest)] == list(range(1, 19))
+    assert rest[-1].kind is EventKind.COMPLETED
+    assert (*first, *rest) == told(store)
+
+
+def test_streams_are_filtered(sqlite_store):
+    wanted, other = (experiments.submit_experiment(sqlite_store, toy(repetitions=1)).id for _ in range(2))
+    for claim in execution.claim(sqlite_store, "me", 2):
+        run(sqlite_store, claim)
+    with served(sqlite_store) as (url, _), Client(url) as client:
+        of_one = take(client.events(experiment=wanted, kind=["probed", "completed"]), 4)
+        with pytest.raises(ServiceError, match="there is no experiment 'nobody'"):
+            next(client.events(experiment="nobody"))
+        with pytest.raises(ServiceError, match="kind"):
+            next(client.events(kind=["nonsense"]))
+
+    assert [each.kind.value for each in of_one] == ["probed"] * 3 + ["completed"]
+    assert {each.experiment for each in of_one} == {wanted} != {other}
+
+
+def test_a_stream_resumes_after_the_last_event_that_the_header_names(sqlite_store):
+    for _ in range(5):
+        experiments.submit_experiment(sqlite_store, toy())
+    with served(sqlite_store) as (url, _), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
+        with http.stream("GET", "/events?after=1", headers={"Last-Event-ID": "3"}) as answer:
+            lines = answer.iter_lines()
+            found = [next(lines) for _ in range(3)]
+        refused = http.get("/events", headers={"Last-Event-ID": "yesterday"})
+
+    assert answer.headers["content-type"].startswith("text/event-stream")
+    assert found[0] == "event: submitted"
+    assert json.loads(found[1].removeprefix("data: "))["number"] == 4
+    assert found[2] == "id: 4"
+    assert refused.status_code == 422
+
+
+def test_a_stream_that_fell_behind_catches_up_from_the_database(sqlite_store, monkeypatch):
+    monkeypatch.setattr(feeding, "PAGE", 3)
+    with served(sqlite_store) as (url, feed), Client(url) as client:
+        feed._recent = type(feed._recent)(maxlen=2)
+        experiments.submit_experiment(sqlite_store, toy(repetitions=1))
+        stream = client.events()
+        first = take(stream, 1)
+        (claim,) = execution.claim(sqlite_store, "me", 1)
+        run(sqlite_store, claim)
+        found = first + take(stream, 17)
+
+    assert [each.number for each in found] == list(range(1, 19))
+
+
+def test_all_streams_together_ask_the_database_once_a_look(sqlite_store, monkeypatch):
+    asked = count()
+    page = events.page
+
+    def counted(*given, **named):
+        next(asked)
+        return page(*given, **named)
+
+    monkeypatch.setattr(feeding.events, "page", counted)
+    with served(sqlite_store) as (url, feed), Client(url) as client:
+        experiments.submit_experiment(sqlite_store, toy())
+        streams = [client.events() for _ in range(8)]
+        for each in streams:
+            take(each, 1)
+        assert feed.open == 8
+        before, began = next(asked), time.monotonic()
+        time.sleep(1.0)
+        looks, seconds = next(asked) - before, time.monotonic() - began
+        experiments.submit_experiment(sqlite_store, toy())
+        second = [take(each, 1)[0].number for each in streams]
+
+    assert looks <= seconds / feeding.EVERY_S + 2  # eight streams that each ask would be eight times as many
+    assert second == [2] * 8
+
+
+def test_a_stream_whose_reader_failed_is_resumed_by_the_client(sqlite_store, monkeypatch):
+    monkeypatch.setattr("api.clients.events.RETRY_S", 0.05)
+    experiments.submit_experiment(sqlite_store, toy())
+    latest, failing = events.latest, iter([True])
+
+    def fail_once(store: Store) -> int:
+        if next(failing, False):
+            msg = "a mistake of ours"
+            raise ValueError(msg)
+        return latest(store)
+
+    monkeypatch.setattr(feeding.events, "latest", fail_once)
+    with served(sqlite_store) as (url, _), Client(url) as client:
+        found = take(client.events(), 1)
+
+    assert found[0].number == 1
+    assert next(failing, None) is None
+
+
+def test_an_idle_stream_says_that_it_lives_and_holds_no_transaction(store, monkeypatch):
+    monkeypatch.setattr("fastapi.routing._PING_INTERVAL", 0.2)
+    with served(store) as (url, _), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
+        answer = http.send(http.build_request("GET", "/events"), stream=True)
+        said, held = next(answer.iter_lines()), store._engine.pool.checkedout()
+        answer.close()
+
+    assert said == ": ping"
+    assert held <= 1  # the look of the moment
+
+
+def test_a_service_that_stops_ends_its_streams(sqlite_store):
+    ended = threading.Event()
+
+    def follow(url: str) -> None:
+        with httpx2.Client(base_url=url, timeout=DEADLINE_S) as http, http.stream("GET", "/events") as answer:
+            list(answer.iter_lines())
+        ended.set()
+
+    with served(sqlite_store) as (url, feed):
+        listening = threading.Thread(target=follow, args=(url,))
+        listening.start()
+        assert within(lambda: feed.open == 1)
+
+    assert ended.wait(DEADLINE_S)
+    listening.join()
+
+
+def test_a_client_goes_on_where_it_was_when_the_service_comes_back(sqlite_store, monkeypatch):
+    monkeypatch.setattr("api.clients.events.RETRY_S", 0.05)
+    experiments.submit_experiment(sqlite_store, toy())
+    with served(sqlite_store) as (url, _):
+        client = Client(url)
+        stream = client.events()
+        found = take(stream, 1)
+    experiments.submit_experiment(sqlite_store, toy())
+
+    with ThreadPoolExecutor(1) as pool:
+        second = pool.submit(take, stream, 1)  # nothing answers yet
+        time.sleep(0.3)
+        with served(sqlite_store, httpx2.URL(url).port):
+            found += second.result(DEADLINE_S)
+            client.close()
+
+    assert [each.number for each in found] == [1, 2]
+
+
+def test_events_can_be_polled_page_by_page(store):
+    everything_that_can_happen(store)
+    with TestClient(create_app(store)) as api:
+        pages, after = [], 0
+        while (page := api.get("/events/page", params={"after": after, "limit": 10}).json())["items"]:
+            pages += page["items"]
+            after = page["last"]
+
+    assert [each["number"] for each in pages] == [each.number for each in told(store)]
+    assert page["last"] == page["latest"] == len(pages)
+
+
+def test_a_poll_may_wait_for_what_comes(sqlite_store):
+    id_ = experiments.submit_experiment(sqlite_store, toy()).id
+    with served(sqlite_store) as (url, feed), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
+        asked = {"after": 1, "kind": "cancelled", "wait_s": 60}
+        with ThreadPoolExecutor(1) as pool:
+            answer = pool.submit(http.get, "/events/page", params=asked)
+            assert within(lambda: feed.open == 1)
+            experiments.cancel_experiment(sqlite_store, id_)
+            found = answer.result(DEADLINE_S).json()
+        nothing = http.get("/events/page", params={"after": 2, "wait_s": 0.1}).json()
+
+    assert [each["kind"] for each in found["items"]] == ["cancelled"]
+    assert nothing["items"] == []
+    assert nothing["last"] == 2
+
+
+def test_events_of_a_study_are_those_of_its_experiments(sqlite_store):
+    from schemas.spec import StudySpec
+
+    study = experiments.submit_study(
+        sqlite_store, StudySpec.model_validate({"robot": "toy_function", "budget": "smoke", "strategies": ["random"]})
+    )
+    experiments.submit_experiment(sqlite_store, toy())
+
+    found = told(sqlite_store, Which(study=study.id))
+
+    assert [each.experiment for each in found] == [study.experiments[0].id]
+    assert found[0].study == study.id
+    with pytest.raises(NotFound, match="there is no study"):
+        events.check(sqlite_store, Which(study="none"))

@@ -1,0 +1,68 @@
+"""`gaplab events`, `gaplab accept-versions`, and what `gaplab show` says of provenance, on a service in a thread."""
+
+import re
+import sys
+
+import pytest
+
+from api.cli import main
+from api.exits import Exit
+from services import execution, experiments
+from services.versions import provenance
+from tests.experiments import run, some_log, toy
+from tests.integration.test_events import served
+
+
+@pytest.fixture
+def gaplab(sqlite_store, monkeypatch, capsys):
+    """Runs the command against a service of the store; its code, and what it printed."""
+    with served(sqlite_store) as (url, _):
+        monkeypatch.setenv("GAPLAB_URL", url)
+
+        def command(*arguments):
+            monkeypatch.setattr(sys, "argv", ["gaplab", *arguments])
+            with pytest.raises(SystemExit) as left:
+                main()
+            said = capsys.readouterr()
+            return left.value.code or 0, said.out, said.err
+
+        yield command
+
+
+def test_events_are_printed_a_line_each(sqlite_store, gaplab):
+    id_ = experiments.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    experiments.submit_experiment(sqlite_store, toy())
+    run(sqlite_store, execution.claim(sqlite_store, "me", 1)[0])
+
+    code, out, _ = gaplab("events", id_)
+    _, probed, _ = gaplab("events", "--kind", "probed", "--after", "9")
+    _, everything, _ = gaplab("events")
+
+    assert code == 0
+    assert out.splitlines()[-1].endswith(f"{id_} completed")
+    assert re.search(
+        rf"^ +\d+ \d{{4}}-\d\d-\d\d \d\d:\d\d:\d\d {id_}/0 measured iteration 2, fitness 0.3333$", out, re.M
+    )
+    assert len(out.splitlines()) == 18
+    assert len(probed.splitlines()) == 2
+    assert len(everything.splitlines()) == 19
+
+
+def test_a_refusal_is_shown_and_can_be_lifted(sqlite_store, gaplab):
+    id_ = experiments.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    (claim,) = execution.claim(sqlite_store, "me", 1)
+    execution.record(sqlite_store, claim, next(some_log()))
+    execution.hand_back(sqlite_store, claim)
+    execution.claim(sqlite_store, "other", 1, provenance().model_copy(update={"architecture": "riscv64"}))
+
+    _, shown, warned = gaplab("show", id_)
+    code, accepted, _ = gaplab("accept-versions", id_)
+    _, _, silent = gaplab("show", id_)
+    refused, _, why = gaplab("accept-versions", id_)
+
+    assert f"computed with gaplab {provenance().gaplab}" in shown
+    assert f"`gaplab accept-versions {id_}`" in warned
+    assert (code, accepted) == (0, f"{id_} goes on under the versions of the next supervisor.\n")
+    assert silent == ""
+    assert refused == Exit.CONFLICT
+    assert "has not begun" in why

@@ -1,0 +1,162 @@
+"""Requests that come twice are done once; what people change, nobody undoes unseen; lists stay in order."""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from datetime import timedelta
+from threading import Barrier
+
+import httpx2
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import func, select, update
+
+from api.app import create_app
+from api.client import Client
+from api.clients import connection
+from schemas.access import Role
+from schemas.spec import ExperimentSpec
+from services import admission, experiments
+from services.access import create_token
+from services.admission import Admission
+from services.core.errors import InvalidSpec
+from services.store.models import ExperimentRow, IdempotencyRow, RepetitionRow
+from services.store.session import Store
+
+TOY = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "iterations": 1, "repetitions": 2}
+STUDY = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "smoke"}
+
+
+@pytest.fixture
+def api(store: Store) -> Iterator[TestClient]:
+    with TestClient(create_app(store)) as client:
+        yield client
+
+
+@pytest.fixture
+def lite(sqlite_store: Store) -> Iterator[TestClient]:
+    with TestClient(create_app(sqlite_store)) as client:
+        yield client
+
+
+def count(store: Store, table: type) -> int:
+    with store.reading() as session:
+        return session.scalar(select(func.count()).select_from(table)) or 0
+
+
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [("/experiments", TOY), ("/studies", STUDY), ("/sensitivity", {"robot": "toy_function", "points": 9})],
+)
+def test_the_same_request_with_the_same_key_is_done_once_and_answered_twice(
+    api: TestClient, path: str, body: dict[str, object]
+):
+    first = api.post(path, json=body, headers={"Idempotency-Key": "k"})
+    again = api.post(path, json=dict(reversed(body.items())), headers={"Idempotency-Key": "k"})
+    new = api.post(path, json=body, headers={"Idempotency-Key": "other"})
+
+    assert (first.status_code, again.status_code, new.status_code) == (202, 202, 202)
+    assert again.json() == first.json()
+    assert again.headers["location"] == first.headers["location"]
+    assert again.headers["idempotent-replayed"] == "true"
+    assert "idempotent-replayed" not in first.headers
+    assert (new.json()["id"] == first.json()["id"]) == (path == "/sensitivity")
+
+
+def test_a_key_with_another_body_or_at_another_endpoint_is_refused(api: TestClient):
+    api.post("/experiments", json=TOY, headers={"Idempotency-Key": "k"})
+
+    other = [
+        api.post("/experiments", json=TOY | {"seed": 1}, headers={"Idempotency-Key": "k"}),
+        api.post("/studies", json=STUDY, headers={"Idempotency-Key": "k"}),
+    ]
+
+    assert [each.status_code for each in other] == [422, 422]
+    assert {each.json()["type"] for each in other} == {"urn:gaplab:problem:key-reused"}
+
+
+def test_keys_of_one_token_are_not_those_of_another(store: Store, api: TestClient):
+    made = set()
+    for _ in range(2):
+        headers = {"Authorization": f"Bearer {create_token(store, Role.RUNNER).secret}", "Idempotency-Key": "k"}
+        made.add(api.post("/experiments", json=TOY, headers=headers).json()["id"])
+
+    assert len(made) == 2
+
+
+@pytest.mark.parametrize("key", ["", "x" * 256, "with space", "t\tab"])
+def test_a_key_that_is_none_is_refused_by_the_headers_name(lite: TestClient, key: str):
+    answer = lite.post("/experiments", json=TOY, headers={"Idempotency-Key": key})
+
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["pointer"].lower() == "idempotency-key"
+
+
+def test_what_was_refused_leaves_its_key_free(api: TestClient):
+    refused = api.post("/experiments", json=TOY | {"strategy": "nope"}, headers={"Idempotency-Key": "k"})
+    accepted = api.post("/experiments", json=TOY, headers={"Idempotency-Key": "k"})
+
+    assert (refused.status_code, accepted.status_code) == (422, 202)
+
+
+def test_duplicates_at_the_same_moment_create_one(store: Store):
+    spec, threads = ExperimentSpec.model_validate(TOY), 6
+    barrier = Barrier(threads)
+
+    def submit(_: int) -> tuple[str, bool]:
+        barrier.wait()
+        done = experiments.admit_experiment(store, spec, Admission(key="k"))
+        return done.answer.id, done.replayed
+
+    with ThreadPoolExecutor(threads) as pool:
+        found = list(pool.map(submit, range(threads)))
+
+    assert len({each for each, _ in found}) == 1
+    assert sum(not replayed for _, replayed in found) == 1
+    assert (count(store, ExperimentRow), count(store, RepetitionRow)) == (1, 2)
+
+
+def test_key_and_work_are_committed_together_or_not_at_all(store: Store, monkeypatch: pytest.MonkeyPatch):
+    def fail(*_: object) -> None:
+        raise InvalidSpec([])
+
+    spec = ExperimentSpec.model_validate(TOY)
+    with monkeypatch.context() as patch:
+        patch.setattr("services.admission.idempotency.keep", fail)
+        with pytest.raises(InvalidSpec):
+            experiments.admit_experiment(store, spec, Admission(key="k"))
+
+    assert (count(store, ExperimentRow), count(store, IdempotencyRow)) == (0, 0)
+    assert not experiments.admit_experiment(store, spec, Admission(key="k")).replayed
+
+
+def test_a_key_is_forgotten_after_a_week(store: Store, api: TestClient):
+    first = api.post("/experiments", json=TOY, headers={"Idempotency-Key": "k"}).json()["id"]
+    with store.transaction() as session:
+        moment = session.scalar(select(IdempotencyRow.created_at))
+        assert moment
+        session.execute(update(IdempotencyRow).values(created_at=moment - admission.KEYS_LIVE - timedelta(minutes=1)))
+
+    again = api.post("/experiments", json=TOY, headers={"Idempotency-Key": "k"})
+
+    assert again.json()["id"] != first
+    assert count(store, IdempotencyRow) == 1
+
+
+def test_a_client_whose_answer_is_lost_asks_again_and_creates_one(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(connection, "PAUSES_S", (0.0, 0.0))
+    inner = TestClient(create_app(sqlite_store))._transport  # what carries requests into the app itself
+
+    class Losing(httpx2.BaseTransport):
+        lost = 0
+
+        def handle_request(self, request: httpx2.Request) -> httpx2.Response:
+            answer = inner.handle_request(request)
+            if request.method == "POST" and self.lost < 2:
+                self.lost += 1
+                raise httpx2.ReadError("the connection was reset")
+            return answer
+
+    with Client("http://testserver", transport=Losing()) as client:
+        made = client.submit(TOY)
+
+    assert [each.id for each in experiments.list_experiments(sqlite_store).items] == [made.id]

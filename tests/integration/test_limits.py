@@ -1,0 +1,141 @@
+"""Limits: beyond each there is a problem that names it, and what is within is let in."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields, replace
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from api.limits import Streams
+from schemas.access import Role
+from services.access import create_token
+from services.core.errors import LimitReached
+from services.settings import Limits, variable_of
+from services.store.session import Store
+
+TOY = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "iterations": 2, "repetitions": 3}
+STUDY = {
+    "strategies": ["random", "direct", "known_fit"],
+    "robot": "toy_function",
+    "budget": "smoke",
+    "repetitions": 3,
+    "iterations": 2,
+}
+
+
+def served(store: Store, **limits: int) -> TestClient:
+    return TestClient(create_app(store, limits=replace(Limits(), **limits)))
+
+
+@pytest.mark.parametrize(
+    ("limits", "path", "body", "name"),
+    [
+        ({"iterations": 1}, "/experiments", TOY, "iterations"),
+        ({"repetitions": 2}, "/experiments", TOY, "repetitions"),
+        ({"repetitions": 8}, "/studies", STUDY, "repetitions"),
+    ],
+)
+def test_a_submission_that_asks_for_too_much_is_refused_for_good(
+    sqlite_store: Store, limits: dict[str, int], path: str, body: dict[str, object], name: str
+):
+    answer = served(sqlite_store, **limits).post(path, json=body)
+
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["pointer"] == f"/{name}"
+    assert variable_of(name) in answer.json()["detail"]
+    assert served(sqlite_store, **{name: limits[name] + 1}).post(path, json=body).status_code == 202
+
+
+@pytest.mark.parametrize("name", ["experiments", "experiments_per_token", "rollouts", "rollouts_per_token"])
+def test_what_is_full_is_full_until_something_ends(store: Store, name: str):
+    api = served(store, **{name: 1 if name.startswith("experiments") else 4_000})
+    answers = [api.post("/experiments", json=TOY) for _ in range(30)]
+    taken = [each.json()["id"] for each in answers if each.status_code == 202]
+    refused = [each for each in answers if each.status_code != 202]
+
+    api.post(f"/experiments/{taken[0]}/cancel")
+    room = api.post("/experiments", json=TOY)
+
+    assert refused
+    assert {each.status_code for each in refused} == {429}
+    assert variable_of(name) in refused[0].json()["detail"]
+    assert refused[0].json()["type"] == "urn:gaplab:problem:limit-reached"
+    assert int(refused[0].headers["retry-after"]) > 0
+    assert room.status_code == 202
+    assert api.post("/experiments", json=TOY).status_code == 429
+
+
+def test_one_token_cannot_take_the_room_of_another(store: Store):
+    api = served(store, experiments_per_token=1, experiments=2)
+    first, second, third = ({"Authorization": f"Bearer {create_token(store, Role.RUNNER).secret}"} for _ in range(3))
+
+    found = [api.post("/experiments", json=TOY, headers=each).status_code for each in (first, first, second, third)]
+
+    assert found == [202, 429, 202, 429]
+
+
+def test_a_study_is_let_in_whole_or_not_at_all(store: Store):
+    api = served(store, experiments=2)
+
+    assert api.post("/studies", json=STUDY).status_code == 429
+    assert api.get("/studies").json()["items"] == api.get("/experiments").json()["items"] == []
+
+
+def test_submissions_at_the_same_moment_do_not_pass_a_limit_together(store: Store):
+    api = served(store, experiments=3)
+
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(lambda _: api.post("/experiments", json=TOY).status_code, range(8)))
+
+    assert sorted(found) == [202] * 3 + [429] * 5
+
+
+def test_a_body_has_the_limit_that_is_set(sqlite_store: Store):
+    api = served(sqlite_store, body_bytes=100)
+
+    refused = api.post("/experiments", json=TOY | {"name": "x" * 100})
+
+    assert refused.status_code == 413
+    assert "GAPLAB_MAX_BODY_BYTES" in refused.json()["detail"]
+
+
+def test_streams_are_limited_for_a_token_and_in_all_and_a_closed_one_makes_room():
+    streams = Streams(replace(Limits(), streams_per_token=2, streams=3))
+    with streams.open("a"), streams.open("a"):
+        with pytest.raises(LimitReached, match="GAPLAB_MAX_STREAMS_PER_TOKEN"), streams.open("a"):
+            pass
+        with (
+            streams.open("b"),
+            pytest.raises(LimitReached, match=r"GAPLAB_MAX_STREAMS\)"),
+            streams.open(None),
+        ):
+            pass
+        with streams.open(None):
+            pass
+
+    with streams.open("a"), streams.open("a"):
+        pass
+
+
+def test_limits_come_from_the_environment(monkeypatch: pytest.MonkeyPatch):
+    assert Limits.from_environment() == Limits()
+    monkeypatch.setenv("GAPLAB_MAX_ROLLOUTS_PER_TOKEN", "7")
+    assert Limits.from_environment() == replace(Limits(), rollouts_per_token=7)
+    monkeypatch.setenv("GAPLAB_MAX_STREAMS", "many")
+    with pytest.raises(ValueError, match="GAPLAB_MAX_STREAMS is 'many'"):
+        Limits.from_environment()
+
+
+def test_every_limit_is_documented_with_its_default():
+    text = (Path(__file__).parents[2] / "docs" / "security.md").read_text()
+
+    for each in fields(Limits):
+        assert f"| `{variable_of(each.name)}` | {each.default:,} |" in text
+
+
+def test_the_papers_whole_figure_is_let_in(sqlite_store: Store):
+    answer = served(sqlite_store).post("/studies", json={"direct_repetitions": 100})
+
+    assert answer.status_code == 202

@@ -1,0 +1,182 @@
+"""Lists: filtered, sorted, page by page. Edits: nobody undoes unseen what somebody else did."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from services import execution
+from services.store.session import Store
+
+TOY = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "iterations": 1, "repetitions": 1}
+NAMES = ["béta", "Alpha", "alpha 50%", "line\nbreak", "delta_1", "alpha"]
+
+
+@pytest.fixture
+def api(store: Store) -> Iterator[TestClient]:
+    with TestClient(create_app(store)) as client:
+        yield client
+
+
+@pytest.fixture
+def lite(sqlite_store: Store) -> Iterator[TestClient]:
+    with TestClient(create_app(sqlite_store)) as client:
+        yield client
+
+
+def walk(api: TestClient, path: str, **query: Any) -> list[dict[str, Any]]:
+    """Every item, two at a time."""
+    found, cursor = [], None
+    while True:
+        page = api.get(path, params=query | {"limit": 2} | ({"cursor": cursor} if cursor else {}))
+        assert page.status_code == 200, page.text
+        found += page.json()["items"]
+        if (cursor := page.json()["next"]) is None:
+            return found
+
+
+@pytest.mark.parametrize("path", ["/experiments", "/studies"])
+@pytest.mark.parametrize("sort", ["name", "-name", "created_at", "-created_at"])
+def test_a_sorted_list_has_each_once_and_its_opposite_is_its_reverse(api: TestClient, path: str, sort: str):
+    base = TOY if path == "/experiments" else {"strategies": ["random"], "robot": "toy_function", "budget": "smoke"}
+    made = [api.post(path, json=base | {"name": name}).json()["id"] for name in NAMES]
+
+    found = [each["id"] for each in walk(api, path, sort=sort)]
+    other = "-" + sort if not sort.startswith("-") else sort[1:]
+
+    assert sorted(found) == sorted(made)
+    assert found == [each["id"] for each in walk(api, path, sort=other)][::-1]
+    if sort == "created_at":
+        assert found == made
+
+
+def test_experiments_are_sorted_by_state_and_strategy(api: TestClient):
+    for strategy in ("simulated_fit", "informative", "random"):
+        last = api.post("/experiments", json=TOY | {"strategy": strategy}).json()["id"]
+    api.post(f"/experiments/{last}/cancel")
+
+    assert [each["strategy"] for each in walk(api, "/experiments", sort="strategy")] == [
+        "informative",
+        "random",
+        "simulated_fit",
+    ]
+    assert [each["state"] for each in walk(api, "/experiments", sort="state")] == ["CANCELLED", "QUEUED", "QUEUED"]
+
+
+def test_text_is_looked_for_in_names_and_ids_as_it_stands(api: TestClient):
+    ids = {name: api.post("/experiments", json=TOY | {"name": name}).json()["id"] for name in NAMES}
+
+    def found(text: str) -> set[str]:
+        return {each["name"] for each in walk(api, "/experiments", text=text)}
+
+    assert found("ALPHA") == {"Alpha", "alpha 50%", "alpha"}
+    assert found("50%") == {"alpha 50%"}
+    assert found("%") == {"alpha 50%"}
+    assert found("a_1") == {"delta_1"}
+    assert found("é") == {"béta"}
+    assert found(ids["Alpha"][2:9]) == {"Alpha"}
+    assert found("\0'") == set()
+
+
+def test_studies_are_filtered_by_state_strategy_and_text(store: Store, api: TestClient):
+    def study(name: str, *strategies: str) -> dict[str, Any]:
+        spec = {"name": name, "strategies": strategies, "robot": "toy_function", "budget": "smoke"}
+        return api.post("/studies", json=spec).json()
+
+    called_off, mixed = study("off", "random"), study("mixed", "random", "known_fit")
+    api.post(f"/experiments/{called_off['experiments'][0]['id']}/cancel")
+    api.post(f"/experiments/{mixed['experiments'][0]['id']}/cancel")
+    study("waiting", "simulated_fit")
+
+    def found(**which: str) -> set[str]:
+        return {each["name"] for each in walk(api, "/studies", **which)}
+
+    assert found(strategy="random") == {"off", "mixed"}
+    assert found(strategy="random", text="MIX") == {"mixed"}
+    for state in ("QUEUED", "RUNNING", "COMPLETED", "FAILED", "CANCELLED"):
+        assert found(state=state) == {each["name"] for each in walk(api, "/studies") if each["state"] == state}
+    assert found(state="RUNNING") == {"mixed"}
+    assert found(state="CANCELLED") == {"off"}
+
+
+@pytest.mark.parametrize("path", ["/experiments", "/studies"])
+def test_a_cursor_is_good_only_for_the_list_that_gave_it(api: TestClient, path: str):
+    base = TOY if path == "/experiments" else {"strategies": ["random"], "robot": "toy_function", "budget": "smoke"}
+    for _ in range(2):
+        api.post(path, json=base)
+    cursor = api.get(path, params={"limit": 1}).json()["next"]
+
+    for other in ({"sort": "created_at"}, {"text": "r"}, {"state": "QUEUED"}, {"strategy": "random"}):
+        refused = api.get(path, params=other | {"cursor": cursor})
+        assert refused.status_code == 422
+        assert refused.json()["errors"][0]["pointer"] == "cursor"
+    assert len(api.get(path, params={"cursor": cursor, "limit": 7}).json()["items"]) == 1
+
+
+def submitted(api: TestClient, noun: str) -> tuple[str, str]:
+    base = TOY if noun == "experiments" else {"strategies": ["random"], "robot": "toy_function", "budget": "smoke"}
+    address = f"/{noun}/{api.post(f'/{noun}', json=base).json()['id']}"
+    return address, api.get(address).headers["etag"]
+
+
+@pytest.mark.parametrize("noun", ["experiments", "studies"])
+def test_a_change_that_starts_from_what_is_there_is_made_and_another_that_does_too_is_refused(
+    api: TestClient, noun: str
+):
+    address, tag = submitted(api, noun)
+
+    first = api.patch(address, json={"name": "first", "notes": "new\0 notes"}, headers={"If-Match": tag})
+    second = api.patch(address, json={"name": "second"}, headers={"If-Match": f'"9.aa", {tag}'})
+    then = api.patch(address, json={"notes": None}, headers={"If-Match": first.headers["etag"]})
+
+    assert (first.status_code, second.status_code, then.status_code) == (200, 412, 200)
+    assert second.json()["type"] == "urn:gaplab:problem:changed"
+    assert first.json()["notes"].startswith("new")
+    shown = api.get(address).json()
+    assert (shown["name"], shown["notes"], shown["edits"]) == ("first", None, 2)
+    assert api.get(f"/{noun}", params={"text": "FIRST"}).json()["items"][0]["edits"] == 2
+
+
+@pytest.mark.parametrize(
+    ("headers", "body", "status"),
+    [
+        ({}, {"name": "x"}, 428),
+        ({"If-Match": "nonsense"}, {"name": "x"}, 412),
+        ({"If-Match": '"99999999999999.aa"'}, {"name": "x"}, 412),
+        ({"If-Match": "*"}, {}, 422),
+        ({"If-Match": "*"}, {"name": None}, 422),
+        ({"If-Match": "*"}, {"name": ""}, 422),
+        ({"If-Match": "*"}, {"state": "COMPLETED"}, 422),
+        ({"If-Match": "*"}, {"notes": "x" * 10_001}, 422),
+    ],
+)
+def test_a_change_that_cannot_be_made_says_why(lite: TestClient, headers: dict[str, str], body: Any, status: int):
+    address, _ = submitted(lite, "experiments")
+
+    answer = lite.patch(address, json=body, headers=headers)
+
+    assert answer.status_code == status
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert lite.get(address).json()["edits"] == 0
+
+
+def test_progress_outdates_what_was_seen_but_refuses_no_edit(store: Store, api: TestClient):
+    address, tag = submitted(api, "experiments")
+    same = api.get(address, headers={"If-None-Match": f'"0.0", W/{tag}'})
+    execution.claim(store, "me", 1)
+
+    moved = api.get(address, headers={"If-None-Match": tag})
+    edited = api.patch(address, json={"name": "x"}, headers={"If-Match": tag})
+
+    assert (same.status_code, same.content, same.headers["etag"]) == (304, b"", tag)
+    assert moved.status_code == 200
+    assert moved.headers["etag"] != tag
+    assert edited.status_code == 200
+
+
+def test_the_catalogue_is_sent_once(lite: TestClient):
+    tag = lite.get("/catalogue").headers["etag"]
+
+    assert lite.get("/catalogue", headers={"If-None-Match": tag}).status_code == 304

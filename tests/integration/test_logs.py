@@ -1,0 +1,136 @@
+"""Logs: one form for people and one for programs, the experiment in each line, and no secret in any."""
+
+import io
+import json
+import logging
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import httpx2
+import pytest
+
+from services import logs
+from tests.integration.test_api_processes import within
+
+SECRET = "Zm9vYmFyLTEyMzQ1"
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def restored() -> Iterator[None]:
+    """The logging of the tests, afterwards."""
+    root = logging.getLogger()
+    before, level = list(root.handlers), root.level
+    yield
+    root.handlers, root.level = before, level
+
+
+def logged(stream: io.StringIO, *given: object, **named: object) -> str:
+    logs.configure(stream)
+    logging.getLogger("gaplab.test").info(*given, **named)
+    return stream.getvalue()
+
+
+@pytest.mark.usefixtures("restored")
+def test_a_terminal_gets_a_line_that_people_read():
+    line = logged(Terminal(), "on from step %d", 3, extra={"experiment": "abc", "repetition": 0})
+
+    assert line.endswith(" INFO    gaplab.test abc/0: on from step 3\n")
+
+
+@pytest.mark.usefixtures("restored")
+def test_anything_else_gets_json():
+    line = logged(io.StringIO(), "on from\nstep %d", 3, extra={"experiment": "abc", "repetition": 0})
+
+    found = json.loads(line)
+    assert line.count("\n") == 1
+    assert found.pop("at").endswith("+00:00")
+    assert found == {
+        "level": "info",
+        "logger": "gaplab.test",
+        "message": "on from\nstep 3",
+        "experiment": "abc",
+        "repetition": 0,
+    }
+
+
+@pytest.mark.usefixtures("restored")
+@pytest.mark.parametrize("kind", [io.StringIO, Terminal])
+@pytest.mark.parametrize(
+    "message",
+    [
+        f"Authorization: Bearer {SECRET}",
+        f"{{'authorization': 'Bearer {SECRET}'}}",
+        f"headers [(b'authorization', b'Bearer {SECRET}')]",
+        f"Authorization: {SECRET}",
+        f"it sent bearer {SECRET}",
+        f"GET /events?after=3&token={SECRET}&kind=probed",
+        f"GET /events?access_token={SECRET}",
+        f"postgresql://me:{SECRET}@127.0.0.1/gaplab is away",
+        f"connection failed: host=db password={SECRET} user=me",
+        f"RAY_AUTH_TOKEN={SECRET}",
+        f'{{"api_key": "{SECRET}"}}',
+        f"GAPLAB_TOKEN: '{SECRET}'",
+    ],
+)
+def test_what_looks_like_a_secret_is_left_out(message, kind):
+    assert SECRET not in logged(kind(), "%s", message)
+
+
+@pytest.mark.usefixtures("restored")
+def test_a_traceback_has_no_secrets_either():
+    stream = io.StringIO()
+    try:
+        msg = f"cannot reach postgresql://me:{SECRET}@db/gaplab"
+        raise ConnectionError(msg)
+    except ConnectionError:
+        said = logged(stream, "it failed", exc_info=True)
+
+    assert "ConnectionError" in json.loads(said)["exception"]
+    assert SECRET not in said
+
+
+@pytest.mark.usefixtures("restored")
+def test_what_is_no_secret_is_left_as_it_is():
+    message = "3 tokens of 12; path /experiments/abc?after=3, see http://127.0.0.1:8000/docs, me@example.org"
+
+    assert json.loads(logged(io.StringIO(), "%s", message))["message"] == message
+
+
+def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_carry_to_itself(tmp_path):
+    """The real process: every line of it is JSON, probes are left out, and no secret that it was given is in any."""
+    log = tmp_path / "log"
+    script = (
+        "import sys; from api import service; from api.server import listen\n"
+        "taken = listen('127.0.0.1', 0); service.listen = lambda *_: taken\n"
+        "open(sys.argv[1], 'w').write(str(taken.getsockname()[1]))\n"
+        "from services.settings import Settings\n"
+        f"service.serve(Settings(database_url='sqlite:///{tmp_path / 'gaplab.db'}'), workers=False)\n"
+    )
+    place = tmp_path / "port"
+    with log.open("wb") as output:
+        process = subprocess.Popen([sys.executable, "-c", script, str(place)], stdout=output, stderr=output)
+    try:
+        assert within(60, lambda: place.exists() and place.read_text())
+        with httpx2.Client(base_url=f"http://127.0.0.1:{place.read_text()}", timeout=60) as http:
+            assert within(60, lambda: http.get("/readyz").status_code == 200)
+            secret = {"Authorization": f"Bearer {SECRET}", "X-Token": SECRET}
+            assert http.get("/experiments/abc", headers=secret).status_code == 404
+            assert http.get("/experiments", params={"token": SECRET, "x": SECRET}, headers=secret).status_code == 422
+    finally:
+        process.terminate()
+        process.wait(60)
+
+    said = log.read_text()
+    lines = [json.loads(line) for line in said.splitlines()]
+    assert SECRET not in said
+    assert lines[0]["message"].startswith("gaplab serves on http://")
+    assert [(each["path"], each["status"], each.get("experiment")) for each in lines[1:]] == [
+        ("/experiments/abc", 404, "abc"),
+        ("/experiments", 422, None),
+    ]

@@ -1,0 +1,165 @@
+"""Under what an experiment is computed, and that it does not go on under something else unless asked to."""
+
+import subprocess
+
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import text
+
+from api.app import create_app
+from schemas.events import EventKind
+from schemas.lifecycle import State
+from services import events, execution, experiments, provenance, versions
+from services.core.errors import Conflict, StoreUnavailable
+from services.events import Which
+from services.store.models import SPEC_VERSION
+from tests.experiments import run, same, some_log, toy
+
+HERE = versions.provenance()
+OTHERS = {
+    "architecture": HERE.model_copy(update={"architecture": "riscv64"}),
+    "engine": HERE.model_copy(update={"engines": HERE.engines | {"analytic": "analytic 2.0"}}),
+    "spec version": HERE.model_copy(update={"spec_version": SPEC_VERSION + 1}),
+}
+ALIKE = HERE.model_copy(
+    update={
+        "python": "3.11.99",
+        "commit": "f" * 40,
+        "engines": HERE.engines | {"pybullet": "pybullet 9"},  # this experiment does not use it
+    }
+)
+
+
+def begun(store):
+    """An experiment with a step, queued again."""
+    experiments.submit_experiment(store, toy(repetitions=2))
+    (claim,) = execution.claim(store, "me", 1)
+    execution.record(store, claim, next(some_log()))
+    execution.hand_back(store, claim)
+    return claim.experiment_id
+
+
+def test_it_is_recorded_with_the_first_claim(store):
+    id_ = experiments.submit_experiment(store, toy(repetitions=2)).id
+    assert provenance.read(store, id_).uses == ()
+
+    execution.claim(store, "me", 2)
+
+    found = provenance.read(store, id_)
+    assert [(each.repetitions, each.provenance) for each in found.uses] == [(2, HERE)]
+    assert found.computed_with == f"analytic (of gaplab's own), {HERE.architecture}, spec {SPEC_VERSION}"
+
+
+def test_it_names_the_library_and_the_version_of_every_engine():
+    assert HERE.engines["pybullet"].startswith("pybullet 3.")
+    assert HERE.engines["mujoco"].startswith("mujoco ")
+    assert "none" not in {*HERE.engines["mujoco"].split(), *HERE.engines["physx"].split()}
+    assert versions.versions()["mujoco"] != "none"
+    assert HERE.libraries.keys() >= {"numpy", "scipy", "cma"}
+
+
+def test_it_knows_the_commit_and_whether_the_code_was_changed_since(tmp_path, monkeypatch):
+    def git(*command):
+        subprocess.run(["git", "-C", tmp_path, *command], check=True, capture_output=True)
+
+    monkeypatch.setattr(versions, "ROOT", tmp_path)
+    for folder in versions.CODE:
+        (tmp_path / folder).mkdir()
+    file = tmp_path / "schemas" / "a.py"
+    file.write_text("a = 1\n")
+    fresh = versions.provenance.__wrapped__
+
+    assert (fresh().commit, fresh().dirty) == (None, None)
+    git("init")
+    git("add", ".")
+    git("-c", "user.name=me", "-c", "user.email=me@example.org", "commit", "-m", "first")
+    assert (len(fresh().commit), fresh().dirty) == (40, False)
+    file.write_text("a = 2\n")
+    assert fresh().dirty is True
+
+
+@pytest.mark.parametrize("what", OTHERS)
+def test_a_supervisor_with_another_of_what_decides_leaves_it_alone_and_the_experiment_says_why(store, what):
+    id_ = begun(store)
+
+    assert execution.claim(store, "other", 9, OTHERS[what]) == ()
+    assert execution.claim(store, "other", 9, OTHERS[what]) == ()
+
+    (warning,) = experiments.read_experiment(store, id_).warnings
+    assert "does not go on" in warning
+    assert f"gaplab accept-versions {id_}" in warning
+    refused = events.page(store, 0, Which(kinds=frozenset({EventKind.VERSIONS_REFUSED})), limit=9).items
+    assert [each.body["refused_by"] for each in refused] == [provenance.read(store, id_).refused_by]
+    assert len(execution.claim(store, "me", 9)) == 2
+
+
+def test_one_that_differs_only_in_what_changes_no_number_goes_on(store):
+    begun(store)
+
+    assert len(execution.claim(store, "other", 9, ALIKE)) == 2
+
+
+def test_what_it_leaves_alone_keeps_nothing_else_waiting(store):
+    begun(store)
+    later = experiments.submit_experiment(store, toy(repetitions=1)).id
+
+    claims = execution.claim(store, "other", 1, OTHERS["architecture"])
+
+    assert [each.experiment_id for each in claims] == [later]
+
+
+def test_accepted_it_goes_on_from_its_log_and_both_are_recorded(store):
+    id_ = begun(store)
+    other = OTHERS["engine"]
+    execution.claim(store, "other", 9, other)
+
+    accepted = provenance.accept_versions(store, id_)
+    claims = execution.claim(store, "other", 9, other)
+
+    assert accepted.warnings == ()
+    assert same(claims[0].log, tuple(some_log())[:1])
+    found = provenance.read(store, id_)
+    assert [each.provenance for each in found.uses] == [HERE, other]
+    assert [each.repetitions for each in found.uses] == [0, 2]
+    assert "analytic 2.0" in found.computed_with
+    told = events.page(store, 0, Which(kinds=frozenset({EventKind.VERSIONS_ACCEPTED})), limit=9).items
+    assert "of gaplab's own" in told[0].body["computed_with"]
+    assert "analytic 2.0" in told[0].body["refused_by"]
+    for claim in claims:
+        execution.hand_back(store, claim)
+    assert execution.claim(store, "me", 9) == ()  # it is bound to the others now
+
+
+def test_there_is_nothing_to_accept_before_it_has_begun_or_after_it_has_ended(store):
+    id_ = experiments.submit_experiment(store, toy(repetitions=1)).id
+
+    with pytest.raises(Conflict, match="has not begun"):
+        provenance.accept_versions(store, id_)
+    run(store, execution.claim(store, "me", 1)[0])
+    with pytest.raises(Conflict, match="has ended: it is COMPLETED"):
+        provenance.accept_versions(store, id_)
+
+
+def test_over_http(sqlite_store):
+    id_ = begun(sqlite_store)
+    with TestClient(create_app(sqlite_store)) as api:
+        shown = api.get(f"/experiments/{id_}/provenance").json()
+        accepted = api.post(f"/experiments/{id_}/accept-versions")
+        missing = api.post("/experiments/nobody/accept-versions")
+
+    assert shown["uses"][0]["provenance"]["python"] == HERE.python
+    assert (accepted.status_code, accepted.json()["id"]) == (200, id_)
+    assert missing.status_code == 404
+
+
+def test_a_spec_of_a_later_version_is_not_read_and_not_run(store):
+    id_ = experiments.submit_experiment(store, toy()).id
+    with store.transaction() as session:
+        session.execute(text("UPDATE experiment SET spec_version = 99"))
+
+    with pytest.raises(StoreUnavailable, match=rf"'{id_}' is of version 99, .* reads up to {SPEC_VERSION}"):
+        experiments.read_experiment(store, id_)
+    assert execution.claim(store, "me", 9) == ()
+    later = experiments.submit_experiment(store, toy(repetitions=1))
+    assert [each.experiment_id for each in execution.claim(store, "me", 9)] == [later.id]
+    assert experiments.read_experiment(store, later.id).state is State.RUNNING

@@ -1,0 +1,100 @@
+"""A Ray of our own lets nobody in but us: it listens on loopback only, and asks for its token."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from services.core.errors import ClusterUnusable
+from services.settings import Settings
+from workers.__main__ import choose_authentication
+from workers.cluster import cluster
+
+OWN = """
+import os, subprocess, sys
+from services.settings import Settings
+from tests.processes import is_ours, processes
+from workers.__main__ import choose_authentication
+
+choose_authentication(Settings())
+import ray
+from workers.cluster import cluster
+
+def listening():
+    sockets = {}
+    for pid, _ in processes():
+        if is_ours(pid):
+            for each in os.listdir(f"/proc/{pid}/fd"):
+                try:
+                    sockets[os.readlink(f"/proc/{pid}/fd/{each}")] = pid
+                except OSError:
+                    continue
+    for family in ("tcp", "tcp6"):
+        for line in open(f"/proc/net/{family}").read().splitlines()[1:]:
+            _, local, _, state, *rest = line.split()
+            if state == "0A" and f"socket:[{rest[5]}]" in sockets:
+                yield local.partition(":")[0]
+
+with cluster(Settings(workers=1)):
+    address = ray.get_runtime_context().gcs_address
+    print("AT", address, *sorted(set(listening())))
+    stranger = f"from ray._raylet import GcsClient; GcsClient({address!r}).internal_kv_keys(b'', None); print('IN')"
+    without = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
+    for home in ({"RAY_AUTH_MODE": "disabled"}, {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": "0" * 64}):
+        tried = subprocess.run([sys.executable, "-c", stranger], env=without | home, capture_output=True, text=True)
+        print("REFUSED" if "AuthenticationError" in tried.stderr and "IN" not in tried.stdout else tried, flush=True)
+"""
+
+LOOPBACK = {"0100007F", "0000000000000000FFFF00000100007F", "00000000000000000000000001000000"}
+
+
+def test_our_own_ray_listens_on_loopback_and_refuses_a_stranger_whatever_the_environment_says():
+    root = Path(__file__).parents[2]
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
+
+    done = subprocess.run(
+        [sys.executable, "-c", OWN],
+        env=inherited | {"PYTHONPATH": str(root), "RAY_AUTH_MODE": "disabled"},
+        capture_output=True,
+        text=True,
+        timeout=180,
+        check=False,
+    )
+
+    assert done.returncode == 0, done.stderr
+    said = dict(line.split(" ", 1) for line in done.stdout.splitlines() if line.startswith("AT "))
+    address, *found = said["AT"].split()
+    assert address.startswith("127.0.0.1:")
+    assert len(found) > 0
+    assert set(found) <= LOOPBACK
+    assert done.stdout.count("REFUSED\n") == 2, done.stdout
+
+
+def test_a_ray_of_our_own_that_would_ask_nobody_is_not_started(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("RAY_AUTH_MODE", "disabled")
+
+    with pytest.raises(ClusterUnusable, match="RAY_AUTH_MODE"), cluster(Settings(workers=1)):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("address", "before", "after"),
+    [
+        (None, "disabled", "token"),
+        (None, None, "token"),
+        ("head:6379", None, "token"),
+        ("head:6379", "disabled", "disabled"),
+    ],
+)
+def test_only_a_cluster_of_others_may_go_without_a_token(
+    monkeypatch: pytest.MonkeyPatch, address: str | None, before: str | None, after: str
+):
+    monkeypatch.setenv("RAY_AUTH_MODE", before or "")
+    if before is None:
+        monkeypatch.delenv("RAY_AUTH_MODE")
+
+    choose_authentication(Settings(ray_address=address))
+
+    assert os.environ["RAY_AUTH_MODE"] == after

@@ -1,0 +1,346 @@
+"""Experiments under whatever may be done to them, in any order, against a model of a page.
+
+People submit, pause, resume, stop, cancel and extend; fake workers claim, compute with the real loop, deliver (now and
+then twice), complete and fail, and are killed; leases run out. After every move the store says what the model says, no
+step is there twice or missing, and what was stored before stands.
+"""
+
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cache
+
+import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule, run_state_machine_as_test
+
+from schemas.lifecycle import ENDS, PERMITTED, Ending, State, Verb
+from schemas.schedule import ExtensionSpec
+from schemas.spec import ExperimentSpec
+from services import execution, experiments, life_cycle
+from services.core.errors import Conflict, InvalidSpec
+from services.core.loop import repetition
+from services.execution import Claim, TimedStep
+from services.resolution import resolve_experiment
+from services.simulation import setting
+from services.store.models import AttemptRow, ExperimentRow, RepetitionRow
+from services.store.repository.steps import logs
+from tests.fakes import flat
+
+MOST_ITERATIONS, MOST_REPETITIONS = 2, 3
+BUDGET = {"controller_evaluations": 20, "selection_evaluations": 20, "simulator_evaluations": 20}
+
+
+def spec(iterations, repetitions):
+    toy = {"strategy": "simulated_fit", "robot": "toy_function", "optimizer": {"name": "steady_state"}}
+    return ExperimentSpec.model_validate(toy | {"budget": BUDGET, "iterations": iterations, "repetitions": repetitions})
+
+
+@cache
+def whole(number):
+    """The log of a repetition that nothing ever happened to, of as many iterations as any has here."""
+    resolved = resolve_experiment(spec(MOST_ITERATIONS, MOST_REPETITIONS))
+    return tuple(flat(step) for step in repetition(setting(resolved, number)))
+
+
+def length(iterations):
+    return 3 + 5 * iterations
+
+
+def points(steps):
+    """Iterations that are done, number 0 included."""
+    return (steps + 2) // 5
+
+
+@dataclass
+class Repetition:
+    """What is expected of one: its state, its steps, how its attempts ended, and who holds it."""
+
+    state: State = State.QUEUED
+    steps: int = 0
+    losses: int = 0
+    endings: list = field(default_factory=list)
+    claim: Claim | None = None
+
+    def leave(self, state, ending):
+        self.state, self.claim = state, None
+        self.endings[-1] = ending
+
+
+@dataclass
+class Experiment:
+    """What is expected of one."""
+
+    id: str
+    iterations: int
+    repetitions: list
+    state: State = State.QUEUED
+
+    def of(self, *states):
+        return [each for each in self.repetitions if each.state in states]
+
+    def settle(self):
+        if self.state is State.STOPPING:
+            for each in self.of(State.QUEUED):
+                each.state = State.COMPLETED if points(each.steps) else State.CANCELLED
+        if self.state in ENDS:
+            return
+        if not self.of(State.QUEUED, State.RUNNING):
+            ends = (State.COMPLETED, State.FAILED, State.CANCELLED)
+            self.state = next(end for end in ends if self.of(end))
+        elif self.state is State.PAUSING and not self.of(State.RUNNING):
+            self.state = State.PAUSED
+        elif self.state is State.QUEUED and self.of(State.RUNNING):
+            self.state = State.RUNNING
+
+    def ask(self, verb):
+        running = bool(self.of(State.RUNNING))
+        if verb is Verb.CANCEL:
+            for each in self.of(State.RUNNING):
+                each.leave(State.CANCELLED, Ending.CANCELLED)
+            for each in self.of(State.QUEUED):
+                each.state = State.CANCELLED
+        self.state = {
+            Verb.PAUSE: State.PAUSING,
+            Verb.RESUME: State.RUNNING if running else State.QUEUED,
+            Verb.STOP: State.STOPPING,
+            Verb.CANCEL: State.CANCELLED,
+        }[verb]
+        self.settle()
+
+
+class LifeCycle(RuleBasedStateMachine):
+    """One database for all examples; each has its own experiments, and calls off what is left at its end."""
+
+    store = None
+    picks = st.integers(0, 10)
+
+    def __init__(self):
+        super().__init__()
+        self.experiments = []
+        self.gone = []  # claims that hold no more
+        self.states = {}
+        self.kept = {}  # the longest log that was seen of each repetition
+
+    def running(self):
+        return [(one, each) for one in self.experiments for each in one.repetitions if each.claim]
+
+    def one_of(self, found, pick):
+        return found[pick % len(found)]
+
+    def claims(self):
+        return [each.claim for _, each in self.running()]
+
+    @precondition(lambda self: len(self.experiments) < 2)
+    @rule(iterations=st.integers(1, MOST_ITERATIONS), repetitions=st.integers(1, MOST_REPETITIONS - 1))
+    def submit(self, iterations, repetitions):
+        read = experiments.submit_experiment(self.store, spec(iterations, repetitions))
+        made = [Repetition() for _ in range(repetitions)]
+        self.experiments.append(Experiment(read.id, iterations, made))
+
+    @precondition(lambda self: self.experiments)
+    @rule(pick=picks, verb=st.sampled_from([Verb.PAUSE, Verb.RESUME, Verb.STOP, Verb.PAUSE, Verb.RESUME, Verb.CANCEL]))
+    def ask(self, pick, verb):
+        experiment = self.one_of(self.experiments, pick)
+        held = self.claims()
+        if experiment.state not in PERMITTED[verb]:
+            with pytest.raises(Conflict):
+                life_cycle.ask_experiment(self.store, experiment.id, verb)
+            return
+        experiment.ask(verb)
+        assert life_cycle.ask_experiment(self.store, experiment.id, verb).state is experiment.state
+        self.gone += [each for each in held if each not in self.claims()]
+
+    @precondition(lambda self: any(each.state is State.COMPLETED for each in self.experiments))
+    @rule(pick=picks, iterations=st.integers(1, MOST_ITERATIONS), repetitions=st.integers(1, MOST_REPETITIONS))
+    def extend(self, pick, iterations, repetitions):
+        experiment = self.one_of([each for each in self.experiments if each.state is State.COMPLETED], pick)
+        totals = ExtensionSpec(iterations=iterations, repetitions=repetitions)
+        new = repetitions - len(experiment.repetitions)
+        if new < 0 or iterations < experiment.iterations:
+            with pytest.raises(InvalidSpec):
+                life_cycle.extend_experiment(self.store, experiment.id, totals)
+            return
+        again = [
+            each for each in experiment.of(State.COMPLETED, State.CANCELLED) if points(each.steps) < iterations + 1
+        ]
+        if not (again or new):
+            with pytest.raises(Conflict):
+                life_cycle.extend_experiment(self.store, experiment.id, totals)
+            return
+        for each in again:
+            each.state, each.losses = State.QUEUED, 0
+        experiment.repetitions += [Repetition() for _ in range(new)]
+        experiment.iterations, experiment.state = iterations, State.QUEUED
+        life_cycle.extend_experiment(self.store, experiment.id, totals)
+
+    @rule(limit=st.integers(1, 3))
+    def claim(self, limit):
+        able = [each for each in self.experiments if each.state in (State.QUEUED, State.RUNNING)]
+        queued = sum(len(each.of(State.QUEUED)) for each in able)
+        claims = execution.claim(self.store, "a worker", limit)
+        assert len(claims) == min(limit, queued)
+        for claim in claims:
+            experiment = next(each for each in able if each.id == claim.experiment_id)
+            each = experiment.repetitions[claim.number]
+            assert each.state is State.QUEUED
+            assert len(claim.log) == each.steps
+            each.state, each.claim = State.RUNNING, claim
+            each.endings.append(None)
+            experiment.settle()
+
+    @precondition(lambda self: self.running())
+    @rule(pick=picks, count=st.integers(1, 6), again=st.booleans())
+    def work(self, pick, count, again):
+        """The next steps by the real loop from the stored log; some are delivered a second time with them."""
+        experiment, each = self.one_of(self.running(), pick)
+        claim = each.claim
+        log = self.stored(experiment)[claim.number][1]
+        steps = repetition(setting(claim.spec, claim.number), log)
+        fresh = [step for _, step in zip(range(count), steps, strict=False)]
+        delivered = [TimedStep(step, 0.0) for step in (*(log[-2:] if again else ()), *fresh)]
+        held = execution.record_all(self.store, [(claim, delivered)]) if delivered else (claim,)
+        each.steps += len(fresh)
+        each.losses = 0 if fresh else each.losses
+        if fresh and experiment.state in (State.PAUSING, State.STOPPING):
+            assert held == ()
+            self.gone.append(claim)
+            if each.steps == length(experiment.iterations):
+                each.leave(State.COMPLETED, Ending.COMPLETED)
+            else:
+                each.leave(State.QUEUED, Ending.PAUSED if experiment.state is State.PAUSING else Ending.STOPPED)
+            experiment.settle()
+        else:
+            assert held == (claim,)
+
+    @precondition(lambda self: self.running())
+    @rule(pick=picks)
+    def complete(self, pick):
+        experiment, each = self.one_of(self.running(), pick)
+        if each.steps < length(experiment.iterations):
+            with pytest.raises(Conflict):
+                execution.complete(self.store, each.claim)
+            return
+        self.end(experiment, each, State.COMPLETED, Ending.COMPLETED, execution.complete)
+
+    @precondition(lambda self: self.running())
+    @rule(pick=picks, seldom=st.integers(0, 3))
+    def fail(self, pick, seldom):
+        if not seldom:
+            experiment, each = self.one_of(self.running(), pick)
+            self.end(experiment, each, State.FAILED, Ending.FAILED, lambda *held: execution.fail(*held, "broken"))
+
+    @precondition(lambda self: self.running())
+    @rule(pick=picks)
+    def hand_back(self, pick):
+        experiment, each = self.one_of(self.running(), pick)
+        asked = {State.PAUSING: Ending.PAUSED, State.STOPPING: Ending.STOPPED}
+        ending = asked.get(experiment.state, Ending.HANDED_BACK)
+        self.end(experiment, each, State.QUEUED, ending, execution.hand_back)
+
+    @precondition(lambda self: self.running())
+    @rule(pick=picks)
+    def crash(self, pick):
+        """The worker of one is killed, and its supervisor says so."""
+        experiment, each = self.one_of(self.running(), pick)
+        each.losses += 1
+        state = State.FAILED if each.losses == 5 else State.QUEUED
+        self.end(experiment, each, state, Ending.LOST, lambda *held: execution.release(*held, "killed"))
+
+    @precondition(lambda self: self.running())
+    @rule()
+    def restart(self):
+        """Everything that ran is forgotten; a new supervisor finds the leases run out."""
+        held = self.running()
+        assert execution.requeue_lost(self.store, stale_after_s=-1) == len(held)
+        for experiment, each in held:
+            self.gone.append(each.claim)
+            each.losses += 1
+            each.leave(State.FAILED if each.losses == 5 else State.QUEUED, Ending.LOST)
+            experiment.settle()
+
+    @precondition(lambda self: self.gone)
+    @rule(pick=picks)
+    def wake_up_late(self, pick):
+        """Who holds no more can change nothing, whatever it tries."""
+        late = self.one_of(self.gone, pick)
+        (following,) = [step for _, step in zip(range(1), repetition(setting(late.spec, late.number)), strict=False)]
+        assert not execution.record(self.store, late, following)
+        assert not execution.complete(self.store, late)
+        assert not execution.fail(self.store, late, "late")
+        assert not execution.release(self.store, late, "late")
+        assert not execution.hand_back(self.store, late)
+        assert execution.heartbeat(self.store, [late]) == ()
+
+    def end(self, experiment, each, state, ending, how):
+        self.gone.append(each.claim)
+        assert how(self.store, each.claim)
+        each.leave(state, ending)
+        experiment.settle()
+
+    def stored(self, experiment):
+        """The row and the log of each repetition."""
+        with self.store.reading() as session:
+            return self.read(session, experiment)
+
+    def read(self, session, experiment):
+        of_this = session.query(RepetitionRow).filter_by(experiment_id=experiment.id)
+        rows = of_this.order_by(RepetitionRow.number).all()
+        found = logs(session, [row.id for row in rows])
+        return [(row, found[row.id]) for row in rows]
+
+    @invariant()
+    def the_store_says_what_the_model_says(self):
+        for experiment in self.experiments:
+            with self.store.reading() as session:
+                row, found = session.get_one(ExperimentRow, experiment.id), self.read(session, experiment)
+                ids = [each.id for each, _ in found]
+                tried = session.query(AttemptRow).where(AttemptRow.repetition_id.in_(ids)).order_by(AttemptRow.epoch)
+                endings = [[each.ending for each in tried if each.repetition_id == id_] for id_ in ids]
+            self.compare(experiment, row, [each for each, _ in found])
+            assert endings == [each.endings for each in experiment.repetitions]
+            for each, log in found:
+                self.no_step_is_missing_or_there_twice_and_old_ones_stand(each, log)
+
+    def compare(self, experiment, row, repetitions):
+        expected = experiment.repetitions
+        assert row.state is experiment.state
+        assert (row.ended_at is not None) == (row.state in ENDS)
+        assert [each.state for each in repetitions] == [each.state for each in expected]
+        assert [each.steps for each in repetitions] == [each.steps for each in expected]
+        assert [each.iterations_done for each in repetitions] == [points(each.steps) for each in expected]
+        assert row.running == len(experiment.of(State.RUNNING))
+        for which, state in {None: row.state, **{each.number: each.state for each in repetitions}}.items():
+            before = self.states.get((experiment.id, which), state)
+            assert state is before or before.may_become(state), (which, before, state)
+            self.states[experiment.id, which] = state
+
+    def no_step_is_missing_or_there_twice_and_old_ones_stand(self, row, log):
+        assert tuple(map(flat, log)) == whole(row.number)[: row.steps]
+        assert row.steps >= self.kept.get(row.id, 0)
+        self.kept[row.id] = row.steps
+
+    def teardown(self):
+        for each in self.experiments:
+            with suppress(Conflict):
+                life_cycle.ask_experiment(self.store, each.id, Verb.CANCEL)
+
+
+def drive(store, examples, steps):
+    machine = type("OnThisStore", (LifeCycle,), {"store": store})
+    chosen = settings(
+        max_examples=examples,
+        stateful_step_count=steps,
+        deadline=None,
+        suppress_health_check=list(HealthCheck),
+        derandomize=True,
+    )
+    run_state_machine_as_test(machine, settings=chosen)
+
+
+def test_any_order_of_events_on_sqlite(sqlite_store):
+    drive(sqlite_store, examples=25, steps=40)
+
+
+def test_any_order_of_events_on_postgres(postgres_store):
+    drive(postgres_store, examples=5, steps=30)

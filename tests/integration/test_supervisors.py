@@ -1,0 +1,186 @@
+"""Supervisors on a real Ray: they obey the verbs, take turns, and two of them do nothing twice."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from pathlib import Path
+from threading import Event
+
+import pytest
+
+from schemas.lifecycle import Ending, State, Verb
+from schemas.spec import ExperimentSpec
+from services import execution, experiments, life_cycle
+from services.core.loop import repetition
+from services.resolution import resolve_experiment
+from services.settings import Settings
+from services.simulation import setting
+from services.store.models import RepetitionRow
+from services.store.repository.steps import logs
+from tests.fakes import flat
+from tests.processes import processes_of_ray
+from tests.supervising import impatient
+from workers.cluster import cluster
+from workers.supervisor import Supervisor
+
+DEADLINE_S = 180
+
+
+@pytest.fixture(scope="module", autouse=True)
+def ray_of_our_own():
+    with cluster(Settings(workers=2)):
+        yield
+
+
+def spec(repetitions, controller_evaluations=200):
+    """Work enough in each repetition for something to happen meanwhile."""
+    budget = {"controller_evaluations": controller_evaluations, "selection_evaluations": 60}
+    return ExperimentSpec.model_validate(
+        {
+            "strategy": "simulated_fit_and_informative",
+            "robot": "toy_function",
+            "iterations": 2,
+            "repetitions": repetitions,
+            "budget": budget | {"simulator_evaluations": 60},
+        }
+    )
+
+
+@cache
+def expected(repetitions):
+    resolved = resolve_experiment(spec(repetitions))
+    return [[flat(step) for step in repetition(setting(resolved, number))] for number in range(repetitions)]
+
+
+def stored(store, experiment):
+    with store.reading() as session:
+        rows = session.query(RepetitionRow).filter_by(experiment_id=experiment).order_by(RepetitionRow.number).all()
+        found = logs(session, [row.id for row in rows])
+        return [[flat(step) for step in found[row.id]] for row in rows]
+
+
+def wait(until, do=lambda: time.sleep(0.1)):
+    deadline = time.monotonic() + DEADLINE_S
+    while not until():
+        assert time.monotonic() < deadline
+        do()
+
+
+def state(store, experiment):
+    return experiments.read_experiment(store, experiment).state
+
+
+def attempts(store, experiment, repetitions):
+    return [each for number in range(repetitions) for each in experiments.list_attempts(store, experiment, number)]
+
+
+def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numbers(store):
+    experiment = experiments.submit_experiment(store, spec(3)).id
+    supervisor = Supervisor(store, lambda: 3)
+    wait(lambda: len(stored(store, experiment)[0]) > 1, supervisor.step)
+
+    life_cycle.ask_experiment(store, experiment, Verb.PAUSE)
+    wait(lambda: state(store, experiment) is State.PAUSED, supervisor.step)
+    wait(lambda: not (supervisor.busy or processes_of_ray("run")), supervisor.step)
+    paused = stored(store, experiment)
+    for _ in range(3):
+        supervisor.step()
+    life_cycle.ask_experiment(store, experiment, Verb.RESUME)
+    wait(lambda: state(store, experiment).ended, supervisor.step)
+
+    found = stored(store, experiment)
+    assert paused != found == expected(3)
+    assert [log[: len(start)] for log, start in zip(found, paused, strict=True)] == paused
+    assert Ending.PAUSED in {each.ending for each in attempts(store, experiment, 3)}
+
+
+def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sqlite_store):
+    experiment = experiments.submit_experiment(sqlite_store, spec(3)).id
+    supervisor = Supervisor(sqlite_store, lambda: 3)
+    done = lambda: experiments.read_experiment(sqlite_store, experiment).progress.iterations_done  # noqa: E731
+    wait(done, supervisor.step)
+
+    life_cycle.ask_experiment(sqlite_store, experiment, Verb.STOP)
+    wait(lambda: state(sqlite_store, experiment).ended, supervisor.step)
+
+    found = stored(sqlite_store, experiment)
+    assert state(sqlite_store, experiment) is State.COMPLETED
+    assert found != expected(3)
+    assert [log[: len(part)] for log, part in zip(expected(3), found, strict=True)] == found
+    wait(lambda: not (supervisor.busy or processes_of_ray("run")), supervisor.step)
+
+
+def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite_store):
+    large = experiments.submit_experiment(sqlite_store, spec(8)).id
+    supervisor = Supervisor(sqlite_store, lambda: 4)
+    wait(lambda: len(stored(sqlite_store, large)[0]) > 1, supervisor.step)
+    small = experiments.submit_experiment(sqlite_store, spec(1, controller_evaluations=100)).id
+
+    wait(lambda: state(sqlite_store, small).ended, supervisor.step)
+
+    begun = [len(each) > 0 for each in stored(sqlite_store, large)]
+    experiments.cancel_experiment(sqlite_store, large)
+    wait(lambda: not (supervisor.busy or processes_of_ray("run")), supervisor.step)
+    assert sum(begun) <= 4  # the two that ran, and who had the cores that they left
+
+
+def test_two_supervisors_on_one_database_do_nothing_twice(store):
+    ids = [experiments.submit_experiment(store, spec(3)).id for _ in range(2)]
+    stop = Event()
+
+    with ThreadPoolExecutor(2) as pool:
+        ends = [pool.submit(Supervisor(store, lambda: 2).serve, stop) for _ in range(2)]
+        wait(lambda: all(state(store, each).ended for each in ids))
+        stop.set()
+
+    assert [each.result() for each in ends] == [None, None]
+    assert [stored(store, each) for each in ids] == [expected(3)] * 2
+    tried = [each for experiment in ids for each in attempts(store, experiment, 3)]
+    assert len({each.owner for each in tried}) == 2
+    assert {each.ending for each in tried} <= {Ending.COMPLETED, Ending.HANDED_BACK}
+    assert sum(each.ending is Ending.COMPLETED for each in tried) == 6
+
+
+@pytest.fixture
+def other(store_url, tmp_path):
+    """A supervisor in a process of its own, with a Ray of its own, and what it says."""
+    said = tmp_path / "other.log"
+    with said.open("w") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "tests.supervising", store_url],
+            cwd=Path(__file__).parents[2],
+            stderr=log,
+            stdout=log,
+        )
+    yield process, said
+    process.send_signal(signal.SIGCONT)
+    process.terminate()
+    try:
+        process.wait(60)
+    except subprocess.TimeoutExpired:
+        process.kill()
+
+
+def test_a_supervisor_that_slept_past_its_lease_writes_nothing_any_more(store, other, monkeypatch):
+    impatient(monkeypatch.setattr)
+    process, said = other
+    experiment = experiments.submit_experiment(store, spec(2)).id
+    wait(lambda: len(stored(store, experiment)[0]) > 1)
+
+    os.kill(process.pid, signal.SIGSTOP)
+    ours = Supervisor(store, lambda: 2)
+    wait(lambda: state(store, experiment).ended, ours.step)
+    ended = stored(store, experiment)
+    os.kill(process.pid, signal.SIGCONT)
+    wait(lambda: "no longer ours" in said.read_text())
+
+    tried = attempts(store, experiment, 2)
+    assert ended == stored(store, experiment) == expected(2)
+    assert (tried[0].ending, tried[0].reason) == (Ending.LOST, "its worker was not heard of for 3 s")
+    assert len({each.owner for each in tried}) == 2
+    assert [each.ending for each in tried if each.owner != tried[0].owner] == [Ending.COMPLETED] * 2
+    assert execution.claim(store, "nobody", 9) == ()

@@ -1,0 +1,23 @@
+"""`python -m tests.supervising URL`: a supervisor as a process of its own, which takes others for lost after 3 s."""
+
+import sys
+from functools import partial
+
+from services import execution
+from services.settings import Settings
+from workers import supervisor
+from workers.__main__ import serve
+
+STALE_S = 3.0
+HEARTBEAT_S = 0.5
+
+
+def impatient(patch=setattr):
+    """Let the supervisors of this process be so."""
+    patch(execution, "requeue_lost", partial(execution.requeue_lost, stale_after_s=STALE_S))
+    patch(supervisor, "HEARTBEAT_S", HEARTBEAT_S)
+
+
+if __name__ == "__main__":
+    impatient()
+    sys.exit(serve(Settings(database_url=sys.argv[1], workers=1)))
