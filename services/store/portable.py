@@ -26,11 +26,19 @@ EXPORTED = ("study", "experiment", "repetition", "iteration", "measurement", "si
 
 LEFT_OUT: Mapping[str, str] = {
     "sensitivity": "follows from what is tuned, and is shared by all experiments that tune the same",
+    "event": "is numbered without holes in one database, in which it happened",
+    "event_counter": "counts the events of one database",
+    "provenance": "is shared by all repetitions that were computed with the same",
+    "experiment_provenance": "refers to what is left out",
+    "supervisor": "is a process of one service",
+    "token": "is a secret of one service",
+    "idempotency": "is of requests to one service",
     "checkpoint": "is a part of a step that is under way, and of use to whoever goes on with it",
 }
 """With the reason."""
 
 COLUMNS_LEFT_OUT: Mapping[tuple[str, str], str] = {
+    ("experiment", "token_id"): "names a token of one service",
     ("experiment", "running"): "counts leases, which nobody holds in an archive",
     ("experiment", "claimable"): "follows from the states of repetitions",
     ("repetition", "checkpoints"): "counts checkpoints, which are left out",

@@ -294,7 +294,7 @@ def test_what_came_without_its_reality_cannot_be_extended(store, other):
     direct = study.experiments[0].id
     for claim in execution.claim(store, "me", 9):
         if claim.experiment_id == direct:
-            run(store, claim, some_log(0))
+            run(store, claim, (_fitting(step, len(claim.spec.tunables)) for step in some_log(0)))
 
     import_archive(other, BytesIO(exported(export_study(store, study.id))))
 
