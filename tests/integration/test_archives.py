@@ -23,7 +23,7 @@ from services.core.arrays import frozen
 from services.core.errors import Conflict, NotFound
 from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
 from services.misfit import misfit
-from services.store.models import ExperimentRow, RepetitionRow, SimulatorRow
+from services.store.models import Base, ExperimentRow, RepetitionRow, SimulatorRow
 from services.store.portable import EXPORTED
 from services.store.repository.attempts import attempts_of
 from tests.experiments import AWKWARD, run, some_log, toy
@@ -93,8 +93,9 @@ def shown(store, experiment):
 def forget(store):
     """Remove what there is, as an import must find its ids free again."""
     with store.transaction() as session:
-        for table in ("attempt", "simulator", "measurement", "iteration", "repetition", "experiment", "study"):
-            session.connection().exec_driver_sql(f"DELETE FROM {table}")
+        for table in reversed(Base.metadata.sorted_tables):
+            if table.name != "event_counter":
+                session.execute(table.delete())
 
 
 def test_an_experiment_goes_to_the_other_kind_of_database_and_back(store, other):
