@@ -111,6 +111,7 @@ def _experiment(number: int, spec: Row, rollouts: int) -> Row:
         "name": "simulated_fit",
         "strategy": "simulated_fit",
         "state": State.COMPLETED,
+        "claimable": False,
         "spec": spec,
         "iterations": SAMPLES + 1,
         "rollouts": rollouts,

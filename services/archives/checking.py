@@ -100,8 +100,8 @@ def _text(column: Column, value: object) -> str:
 
 
 def _whole(column: Column, value: object) -> int:
-    if type(value) is not int or not 0 <= value <= column.greatest:
-        msg = f"is no whole number from 0 to {column.greatest}"
+    if type(value) is not int or not column.least <= value <= column.greatest:
+        msg = f"is no whole number from {column.least} to {column.greatest}"
         raise ValueError(msg)
     return value
 

@@ -16,9 +16,9 @@ from pydantic import ValidationError
 
 from schemas.archives import ImportRead, Manifest
 from schemas.events import EventKind
-from schemas.lifecycle import State
+from schemas.lifecycle import Ending, State
 from schemas.provenance import Provenance
-from schemas.spec import ExperimentSpec, Schedule
+from schemas.spec import ExperimentSpec
 from services.archives.checking import checked
 from services.archives.opening import open_archive
 from services.core.errors import Conflict, InvalidArchive
@@ -29,6 +29,7 @@ from services.store.models import SPEC_VERSION, ExperimentRow, RepetitionRow, St
 from services.store.portable import EXPERIMENT, EXPORTED, REPETITION
 from services.store.repository import archives, experiments, provenance, steps
 from services.store.repository.events import note
+from services.store.repository.settling import settle
 from services.store.session import Session, Store
 
 Row = dict[str, Any]
@@ -129,12 +130,12 @@ def _checked_spec(row: Row) -> Row:
     if left_out or unknown or spec.reality.engine is None or spec.strategy.name != row["strategy"]:
         msg = f"{place} is not resolved, or names what is not installed here: {', '.join([*left_out, *unknown])[:200]}"
         raise InvalidArchive(msg)
-    return _whole(spec, truth)
+    return _whole(spec, truth, row["spec"])
 
 
-def _whole(spec: ExperimentSpec, truth: Row) -> Row:
-    """As it is stored; what is not known of its reality is null."""
-    stored = spec.model_dump(mode="json", exclude=set(Schedule.model_fields))
+def _whole(spec: ExperimentSpec, truth: Row, given: Row) -> Row:
+    """As it is stored, with what was given and no more; what is not known of its reality is null."""
+    stored = {name: value for name, value in spec.model_dump(mode="json").items() if name in given}
     return stored | {"reality": stored["reality"] | {"parameters": truth | stored["reality"]["parameters"]}}
 
 
@@ -188,6 +189,7 @@ def _store(session: Session, manifest: Manifest, tables: dict[str, Path], owners
     _check_logs(session, list(found.values()))
     for each in found.values():
         note(session, EventKind.IMPORTED, each)
+    settle(session, found.values())
     return ImportRead(
         study=study,
         experiments=tuple(found.values()),
@@ -205,13 +207,15 @@ def _arriving(table: str, row: Row, arrival: Arrival, study: str | None) -> Row:
         if not State(row["state"]).ended:
             arrival.called_off.append(row["id"])
         row["spec"] = arrival.owners[row["id"]]["spec"]
-        row |= {"id": arrival.ids[row["id"]], "study_id": study, "running": 0, "claimable": False}
+        row |= {"id": arrival.ids[row["id"]], "study_id": study}
     for name in {EXPERIMENT, "experiment_id"} & set(row):
         row[name] = None if row[name] is None else arrival.ids[row[name]]
     if "study_id" in row:
         row["study_id"] = study
     if table in {"experiment", "repetition"} and not State(row["state"]).ended:
         row |= {"state": State.CANCELLED, "ended_at": arrival.now}
+    if table == "attempt" and row.get("ended_at") is None:
+        row |= {"ending": Ending.CANCELLED, "ended_at": arrival.now}
     return row
 
 

@@ -30,31 +30,34 @@ EXPORTED = (
     "iteration",
     "measurement",
     "simulator",
+    "attempt",
 )
 """Each after those that it refers to: the order in which they are read back."""
 
 LEFT_OUT: Mapping[str, str] = {
-    "attempt": "names machines and processes there",
-    "checkpoint": "is of a step under way, which ends where it is computed",
-    "event": "is numbered among all events there; it tells of what the other tables have",
-    "event_counter": "numbers the events there",
-    "idempotency": "is of requests to the service there",
-    "supervisor": "works there",
-    "token": "lets people in there",
     "sensitivity": "follows from what is tuned, and is shared by all experiments that tune the same",
+    "event": "is numbered without holes in one database, in which it happened",
+    "event_counter": "counts the events of one database",
+    "supervisor": "is a process of one service",
+    "token": "is a secret of one service",
+    "idempotency": "is of requests to one service",
+    "checkpoint": "is a part of a step that is under way, and of use to whoever goes on with it",
 }
 """With the reason."""
 
 COLUMNS_LEFT_OUT: Mapping[tuple[str, str], str] = {
-    ("experiment", "token_id"): "names a token there",
-    ("experiment", "sensitivity_id"): "names a check there",
-    ("experiment", "running"): "counts leases, of which an archive has none",
-    ("experiment", "claimable"): "is of an experiment that somebody may go on with",
-    ("repetition", "checkpoints"): "counts what is left out",
+    ("experiment", "token_id"): "names a token of one service",
+    ("experiment", "sensitivity_id"): "names a check of one service",
+    ("experiment", "running"): "counts leases, which nobody holds in an archive",
+    ("experiment", "claimable"): "follows from the states of repetitions",
+    ("repetition", "checkpoints"): "counts checkpoints, which are left out",
     ("repetition", "owner"): "names a machine and a process there",
     ("repetition", "heartbeat_at"): "is of a lease, which nobody holds in an archive",
 }
 """Of exported tables, with the reason."""
+
+SIGNED = {("experiment", "precedence")}
+"""The whole numbers that may be negative; all others count something."""
 
 EXPERIMENT, REPETITION = "experiment", "repetition"
 """In place of the number that a database gave to a repetition: whose it is, and its number there."""
@@ -80,7 +83,7 @@ class Column:
         required: a row without it cannot be stored: it has no default.
         nullable: it may be null.
         longest: characters of a text; None for any number of them.
-        greatest: of whole numbers.
+        least, greatest: of whole numbers.
         choices: the only permitted texts, if there are such.
     """
 
@@ -89,6 +92,7 @@ class Column:
     required: bool
     nullable: bool = False
     longest: int | None = None
+    least: int = 0
     greatest: int = 2**31 - 1
     choices: tuple[str, ...] = ()
 
@@ -135,7 +139,8 @@ def _column(table: str, column: TableColumn[Any]) -> Column:
     choices = tuple(getattr(column.type, "enums", ()))
     longest = column.type.length if isinstance(column.type, String) and not choices else None
     greatest = MOST if isinstance(column.type, BigInteger) else 2**31 - 1
-    return Column(column.name, kind, required, bool(column.nullable), longest, greatest, choices)
+    least = -greatest if (table, column.name) in SIGNED else 0
+    return Column(column.name, kind, required, bool(column.nullable), longest, least, greatest, choices)
 
 
 def _kind(table: str, column: TableColumn[Any]) -> Kind:

@@ -14,16 +14,18 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import insert
 
-from schemas.lifecycle import State
+from schemas.lifecycle import Ending, State
+from schemas.schedule import ExtensionSpec
 from schemas.spec import StudySpec
-from services import execution, experiments, reports
+from services import execution, experiments, life_cycle, reports
 from services.archives import export_experiment, export_study, import_archive, opening, unpacking
 from services.core.arrays import frozen
-from services.core.errors import NotFound
+from services.core.errors import Conflict, NotFound
 from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
 from services.misfit import misfit
 from services.store.models import Base, ExperimentRow, RepetitionRow, SimulatorRow
 from services.store.portable import EXPORTED
+from services.store.repository.attempts import attempts_of
 from tests.experiments import AWKWARD, run, some_log, toy
 
 EVERY = settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -266,11 +268,40 @@ def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store):
     assert {name.partition(".")[0] for name in manifest["members"]} == {*EXPORTED, "curves"}
 
 
-def test_no_lease_and_no_machine_is_in_an_archive(sqlite_store):
-    submitted = experiments.submit_experiment(sqlite_store, toy()).id
-    execution.claim(sqlite_store, "a-machine-of-mine:4711", 9)
+def test_attempts_go_with_it_and_none_goes_on(store, other):
+    submitted = experiments.submit_experiment(store, toy(repetitions=2)).id
+    first, second = execution.claim(store, "me", 2)
+    run(store, first)
+    assert execution.release(store, second, "its worker was lost")
+    execution.claim(store, "another", 1)
 
-    assert b"a-machine-of-mine" not in exported(export_experiment(sqlite_store, submitted))
+    import_archive(other, BytesIO(exported(export_experiment(store, submitted))))
+
+    there, here = (attempts(each, submitted, 0) for each in (store, other))
+    assert here == there
+    *before, last = attempts(other, submitted, 1)
+    assert before == list(attempts(store, submitted, 1)[:-1])
+    assert (last.owner, last.ending) == ("another", Ending.CANCELLED)
+    assert last.ended_at is not None
+
+
+def attempts(store, experiment, number):
+    with store.reading() as session:
+        return attempts_of(session, experiment, number)
+
+
+def test_what_came_without_its_reality_cannot_be_extended(store, other):
+    study = experiments.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["direct", "random"]}))
+    direct = study.experiments[0].id
+    for claim in execution.claim(store, "me", 9):
+        if claim.experiment_id == direct:
+            run(store, claim, (_fitting(step, len(claim.spec.tunables)) for step in some_log(0)))
+
+    import_archive(other, BytesIO(exported(export_study(store, study.id))))
+
+    assert experiments.read_experiment(other, direct).state is State.COMPLETED
+    with pytest.raises(Conflict, match="before its reality was shown"):
+        life_cycle.extend_experiment(other, direct, ExtensionSpec(repetitions=3))
 
 
 def test_times_keep_their_microseconds(store, other):

@@ -87,9 +87,12 @@ def extend(
 
     Raises:
         NotFound: no such experiment.
-        Conflict: it is not COMPLETED, or nothing would be left to run.
+        Conflict: it is not COMPLETED, nothing would be left to run, or its reality is not known here.
     """
     experiment, row = _locked(session, experiment_id, Verb.EXTEND), RepetitionRow
+    if None in experiment.spec["reality"]["parameters"].values():
+        msg = f"experiment {experiment_id!r} was imported before its reality was shown: nobody can go on with it"
+        raise Conflict(msg)
     spec, extent = larger(ExperimentSpec.model_validate(experiment.spec))
     there, total = len(repetitions_of(session, experiment.id)), spec.repetitions or 0
     again = session.scalars(
