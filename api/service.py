@@ -15,10 +15,11 @@ from api.server import end_in_order, listen, serve_api
 from services.core.errors import StoreUnavailable
 from services.settings import Settings
 
-LONG_LIFE_S = 60.0
+LONG_LIFE_S = 15.0
 """A supervisor that lived so long did not fail at its start; it is started again at once."""
 
-LONGEST_PAUSE_S = 60.0
+LONGEST_PAUSE_S = 30.0
+"""With what Ray takes to start, a service is well again within a minute."""
 
 
 def serve(settings: Settings, *, workers: bool = True) -> None:
@@ -76,6 +77,7 @@ def environment_of(settings: Settings) -> dict[str, str]:
         "GAPLAB_DATABASE_URL": settings.database_url,
         "GAPLAB_RAY_ADDRESS": settings.ray_address,
         "GAPLAB_WORKERS": settings.workers,
+        "GAPLAB_LEASE_S": settings.lease_s,
         "GAPLAB_HOST": settings.host,
         "GAPLAB_PORT": settings.port,
     }

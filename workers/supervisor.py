@@ -25,8 +25,8 @@ from workers import repetition
 from workers.nodes import Versions
 from workers.sensitivity import Checks
 
-HEARTBEAT_S = 5.0
-"""Between heartbeats; a lease is lost after 30 s without one."""
+HEARTBEATS = 6
+"""In the time after which a lease without one is lost."""
 
 WAIT_S = 0.2
 """How long the supervisor waits for something to happen before it looks for new work."""
@@ -88,16 +88,25 @@ class Supervisor:
         store: the database.
         capacity: how many repetitions to have at Ray at once, as things are when it is asked.
         versions: that a node must have to run them.
+        lease_s: for how long a supervisor may be silent before its work goes to others; the same for all of them.
     """
 
-    def __init__(self, store: Store, capacity: Callable[[], int], versions: Versions | None = None) -> None:
+    def __init__(
+        self,
+        store: Store,
+        capacity: Callable[[], int],
+        versions: Versions | None = None,
+        *,
+        lease_s: float = execution.STALE_AFTER_S,
+    ) -> None:
         self._store = store
         self._capacity = capacity
         self._versions = versions or {}
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
         self._runs: list[Run] = []
-        self._checks = Checks(store, self._owner)
-        self._beat = -HEARTBEAT_S
+        self._checks = Checks(store, self._owner, lease_s)
+        self._lease_s = lease_s
+        self._beat = -lease_s
         self._looked = -WAIT_S
 
     @property
@@ -136,12 +145,12 @@ class Supervisor:
         self._end()
 
     def _heartbeat(self) -> None:
-        if monotonic() - self._beat < HEARTBEAT_S:
+        if monotonic() - self._beat < self._lease_s / HEARTBEATS:
             return
         held = execution.heartbeat(self._store, [run.claim for run in self._runs])
         self._drop_all_but(held)
         self._checks.heartbeat()
-        requeued = execution.requeue_lost(self._store)
+        requeued = execution.requeue_lost(self._store, stale_after_s=self._lease_s)
         if requeued:
             log.warning("%d repetitions whose supervisor was lost are queued again", requeued)
         self._beat = monotonic()

@@ -1,0 +1,138 @@
+"""Clients: they submit, read, and move experiments through their life cycle, and write down what they were told.
+
+Which verbs there are is asked of the service. Nothing is asked twice: whether a request that got no answer took effect
+is for the checker to find out.
+"""
+
+import random
+import time
+from itertools import count
+from threading import Event, Thread
+
+import httpx2
+
+VERBS = {"cancel": 2, "pause": 3, "resume": 3, "stop": 1}
+"""Those that are used, if the service has them, and how often compared with each other."""
+
+OPEN = 8
+"""Experiments that clients keep under way: enough for both supervisors to have something to do."""
+
+READS = ("", "/samples", "/repetitions", "/curve")
+
+PATIENCE_S = 8
+"""After which a client gives up on an answer."""
+
+TOY = {
+    "robot": "toy_function",
+    "iterations": 3,
+    "repetitions": 3,
+    "budget": {"controller_evaluations": 600, "selection_evaluations": 200, "simulator_evaluations": 100},
+}
+QUADRUPED = {
+    "robot": "quadruped",
+    "iterations": 1,
+    "repetitions": 2,
+    "budget": {"controller_evaluations": 25, "selection_evaluations": 20, "simulator_evaluations": 20},
+}
+STRATEGIES = ("simulated_fit", "random", "known_fit", "direct", "informative", "simulated_fit_and_informative")
+
+
+def specs(rng):
+    """Specs without end, of few kinds: those with the same settings have the same results."""
+    for number in count():
+        base = QUADRUPED if number % 4 == 3 else TOY
+        seed = rng.randrange(2)
+        if number % 3 == 2:
+            yield "/studies", base | {"strategies": rng.sample(STRATEGIES[:4], 2), "seed": seed}
+        else:
+            yield (
+                "/experiments",
+                base | {"strategy": rng.choice(STRATEGIES[:4] if base is QUADRUPED else STRATEGIES), "seed": seed},
+            )
+
+
+class Clients:
+    """Some clients in threads of their own.
+
+    Args:
+        url: of the service.
+        history: where they write down what they were told.
+        seed: of what they do; when they do it is chance.
+        number: of clients.
+    """
+
+    def __init__(self, url, history, seed, number=3):
+        self._history = history
+        self._http = httpx2.Client(base_url=url, timeout=PATIENCE_S, trust_env=False)
+        self._stopping = Event()
+        self._known = []
+        self._open = 0
+        self._verbs = []
+        self._threads = [
+            Thread(target=self._use, args=(name, random.Random(f"{seed}-{name}")), daemon=True)
+            for name in range(number)
+        ]
+
+    def start(self):
+        """Find out what the service can do, and begin."""
+        paths = self._http.get("/openapi.json").json()["paths"]
+        self._verbs = [verb for verb in VERBS if f"/experiments/{{id}}/{verb}" in paths]
+        for thread in self._threads:
+            thread.start()
+
+    def stop(self):
+        """Ask for nothing more."""
+        self._stopping.set()
+        for thread in self._threads:
+            thread.join()
+
+    def wake(self):
+        """Resume what is paused, so that it can end."""
+        for each in self._experiments(state="PAUSED") if "resume" in self._verbs else []:
+            self._ask("resume", "POST", f"/experiments/{each['id']}/resume")
+
+    def waiting(self):
+        """Experiments that have not ended; None if the service does not say."""
+        found = [self._experiments(state=state) for state in ("QUEUED", "RUNNING")]
+        return None if None in found else [each["id"] for page in found for each in page]
+
+    def _experiments(self, **which):
+        answer = self._http.get("/experiments", params={"limit": 500} | which)
+        return answer.json()["items"] if answer.status_code == 200 else None
+
+    def _use(self, name, rng):
+        wanted = specs(rng)
+        for number in count():
+            if self._stopping.wait(rng.uniform(0.1, 0.6)):
+                return
+            self._look(rng)
+            if self._open < OPEN:
+                path, spec = next(wanted)
+                self._submit(path, spec | {"name": f"client {name}, number {number}"})
+            if self._known and rng.random() < 0.1:
+                verb = rng.choices(self._verbs, [VERBS[each] for each in self._verbs])[0]
+                self._ask(verb, "POST", f"/experiments/{rng.choice(self._known[-2 * OPEN :])}/{verb}")
+
+    def _look(self, rng):
+        """Read something that exists, and what is under way."""
+        if self._known:
+            self._ask("read", "GET", f"/experiments/{rng.choice(self._known)}{rng.choice(READS)}")
+        try:
+            waiting = self.waiting()
+        except (httpx2.HTTPError, ValueError):
+            return
+        if waiting is not None:
+            self._open = len(waiting)
+
+    def _submit(self, path, spec):
+        record = self._ask("submit", "POST", path, spec)
+        if record.acknowledged:
+            answer = record.answer
+            self._known += [each["id"] for each in answer.get("experiments", [answer])]
+            self._open += len(answer.get("experiments", [answer]))
+
+    def _ask(self, verb, method, path, body=None):
+        record = self._history.ask(self._http, verb, method, path, body)
+        if record.status is None:
+            time.sleep(0.2)
+        return record
