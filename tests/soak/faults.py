@@ -4,7 +4,7 @@ import random
 import signal
 import time
 from collections import namedtuple
-from threading import Thread
+from concurrent.futures import ThreadPoolExecutor
 
 from tests.soak import witness
 from tests.soak.stage import send, until
@@ -95,19 +95,13 @@ def volleys(database, rng, at_once):
 
 def strike(stage, volley):
     """Inflict faults at about the same time; those that hit something."""
-    hit = []
 
     def one(fault):
         time.sleep(random.uniform(0, 1.5))
-        if fault.inflict(stage):
-            hit.append(fault.name)
+        return fault.name if fault.inflict(stage) else None
 
-    threads = [Thread(target=one, args=[fault]) for fault in volley]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    return hit
+    with ThreadPoolExecutor() as threads:
+        return [name for name in threads.map(one, volley) if name]
 
 
 def recovered(stage, store, within_s):

@@ -21,8 +21,8 @@ def expected(spec, number):
     return LOG
 
 
-def move(id, was, state, *, epochs=(1, 1), owner="a", steps=(0, 0), at=10.0, repetition=1):
-    return Move(id, repetition, was, state, *epochs, owner, *steps, at)
+def move(number, was, state, *, epochs=(1, 1), owner="a", steps=(0, 0), at=10.0, repetition=1):
+    return Move(number, repetition, was, state, *epochs, owner, *steps, at)
 
 
 CLAIMED = move(1, "QUEUED", "RUNNING", epochs=(0, 1), at=3.0)
