@@ -15,6 +15,9 @@ PAST_THE_LEASE = 1.5
 DISK_S = 3.0
 """For how long the disk is full, or slow."""
 
+SETTLE_S = 2.0
+"""After which a process that cannot go on has noticed it; what it stores until then proves nothing."""
+
 Fault = namedtuple("Fault", "name inflict")
 
 
@@ -107,6 +110,7 @@ def strike(stage, volley):
 def recovered(stage, store, within_s):
     """Seconds until the API answers and each of two supervisors has stored a step since; None if that never came."""
     begun, since = time.monotonic(), []
+    time.sleep(SETTLE_S)
 
     def well():
         if not since:
