@@ -24,33 +24,34 @@ def main():
     parser.add_argument("--faults", type=int, default=1000, help="in all; half of them on each database")
     parser.add_argument("--seed", type=int, help="left out: a new one")
     parser.add_argument("--database", choices=KINDS, action="append", help="left out: both, one after the other")
+    parser.add_argument("--at-once", type=int, default=4, help="faults that may come together")
     parser.add_argument("--folder", type=Path, help="for logs and histories; left out: they are not kept")
     given = parser.parse_args()
     seed = SystemRandom().randrange(10**6) if given.seed is None else given.seed
     console, kinds = Console(), given.database or list(KINDS)
     expected = given.faults * FAULT_S + 120
     console.print(f"{given.faults} faults with --seed {seed} on {', '.join(kinds)}: about {_duration(expected)}")
+    kept = 0
     with TemporaryDirectory(prefix="gaplab-soak-") as temporary:
-        outcomes = [
-            _one(
-                Path(given.folder or temporary) / name,
-                KINDS[name],
-                _share(given.faults, index, len(kinds)),
-                seed,
-                console,
+        for index, name in enumerate(kinds):
+            folder = (given.folder or Path(temporary)) / name
+            folder.mkdir(parents=True)
+            number = _share(given.faults, index, len(kinds))
+            outcome = soak(
+                folder, KINDS[name], number, seed, given.at_once, lambda told: console.print(told, style="dim")
             )
-            for index, name in enumerate(kinds)
-        ]
-    return 1 if any(each.violations for each in outcomes) else 0
+            show(console, outcome)
+            kept += not outcome.violations
+    return 0 if kept == len(kinds) else 1
 
 
-def _one(folder, kind, number, seed, console):
-    folder.mkdir(parents=True)
-    outcome = soak(folder, kind, number, seed, say=lambda sentence: console.print(sentence, highlight=False))
+def show(console, outcome):
+    """The figures of an outcome, and what was violated."""
     table = Table(title=f"{outcome.database}: {outcome.faults} faults in {_duration(outcome.seconds)}")
     for column in ("fault", "times", "well again after: median", "worst"):
         table.add_column(column, justify="left" if column == "fault" else "right")
-    for name, seconds in sorted(outcome.recoveries.items()):
+    every = [each for times in outcome.recoveries.values() for each in times]
+    for name, seconds in [*sorted(outcome.recoveries.items()), ("all", every)]:
         table.add_row(name, str(len(seconds)), f"{median(seconds):.1f} s", f"{max(seconds):.1f} s")
     console.print(table)
     console.print(
@@ -60,7 +61,6 @@ def _one(folder, kind, number, seed, console):
     )
     for each in outcome.violations:
         console.print(f"  {each}", markup=False, highlight=False)
-    return outcome
 
 
 def _share(number, index, parts):

@@ -48,7 +48,7 @@ class Outcome:
         return sum(map(len, self.recoveries.values()))
 
 
-def soak(folder, kind, number, seed, at_once=3, say=lambda sentence: None):
+def soak(folder, kind, number, seed, at_once=4, say=lambda sentence: None):
     """Run so many faults on a service in this folder, and check it; the evidence stays there.
 
     Args:
