@@ -45,20 +45,21 @@ def submissions(history, evidence):
             told = "acknowledged" if record.acknowledged else f"answered with {record.status}"
             yield f"{name}: {told}, and there {there} times"
         elif record.acknowledged:
-            yield from _as_submitted(record, found, evidence.studies)
+            yield from _as_submitted(record, found, evidence.studies, _extensions(history))
         elif there and record.status is not None and record.status < 500:
             yield f"{name}: refused with {record.status}, and yet there"
     for name in names:
         yield f"{name}: nobody submitted it"
 
 
-def _as_submitted(record, found, studies):
+def _extensions(history):
+    return {record.id for record in history if record.verb == "extend"}
+
+
+def _as_submitted(record, found, studies, extended):
     name, answer = record.body["name"], record.answer
     if record.path == "/studies":
-        wanted, ids = (
-            resolve_study(StudySpec.model_validate(record.body)),
-            [each["id"] for each in answer["experiments"]],
-        )
+        wanted, ids = resolve_study(StudySpec.model_validate(record.body)), [one["id"] for one in answer["experiments"]]
         if answer["id"] not in studies:
             yield f"{name}: the study {answer['id']} that was acknowledged is not there"
     else:
@@ -68,10 +69,20 @@ def _as_submitted(record, found, studies):
     for each, spec in zip(ids, wanted, strict=False):
         if each not in found:
             yield f"{name}: the experiment {each} that was acknowledged is not there"
-        elif found[each].spec != spec.model_dump(mode="json"):
+            continue
+        grown = EXTENSIBLE if each in extended else ()
+        there, submitted = found[each].spec, spec.model_dump(mode="json")
+        if _without(there, grown) != _without(submitted, grown):
             yield f"{name}: the experiment {each} has another spec than was submitted"
-        elif [one.number for one in found[each].repetitions] != list(range(spec.repetitions)):
-            yield f"{name}: the experiment {each} has other repetitions than 0 to {spec.repetitions - 1}"
+        if [one.number for one in found[each].repetitions] != list(range(there["repetitions"])):
+            yield f"{name}: the experiment {each} has other repetitions than 0 to {there['repetitions'] - 1}"
+
+
+EXTENSIBLE = ("iterations", "repetitions")
+
+
+def _without(spec, names):
+    return {name: value for name, value in spec.items() if name not in names}
 
 
 def answers(history, evidence):
@@ -102,20 +113,26 @@ def _cancelled(record, experiment, moves, history):
     return experiment.state == State.CANCELLED and not later
 
 
-def _stopped(record, experiment, moves, history):
-    called_off = any(each.verb == "cancel" and each.id == record.id for each in history)
-    return experiment.state == State.COMPLETED or (called_off and experiment.state == State.CANCELLED)
+def _held(*ends):
+    """Nothing of it is begun until somebody may have asked for that."""
+
+    def held(record, experiment, moves, history):
+        asked = [each.sent_at for each in history if each.verb in ends and each.id == record.id]
+        until = min((at for at in asked if at > record.sent_at), default=float("inf"))
+        return not any(_claims(move) and record.answered_at < move.at < until for move in moves)
+
+    return held
 
 
-def _paused(record, experiment, moves, history):
-    """Nothing of it was begun until somebody may have resumed it."""
-    resumed = [each.sent_at for each in history if each.verb == "resume" and each.id == record.id]
-    until = min((at for at in resumed if at > record.sent_at), default=float("inf"))
-    begun = [move for move in moves if move.state == State.RUNNING and move.was != State.RUNNING]
-    return not any(record.answered_at < move.at < until for move in begun)
+def _extended(record, experiment, moves, history):
+    return all(experiment.spec[name] >= total for name, total in record.body.items())
 
 
-EFFECTS = {"cancel": _cancelled, "stop": _stopped, "pause": _paused}
+def _claims(move):
+    return move.state == State.RUNNING and move.was != State.RUNNING
+
+
+EFFECTS = {"cancel": _cancelled, "stop": _held("extend"), "pause": _held("resume", "extend"), "extend": _extended}
 
 
 def ends(evidence):
@@ -170,7 +187,7 @@ def epochs(evidence):
 
 
 def _of_state(move, winners):
-    claimed = move.state == State.RUNNING and move.was != State.RUNNING
+    claimed = _claims(move)
     if move.was != move.state and not State(move.was).may_become(State(move.state)):
         yield f"from {move.was} to {move.state}"
     if move.epoch != move.epoch_was + claimed:

@@ -11,11 +11,13 @@ from threading import Event, Thread
 
 import httpx2
 
-VERBS = {"cancel": 2, "pause": 3, "resume": 3, "stop": 1}
+from schemas.lifecycle import State
+
+VERBS = {"cancel": 2, "pause": 3, "resume": 4, "stop": 1, "extend": 2}
 """Those that are used, if the service has them, and how often compared with each other."""
 
 OPEN = 8
-"""Experiments that clients keep under way: enough for both supervisors to have something to do."""
+"""Experiments that clients keep in the queue: enough for both supervisors to have something to do."""
 
 READS = ("", "/samples", "/repetitions", "/curve")
 
@@ -85,17 +87,18 @@ class Clients:
 
     def wake(self):
         """Resume what is paused, so that it can end."""
-        for each in self._experiments(state="PAUSED") if "resume" in self._verbs else []:
-            self._ask("resume", "POST", f"/experiments/{each['id']}/resume")
+        for state in {str(each) for each in State} & {"PAUSING", "PAUSED"}:
+            for paused in self._in(state):
+                self._ask("resume", "POST", f"/experiments/{paused}/resume")
 
-    def waiting(self):
-        """Experiments that have not ended; None if the service does not say."""
-        found = [self._experiments(state=state) for state in ("QUEUED", "RUNNING")]
-        return None if None in found else [each["id"] for page in found for each in page]
+    def under_way(self):
+        """Experiments that have not ended."""
+        return [each for state in State if not state.ended for each in self._in(state)]
 
-    def _experiments(self, **which):
-        answer = self._http.get("/experiments", params={"limit": 500} | which)
-        return answer.json()["items"] if answer.status_code == 200 else None
+    def _in(self, state):
+        answer = self._http.get("/experiments", params={"limit": 500, "state": str(state)})
+        answer.raise_for_status()
+        return [each["id"] for each in answer.json()["items"]]
 
     def _use(self, name, rng):
         wanted = specs(rng)
@@ -107,26 +110,32 @@ class Clients:
                 path, spec = next(wanted)
                 self._submit(path, spec | {"name": f"client {name}, number {number}"})
             if self._known and rng.random() < 0.1:
-                verb = rng.choices(self._verbs, [VERBS[each] for each in self._verbs])[0]
-                self._ask(verb, "POST", f"/experiments/{rng.choice(self._known[-2 * OPEN :])}/{verb}")
+                self._move(rng)
 
     def _look(self, rng):
         """Read something that exists, and what is under way."""
         if self._known:
-            self._ask("read", "GET", f"/experiments/{rng.choice(self._known)}{rng.choice(READS)}")
+            one, _ = rng.choice(self._known)
+            self._ask("read", "GET", f"/experiments/{one}{rng.choice(READS)}")
         try:
-            waiting = self.waiting()
+            self._open = len(self._in(State.QUEUED)) + len(self._in(State.RUNNING))
         except (httpx2.HTTPError, ValueError):
             return
-        if waiting is not None:
-            self._open = len(waiting)
+
+    def _move(self, rng):
+        """One of the latest experiments to another state, if it may."""
+        verb = rng.choices(self._verbs, [VERBS[each] for each in self._verbs])[0]
+        one, spec = rng.choice(self._known[-2 * OPEN :])
+        what = rng.choice(("iterations", "repetitions"))
+        body = {what: spec[what] + 1} if verb == "extend" else None
+        self._ask(verb, "POST", f"/experiments/{one}/{verb}", body)
 
     def _submit(self, path, spec):
         record = self._ask("submit", "POST", path, spec)
         if record.acknowledged:
-            answer = record.answer
-            self._known += [each["id"] for each in answer.get("experiments", [answer])]
-            self._open += len(answer.get("experiments", [answer]))
+            found = record.answer.get("experiments", [record.answer])
+            self._known += [(each["id"], spec) for each in found]
+            self._open += len(found)
 
     def _ask(self, verb, method, path, body=None):
         record = self._history.ask(self._http, verb, method, path, body)

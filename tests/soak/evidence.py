@@ -95,9 +95,8 @@ def _experiment(session, row):
 
 def undisturbed(spec: dict, number: int) -> tuple[str, ...]:
     """The digests of one repetition's steps, computed here and now with nothing in the way."""
-    return _undisturbed(
-        json.dumps({name: value for name, value in spec.items() if name != "name"}, sort_keys=True), number
-    )
+    settings = {name: value for name, value in spec.items() if name not in {"name", "repetitions"}}
+    return _undisturbed(json.dumps(settings, sort_keys=True), number)
 
 
 @cache

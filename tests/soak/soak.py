@@ -6,6 +6,8 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import httpx2
+
 from services.store.session import Store
 from tests.soak import checker, faults
 from tests.soak.clients import Clients
@@ -97,8 +99,8 @@ def _peace(clients, outcome):
     def quiet():
         try:
             clients.wake()
-            return clients.waiting() == []
-        except (OSError, ValueError):
+            return not clients.under_way()
+        except (httpx2.HTTPError, ValueError):
             return False
 
     if not until(quiet, STUCK_S, every_s=1.0):

@@ -80,6 +80,16 @@ def test_what_was_cancelled_while_it_ran_keeps_the_beginning_of_its_log():
     assert found([SUBMITTED, verb("cancel")], cancelled) == []
 
 
+def test_what_was_held_until_it_was_resumed_is_no_violation():
+    assert found([SUBMITTED, verb("pause", sent_at=1.0), verb("resume", sent_at=2.5)]) == []
+
+
+def test_what_was_extended_may_have_more_than_was_submitted():
+    larger = replace(EVIDENCE, experiments=(replace(EXPERIMENT, spec=SPEC | {"iterations": 3}),))
+
+    assert found([SUBMITTED, replace(verb("extend"), body={"iterations": 3})], larger) == []
+
+
 def replace_steps(move, was, steps):
     return move._replace(steps_was=was, steps=steps)
 
@@ -103,14 +113,19 @@ BROKEN = {
     "failed inside": ("the service failed", [SUBMITTED, verb("read", 500)], EVIDENCE),
     "denied": ("said not to exist", [SUBMITTED, verb("read", 404)], EVIDENCE),
     "cancelled in vain": ("cancel: acknowledged, and without effect", [SUBMITTED, verb("cancel")], EVIDENCE),
-    "stopped in vain": (
+    "begun although stopped": (
         "stop: acknowledged, and without effect",
-        [SUBMITTED, verb("stop")],
-        replace(EVIDENCE, experiments=(replace(EXPERIMENT, state="FAILED"),)),
+        [SUBMITTED, verb("stop", sent_at=2.0)],
+        EVIDENCE,
     ),
     "begun while paused": (
         "pause: acknowledged, and without effect",
         [SUBMITTED, verb("pause", sent_at=2.0), verb("resume")],
+        EVIDENCE,
+    ),
+    "extended in vain": (
+        "extend: acknowledged, and without effect",
+        [SUBMITTED, replace(verb("extend"), body={"iterations": 1_000})],
         EVIDENCE,
     ),
     "experiment stuck": (
