@@ -121,10 +121,10 @@ class Postgres:
         """What reading every page finds, each of which has its checksum."""
         found = []
         with psycopg.connect(self.url, autocommit=True) as connection:
-            names = connection.execute("SELECT relname FROM pg_class WHERE relkind = 'r'").fetchall()
+            names = connection.execute("SELECT oid::regclass::text FROM pg_class WHERE relkind = 'r'").fetchall()
             for (name,) in names:
                 try:
-                    connection.execute(f'SELECT count(t.*) FROM "{name}" t')
+                    connection.execute(f"SELECT count(t.*) FROM {name} t")
                 except psycopg.Error as error:
                     found.append(f"{name}: {error}")
         return found
