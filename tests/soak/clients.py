@@ -123,9 +123,9 @@ class Clients:
             return
 
     def _move(self, rng):
-        """One of the latest experiments to another state, if it may."""
+        """An experiment to another state, if it may: one of the latest, or to be extended any."""
         verb = rng.choices(self._verbs, [VERBS[each] for each in self._verbs])[0]
-        one, spec = rng.choice(self._known[-2 * OPEN :])
+        one, spec = rng.choice(self._known if verb == "extend" else self._known[-OPEN:])
         what = rng.choice(("iterations", "repetitions"))
         body = {what: spec[what] + 1} if verb == "extend" else None
         self._ask(verb, "POST", f"/experiments/{one}/{verb}", body)
