@@ -70,19 +70,13 @@ def _as_submitted(record, found, studies, extended):
         if each not in found:
             yield f"{name}: the experiment {each} that was acknowledged is not there"
             continue
-        grown = EXTENSIBLE if each in extended else ()
-        there, submitted = found[each].spec, spec.model_dump(mode="json")
-        if _without(there, grown) != _without(submitted, grown):
+        there = ExperimentSpec.model_validate(found[each].spec)
+        if each in extended:
+            spec = spec.model_copy(update={"iterations": there.iterations, "repetitions": there.repetitions})
+        if there != spec:
             yield f"{name}: the experiment {each} has another spec than was submitted"
-        if [one.number for one in found[each].repetitions] != list(range(there["repetitions"])):
-            yield f"{name}: the experiment {each} has other repetitions than 0 to {there['repetitions'] - 1}"
-
-
-EXTENSIBLE = ("iterations", "repetitions")
-
-
-def _without(spec, names):
-    return {name: value for name, value in spec.items() if name not in names}
+        if [one.number for one in found[each].repetitions] != list(range(there.repetitions)):
+            yield f"{name}: the experiment {each} has other repetitions than 0 to {there.repetitions - 1}"
 
 
 def answers(history, evidence):
