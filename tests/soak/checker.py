@@ -67,16 +67,20 @@ def _as_submitted(record, found, studies, extended):
     if len(ids) != len(wanted):
         yield f"{name}: {len(ids)} experiments instead of {len(wanted)}"
     for each, spec in zip(ids, wanted, strict=False):
-        if each not in found:
+        if each in found:
+            yield from (f"{name}: {wrong}" for wrong in _unlike(found[each], spec, larger=each in extended))
+        else:
             yield f"{name}: the experiment {each} that was acknowledged is not there"
-            continue
-        there = ExperimentSpec.model_validate(found[each].spec)
-        if each in extended:
-            spec = spec.model_copy(update={"iterations": there.iterations, "repetitions": there.repetitions})
-        if there != spec:
-            yield f"{name}: the experiment {each} has another spec than was submitted"
-        if [one.number for one in found[each].repetitions] != list(range(there.repetitions)):
-            yield f"{name}: the experiment {each} has other repetitions than 0 to {there.repetitions - 1}"
+
+
+def _unlike(experiment, spec, larger):
+    there = ExperimentSpec.model_validate(experiment.spec)
+    if larger:
+        spec = spec.model_copy(update={"iterations": there.iterations, "repetitions": there.repetitions})
+    if there != spec:
+        yield f"the experiment {experiment.id} has another spec than was submitted"
+    if [each.number for each in experiment.repetitions] != list(range(there.repetitions)):
+        yield f"the experiment {experiment.id} has other repetitions than 0 to {there.repetitions - 1}"
 
 
 def answers(history, evidence):
