@@ -10,7 +10,7 @@ from tests.soak.soak import soak
 def test_under_random_faults_it_keeps_its_word(tmp_path, kind, number):
     said = []
 
-    outcome = soak(tmp_path, kind, number, seed=1, at_once=5, say=said.append)
+    outcome = soak(tmp_path, kind, number, seed=1, at_once=8, say=said.append)
 
     assert outcome.violations == [], "\n".join(said)
     assert outcome.faults == number
