@@ -28,7 +28,7 @@ TOY = {
     "robot": "toy_function",
     "iterations": 3,
     "repetitions": 3,
-    "budget": {"controller_evaluations": 300, "selection_evaluations": 100, "simulator_evaluations": 40},
+    "budget": {"controller_evaluations": 200, "selection_evaluations": 60, "simulator_evaluations": 30},
 }
 QUADRUPED = {
     "robot": "quadruped",
