@@ -83,7 +83,13 @@ class Clients:
         """Ask for nothing more."""
         self._stopping.set()
         for thread in self._threads:
-            thread.join()
+            if thread.is_alive():
+                thread.join()
+
+    def close(self):
+        """Let go of the connections."""
+        self.stop()
+        self._http.close()
 
     def wake(self):
         """Resume what is paused, so that it can end."""

@@ -71,6 +71,12 @@ def gather(store, database) -> Evidence:
     return Evidence(experiments, studies, checks, tuple(witness.moves(store)), tuple(database.complaints()))
 
 
+def checks_under_way(store) -> bool:
+    """Whether sensitivity checks have not ended; the API lists none."""
+    with store.reading() as session:
+        return any(not state.ended for state in session.scalars(select(SensitivityRow.state)))
+
+
 def _experiment(session, row):
     rows = session.scalars(
         select(RepetitionRow).where(RepetitionRow.experiment_id == row.id).order_by(RepetitionRow.number)

@@ -11,7 +11,7 @@ import httpx2
 from services.store.session import Store
 from tests.soak import checker, faults
 from tests.soak.clients import Clients
-from tests.soak.evidence import gather
+from tests.soak.evidence import checks_under_way, gather
 from tests.soak.history import History
 from tests.soak.stage import Stage, until
 
@@ -71,11 +71,12 @@ def soak(folder, kind, number, seed, at_once=4, say=lambda sentence: None):
         clients.start()
         _attack(stage, store, outcome, number, faults.volleys(database, random.Random(seed), at_once), say)
         clients.stop()
-        _peace(clients, outcome)
+        _peace(clients, store, outcome)
         outcome.violations += stage.stop()
         _check(history.records(), gather(store, database), outcome)
         outcome.seconds = time.monotonic() - begun
     finally:
+        clients.close()
         stage.kill()
         store.dispose()
         database.close()
@@ -95,11 +96,11 @@ def _attack(stage, store, outcome, number, volleys, say):
             outcome.recoveries[name].append(RECOVERY_S if seconds is None else seconds)
 
 
-def _peace(clients, outcome):
+def _peace(clients, store, outcome):
     def quiet():
         try:
             clients.wake()
-            return not clients.under_way()
+            return not clients.under_way() and not checks_under_way(store)
         except (httpx2.HTTPError, ValueError):
             return False
 
