@@ -1,6 +1,7 @@
 """`python -m tests.soak`: random faults on the real service, and whether it kept its word; exits with 1 if not."""
 
 import argparse
+import signal
 import sys
 from pathlib import Path
 from random import SystemRandom
@@ -31,6 +32,7 @@ def main():
     console, kinds = Console(), given.database or list(KINDS)
     expected = given.faults * FAULT_S + 120
     console.print(f"{given.faults} faults with --seed {seed} on {', '.join(kinds)}: about {_duration(expected)}")
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # what was started is ended
     kept = 0
     with TemporaryDirectory(prefix="gaplab-soak-") as temporary:
         for index, name in enumerate(kinds):
