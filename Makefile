@@ -25,6 +25,9 @@ lint: .venv/installed-dev  ## style, types, dependencies and the arrows between 
 bench: .venv/installed-dev  ## the table of speeds, as ratios within one run
 	$(BIN)/python -m benchmarks
 
+soak: .venv/installed-dev  ## a thousand random faults on the real service, and whether it kept its word: about two hours
+	$(BIN)/python -m tests.soak $(if $(FAULTS),--faults $(FAULTS)) $(if $(SEED),--seed $(SEED))
+
 clean:  ## remove the environment and what tools cached; results stay
 	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
@@ -39,4 +42,4 @@ clean:  ## remove the environment and what tools cached; results stay
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
 	touch $@
 
-.PHONY: help demo serve test lint bench clean
+.PHONY: help demo serve test lint bench soak clean

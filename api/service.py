@@ -17,10 +17,11 @@ from services.settings import Settings
 
 log = logging.getLogger("gaplab.service")
 
-LONG_LIFE_S = 60.0
+LONG_LIFE_S = 15.0
 """A supervisor that lived so long did not fail at its start; it is started again at once."""
 
-LONGEST_PAUSE_S = 60.0
+LONGEST_PAUSE_S = 30.0
+"""With what Ray takes to start, a service is well again within a minute."""
 
 GRACE_S = 24.0
 """How long the supervisor may take to end: its repetitions deliver once more, and Ray ends.
@@ -86,6 +87,7 @@ def environment_of(settings: Settings) -> dict[str, str]:
         "GAPLAB_DATABASE_URL": settings.database_url,
         "GAPLAB_RAY_ADDRESS": settings.ray_address,
         "GAPLAB_WORKERS": settings.workers,
+        "GAPLAB_LEASE_S": settings.lease_s,
         "GAPLAB_HOST": settings.host,
         "GAPLAB_PORT": settings.port,
     }

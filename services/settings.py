@@ -12,6 +12,7 @@ class Settings:
         database_url: SQLAlchemy URL. `GAPLAB_DATABASE_URL`; `sqlite:///gaplab.db` in the working directory.
         ray_address: of an existing cluster; None starts Ray on this machine. `GAPLAB_RAY_ADDRESS`.
         workers: repetitions that run at once; None is one for each core that Ray has. `GAPLAB_WORKERS`.
+        lease_s: seconds for which a supervisor may be silent before its work goes to others. `GAPLAB_LEASE_S`; 30.
         host: that the API binds. `GAPLAB_HOST`; loopback.
         port: that the API binds. `GAPLAB_PORT`; 8000.
         url: where the command finds the service. `GAPLAB_URL`; host and port.
@@ -21,6 +22,7 @@ class Settings:
     database_url: str = "sqlite:///gaplab.db"
     ray_address: str | None = None
     workers: int | None = None
+    lease_s: int = 30
     host: str = "127.0.0.1"
     port: int = 8000
     url: str = "http://127.0.0.1:8000"
@@ -39,6 +41,7 @@ class Settings:
             database_url=get("GAPLAB_DATABASE_URL", cls.database_url),
             ray_address=get("GAPLAB_RAY_ADDRESS") or None,
             workers=_number("GAPLAB_WORKERS", None),
+            lease_s=_number("GAPLAB_LEASE_S", None) or cls.lease_s,
             host=host,
             port=port or cls.port,
             url=get("GAPLAB_URL", f"http://{host}:{port}"),

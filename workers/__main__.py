@@ -27,7 +27,7 @@ def serve(settings: Settings) -> int:
             for signum in (signal.SIGTERM, signal.SIGINT):  # only now, for Ray has put handlers of its own in place
                 signal.signal(signum, lambda *_: stop.set())
             logging.getLogger("gaplab.supervisor").info("ready for %d repetitions at once", joined.capacity())
-            Supervisor(store, joined.capacity, joined.versions).serve(stop)
+            Supervisor(store, joined.capacity, joined.versions, lease_s=settings.lease_s).serve(stop)
     except ClusterUnusable as error:
         sys.stderr.write(f"{error}\n")
         return 1

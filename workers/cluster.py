@@ -34,7 +34,11 @@ class Cluster:
         """How many repetitions to have at Ray at once: it changes as nodes come and go.
 
         That is two for each core: while one runs, the next one waits at Ray, and no core idles between them.
+
+        Raises:
+            ClusterUnusable: this process lost its node, and can run nothing any more.
         """
+        _refuse_dead_node()
         return self.workers or 2 * int(ray.cluster_resources().get("CPU", 0))
 
 
@@ -61,6 +65,14 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
             yield Cluster(None, {})
     finally:
         ray.shutdown()
+
+
+def _refuse_dead_node() -> None:
+    """A process whose node has died has no Ray any more, and never gets another: it has to be started again."""
+    here = ray.get_runtime_context().get_node_id()
+    if any(node["NodeID"] == here and not node["Alive"] for node in ray.nodes()):
+        msg = "Ray died on this machine"
+        raise ClusterUnusable(msg)
 
 
 def _start(cores: int | None) -> None:

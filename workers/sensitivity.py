@@ -12,6 +12,7 @@ from services import sensitivity
 from services.core.optimizers.steady_state import SteadyState
 from services.core.sensitivity import Effort
 from services.core.sensitivity import check as check_tunables
+from services.execution import STALE_AFTER_S
 from services.sensitivity import CheckClaim
 from services.simulation import subject
 from services.store.session import Store
@@ -37,13 +38,15 @@ class Checks:
     Args:
         store: the database.
         owner: the supervisor's name in it.
+        lease_s: for how long the holder of a check may be silent before it goes to others.
 
     All methods raise StoreUnavailable; nothing is lost by it.
     """
 
-    def __init__(self, store: Store, owner: str) -> None:
+    def __init__(self, store: Store, owner: str, lease_s: float = STALE_AFTER_S) -> None:
         self._store = store
         self._owner = owner
+        self._lease_s = lease_s
         self._run: tuple[CheckClaim, ObjectRef[tuple[Sensitivity, ...]]] | None = None
         self._looked = -LOOK_S
 
@@ -60,7 +63,7 @@ class Checks:
         if self._run is not None and not sensitivity.heartbeat(self._store, self._run[0]):
             ray.cancel(self._run[1], force=True)
             self._run = None
-        sensitivity.requeue_lost(self._store)
+        sensitivity.requeue_lost(self._store, stale_after_s=self._lease_s)
 
     def hand_back(self) -> None:
         """Give the unfinished check back to whoever comes next."""

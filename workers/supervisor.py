@@ -24,8 +24,8 @@ from workers.nodes import Versions
 from workers.run import Run as Run
 from workers.sensitivity import Checks
 
-HEARTBEAT_S = 5.0
-"""Between heartbeats; a lease is lost after 30 s without one."""
+HEARTBEATS = 6
+"""In the time after which a lease without one is lost."""
 
 WAIT_S = 0.2
 """How long the supervisor waits for something to happen before it looks for new work."""
@@ -47,6 +47,7 @@ class Supervisor:
         capacity: how many repetitions to have at Ray at once, as things are when it is asked.
         versions: that a node must have to run them.
         checkpoint_s: between the checkpoints of a step that takes long.
+        lease_s: for how long a supervisor may be silent before its work goes to others; the same for all of them.
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class Supervisor:
         versions: Versions | None = None,
         *,
         checkpoint_s: float = CHECKPOINT_S,
+        lease_s: float = execution.STALE_AFTER_S,
     ) -> None:
         self._store = store
         self._capacity = capacity
@@ -63,8 +65,9 @@ class Supervisor:
         self._checkpoint_s = checkpoint_s
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
         self._runs: list[Run] = []
-        self._checks = Checks(store, self._owner)
-        self._beat = -HEARTBEAT_S
+        self._checks = Checks(store, self._owner, lease_s)
+        self._lease_s = lease_s
+        self._beat = -lease_s
         self._looked = -WAIT_S
         self._unsure = False
 
@@ -111,13 +114,13 @@ class Supervisor:
         self._end()
 
     def _heartbeat(self) -> None:
-        if monotonic() - self._beat < HEARTBEAT_S:
+        if monotonic() - self._beat < self._lease_s / HEARTBEATS:
             return
         supervisors.heartbeat(self._store, self._owner)
         held = execution.heartbeat(self._store, [run.claim for run in self._runs])
         self._drop_all_but(held)
         self._checks.heartbeat()
-        requeued = execution.requeue_lost(self._store)
+        requeued = execution.requeue_lost(self._store, stale_after_s=self._lease_s)
         if requeued:
             log.warning("%d repetitions whose supervisor was lost are queued again", requeued)
         self._beat = monotonic()

@@ -203,6 +203,7 @@ def test_children_read_the_same_settings():
         "GAPLAB_DATABASE_URL": "sqlite:///x.db",
         "GAPLAB_RAY_ADDRESS": "auto",
         "GAPLAB_WORKERS": "3",
+        "GAPLAB_LEASE_S": "30",
         "GAPLAB_HOST": "0.0.0.0",
         "GAPLAB_PORT": "99",
     }

@@ -1,0 +1,78 @@
+"""`python -m tests.soak`: random faults on the real service, and whether it kept its word; exits with 1 if not."""
+
+import argparse
+import signal
+import sys
+from pathlib import Path
+from random import SystemRandom
+from statistics import median
+from tempfile import TemporaryDirectory
+
+from rich.console import Console
+from rich.table import Table
+
+from tests.soak.databases import Postgres, Sqlite
+from tests.soak.soak import soak
+
+KINDS = {"sqlite": Sqlite, "postgres": Postgres}
+
+FAULT_S = 7.0
+"""That a fault takes on two cores, with what comes after it."""
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="python -m tests.soak", description=__doc__)
+    parser.add_argument("--faults", type=int, default=1000, help="in all; half of them on each database")
+    parser.add_argument("--seed", type=int, help="left out: a new one")
+    parser.add_argument("--database", choices=KINDS, action="append", help="left out: both, one after the other")
+    parser.add_argument("--at-once", type=int, default=4, help="faults that may come together")
+    parser.add_argument("--folder", type=Path, help="for logs and histories; left out: they are not kept")
+    given = parser.parse_args()
+    seed = SystemRandom().randrange(10**6) if given.seed is None else given.seed
+    console, kinds = Console(), given.database or list(KINDS)
+    expected = given.faults * FAULT_S + 120
+    console.print(f"{given.faults} faults with --seed {seed} on {', '.join(kinds)}: about {_duration(expected)}")
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # what was started is ended
+    kept = 0
+    with TemporaryDirectory(prefix="gaplab-soak-") as temporary:
+        for index, name in enumerate(kinds):
+            folder = (given.folder or Path(temporary)) / name
+            folder.mkdir(parents=True)
+            number = _share(given.faults, index, len(kinds))
+            outcome = soak(
+                folder, KINDS[name], number, seed, given.at_once, lambda told: console.print(told, style="dim")
+            )
+            show(console, outcome)
+            kept += not outcome.violations
+    return 0 if kept == len(kinds) else 1
+
+
+def show(console, outcome):
+    """The figures of an outcome, and what was violated."""
+    table = Table(title=f"{outcome.database}: {outcome.faults} faults in {_duration(outcome.seconds)}")
+    for column in ("fault", "times", "well again after: median", "worst"):
+        table.add_column(column, justify="left" if column == "fault" else "right")
+    every = [each for times in outcome.recoveries.values() for each in times]
+    for name, seconds in [*sorted(outcome.recoveries.items()), ("all", every)]:
+        table.add_row(name, str(len(seconds)), f"{median(seconds):.1f} s", f"{max(seconds):.1f} s")
+    console.print(table)
+    console.print(
+        f"{outcome.acknowledged} acknowledged writes and {outcome.unanswered} without an answer, "
+        f"{outcome.experiments} experiments, {outcome.steps} steps, {outcome.claims} claims, "
+        f"{outcome.given_up} repetitions given up; violations: {len(outcome.violations)}"
+    )
+    for each in outcome.violations:
+        console.print(f"  {each}", markup=False, highlight=False)
+
+
+def _share(number, index, parts):
+    return number // parts + (index < number % parts)
+
+
+def _duration(seconds):
+    minutes = round(seconds / 60)
+    return f"{minutes // 60} h {minutes % 60} min" if minutes >= 60 else f"{minutes} min"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

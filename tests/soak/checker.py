@@ -1,0 +1,203 @@
+"""Whether the service kept its word: what was acknowledged against what is in the database. It changes nothing.
+
+Each check takes the history and the evidence and gives a sentence for each violation.
+"""
+
+from collections import Counter, defaultdict
+
+from schemas.lifecycle import State
+from schemas.spec import ExperimentSpec, StudySpec
+from services.resolution import resolve_experiment, resolve_study
+from tests.soak.evidence import undisturbed
+
+GIVEN_UP = "lost 5 times without a step in between"
+"""Why the service may fail a repetition whose worker dies again and again; it is counted, and shown in the table."""
+
+
+def violations(history, evidence, expected=undisturbed):
+    """Everything that is wrong; nothing, if the service kept its word.
+
+    Args:
+        history: what clients were told.
+        evidence: what the database has.
+        expected: digests of an undisturbed repetition of a spec.
+    """
+    return [
+        *submissions(history, evidence),
+        *answers(history, evidence),
+        *verbs(history, evidence),
+        *ends(evidence),
+        *results(history, evidence, expected),
+        *epochs(evidence),
+        *evidence.complaints,
+    ]
+
+
+def submissions(history, evidence):
+    """Each acknowledged one is there exactly once, each other at most once, and nothing else is."""
+    names = Counter(evidence.studies.values())
+    names.update(each.name for each in evidence.experiments if each.study is None)
+    asked = {record.body["name"]: record for record in history if record.verb == "submit"}
+    found = {each.id: each for each in evidence.experiments}
+    for name, record in asked.items():
+        there = names.pop(name, 0)
+        if there > 1 or (record.acknowledged and there != 1):
+            told = "acknowledged" if record.acknowledged else f"answered with {record.status}"
+            yield f"{name}: {told}, and there {there} times"
+        elif record.acknowledged:
+            yield from _as_submitted(record, found, evidence.studies, _extensions(history))
+        elif there and record.status is not None and record.status < 500:
+            yield f"{name}: refused with {record.status}, and yet there"
+    for name in names:
+        yield f"{name}: nobody submitted it"
+
+
+def _extensions(history):
+    return {record.id for record in history if record.verb == "extend"}
+
+
+def _as_submitted(record, found, studies, extended):
+    name, answer = record.body["name"], record.answer
+    if record.path == "/studies":
+        wanted, ids = resolve_study(StudySpec.model_validate(record.body)), [one["id"] for one in answer["experiments"]]
+        if answer["id"] not in studies:
+            yield f"{name}: the study {answer['id']} that was acknowledged is not there"
+    else:
+        wanted, ids = (resolve_experiment(ExperimentSpec.model_validate(record.body)),), [answer["id"]]
+    if len(ids) != len(wanted):
+        yield f"{name}: {len(ids)} experiments instead of {len(wanted)}"
+    for each, spec in zip(ids, wanted, strict=False):
+        if each in found:
+            yield from (f"{name}: {wrong}" for wrong in _unlike(found[each], spec, larger=each in extended))
+        else:
+            yield f"{name}: the experiment {each} that was acknowledged is not there"
+
+
+def _unlike(experiment, spec, larger):
+    there = ExperimentSpec.model_validate(experiment.spec)
+    if larger:
+        spec = spec.model_copy(update={"iterations": there.iterations, "repetitions": there.repetitions})
+    if there != spec:
+        yield f"the experiment {experiment.id} has another spec than was submitted"
+    if [each.number for each in experiment.repetitions] != list(range(there.repetitions)):
+        yield f"the experiment {experiment.id} has other repetitions than 0 to {there.repetitions - 1}"
+
+
+def answers(history, evidence):
+    """No request fails inside the service, and what was acknowledged is never said not to exist."""
+    for record in history:
+        if record.status == 500:
+            yield f"{record.verb} {record.path}: the service failed: {record.answer.get('detail')}"
+        if record.status == 404:
+            yield f"{record.verb} {record.path}: acknowledged before, and said not to exist"
+
+
+def verbs(history, evidence):
+    """Each acknowledged one took effect."""
+    found = {each.id: each for each in evidence.experiments}
+    moves = defaultdict(list)
+    for move in evidence.moves:
+        moves[move.repetition].append(move)
+    for record in history:
+        if record.verb in EFFECTS and record.acknowledged and record.id in found:
+            experiment = found[record.id]
+            own = [move for each in experiment.repetitions for move in moves[each.id]]
+            if not EFFECTS[record.verb](record, experiment, own, history):
+                yield f"{record.path}: acknowledged, and without effect: it is {experiment.state}"
+
+
+def _cancelled(record, experiment, moves, history):
+    later = [move for move in moves if move.at > record.answered_at and move.steps != move.steps_was]
+    return experiment.state == State.CANCELLED and not later
+
+
+def _held(*ends):
+    """Nothing of it is begun until somebody may have asked for that."""
+
+    def held(record, experiment, moves, history):
+        asked = [each.sent_at for each in history if each.verb in ends and each.id == record.id]
+        until = min((at for at in asked if at > record.sent_at), default=float("inf"))
+        return not any(_claims(move) and record.answered_at < move.at < until for move in moves)
+
+    return held
+
+
+def _extended(record, experiment, moves, history):
+    return all(experiment.spec[name] >= total for name, total in record.body.items())
+
+
+def _claims(move):
+    return move.state == State.RUNNING and move.was != State.RUNNING
+
+
+EFFECTS = {"cancel": _cancelled, "stop": _held("extend"), "pause": _held("resume", "extend"), "extend": _extended}
+
+
+def ends(evidence):
+    """Nothing is stuck, and an experiment ends as its repetitions do."""
+    for experiment in evidence.experiments:
+        states = {each.state for each in experiment.repetitions}
+        if not State(experiment.state).ended:
+            yield f"{experiment.id} is stuck: {experiment.state}"
+        for each in experiment.repetitions:
+            if not State(each.state).ended:
+                yield f"{experiment.id}/{each.number} is stuck: {each.state}"
+        if experiment.state == State.COMPLETED and State.COMPLETED not in states:
+            yield f"{experiment.id} is COMPLETED, and none of its repetitions is"
+    for check, state in evidence.checks.items():
+        if not State(state).ended:
+            yield f"the sensitivity check {check} is stuck: {state}"
+
+
+def results(history, evidence, expected):
+    """No log has holes, and each has the numbers of an undisturbed one: all of them, if it was completed."""
+    cut_short = {record.id for record in history if record.verb == "stop"}
+    for experiment in evidence.experiments:
+        for each in experiment.repetitions:
+            where = f"{experiment.id}/{each.number}"
+            if each.places != tuple(range(each.steps)):
+                yield f"{where}: {each.steps} steps are counted, and there are {list(each.places)}"
+            if each.state == State.FAILED and not (each.error or "").startswith(GIVEN_UP):
+                yield f"{where}: failed: {each.error}"
+            whole = expected(experiment.spec, each.number)
+            if each.log != whole[: len(each.log)]:
+                step = next(
+                    place
+                    for place, (one, other) in enumerate(zip(each.log, (*whole, None), strict=False))
+                    if one != other
+                )
+                yield f"{where}: step {step} is another than without faults"
+            elif each.state == State.COMPLETED and len(each.log) != len(whole) and experiment.id not in cut_short:
+                yield f"{where}: COMPLETED with {len(each.log)} of {len(whole)} steps"
+
+
+def epochs(evidence):
+    """One winner an epoch, no step by anybody else, and no forbidden move."""
+    winners, steps = {}, Counter()
+    for move in evidence.moves:
+        where = f"move {move.id} of repetition {move.repetition}"
+        yield from (f"{where}: {wrong}" for wrong in (*_of_state(move, winners), *_of_steps(move, winners, steps)))
+        steps[move.repetition] = move.steps
+    for experiment in evidence.experiments:
+        for each in experiment.repetitions:
+            if each.steps != steps[each.id]:
+                yield f"{experiment.id}/{each.number}: {each.steps} steps, and {steps[each.id]} by its moves"
+
+
+def _of_state(move, winners):
+    claimed = _claims(move)
+    if move.was != move.state and not State(move.was).may_become(State(move.state)):
+        yield f"from {move.was} to {move.state}"
+    if move.epoch != move.epoch_was + claimed:
+        yield f"from epoch {move.epoch_was} to {move.epoch}"
+    if claimed and (move.repetition, move.epoch) in winners:
+        yield f"epoch {move.epoch} has two winners"
+    if claimed:
+        winners[move.repetition, move.epoch] = move.owner
+
+
+def _of_steps(move, winners, steps):
+    if move.steps_was != steps[move.repetition] or move.steps < move.steps_was:
+        yield f"from {move.steps_was} to {move.steps} steps, after {steps[move.repetition]}"
+    if move.steps > move.steps_was and winners.get((move.repetition, move.epoch)) != move.owner:
+        yield f"steps by {move.owner}, whose epoch it is not"

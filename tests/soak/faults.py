@@ -1,0 +1,126 @@
+"""The faults, and how the service is waited for after them."""
+
+import random
+import signal
+import time
+from collections import namedtuple
+from concurrent.futures import ThreadPoolExecutor
+
+from tests.soak import witness
+from tests.soak.stage import send, until
+
+PAST_THE_LEASE = 1.5
+"""For how many leases a process is stopped."""
+
+DISK_S = 3.0
+"""For how long the disk is full, or slow."""
+
+Fault = namedtuple("Fault", "name inflict")
+
+
+def _kill(role):
+    def inflict(stage):
+        return _signal(stage, role, signal.SIGKILL) is not None
+
+    return Fault(f"SIGKILL {role}", inflict)
+
+
+def _pause(role):
+    def inflict(stage):
+        pid = _signal(stage, role, signal.SIGSTOP)
+        if pid is None:
+            return False
+        try:
+            time.sleep(PAST_THE_LEASE * stage.lease_s)
+        finally:
+            send(pid, signal.SIGCONT)
+        return True
+
+    return Fault(f"SIGSTOP {role}", inflict)
+
+
+def _signal(stage, role, number):
+    """Send it to one of those that play the role; its id, or None if there is none to be found in a while."""
+    found = []
+    until(lambda: found.extend(stage.of(role)) or found, 20)
+    pid = random.choice(found) if found else None
+    return pid if pid and send(pid, number) else None
+
+
+def _fill(stage):
+    stage.database.disk.fill()
+    try:
+        time.sleep(DISK_S)
+    finally:
+        stage.database.disk.free()
+    return True
+
+
+def _stall(stage):
+    stage.database.stall(DISK_S)
+    return True
+
+
+def _restart(stage):
+    stage.database.restart()
+    return True
+
+
+def _kill_database(stage):
+    stage.database.kill()
+    return True
+
+
+def faults(database):
+    """What can be done to a service on this database."""
+    found = [make(role) for role in ("api", "supervisor", "worker", "raylet") for make in (_kill, _pause)]
+    found.append(Fault("disk slow", _stall))
+    if database.disk.small:
+        found.append(Fault("disk full", _fill))
+    if hasattr(database, "restart"):
+        found += [Fault("Postgres restarted", _restart), Fault("SIGKILL Postgres", _kill_database)]
+    return found
+
+
+def volleys(database, rng, at_once):
+    """Faults without end, one to so many at a time, each kind in turn, in an order that is shuffled."""
+    kinds, order = faults(database), []
+    while True:
+        size = rng.randint(1, at_once)
+        while len(order) < size:
+            order += rng.sample(kinds, len(kinds))
+        yield order[:size]
+        order = order[size:]
+
+
+def strike(stage, volley):
+    """Inflict faults at about the same time; those that hit something."""
+
+    def one(fault):
+        time.sleep(random.uniform(0, 1.5))
+        return fault.name if fault.inflict(stage) else None
+
+    with ThreadPoolExecutor() as threads:
+        return [name for name in threads.map(one, volley) if name]
+
+
+def recovered(stage, store, within_s):
+    """Seconds until all is well; None if that never came.
+
+    That is when the API answers and each of two supervisors has stored a step, and then another: the first may be one
+    that it had in hand when its Ray was hit.
+    """
+    begun = time.monotonic()
+    for _ in range(2):
+        since, left_s = [], within_s - (time.monotonic() - begun)
+        if not until(lambda since=since: _well(stage, store, since), left_s):
+            return None
+    return time.monotonic() - begun
+
+
+def _well(stage, store, since):
+    if not since:
+        since.append(witness.last(store))
+    owners = {int(owner.split(":")[1]) for owner in witness.owners_since(store, since[0])}
+    supervisors = set(stage.of("supervisor"))
+    return len(supervisors) == 2 and supervisors <= owners and stage.answers()

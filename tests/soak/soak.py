@@ -1,0 +1,119 @@
+"""One soak on one database: faults, then peace, then the check."""
+
+import random
+import time
+from collections import defaultdict
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import httpx2
+
+from services.store.session import Store
+from tests.soak import checker, faults
+from tests.soak.clients import Clients
+from tests.soak.evidence import checks_under_way, gather
+from tests.soak.history import History
+from tests.soak.stage import Stage, until
+
+LEASE_S = 3
+"""In production it is 30 s; nothing depends on it but how long a soak takes."""
+
+RECOVERY_S = 180
+"""After which what has not come back by itself never will."""
+
+STUCK_S = 300
+"""In peace, and without a fault: what has not ended by then is stuck."""
+
+
+@dataclass
+class Outcome:
+    """Of a soak.
+
+    Attributes:
+        recoveries: seconds from the end of a volley until all was well again, by the faults that were in it.
+        violations: what the service did not keep.
+    """
+
+    database: str
+    recoveries: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    violations: list[str] = field(default_factory=list)
+    acknowledged: int = 0
+    unanswered: int = 0
+    experiments: int = 0
+    steps: int = 0
+    claims: int = 0
+    given_up: int = 0
+    seconds: float = 0.0
+
+    @property
+    def faults(self):
+        return sum(map(len, self.recoveries.values()))
+
+
+def soak(folder, kind, number, seed, at_once=4, say=lambda sentence: None):
+    """Run so many faults on a service in this folder, and check it; the evidence stays there.
+
+    Args:
+        folder: empty.
+        kind: Sqlite or Postgres.
+        number: of faults.
+        seed: of their order and of what clients do.
+        at_once: faults that the service has to bear together.
+        say: is told of every volley.
+    """
+    folder = Path(folder)
+    begun, database = time.monotonic(), kind(folder)
+    outcome, stage = Outcome(database.name), Stage(folder, database, LEASE_S)
+    history, store = History(folder / "history.jsonl"), Store(database.url)
+    clients = Clients(stage.url, history, seed)
+    try:
+        stage.start()
+        clients.start()
+        _attack(stage, store, outcome, number, faults.volleys(database, random.Random(seed), at_once), say)
+        clients.stop()
+        _peace(clients, store, outcome)
+        outcome.violations += stage.stop()
+        _check(history.records(), gather(store, database), outcome)
+        outcome.seconds = time.monotonic() - begun
+    finally:
+        clients.close()
+        stage.kill()
+        store.dispose()
+        database.close()
+    return outcome
+
+
+def _attack(stage, store, outcome, number, volleys, say):
+    faults.recovered(stage, store, RECOVERY_S)  # from the start
+    while outcome.faults < number:
+        hit = faults.strike(stage, next(volleys)[: number - outcome.faults])
+        seconds = faults.recovered(stage, store, RECOVERY_S)
+        after = "never well again" if seconds is None else f"well again after {seconds:.1f} s"
+        say(f"{stage.database.name} {outcome.faults + len(hit)}: {', '.join(hit)}: {after}")
+        if seconds is None:
+            outcome.violations.append(f"not well {RECOVERY_S} s after {', '.join(hit)}: {stage.processes()}")
+        for name in hit:
+            outcome.recoveries[name].append(RECOVERY_S if seconds is None else seconds)
+
+
+def _peace(clients, store, outcome):
+    def quiet():
+        try:
+            clients.wake()
+            return not clients.under_way() and not checks_under_way(store)
+        except (httpx2.HTTPError, ValueError):
+            return False
+
+    if not until(quiet, STUCK_S, every_s=1.0):
+        outcome.violations.append(f"not at rest {STUCK_S} s after the last fault")
+
+
+def _check(history, evidence, outcome):
+    outcome.violations += checker.violations(history, evidence)
+    outcome.acknowledged = sum(each.acknowledged for each in history if each.verb != "read")
+    outcome.unanswered = sum(each.status is None for each in history if each.verb != "read")
+    outcome.experiments = len(evidence.experiments)
+    repetitions = [each for one in evidence.experiments for each in one.repetitions]
+    outcome.steps = sum(each.steps for each in repetitions)
+    outcome.claims = sum(each.epoch for each in repetitions)
+    outcome.given_up = sum((each.error or "").startswith(checker.GIVEN_UP) for each in repetitions)

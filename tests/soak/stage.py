@@ -1,0 +1,182 @@
+"""The real service on a database of its own: an API with its supervisor, a second supervisor, each with its Ray.
+
+What runs outside of gaplab in production, a service manager that starts again what has ended, is played by `Kept`.
+"""
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from tempfile import mkdtemp
+from threading import Event, Thread
+
+import httpx2
+
+import migrations
+from services.core.errors import StoreUnavailable
+from tests.soak import witness
+
+RESTART_S = 1.0
+"""After how long a service manager starts again what has ended."""
+
+
+class Kept:
+    """A process that is started again whenever it ends, as systemd or Docker do.
+
+    Attributes:
+        pid: of the process that runs now.
+    """
+
+    def __init__(self, command, log, environment=None, user=None):
+        self._command, self._log, self._environment, self._user = command, log, environment, user
+        self._stopping = Event()
+        self._process = self._start()
+        self._thread = Thread(target=self._keep, daemon=True)
+        self._thread.start()
+
+    @property
+    def pid(self):
+        return self._process.pid
+
+    def stop(self, how=signal.SIGINT, patience_s=60):
+        """Ask it to end, and say whether it did; if not, it is killed."""
+        self._stopping.set()
+        self._thread.join()
+        self._process.send_signal(how)
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(patience_s)
+            return True
+        self._process.kill()
+        self._process.wait()
+        return False
+
+    def _keep(self):
+        while not self._stopping.wait(0.1):
+            if self._process.poll() is not None and not self._stopping.wait(RESTART_S):
+                self._process = self._start()
+
+    def _start(self):
+        with self._log.open("ab") as log:
+            return subprocess.Popen(
+                self._command,
+                env=self._environment,
+                user=self._user,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+
+
+class Stage:
+    """Everything that a fault can hit.
+
+    Attributes:
+        url: of the API.
+        database: Sqlite or Postgres, as in `databases`.
+        lease_s: for which a supervisor may be silent.
+    """
+
+    def __init__(self, folder, database, lease_s):
+        self.database, self.lease_s = database, lease_s
+        self._folder = Path(folder)
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self._port = probe.getsockname()[1]
+        self.url = f"http://127.0.0.1:{self._port}"
+        self._environment = os.environ | {
+            "GAPLAB_DATABASE_URL": database.url,
+            "GAPLAB_PORT": str(self._port),
+            "GAPLAB_WORKERS": "1",
+            "GAPLAB_LEASE_S": str(lease_s),
+            "RAY_TMPDIR": mkdtemp(prefix="gaplab-"),  # Ray leaves logs behind; the paths of its sockets must be short
+        }
+        self._kept = []
+
+    def start(self):
+        """Migrate, set the witness, start the processes, and wait until the API answers."""
+        migrations.upgrade(self.database.url)
+        witness.install(self.database.url)
+        for name, module in (("service", "api.cli"), ("second", "workers")):
+            log = self._folder / f"{name}.log"
+            self._kept.append(Kept([sys.executable, "-m", module, "serve"], log, self._environment))
+        assert until(self.answers, 120), self.logs()
+
+    def stop(self):
+        """End all in order; what did not end when asked, and what was left behind, in words."""
+        left = [f"{each.pid} did not end within a minute" for each in self._kept if not each.stop()]
+        if not until(lambda: not self.processes(), 60):
+            left += [f"left running: {pid} {command}" for pid, command in self.processes().items()]
+        return left
+
+    def kill(self):
+        """End what is left outright, and remove what it left."""
+        for each in self._kept:
+            each.stop(signal.SIGKILL)
+        for pid in self.processes():
+            send(pid, signal.SIGKILL)
+        shutil.rmtree(self._environment["RAY_TMPDIR"], ignore_errors=True)
+
+    def answers(self):
+        """Whether the API answers and can use its database."""
+        try:
+            return httpx2.get(f"{self.url}/readyz", timeout=5, trust_env=False).status_code == 200
+        except httpx2.HTTPError:
+            return False
+
+    def processes(self):
+        """All processes of the service that live, by id, with their commands."""
+        mark = f"GAPLAB_PORT={self._port}".encode()
+        found: dict[int, str] = {}
+        for path in Path("/proc").glob("[0-9]*"):
+            try:
+                if mark in (path / "environ").read_bytes().split(b"\0"):
+                    found[int(path.name)] = (path / "cmdline").read_bytes().replace(b"\0", b" ").decode().strip()
+            except OSError:  # it has ended
+                continue
+        return {pid: command for pid, command in found.items() if command}
+
+    def of(self, role):
+        """The ids of the processes that play a role: api, supervisor, worker or raylet."""
+        return [pid for pid, command in self.processes().items() if role_of(command) == role]
+
+    def logs(self):
+        return "\n".join(path.read_text(errors="replace")[-3000:] for path in sorted(self._folder.glob("*.log")))
+
+
+def role_of(command):
+    program = command.partition(" ")[0]
+    if "-m api.cli serve" in command:
+        return "api"
+    if "-m workers serve" in command:
+        return "supervisor"
+    if command.startswith("ray::"):
+        return "worker"
+    return "raylet" if program.endswith("/raylet") else None
+
+
+def send(pid, number):
+    """A signal to a process, if it is still there."""
+    try:
+        os.kill(pid, number)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def until(condition, within_s, every_s=0.2):
+    """Whether the condition came to hold in time; a database that is away does not count as an answer."""
+    deadline = time.monotonic() + within_s
+    while time.monotonic() < deadline:
+        try:
+            if condition():
+                return True
+        except StoreUnavailable:
+            pass
+        time.sleep(every_s)
+    return False

@@ -1,0 +1,199 @@
+"""The soak's checker finds what it looks for: histories and databases that were broken by hand."""
+
+from dataclasses import replace
+
+import pytest
+
+from schemas.spec import ExperimentSpec, StudySpec
+from services.resolution import resolve_experiment, resolve_study
+from tests.soak.checker import violations
+from tests.soak.evidence import Evidence, Experiment, Repetition, undisturbed
+from tests.soak.history import Record
+from tests.soak.witness import Move
+
+LOG = ("tuned", "transferred", "probed", "selected")
+BODY = {"name": "one", "strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "repetitions": 1}
+SPEC = resolve_experiment(ExperimentSpec.model_validate(BODY)).model_dump(mode="json")
+STUDY = {name: value for name, value in BODY.items() if name != "strategy"} | {"name": "two", "strategies": ["random"]}
+
+
+def expected(spec, number):
+    return LOG
+
+
+def move(number, was, state, *, epochs=(1, 1), owner="a", steps=(0, 0), at=10.0, repetition=1):
+    return Move(number, repetition, was, state, *epochs, owner, *steps, at)
+
+
+CLAIMED = move(1, "QUEUED", "RUNNING", epochs=(0, 1), at=3.0)
+STORED = move(2, "RUNNING", "RUNNING", steps=(0, 4), at=4.0)
+ENDED = move(3, "RUNNING", "COMPLETED", steps=(4, 4), at=5.0)
+SUBMITTED = Record("submit", "/experiments", BODY, 1.0, 2.0, 202, {"id": "e1"})
+DONE = Repetition(1, 0, "COMPLETED", 1, 4, 1, LOG, (0, 1, 2, 3))
+EXPERIMENT = Experiment("e1", None, "one", "COMPLETED", SPEC, (DONE,))
+EVIDENCE = Evidence((EXPERIMENT,), {}, {"c1": "COMPLETED"}, (CLAIMED, STORED, ENDED))
+
+
+def found(history=(SUBMITTED,), evidence=EVIDENCE):
+    return violations(list(history), evidence, expected)
+
+
+def with_repetition(**changes):
+    return replace(EVIDENCE, experiments=(replace(EXPERIMENT, repetitions=(replace(DONE, **changes),)),))
+
+
+def verb(name, status=200, sent_at=6.0):
+    return Record(name, f"/experiments/e1/{name}", None, sent_at, sent_at + 0.5, status)
+
+
+def test_a_service_that_kept_its_word_has_no_violations():
+    assert found() == []
+
+
+def test_a_study_that_is_there_as_it_was_submitted_is_none():
+    (resolved,) = resolve_study(StudySpec.model_validate(STUDY))
+    answer = {"id": "s1", "experiments": [{"id": "e1"}]}
+    submitted = Record("submit", "/studies", STUDY, 1.0, 2.0, 202, answer)
+    own = replace(EXPERIMENT, study="s1", name="random", spec=resolved.model_dump(mode="json"))
+
+    assert found([submitted], replace(EVIDENCE, experiments=(own,), studies={"s1": "two"})) == []
+    assert found([submitted], replace(EVIDENCE, experiments=(), moves=(), studies={"s1": "two"})) != []
+    assert found([submitted], replace(EVIDENCE, experiments=(own,))) != []
+
+
+@pytest.mark.parametrize("status", [None, 503])
+def test_a_submission_without_an_acknowledgement_may_be_there_or_not(status):
+    silent = replace(SUBMITTED, status=status, answer={})
+
+    assert found([silent]) == []
+    assert found([silent], Evidence()) == []
+
+
+def test_what_was_cancelled_while_it_ran_keeps_the_beginning_of_its_log():
+    cancelled = with_repetition(state="CANCELLED", steps=2, log=LOG[:2], places=(0, 1))
+    cancelled = replace(
+        cancelled,
+        experiments=(replace(cancelled.experiments[0], state="CANCELLED"),),
+        moves=(CLAIMED, replace_steps(STORED, 0, 2), move(3, "RUNNING", "CANCELLED", steps=(2, 2), at=6.2)),
+    )
+
+    assert found([SUBMITTED, verb("cancel")], cancelled) == []
+
+
+def test_what_was_held_until_it_was_resumed_is_no_violation():
+    assert found([SUBMITTED, verb("pause", sent_at=1.0), verb("resume", sent_at=2.5)]) == []
+
+
+def test_what_was_extended_may_have_more_than_was_submitted():
+    larger = replace(EVIDENCE, experiments=(replace(EXPERIMENT, spec=SPEC | {"iterations": 3}),))
+
+    assert found([SUBMITTED, replace(verb("extend"), body={"iterations": 3})], larger) == []
+
+
+def replace_steps(move, was, steps):
+    return move._replace(steps_was=was, steps=steps)
+
+
+BROKEN = {
+    "lost": ("there 0 times", [SUBMITTED], Evidence()),
+    "twice": ("there 2 times", [SUBMITTED], replace(EVIDENCE, experiments=(EXPERIMENT, replace(EXPERIMENT, id="e2")))),
+    "with another id": ("is not there", [SUBMITTED], replace(EVIDENCE, experiments=(replace(EXPERIMENT, id="e2"),))),
+    "with another spec": (
+        "another spec",
+        [SUBMITTED],
+        replace(EVIDENCE, experiments=(replace(EXPERIMENT, spec=SPEC | {"seed": 7}),)),
+    ),
+    "without a repetition": (
+        "other repetitions",
+        [SUBMITTED],
+        replace(EVIDENCE, experiments=(replace(EXPERIMENT, repetitions=()),)),
+    ),
+    "refused and there": ("yet there", [replace(SUBMITTED, status=422)], EVIDENCE),
+    "nobody's": ("nobody submitted", [], EVIDENCE),
+    "failed inside": ("the service failed", [SUBMITTED, verb("read", 500)], EVIDENCE),
+    "denied": ("said not to exist", [SUBMITTED, verb("read", 404)], EVIDENCE),
+    "cancelled in vain": ("cancel: acknowledged, and without effect", [SUBMITTED, verb("cancel")], EVIDENCE),
+    "begun although stopped": (
+        "stop: acknowledged, and without effect",
+        [SUBMITTED, verb("stop", sent_at=2.0)],
+        EVIDENCE,
+    ),
+    "begun while paused": (
+        "pause: acknowledged, and without effect",
+        [SUBMITTED, verb("pause", sent_at=2.0), verb("resume")],
+        EVIDENCE,
+    ),
+    "extended in vain": (
+        "extend: acknowledged, and without effect",
+        [SUBMITTED, replace(verb("extend"), body={"iterations": 1_000})],
+        EVIDENCE,
+    ),
+    "experiment stuck": (
+        "e1 is stuck",
+        [SUBMITTED],
+        replace(EVIDENCE, experiments=(replace(EXPERIMENT, state="RUNNING"),)),
+    ),
+    "repetition stuck": ("e1/0 is stuck", [SUBMITTED], with_repetition(state="QUEUED")),
+    "check stuck": ("check c1 is stuck", [SUBMITTED], replace(EVIDENCE, checks={"c1": "RUNNING"})),
+    "completed without a completed one": (
+        "none of its repetitions is",
+        [SUBMITTED],
+        with_repetition(state="FAILED", error="lost 5 times"),
+    ),
+    "failed": ("failed: ValueError", [SUBMITTED], with_repetition(state="FAILED", error="ValueError: no")),
+    "a hole": ("4 steps are counted", [SUBMITTED], with_repetition(places=(0, 1, 3, 4))),
+    "a step lost": ("4 steps are counted", [SUBMITTED], with_repetition(log=LOG[:3], places=(0, 1, 2))),
+    "a step of other numbers": ("step 3 is another", [SUBMITTED], with_repetition(log=(*LOG[:3], "other"))),
+    "a step too many": (
+        "step 4 is another",
+        [SUBMITTED],
+        with_repetition(log=(*LOG, "more"), places=(0, 1, 2, 3, 4), steps=5),
+    ),
+    "completed too early": ("COMPLETED with 2 of 4", [SUBMITTED], with_repetition(log=LOG[:2], places=(0, 1), steps=2)),
+    "two winners": (
+        "two winners",
+        [SUBMITTED],
+        replace(EVIDENCE, moves=(CLAIMED, CLAIMED._replace(id=2, owner="b"), STORED, ENDED)),
+    ),
+    "an epoch skipped": (
+        "from epoch 0 to 2",
+        [SUBMITTED],
+        replace(EVIDENCE, moves=(CLAIMED._replace(epoch=2), STORED, ENDED)),
+    ),
+    "a forbidden move": (
+        "from COMPLETED to QUEUED",
+        [SUBMITTED],
+        replace(EVIDENCE, moves=(CLAIMED, STORED, ENDED, move(4, "COMPLETED", "QUEUED", steps=(4, 4)))),
+    ),
+    "a late write": (
+        "whose epoch it is not",
+        [SUBMITTED],
+        replace(EVIDENCE, moves=(CLAIMED, STORED._replace(owner="b"), ENDED)),
+    ),
+    "steps taken back": (
+        "from 4 to 2 steps",
+        [SUBMITTED],
+        replace(EVIDENCE, moves=(CLAIMED, STORED, replace_steps(STORED, 4, 2), replace_steps(ENDED, 2, 4))),
+    ),
+    "steps nobody stored": (
+        "from 4 to 4 steps, after 3",
+        [SUBMITTED],
+        replace(EVIDENCE, moves=(CLAIMED, replace_steps(STORED, 0, 3), ENDED)),
+    ),
+    "a corrupt file": ("page 7", [SUBMITTED], replace(EVIDENCE, complaints=("page 7 is never used",))),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_it_finds_what_was_broken(case):
+    sentence, history, evidence = BROKEN[case]
+
+    assert any(sentence in each for each in found(history, evidence)), found(history, evidence)
+
+
+def test_what_is_expected_is_computed_once_and_differs_between_repetitions():
+    first = undisturbed(SPEC, 0)
+
+    assert undisturbed(SPEC | {"name": "other"}, 0) is first
+    assert undisturbed(SPEC, 1) != first
+    assert len(set(first)) == len(first)
