@@ -7,16 +7,17 @@ from sqlalchemy import event
 
 from benchmarks.filling import IN_A_STUDY, experiment_id, fill, study_id
 from schemas.lifecycle import State
-from services import execution, experiments, reports
+from services import execution, experiments, listing, reports
 from services.archives import export_study, import_archive
 from services.store.models import Base
+from services.store.repository.listing import Which
 from tests.experiments import toy
 
 READS = {
-    "experiments": lambda store: experiments.list_experiments(store, limit=5),
-    "experiments of a study": lambda store: experiments.list_experiments(store, study=study_id(0)),
-    "experiments in a state": lambda store: experiments.list_experiments(store, state=State.COMPLETED),
-    "studies": lambda store: experiments.list_studies(store, limit=2),
+    "experiments": lambda store: listing.list_experiments(store, limit=5),
+    "experiments of a study": lambda store: listing.list_experiments(store, Which(study=study_id(0))),
+    "experiments in a state": lambda store: listing.list_experiments(store, Which(state=State.COMPLETED)),
+    "studies": lambda store: listing.list_studies(store, limit=2),
     "an experiment": lambda store: experiments.read_experiment(store, experiment_id(0)),
     "samples": lambda store: experiments.list_samples(store, experiment_id(0)),
     "a curve": lambda store: reports.curve(store, experiment_id(0)),
@@ -53,7 +54,7 @@ def test_what_benchmarks_fill_a_database_with_is_what_the_service_stores(store, 
 
     with export_study(store, study_id(1)).file as archive:
         assert len(import_archive(store, archive).experiments) == IN_A_STUDY  # whole logs, or it would be refused
-    shown = experiments.list_experiments(store, study=study_id(0)).items
+    shown = listing.list_experiments(store, Which(study=study_id(0))).items
     assert {each.state for each in shown} == {State.COMPLETED}
     assert all(each.progress.iterations_done == each.progress.iterations == 44 for each in shown)
     assert [point.n for point in reports.curve(store, experiment_id(3)).points] == [4] * 11
@@ -91,7 +92,7 @@ def test_every_read_finds_its_rows_by_an_index(sqlite_store):
 def test_a_page_of_experiments_is_read_in_its_order_and_not_sorted(sqlite_store, filters):
     fill(sqlite_store, IN_A_STUDY)
     with statements(sqlite_store) as found:
-        experiments.list_experiments(sqlite_store, **filters)
+        listing.list_experiments(sqlite_store, Which(**filters))
     page, parameters = next(each for each in found if "FROM experiment" in each[0] and "LIMIT" in each[0])
 
     with sqlite_store.reading() as session:
