@@ -10,9 +10,24 @@ FROM_EXPERIMENT = (
     "read_misfit",
     "read_curve",
     "edit_experiment",
+    "read_provenance",
+    "export_experiment",
+    "pause_experiment",
+    "resume_experiment",
+    "stop_experiment",
     "cancel_experiment",
+    "schedule_experiment",
 )
-FROM_STUDY = ("read_study", "read_study_curves", "edit_study")
+FROM_STUDY = (
+    "read_study",
+    "read_study_curves",
+    "edit_study",
+    "export_study",
+    "pause_study",
+    "resume_study",
+    "stop_study",
+    "cancel_study",
+)
 FROM_CHECK = ("read_sensitivity",)
 
 
