@@ -47,6 +47,22 @@ TAGS = [
     {"name": "health", "description": "for whoever keeps the service alive"},
 ]
 
+MODULES = (
+    studies,
+    experiments,
+    life_cycle,
+    provenance,
+    events,
+    curves,
+    figures,
+    archives,
+    sensitivity,
+    catalogue,
+    health,
+    metrics,
+)
+"""In the order in which their routes are documented."""
+
 
 def create_app(store: Store, settings: Settings | None = None, limits: Limits | None = None) -> FastAPI:
     """The application over a database, which it neither migrates nor closes.
@@ -68,30 +84,16 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
         generate_unique_id_function=lambda route: route.name,
         license_info={"name": "MIT", "identifier": "MIT"},
     )
-    app.state.store = store
-    app.state.feed = Feed(store)
-    app.state.metrics = Metrics(store, app.state.feed)
     limits = limits or Limits()
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
+    app.state.feed = Feed(store)
+    app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(BodyLimit, most_bytes=limits.body_bytes)
     app.add_middleware(Access, settings=settings)
     app.add_middleware(Headers)
     app.add_middleware(Measured, metrics=app.state.metrics)
     problems.install(app)
-    for module in (
-        studies,
-        experiments,
-        life_cycle,
-        provenance,
-        events,
-        curves,
-        figures,
-        archives,
-        sensitivity,
-        catalogue,
-        health,
-        metrics,
-    ):
+    for module in MODULES:
         app.include_router(module.router)
     documentation.install(app)
     return app

@@ -161,9 +161,9 @@ BROKEN = {
         replace(EVIDENCE, moves=(CLAIMED._replace(epoch=2), STORED, ENDED)),
     ),
     "a forbidden move": (
-        "from COMPLETED to QUEUED",
+        "from COMPLETED to RUNNING",
         [SUBMITTED],
-        replace(EVIDENCE, moves=(CLAIMED, STORED, ENDED, move(4, "COMPLETED", "QUEUED", steps=(4, 4)))),
+        replace(EVIDENCE, moves=(CLAIMED, STORED, ENDED, move(4, "COMPLETED", "RUNNING", steps=(4, 4)))),
     ),
     "a late write": (
         "whose epoch it is not",
