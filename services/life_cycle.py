@@ -10,12 +10,13 @@ from schemas.lifecycle import Verb
 from schemas.records import ExperimentRead, StudyRead
 from schemas.schedule import ExtensionSpec, ScheduleChange
 from schemas.spec import ExperimentSpec
+from services.admission import FREELY, Admission, check_extent, check_load
 from services.core.errors import InvalidSpec, Violation
 from services.experiments import extent_of
 from services.resolution import is_direct
 from services.store.repository import reads, verbs
 from services.store.repository.experiments import Extent
-from services.store.session import Store
+from services.store.session import Session, Store
 
 
 def ask_experiment(store: Store, experiment_id: str, verb: Verb) -> ExperimentRead:
@@ -38,7 +39,9 @@ def ask_study(store: Store, study_id: str, verb: Verb) -> StudyRead:
     return store.write(lambda session: reads.read_studies(session, [verbs.ask_study(session, study_id, verb)])[0])
 
 
-def extend_experiment(store: Store, experiment_id: str, extension: ExtensionSpec) -> ExperimentRead:
+def extend_experiment(
+    store: Store, experiment_id: str, extension: ExtensionSpec, admitted: Admission = FREELY
+) -> ExperimentRead:
     """Make a COMPLETED experiment as large as one that was submitted with these totals; what is there stands.
 
     With the totals that it has, one that was stopped is brought to its end.
@@ -46,13 +49,20 @@ def extend_experiment(store: Store, experiment_id: str, extension: ExtensionSpec
     Raises:
         NotFound: no such experiment.
         Conflict: it is not COMPLETED, or it is as large already.
-        InvalidSpec: less than there is, or iterations for the direct baseline.
+        InvalidSpec: less than there is, more than a limit permits, or iterations for the direct baseline.
+        LimitReached: there is no room for it now.
     """
-    return store.write(
-        lambda session: reads.read_experiments(
-            session, [verbs.extend(session, experiment_id, lambda spec: _larger(spec, extension))]
-        )[0]
-    )
+
+    def work(session: Session) -> ExperimentRead:
+        def larger(spec: ExperimentSpec) -> tuple[ExperimentSpec, Extent]:
+            found = _larger(spec, extension)
+            check_extent([found], admitted.limits)
+            check_load(session, [found], admitted)
+            return found, extent_of(found)
+
+        return reads.read_experiments(session, [verbs.extend(session, experiment_id, larger)])[0]
+
+    return store.write(work)
 
 
 def schedule_experiment(store: Store, experiment_id: str, change: ScheduleChange) -> ExperimentRead:
@@ -67,11 +77,10 @@ def schedule_experiment(store: Store, experiment_id: str, change: ScheduleChange
     )
 
 
-def _larger(spec: ExperimentSpec, extension: ExtensionSpec) -> tuple[ExperimentSpec, Extent]:
+def _larger(spec: ExperimentSpec, extension: ExtensionSpec) -> ExperimentSpec:
     if violations := list(_violations(spec, extension)):
         raise InvalidSpec(violations)
-    larger = spec.model_copy(update=extension.model_dump(exclude_none=True))
-    return larger, extent_of(larger)
+    return spec.model_copy(update=extension.model_dump(exclude_none=True))
 
 
 def _violations(spec: ExperimentSpec, extension: ExtensionSpec) -> Iterator[Violation]:

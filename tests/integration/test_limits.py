@@ -10,10 +10,12 @@ from fastapi.testclient import TestClient
 from api.app import create_app
 from api.limits import Streams
 from schemas.access import Role
+from services import execution
 from services.access import create_token
 from services.core.errors import LimitReached
 from services.settings import Limits, variable_of
 from services.store.session import Store
+from tests.experiments import run
 
 TOY = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "iterations": 2, "repetitions": 3}
 STUDY = {
@@ -65,6 +67,21 @@ def test_what_is_full_is_full_until_something_ends(store: Store, name: str):
     assert int(refused[0].headers["retry-after"]) > 0
     assert room.status_code == 202
     assert api.post("/experiments", json=TOY).status_code == 429
+
+
+def test_what_is_extended_stays_within_the_limits_too(sqlite_store: Store):
+    made = served(sqlite_store).post("/experiments", json=TOY).json()["id"]
+    for claim in execution.claim(sqlite_store, "me", 9):
+        run(sqlite_store, claim)
+
+    refused = served(sqlite_store, repetitions=4).post(f"/experiments/{made}/extend", json={"repetitions": 5})
+    full = served(sqlite_store, rollouts=1).post(f"/experiments/{made}/extend", json={"repetitions": 4})
+    extended = served(sqlite_store, repetitions=4).post(f"/experiments/{made}/extend", json={"repetitions": 4})
+
+    assert refused.status_code == 422
+    assert variable_of("repetitions") in refused.json()["detail"]
+    assert full.status_code == 429
+    assert extended.status_code == 202
 
 
 def test_one_token_cannot_take_the_room_of_another(store: Store):
