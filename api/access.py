@@ -13,11 +13,14 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from api import problems
 from schemas.access import Role
 from services.access import ANYONE, Caller, authenticate, demand, is_loopback
-from services.core.errors import Forbidden, GaplabError
+from services.core.errors import Forbidden, GaplabError, StoreUnavailable
 from services.settings import Settings
 
 OPEN = {"/livez", "/readyz"}
 """For whoever keeps the service alive; they tell nothing else."""
+
+WITHOUT_A_STORE = "/metrics"
+"""Says that the database is away, and nothing of what is in it then, also to whoever cannot be known."""
 
 READING = {"GET", "HEAD", "OPTIONS"}
 
@@ -47,6 +50,11 @@ class Access:
             return
         try:
             request.state.caller = await run_in_threadpool(self._admit, request)
+        except StoreUnavailable as error:
+            if scope["path"] != WITHOUT_A_STORE:
+                await problems.of_gaplab(request, error)(scope, receive, send)
+                return
+            request.state.caller = ANYONE
         except GaplabError as error:
             await problems.of_gaplab(request, error)(scope, receive, send)
             return

@@ -1,7 +1,6 @@
 """`python -m tests.supervising URL`: a supervisor as a process of its own, which takes others for lost after 3 s."""
 
 import sys
-from functools import partial
 
 from services import execution
 from services.settings import Settings
@@ -9,13 +8,14 @@ from workers import supervisor
 from workers.__main__ import serve
 
 STALE_S = 3.0
-HEARTBEAT_S = 0.5
+HEARTBEATS = 60
 
 
 def impatient(patch=setattr):
     """Let the supervisors of this process be so."""
-    patch(execution, "requeue_lost", partial(execution.requeue_lost, stale_after_s=STALE_S))
-    patch(supervisor, "HEARTBEAT_S", HEARTBEAT_S)
+    requeue = execution.requeue_lost
+    patch(execution, "requeue_lost", lambda store, **_: requeue(store, stale_after_s=STALE_S))
+    patch(supervisor, "HEARTBEATS", HEARTBEATS)
 
 
 if __name__ == "__main__":

@@ -266,7 +266,7 @@ def test_an_experiment_is_extended_to_totals_and_given_another_turn(store: Store
 
     less = api.post(f"/experiments/{made['id']}/extend", json={"iterations": 1})
     more = api.post(f"/experiments/{made['id']}/extend", json={"repetitions": 50})
-    turn = api.patch(f"/experiments/{made['id']}", json={"priority": 3})
+    turn = api.patch(f"/experiments/{made['id']}/schedule", json={"priority": 3})
     attempts = api.get(f"/experiments/{made['id']}/repetitions/0/attempts").json()
 
     assert [each.status_code for each in (too_early, less, more, turn)] == [409, 422, 202, 200]

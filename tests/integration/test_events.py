@@ -20,7 +20,9 @@ from api.client import Client, ServiceError
 from api.feed import Feed
 from api.server import Server, listen
 from schemas.events import EventKind, EventRead
-from services import events, execution, experiments, provenance, sensitivity
+from schemas.lifecycle import Verb
+from schemas.schedule import ExtensionSpec
+from services import archives, events, execution, experiments, life_cycle, provenance, sensitivity
 from services.core.errors import NotFound
 from services.events import Which
 from services.store.repository.events import note, write
@@ -89,10 +91,29 @@ def everything_that_can_happen(store: Store) -> None:
         (waits,) = execution.claim(store, "me", 1)
         execution.release(store, waits, "killed")
     cancelled = experiments.submit_experiment(store, toy())
+    execution.claim(store, "me", 1)
     experiments.cancel_experiment(store, cancelled.id)
+    all_verbs(store)
     check = sensitivity.claim(store, "me")
     assert check is not None
     sensitivity.fail(store, check, "no legs")
+
+
+def all_verbs(store: Store) -> None:
+    """An experiment paused, resumed, stopped, extended; and another, imported."""
+    asked = experiments.submit_experiment(store, toy(repetitions=1)).id
+    steps = some_log()
+    for verb in (Verb.PAUSE, Verb.STOP):
+        (claim,) = execution.claim(store, "me", 1)
+        life_cycle.ask_experiment(store, asked, verb)
+        while execution.record(store, claim, next(steps)):
+            continue
+        if verb is Verb.PAUSE:
+            life_cycle.ask_experiment(store, asked, Verb.RESUME)
+    whole = experiments.submit_experiment(store, toy(repetitions=1)).id
+    run(store, *execution.claim(store, "me", 1))
+    life_cycle.extend_experiment(store, whole, ExtensionSpec(repetitions=2))
+    archives.import_archive(store, archives.export_experiment(store, asked).file)
 
 
 def test_every_kind_of_event_is_told_and_none_shows_where_reality_is(store):

@@ -120,8 +120,9 @@ def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_car
         with httpx2.Client(base_url=f"http://127.0.0.1:{place.read_text()}", timeout=60) as http:
             assert within(60, lambda: http.get("/readyz").status_code == 200)
             secret = {"Authorization": f"Bearer {SECRET}", "X-Token": SECRET}
-            assert http.get("/experiments/abc", headers=secret).status_code == 404
-            assert http.get("/experiments", params={"token": SECRET, "x": SECRET}, headers=secret).status_code == 422
+            assert http.get("/experiments/abc", headers=secret).status_code == 401
+            assert http.get("/experiments/abc").status_code == 404
+            assert http.get("/experiments", params={"token": SECRET, "x": SECRET}).status_code == 422
     finally:
         process.terminate()
         process.wait(60)
@@ -131,6 +132,7 @@ def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_car
     assert SECRET not in said
     assert lines[0]["message"].startswith("gaplab serves on http://")
     assert [(each["path"], each["status"], each.get("experiment")) for each in lines[1:]] == [
+        ("/experiments/abc", 401, None),
         ("/experiments/abc", 404, "abc"),
         ("/experiments", 422, None),
     ]

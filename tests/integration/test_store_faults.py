@@ -136,12 +136,14 @@ def outcome(store):
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """Time passes fast: who is not heard of for a fifth of a second is lost."""
-    for name in ("HEARTBEAT_S", "WAIT_S", "RETRY_S"):
-        monkeypatch.setattr(supervisor, name, 0.0)
+    for name, value in {"HEARTBEATS": 1e9, "WAIT_S": 0.0, "RETRY_S": 0.0}.items():
+        monkeypatch.setattr(supervisor, name, value)
     monkeypatch.setattr(checking, "LOOK_S", 0.0)
     for module in MODULES.values():
         requeue = module.requeue_lost
-        monkeypatch.setattr(module, "requeue_lost", lambda store, requeue=requeue: requeue(store, stale_after_s=0.2))
+        monkeypatch.setattr(
+            module, "requeue_lost", lambda store, requeue=requeue, **_: requeue(store, stale_after_s=0.2)
+        )
     ray = Ray()
     monkeypatch.setattr(checking, "ray", ray)
     monkeypatch.setattr(checking, "check", ray)
