@@ -113,7 +113,8 @@ def all_verbs(store: Store) -> None:
     whole = experiments.submit_experiment(store, toy(repetitions=1)).id
     run(store, *execution.claim(store, "me", 1))
     life_cycle.extend_experiment(store, whole, ExtensionSpec(repetitions=2))
-    archives.import_archive(store, archives.export_experiment(store, asked).file)
+    with archives.export_experiment(store, asked).file as file:
+        archives.import_archive(store, file)
 
 
 def test_every_kind_of_event_is_told_and_none_shows_where_reality_is(store):

@@ -132,7 +132,7 @@ def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_car
     assert SECRET not in said
     assert lines[0]["message"].startswith("gaplab serves on http://")
     assert [(each["path"], each["status"], each.get("experiment")) for each in lines[1:]] == [
-        ("/experiments/abc", 401, None),
+        ("/experiments/abc", 401, "abc"),
         ("/experiments/abc", 404, "abc"),
         ("/experiments", 422, None),
     ]

@@ -71,9 +71,11 @@ def test_the_database_is_asked_once_however_often_the_metrics_are_read(sqlite_st
     monkeypatch.setattr(metrics, "KEPT_S", 3600.0)
     api = TestClient(create_app(sqlite_store))
     asked: list[str] = []
-    event.listen(
-        sqlite_store._engine, "before_cursor_execute", lambda *given: _TOKEN in given[2] or asked.append(given[2])
-    )
+
+    @event.listens_for(sqlite_store._engine, "before_cursor_execute")
+    def _(*given):
+        if "SELECT" in given[2] and _TOKEN not in given[2]:
+            asked.append(given[2])
 
     read(api)
     first = len(asked)

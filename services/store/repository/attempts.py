@@ -40,10 +40,12 @@ def end(session: Session, repetitions: Sequence[int], ending: Ending, reason: st
         .values(ended_at=now(), ending=ending, reason=reason)
         .returning(row.repetition_id)
     ).all()
-    found = select(repetition.experiment_id, repetition.number, repetition.state).where(repetition.id.in_(ended))
-    for experiment, number, state in session.execute(found.order_by(repetition.id)):
-        kind = EventKind.REPETITION_FAILED if state is State.FAILED else _TOLD[ending]
-        note(session, kind, experiment, number, **({"reason": reason} if reason else {}))
+    found = select(repetition).where(repetition.id.in_(ended)).order_by(repetition.id)
+    for each in session.scalars(found, execution_options={"populate_existing": True}):
+        failed = each.state is State.FAILED
+        why = each.error if failed else reason
+        kind = EventKind.REPETITION_FAILED if failed else _TOLD[ending]
+        note(session, kind, each.experiment_id, each.number, **({"reason": why} if why else {}))
 
 
 def attempts_of(session: Session, experiment: str, number: int) -> tuple[AttemptRead, ...]:
