@@ -30,6 +30,7 @@ class Service:
             "GAPLAB_DATABASE_URL": database_url or f"sqlite:///{folder / 'gaplab.db'}",
             "GAPLAB_PORT": str(port),
             "GAPLAB_WORKERS": "2",
+            "GAPLAB_LEASE_S": "5",
         }
         self._process = None
 
