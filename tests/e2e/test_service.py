@@ -18,7 +18,7 @@ TOY = {
     "budget": {"controller_evaluations": 60, "selection_evaluations": 40, "simulator_evaluations": 40},
     "seed": 5,
 }
-SLOW_TOY = TOY | {"budget": {"controller_evaluations": 3_000, "selection_evaluations": 500}, "iterations": 2}
+SLOW_TOY = TOY | {"budget": {"controller_evaluations": 1_500, "selection_evaluations": 300}, "iterations": 2}
 QUADRUPED = {
     "strategies": [
         "simulated_fit",
