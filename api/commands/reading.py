@@ -62,10 +62,11 @@ def curve(
     with connect(url) as client:
         if csv:
             typer.echo(client.curves_csv(ids), nl=False)
-        if svg:
-            _write(svg, client.figure(ids, "svg"))
-        if html:
-            _write(html, client.figure(ids, "html"))
+        for format, path in (("svg", svg), ("html", html)):  # noqa: A001 - as the API says
+            if path:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(client.figure(*ids).content(format))
+                typer.echo(f"Wrote {path}.")
         if not (csv or svg or html):
             found = client.curves(ids)
             display.console().print(display.curves(found), *display.baselines(found))
@@ -93,12 +94,6 @@ def catalogue(url: Url = None) -> None:
     """List the strategies, robots, engines, tunables and optimizers, and their options."""
     with connect(url) as client:
         display.console().print(*display.catalogue(client.catalogue()))
-
-
-def _write(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, "utf-8")
-    typer.echo(f"Wrote {path}.")
 
 
 def _print_misfit(found: MisfitRead, console: Console) -> None:
