@@ -10,6 +10,8 @@ from schemas.records import ExperimentRead, StudyRead
 if TYPE_CHECKING:
     from api.client import Client
 
+_FIGURES = "/figures/"
+
 FORMATS = ("svg", "png", "pdf", "html", "json")
 
 
@@ -81,6 +83,11 @@ class Figures:
         asked: dict[str, Any] = {name: those for name, those in which.items() if those} | options
 
         def draw(format: str) -> bytes:  # noqa: A002 - as the API says
-            return self._get(f"/figures/{kind}", **asked, format=format).content
+            return self._get(f"{_FIGURES}{kind}", **asked, format=format).content
 
         return Figure(kind, ids, draw)
+
+    def figure_kinds(self: "Client") -> tuple[str, ...]:
+        """The kinds of figures that the service draws."""
+        paths = self._get("/openapi.json").json()["paths"]
+        return tuple(path.removeprefix(_FIGURES) for path in paths if path.startswith(_FIGURES))

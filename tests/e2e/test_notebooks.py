@@ -32,7 +32,9 @@ def test_a_notebook_runs_from_its_first_cell_to_its_last(
     path: Path, service: LocalService, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("GAPLAB_URL", service.url)
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.setenv(
+        "PYTHONPATH", os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
+    )
 
     shown = outputs_of(path, tmp_path)
 
