@@ -234,6 +234,20 @@ def test_a_figure_shows_itself_and_saves_itself_by_its_suffix(
     assert repr(figure) == f"<figure curves of {study.id}>" == shown["text/plain"]
 
 
+def test_a_figure_can_be_gone_on_with_in_plotly(client: Client, finish: Callable[[], None]):
+    study = client.submit(BOTH)
+    finish()
+
+    found = client.figure(study.id).plotly()
+
+    assert found.data
+    assert "evaluations" in found.layout.xaxis.title.text
+
+
+def test_the_client_knows_which_kinds_of_figures_there_are(client: Client):
+    assert "curves" in client.figure_kinds()
+
+
 def test_a_figure_of_an_unknown_format_or_kind_or_id_is_a_sentence(client: Client, tmp_path: Any):
     id = client.submit(SMALL).id  # noqa: A001
 

@@ -192,14 +192,19 @@ def test_a_figure_is_drawn_into_as_many_files_as_one_names(
     gaplab: Gaplab, study: str, finish: Callable[[], None], tmp_path: Path
 ):
     finish()
-    svg, html = tmp_path / "new" / "a.svg", tmp_path / "a.html"
+    files = [tmp_path / "new" / f"a.{suffix}" for suffix in ("svg", "png", "pdf", "html", "json")]
 
-    said = gaplab("figure", "curves", study, "-o", str(svg), "-o", str(html), "--set", "title=A title")
+    out = [argument for file in files for argument in ("-o", str(file))]
+    said = gaplab("figure", "curves", study, *out, "--set", "title=A title", "-s", "each=true")
 
     assert said.code == 0, said.err
-    assert said.out == f"Wrote {svg}.\nWrote {html}.\n"
-    assert "A title" in svg.read_text()
-    assert "A title" in html.read_text()
+    assert said.out == "".join(f"Wrote {file}.\n" for file in files)
+    svg, png, pdf, html, data = (file.read_bytes() for file in files)
+    assert png.startswith(b"\x89PNG")
+    assert pdf.startswith(b"%PDF")
+    assert b"A title" in svg
+    assert b"A title" in html
+    assert json.loads(data)["title"] == "A title"
 
 
 @pytest.mark.parametrize(
@@ -300,7 +305,7 @@ def test_in_a_terminal_it_is_a_view_of_curves_and_repetitions(url: str, study: s
     assert ended.state == "COMPLETED"
     assert "QUEUED" in shown
     assert "fitness in reality, m/s" in shown
-    assert re.search(r"random .* COMPLETED .* [▁-█]{3} 1\.\d\d±\d\.\d\d after 2 +███ ", shown)  # three repetitions
+    assert re.search(r"random .* COMPLETED .* ▁▄█ 3\.20±0\.20 after 2 +███ ", shown)  # three repetitions
 
 
 class Shaky(Client):
