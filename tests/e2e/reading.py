@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import nbformat
 
@@ -22,6 +23,42 @@ def plugins_of_notebooks() -> dict[str, str]:
             if match := WRITES.match(cell.source):
                 found[match[1]] = cell.source[match.end() :] + "\n"
     return found
+
+
+DOCUMENTS = [ROOT / "docs" / "tutorial.md", *sorted((ROOT / "docs" / "how-to").glob("*.md"))]
+BLOCK = re.compile(r"(?P<skipped><!-- not run: [^\n]+ -->\n)?^```(?P<language>\w+)\n(?P<text>.*?)^```", re.M | re.S)
+FILE = re.compile(r"# plugins/(\w+\.py)\n")
+
+
+class Block(NamedTuple):
+    language: str
+    text: str
+    skipped: bool
+
+
+def blocks(path: Path) -> list[Block]:
+    return [Block(each["language"], each["text"], bool(each["skipped"])) for each in BLOCK.finditer(path.read_text())]
+
+
+def plugins_of_documents() -> dict[str, str]:
+    """The files that documents show, as their readers would write them."""
+    found = {}
+    for path in DOCUMENTS:
+        for block in blocks(path):
+            if match := FILE.match(block.text):
+                found[match[1]] = block.text
+    return found
+
+
+def script(path: Path) -> str:
+    """What a document has its reader run, in its order, in one shell."""
+    parts = ["set -euo pipefail"]
+    for block in blocks(path):
+        if block.skipped or FILE.match(block.text) or block.language == "text":
+            continue
+        assert block.language in {"sh", "python"}, f"{path.name} has a block of {block.language}"
+        parts.append(block.text if block.language == "sh" else f"python - <<'THE_END'\n{block.text}THE_END")
+    return "\n".join(parts)
 
 
 @contextmanager
