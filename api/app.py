@@ -24,6 +24,7 @@ from api.routes import (
     sensitivity,
     studies,
 )
+from services.physics import Physics
 from services.settings import Limits, Settings
 from services.store.session import Store
 
@@ -40,6 +41,7 @@ TAGS = [
     {"name": "studies", "description": "experiments that belong together to be compared"},
     {"name": "experiments", "description": "one strategy under one setting, repeated"},
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
+    {"name": "replays", "description": "what controllers do, computed when it is asked for"},
     {"name": "events", "description": "what happens to experiments, as it happens"},
     {"name": "archives", "description": "everything of an experiment or a study as one file, and back"},
     {"name": "sensitivity", "description": "what tunables do to fitness, checked before anything is tuned"},
@@ -87,6 +89,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     limits = limits or Limits()
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
     app.state.feed = Feed(store)
+    app.state.physics = Physics()
     app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(BodyLimit, most_bytes=limits.body_bytes)
     app.add_middleware(Access, settings=settings)

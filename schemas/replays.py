@@ -1,15 +1,22 @@
 """A controller's motion as it can be drawn: shapes, where they are over time, and what touches the ground."""
 
+from enum import StrEnum
 from typing import Literal
 
 from pydantic import Field
 
 from schemas.base import Frozen
-from schemas.records import MeasurementKind
 
 Position = tuple[float, float, float]
 Orientation = tuple[float, float, float, float]
 Interval = tuple[float, float]
+
+
+class ControllerKind(StrEnum):
+    """Whence a controller comes: selected to be a sample, or evolved in the best simulator and transferred."""
+
+    SAMPLE = "sample"
+    TRANSFER = "transfer"
 
 
 class Shape(Frozen):
@@ -31,16 +38,22 @@ class ReplayWorld(Frozen):
     """The motion in one world. Of a motion whose physics failed there is nothing, and its fitness is null."""
 
     engine: str
+    shapes: tuple[Shape, ...]
     fitness: float | None = Field(description="of this replay")
     recorded: float | None = Field(description="of the same as it was stored; null: it was not computed, or failed")
-    positions_m: tuple[tuple[float, ...], ...] = Field(description="by frame: x, y, z of each body's frame in turn")
-    orientations: tuple[tuple[float, ...], ...] = Field(description="by frame: x, y, z, w of each body in turn")
-    heights_m: tuple[float, ...] = Field(description="by frame, of the base")
+    positions_m: tuple[tuple[float, ...], ...] = Field(
+        default=(), description="by frame: x, y, z of each body's frame in turn"
+    )
+    orientations: tuple[tuple[float, ...], ...] = Field(
+        default=(), description="by frame: x, y, z, w of each body in turn"
+    )
+    heights_m: tuple[float, ...] = Field(default=(), description="by frame, of the base")
     speeds_m_s: tuple[float, ...] = Field(
-        description="by frame, of the base, towards where it is at the end, over 0.2 s around the frame"
+        default=(),
+        description="by frame, of the base, towards where it is at the end, over 0.2 s around the frame",
     )
     contacts: tuple[tuple[Interval, ...], ...] = Field(
-        description="by foot: from when to when, in s, it was less than 2 mm above the ground"
+        default=(), description="by foot: from when to when, in s, it was less than 2 mm above the ground"
     )
 
 
@@ -50,14 +63,13 @@ class Replay(Frozen):
     experiment: str
     repetition: int
     iteration: int
-    kind: MeasurementKind = Field(description="a sample, or the transferred controller that a probe looked at")
+    kind: ControllerKind
     simulator: int | None = Field(description="iteration whose best simulator it is in; null: there is none")
     robot: str
     unit: str = Field(description="of fitness")
-    bodies: tuple[str, ...]
-    shapes: tuple[Shape, ...]
-    feet: tuple[str, ...]
-    times_s: tuple[float, ...] = Field(description="of the frames")
+    bodies: tuple[str, ...] = Field(description="the base first")
+    feet: tuple[str, ...] = Field(description="the bodies, but for the base, that collide with the ground")
+    times_s: tuple[float, ...] = Field(description="of the frames; of a long motion, its first 20 s")
     counted_s: Interval = Field(description="from when to when the movement counts for the fitness")
     simulation: ReplayWorld | None = Field(description="null: the controller evolved in reality itself")
     reality: ReplayWorld | None = Field(description="null: reality's parameters are not known here")

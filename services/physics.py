@@ -3,12 +3,13 @@
 import logging
 import os
 import signal
+from collections import OrderedDict
 from collections.abc import Callable
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from threading import Lock
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
 
@@ -23,7 +24,41 @@ QUEUE_S = 20.0
 NICENESS = 10
 """Whoever asks for pictures does not slow down those who serve."""
 
+MOST_BYTES = 50_000_000
+"""Of answers that are remembered."""
+
+Key: TypeAlias = tuple[str | int | None, ...]
+
 log = logging.getLogger(__name__)
+
+
+class Memory:
+    """Answers that never change, the longest unused forgotten first.
+
+    Args:
+        most_bytes: that they may take together.
+    """
+
+    def __init__(self, most_bytes: int = MOST_BYTES) -> None:
+        self._most, self._taken = most_bytes, 0
+        self._lock = Lock()
+        self._found: OrderedDict[Key, tuple[Any, int]] = OrderedDict()
+
+    def get(self, key: Key) -> Any:  # noqa: ANN401 - whatever was kept
+        """What was kept under the key; None if nothing is."""
+        with self._lock:
+            if key not in self._found:
+                return None
+            self._found.move_to_end(key)
+            return self._found[key][0]
+
+    def keep(self, key: Key, answer: Any, weight: int) -> None:  # noqa: ANN401 - whatever it is
+        """Remember an answer that takes so many bytes."""
+        with self._lock:
+            self._taken += weight - self._found.pop(key, (None, 0))[1]
+            self._found[key] = (answer, weight)
+            while self._taken > self._most:
+                self._taken -= self._found.popitem(last=False)[1][1]
 
 
 class Physics:
@@ -34,13 +69,18 @@ class Physics:
     Args:
         longest_s: that one question may take.
         queue_s: that a question waits for those before it.
+
+    Attributes:
+        memory: of answers, for those who ask.
     """
 
     def __init__(self, longest_s: float = LONGEST_S, queue_s: float = QUEUE_S) -> None:
+        self.memory = Memory()
         self._longest_s, self._queue_s = longest_s, queue_s
         self._lock = Lock()
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
+        self._closed = False
 
     @property
     def pid(self) -> int | None:
@@ -51,7 +91,7 @@ class Physics:
         """What the function of a module returns for the arguments, in the process.
 
         Raises:
-            EngineInterrupted: the process died of it, or it took too long.
+            EngineInterrupted: the process died of it, or it took too long, or everything is closed.
             EngineUnavailable: the library of an engine is not installed.
             LimitReached: others were asking for too long.
             RuntimeError: the function raised anything else; the message has what.
@@ -65,12 +105,18 @@ class Physics:
             self._lock.release()
 
     def close(self) -> None:
-        """End the process; the next question would start another."""
+        """End the process, whatever it is at; questions are refused from now on."""
+        self._closed = True
+        if (process := self._process) is not None:
+            process.kill()
+        with self._lock:
+            self._discard()
+
+    def _discard(self) -> None:
         if self._process is not None and self._pipe is not None:
             self._pipe.close()
             self._process.kill()
             self._process.join()
-            self._process.close()
         self._process = self._pipe = None
 
     def _answer(self, function: Callable[..., T], arguments: tuple[Any, ...]) -> T:
@@ -81,10 +127,11 @@ class Physics:
                 raise TimeoutError
             good, answer = pipe.recv()
         except (OSError, EOFError) as error:
-            self.close()
-            what = f"took more than {self._longest_s:g} s" if isinstance(error, TimeoutError) else "ended the process"
-            log.warning("physics was started anew: %s %s", function.__name__, what)
-            msg = f"the physics {what} that computes it; nothing else was harmed"
+            self._discard()
+            late = isinstance(error, TimeoutError)
+            what = f"took more than {self._longest_s:g} s in the process" if late else "ended the process"
+            log.warning("%s %s of physics; the next question starts another", function.__name__, what)
+            msg = f"computing it {what} of physics; nothing else was harmed"
             raise EngineInterrupted(msg) from error
         if good:
             return answer  # type: ignore[no-any-return]
@@ -92,8 +139,11 @@ class Physics:
         raise EngineUnavailable(text) if kind == EngineUnavailable.__name__ else RuntimeError(f"{kind}: {text}")
 
     def _started(self) -> Connection:
+        if self._closed:
+            msg = "the service ends; nothing is computed any more"
+            raise EngineInterrupted(msg)
         if self._process is not None and not self._process.is_alive():
-            self.close()
+            self._discard()
         if self._pipe is None:
             context = get_context("spawn")
             self._pipe, theirs = context.Pipe()
