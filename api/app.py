@@ -21,6 +21,7 @@ from api.routes import (
     life_cycle,
     metrics,
     provenance,
+    replays,
     sensitivity,
     studies,
 )
@@ -58,6 +59,7 @@ MODULES = (
     curves,
     figures,
     archives,
+    replays,
     sensitivity,
     catalogue,
     health,
