@@ -19,6 +19,9 @@ from services.settings import Settings
 OPEN = {"/livez", "/readyz"}
 """For whoever keeps the service alive; they tell nothing else."""
 
+ASSETS = "/assets/"
+"""Files of the page at `/`, which like the page hold no data: it asks its reader for the token."""
+
 WITHOUT_A_STORE = "/metrics"
 """Says that the database is away, and nothing of what is in it then, also to whoever cannot be known."""
 
@@ -44,7 +47,7 @@ class Access:
             await self.app(scope, receive, send)
             return
         request = Request(scope)
-        if scope["path"] in OPEN:
+        if scope["path"] in OPEN or scope["path"] == "/" or scope["path"].startswith(ASSETS):
             request.state.caller = ANYONE
             await self.app(scope, receive, send)
             return

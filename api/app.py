@@ -14,6 +14,7 @@ from api.routes import (
     archives,
     catalogue,
     curves,
+    dashboard,
     events,
     experiments,
     figures,
@@ -95,5 +96,6 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     problems.install(app)
     for module in MODULES:
         app.include_router(module.router)
+    dashboard.install(app)
     documentation.install(app)
     return app

@@ -90,7 +90,9 @@ def test_each_role_may_do_what_it_is_for_and_no_more(store: Store, api: TestClie
         assert "insufficient_scope" in answers[name].headers["www-authenticate"]
 
 
-def test_every_route_wants_a_token_but_the_two_for_health(sqlite_store: Store, lite: TestClient):
+def test_every_route_wants_a_token_but_those_for_health_and_the_files_of_the_page(
+    sqlite_store: Store, lite: TestClient
+):
     create_token(sqlite_store, Role.ADMIN)
     document = create_app(sqlite_store).openapi()
     routes = [(method, path) for path, operations in document["paths"].items() for method in operations]
@@ -100,7 +102,12 @@ def test_every_route_wants_a_token_but_the_two_for_health(sqlite_store: Store, l
         path: lite.request(method, path.format(id="x", number=0)).status_code for method, path in [*routes, *pages]
     }
 
-    assert {path for path, status in found.items() if status != 401} == {"/livez", "/readyz"}
+    assert {path for path, status in found.items() if status != 401} == {
+        "/livez",
+        "/readyz",
+        "/",
+        "/assets/docs/swagger-ui.css",
+    }
 
 
 @pytest.mark.parametrize(

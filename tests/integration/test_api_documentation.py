@@ -223,5 +223,6 @@ def test_the_pages_load_everything_from_the_service_itself(api: TestClient, page
         assert api.get(source).status_code == 200, source
 
 
-def test_the_address_of_the_service_leads_to_its_documentation(api: TestClient):
-    assert "swagger" in api.get("/").text
+def test_the_page_of_the_service_leads_to_its_documentation(api: TestClient):
+    assert 'href="docs"' in api.get("/").text
+    assert "swagger" in api.get("/docs").text
