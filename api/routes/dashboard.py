@@ -1,4 +1,4 @@
-"""The page at `/`: static files, which hold no data and are open; what they show they ask of the API like any client."""
+"""The page at `/`: static files, open since they hold no data; what they show they ask of the API like any client."""
 
 from functools import cache
 from pathlib import Path
