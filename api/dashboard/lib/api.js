@@ -55,7 +55,8 @@ export async function events(query, handler, connected, signal) {
   let last = null;
   while (!signal.aborted) {
     try {
-      const headers = { Accept: "text/event-stream", ...(last === null ? {} : { "Last-Event-ID": last }) };
+      last ??= (await get("/events/page", { limit: 1 }, signal)).latest;
+      const headers = { Accept: "text/event-stream", "Last-Event-ID": last };
       const answer = await request(`/events${search(query)}`, { headers, signal });
       connected(true);
       for await (const event of parsed(answer.body)) {
