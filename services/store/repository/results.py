@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import case, select, tuple_
+from sqlalchemy import case, func, select, tuple_
 from sqlalchemy.orm import Session
 
 from schemas.records import MeasurementKind, SampleRead, SimulatorRead
@@ -101,6 +101,20 @@ def recorded(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str
         .where(RepetitionRow.experiment_id.in_(experiments), row.recorded_fitness.is_not(None))
     )
     return session.execute(query).all()
+
+
+def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, float]:
+    """Of each experiment, the best recorded fitness of a repetition so far, on average over those that have one."""
+    row = IterationRow
+    best = (
+        select(RepetitionRow.experiment_id.label("experiment"), func.max(row.recorded_fitness).label("best"))
+        .join(RepetitionRow, RepetitionRow.id == row.repetition_id)
+        .where(RepetitionRow.experiment_id.in_(experiments), row.recorded_fitness.is_not(None))
+        .group_by(RepetitionRow.id, RepetitionRow.experiment_id)
+        .subquery()
+    )
+    mean = select(best.c.experiment, func.avg(best.c.best)).group_by(best.c.experiment)
+    return {experiment: float(fitness) for experiment, fitness in session.execute(mean)}
 
 
 @dataclass(frozen=True)
