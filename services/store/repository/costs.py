@@ -17,7 +17,7 @@ def latest(session: Session, count: int) -> tuple[tuple[dict[str, Any], float, i
         .order_by(row.created_at.desc(), row.position.desc(), row.id.desc())
         .limit(count)
     )
-    specs = dict(session.execute(newest).all())
+    specs: dict[str, dict[str, Any]] = dict(session.execute(newest).all())
     sums = (
         select(run.experiment_id, func.sum(run.seconds), func.sum(run.rollouts_done))
         .where(run.experiment_id.in_(list(specs)))

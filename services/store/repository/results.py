@@ -105,16 +105,17 @@ def recorded(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str
 
 def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, float]:
     """Of each experiment, the best recorded fitness of a repetition so far, on average over those that have one."""
-    row = IterationRow
-    best = (
-        select(RepetitionRow.experiment_id.label("experiment"), func.max(row.recorded_fitness).label("best"))
-        .join(RepetitionRow, RepetitionRow.id == row.repetition_id)
-        .where(RepetitionRow.experiment_id.in_(experiments), row.recorded_fitness.is_not(None))
-        .group_by(RepetitionRow.id, RepetitionRow.experiment_id)
-        .subquery()
+    of_one = (
+        select(func.max(IterationRow.recorded_fitness))
+        .where(IterationRow.repetition_id == RepetitionRow.id)
+        .scalar_subquery()
     )
-    mean = select(best.c.experiment, func.avg(best.c.best)).group_by(best.c.experiment)
-    return {experiment: float(fitness) for experiment, fitness in session.execute(mean)}
+    query = select(RepetitionRow.experiment_id, of_one).where(RepetitionRow.experiment_id.in_(experiments))
+    found: dict[str, list[float]] = {}
+    for experiment, best in session.execute(query):
+        if best is not None:
+            found.setdefault(experiment, []).append(best)
+    return {experiment: sum(each) / len(each) for experiment, each in found.items()}
 
 
 @dataclass(frozen=True)
