@@ -14,6 +14,15 @@ export class Problem extends Error {
 export const get = async (path, query = {}, signal = undefined) =>
   (await request(path + search(query), { signal })).json();
 
+/** The JSON at `path`, and the tag that a change of it names. */
+export async function tagged(path, signal = undefined) {
+  const answer = await request(path, { signal });
+  return { value: await answer.json(), tag: answer.headers.get("ETag") };
+}
+
+/** The file at `path`. */
+export const blob = async (path, query = {}) => (await request(path + search(query), {})).blob();
+
 /** What the service made of a POST. */
 export const post = (path, body = undefined, headers = {}) => send("POST", path, body, headers);
 
@@ -48,14 +57,14 @@ async function request(path, options) {
 }
 
 /**
- * Server-sent events from now on, for as long as `signal` lasts: `handler({ kind, id, data })` for each of them, and
+ * Server-sent events after `query.after`, or from now on, for as long as `signal` lasts: `handler({ kind, id, data })` for each of them, and
  * `connected(true | false)` as the stream comes and goes. It is taken up again where it broke off, without a hole.
  */
 export async function events(query, handler, connected, signal) {
   let last = null;
   while (!signal.aborted) {
     try {
-      last ??= (await get("/events/page", { limit: 1 }, signal)).latest;
+      last ??= query.after ?? (await get("/events/page", { limit: 1 }, signal)).latest;
       const headers = { Accept: "text/event-stream", "Last-Event-ID": last };
       const answer = await request(`/events${search(query)}`, { headers, signal });
       connected(true);
