@@ -1,5 +1,6 @@
 """The application: routes, problems, limits and the pages that document them, put together."""
 
+import os
 from importlib.metadata import version
 
 from fastapi import FastAPI
@@ -14,6 +15,8 @@ from api.routes import (
     archives,
     catalogue,
     curves,
+    dashboard,
+    estimates,
     events,
     experiments,
     figures,
@@ -52,6 +55,7 @@ TAGS = [
 
 MODULES = (
     studies,
+    estimates,
     experiments,
     life_cycle,
     provenance,
@@ -92,6 +96,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
     app.state.feed = Feed(store)
     app.state.physics = Physics()
+    app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
     app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(BodyLimit, most_bytes=limits.body_bytes)
     app.add_middleware(Access, settings=settings)
@@ -100,5 +105,6 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     problems.install(app)
     for module in MODULES:
         app.include_router(module.router)
+    dashboard.install(app)
     documentation.install(app)
     return app

@@ -1,0 +1,25 @@
+/** What a view shows while it has nothing to show: it loads, there is nothing, or it failed. */
+
+import { TokenForm } from "./token.js";
+import { Problem } from "./api.js";
+import { h } from "./dom.js";
+
+/** Something is on its way. */
+export function loading(words = "Loading…") {
+  return h("p", { class: "state loading", role: "status" }, h("span", { class: "spinner", "aria-hidden": "true" }), words);
+}
+
+/** There is nothing yet, and what one does about it. */
+export function empty(words, ...action) {
+  return h("div", { class: "state empty" }, h("p", {}, words), ...action);
+}
+
+/** It failed, with the service's own words; `again` tries once more. */
+export function failed(error, again) {
+  if (error instanceof Problem && (error.status === 401 || error.status === 403)) return TokenForm(error, again);
+  const title = error instanceof Problem ? error.title : "It did not work";
+  const places = error.errors?.map((each) => h("li", {}, each.pointer ? h("code", {}, each.pointer) : "", " ", each.detail)) ?? [];
+  return h("div", { class: "state failed", role: "alert" },
+    h("h1", {}, title), h("p", {}, error.message), places.length ? h("ul", {}, ...places) : null,
+    again ? h("button", { type: "button", onclick: () => again() }, "Try again") : null);
+}
