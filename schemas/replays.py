@@ -26,12 +26,12 @@ class Shape(Frozen):
     radius and the distance between the centres of its ends; of a plane, whose normal is its own z, nothing.
     """
 
-    body: int | None = Field(description="place of the body in `bodies`; null: it does not move")
     kind: Literal["box", "sphere", "capsule", "plane"]
     size_m: tuple[float, ...]
     position_m: Position = Field(default=(0.0, 0.0, 0.0), description="of its centre")
     orientation: Orientation = Field(default=(0.0, 0.0, 0.0, 1.0), description="a quaternion x, y, z, w")
     role: Literal["trunk", "limb", "foot", "ground"] = Field(description="by which it is coloured")
+    body: int | None = Field(default=None, description="place of the body in `bodies`; null: it does not move")
 
 
 class ReplayWorld(Frozen):
