@@ -7,7 +7,7 @@ const KEYS = { ArrowLeft: [-STEP, 0, 1], ArrowRight: [STEP, 0, 1], ArrowUp: [0, 
 
 /** The camera; `changed` is called when somebody moved it. */
 export function camera(changed) {
-  const at = { turn: -1.0, rise: 0.35, distance: 1.6 };
+  const at = { turn: -1.0, rise: 0.35, distance: 1.25 };
 
   function go(turn, rise, nearer = 1) {
     at.turn += turn;
