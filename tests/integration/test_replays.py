@@ -176,6 +176,19 @@ def test_physics_that_fails_has_no_frames(sqlite_store, api):
     assert len(shown["shapes"]) == 18
 
 
+def test_the_gait_is_drawn_in_every_format(sqlite_store, api):
+    experiment, _, _ = walked(sqlite_store)
+    address = f"/figures/gait?experiment={experiment}&iteration=1&kind=sample"
+
+    shown = api.get(f"{address}&format=json").json()
+
+    assert {each["name"] for each in shown["figure"]["data"]} >= {"In simulation", "In reality"}
+    assert not shown["empty"]
+    for format_ in ("html", "svg", "png", "pdf"):
+        assert api.get(f"{address}&format={format_}").status_code == 200
+    assert api.get(f"/figures/gait?experiment={experiment}&repetition=1").status_code == 409
+
+
 def test_a_crash_of_physics_never_ends_the_api(sqlite_store, app, api):
     experiment, _, _ = walked(sqlite_store)
     first = api.get(f"/experiments/{experiment}/replay")
