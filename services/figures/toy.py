@@ -5,12 +5,15 @@ from collections.abc import Sequence
 from schemas.toys import Toy
 from services.figures.marks import Arrow, Axis, Figure, Line, Mark, Panel, Points, Table
 from services.figures.style import COLORS, INK, Style
-from services.figures.words import number, printable, with_unit
+from services.figures.words import number, printable, spoken, with_unit
 
 REALITY = Style(INK, "dashed", "circle")
 SIMULATION = Style(COLORS[0], "solid", "circle")
 SAMPLES = Style(COLORS[1], "solid", "circle")
 TRANSFER = Style(COLORS[2], "solid", "star")
+
+SHORTEST = 0.03
+"""An arrow that is a smaller share of the figure would hide what it points from."""
 
 
 def toy_figure(toys: Sequence[Toy], *, title: str | None = None) -> Figure:
@@ -22,7 +25,7 @@ def toy_figure(toys: Sequence[Toy], *, title: str | None = None) -> Figure:
     """
     several = len(toys) > 1
     first = toys[0]
-    own = f"{first.name}, repetition {first.repetition}{'' if several else f', iteration {first.iteration}'}"
+    own = f"{spoken(first.name)}, repetition {first.repetition}{'' if several else f', iteration {first.iteration}'}"
     return Figure(
         name="toy",
         title=printable(own if title is None else title),
@@ -67,7 +70,8 @@ def _transfer(toy: Toy) -> list[Mark]:
         return []
     gene, simulated, real = toy.transfer.gene, toy.transfer.simulated, toy.transfer.real
     marks: list[Mark] = []
-    if simulated is not None and real is not None and simulated != real:
+    visible = SHORTEST * (toy.limits[1] - toy.limits[0])
+    if simulated is not None and real is not None and abs(simulated - real) > visible:
         marks.append(Arrow((gene, simulated), (gene, real), TRANSFER))
     if simulated is not None:
         marks.append(Points("Transferred: fittest in simulation", (gene,), (simulated,), TRANSFER, size=1.4))
