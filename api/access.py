@@ -1,7 +1,7 @@
 """Who is let in: every request is asked for its token before anything else looks at it.
 
 Reading wants a reader's token, and whatever else a method does a runner's. That follows from the method, so that no new
-route can forget it.
+route can forget it; but for what is asked with a body and changes nothing.
 """
 
 from urllib.parse import urlsplit
@@ -26,6 +26,9 @@ WITHOUT_A_STORE = "/metrics"
 """Says that the database is away, and nothing of what is in it then, also to whoever cannot be known."""
 
 READING = {"GET", "HEAD", "OPTIONS"}
+
+ASKING = {"/studies/estimate"}
+"""Reading, though it is a POST: the question is too long for an address."""
 
 
 class Access:
@@ -69,7 +72,8 @@ class Access:
         caller = authenticate(request.app.state.store, token, required=self._required)
         if caller.token is None and self._by_name:
             _refuse_other_sites(request)
-        role = Role.READER if request.method in READING else Role.RUNNER
+        reads = request.method in READING or request.scope["path"] in ASKING
+        role = Role.READER if reads else Role.RUNNER
         demand(caller, role, f"{request.method} here")
         return caller
 

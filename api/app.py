@@ -1,5 +1,6 @@
 """The application: routes, problems, limits and the pages that document them, put together."""
 
+import os
 from importlib.metadata import version
 
 from fastapi import FastAPI
@@ -15,6 +16,7 @@ from api.routes import (
     catalogue,
     curves,
     dashboard,
+    estimates,
     events,
     experiments,
     figures,
@@ -50,6 +52,7 @@ TAGS = [
 
 MODULES = (
     studies,
+    estimates,
     experiments,
     life_cycle,
     provenance,
@@ -88,6 +91,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     limits = limits or Limits()
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
     app.state.feed = Feed(store)
+    app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
     app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(BodyLimit, most_bytes=limits.body_bytes)
     app.add_middleware(Access, settings=settings)

@@ -1,4 +1,4 @@
-"""A real Chromium that looks at the page: found on this machine, strict about errors, and axe for those who see less."""
+"""A real Chromium that looks at the page, found on this machine and strict about errors; and axe."""
 
 import os
 import re
@@ -42,7 +42,8 @@ def chromium(playwright):
     found = os.environ.get(VARIABLE) or next(filter(None, map(shutil.which, (*NAMES, "/usr/bin/chromium"))), None)
     if found is None and Path(playwright.chromium.executable_path).is_file():
         found = playwright.chromium.executable_path
-    assert found and Path(found).is_file(), MISSING
+    assert found is not None, MISSING
+    assert Path(found).is_file(), f"there is no {found}: {MISSING}"
     return found
 
 

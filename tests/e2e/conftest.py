@@ -2,7 +2,7 @@
 
 `visit(address, dark=…, width=…)` opens the page in Chromium, and fails the test if the console, a script or a request
 reports an error; `visit.forgive(pattern, …)` names those that a test causes. `archive` is the API alone on a database
-with ended studies, `shared_service` the real service with workers; each is started once, when the first test asks for it.
+with ended studies, `shared_service` the real service with workers; each is started once, for all tests that ask for it.
 """
 
 import shutil

@@ -66,9 +66,9 @@ def test_beyond_loopback_a_token_is_needed_even_where_none_was_ever_made(sqlite_
 @pytest.mark.parametrize(
     ("role", "permitted"),
     [
-        (Role.READER, {"read"}),
-        (Role.RUNNER, {"read", "submit", "check", "edit", "cancel"}),
-        (Role.ADMIN, {"read", "submit", "check", "edit", "cancel", "reveal"}),
+        (Role.READER, {"read", "estimate"}),
+        (Role.RUNNER, {"read", "estimate", "submit", "check", "edit", "cancel"}),
+        (Role.ADMIN, {"read", "estimate", "submit", "check", "edit", "cancel", "reveal"}),
     ],
 )
 def test_each_role_may_do_what_it_is_for_and_no_more(store: Store, api: TestClient, role: Role, permitted: set[str]):
@@ -76,6 +76,7 @@ def test_each_role_may_do_what_it_is_for_and_no_more(store: Store, api: TestClie
     headers = bearer(store, role)
     answers = {
         "read": api.get(f"/experiments/{made}", headers=headers),
+        "estimate": api.post("/studies/estimate", json={"robot": "toy_function"}, headers=headers),
         "submit": api.post("/experiments", json=TOY, headers=headers),
         "check": api.post("/sensitivity", json={"robot": "toy_function"}, headers=headers),
         "edit": api.patch(f"/experiments/{made}", json={"name": "x"}, headers=headers | {"If-Match": "*"}),

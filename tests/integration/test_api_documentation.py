@@ -19,6 +19,7 @@ from tests.experiments import run, toy
 METHODS = {"get", "post", "put", "patch", "delete"}
 ENDPOINTS = {
     "POST /studies",
+    "POST /studies/estimate",
     "GET /studies",
     "GET /studies/{id}",
     "GET /studies/{id}/curves",
@@ -63,6 +64,7 @@ ENDPOINTS = {
 
 OPERATIONS = {
     "submit_study",
+    "estimate_study",
     "list_studies",
     "read_study",
     "edit_study",
