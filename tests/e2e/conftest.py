@@ -2,7 +2,8 @@
 
 `visit(address, dark=…, width=…)` opens the page in Chromium, and fails the test if the console, a script or a request
 reports an error; `visit.forgive(pattern, …)` names those that a test causes. `archive` is the API alone on a database
-with ended studies, `shared_service` the real service with workers; each is started once, for all tests that ask for it.
+with ended studies, `api` the same on that of `sqlite_store`, which a test fills as workers would, `shared_service` the
+real service with workers.
 """
 
 import shutil
@@ -38,6 +39,15 @@ def visit(browser):
     open_page.forgive = browser.forgive
     yield open_page
     browser.end()
+
+
+@pytest.fixture
+def api(sqlite_url, tmp_path):
+    """The API alone on the database of `sqlite_store`, to which a test writes as workers would."""
+    api = Api(sqlite_url, tmp_path / "api.log").start()
+    yield api
+    api.kill()  # an end in order would wait for the page's stream
+    api.close()
 
 
 @pytest.fixture(scope="session")
