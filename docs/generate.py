@@ -15,8 +15,9 @@ import typer
 from api.app import create_app
 from api.cli import app
 from api.client import Client
+from api.completion import KINDS
 from api.exits import MEANINGS
-from schemas.plugin import PluginRead
+from schemas.plugin import BudgetRead, PluginRead
 from services.catalogue import catalogue
 from services.plugins import VARIABLE
 from services.settings import Limits, Settings, variable_of
@@ -74,10 +75,14 @@ def plugins() -> Iterator[str]:
     """Every plug-in with its options."""
     found = catalogue()
     yield "What specs can name. A running service lists its own, and those of `GAPLAB_PLUGINS`: `gaplab catalogue`.\n"
-    for kind in type(found).model_fields:
+    for kind in KINDS:
         yield f"## {kind.capitalize()}\n"
         for each in getattr(found, kind):
             yield from _plugin(each)
+    yield "## Budgets\n"
+    columns = tuple(BudgetRead.model_fields)
+    rows = [tuple(f"{getattr(each, name)}" for name in columns) for each in found.budgets]
+    yield from _table(tuple(name.replace("_", " ") for name in columns), rows)
 
 
 def python() -> Iterator[str]:

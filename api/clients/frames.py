@@ -1,10 +1,12 @@
 """What the service knows as tables: frames of pandas, one row per observation, whole however many pages it is."""
 
+import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from api.clients.errors import ExtraMissing
 from api.clients.life_cycle import part
+from schemas.predictions import Prediction, Predictions
 from schemas.records import MeasurementKind, Page, SampleRead, SimulatorRead
 
 if TYPE_CHECKING:
@@ -91,6 +93,29 @@ class Frames:
         columns = ["repetition", "iteration", "rank", "squared_error"]
         frame = frames.DataFrame([each.model_dump(include={*columns}) for each in found], columns=columns)
         return _numeric(frame.join(frames.DataFrame([each.parameters for each in found], index=frame.index)), columns)
+
+    def predictions(self: "Client", id: str, *, every_s: float = 0.5, timeout_s: float = 600.0) -> "pandas.DataFrame":  # noqa: A002
+        """What simulators said of each sample of an experiment before and after it was measured, and what reality said.
+
+        The service computes it when it is asked for the first time, and is waited for.
+
+        Args:
+            id: of the experiment.
+            every_s: how often it is asked whether all is computed.
+            timeout_s: how long to wait at most.
+
+        Raises:
+            TimeoutError: it takes longer; what is computed is kept, ask again.
+        """
+        frames = _pandas()
+        began = time.monotonic()
+        while (found := self._read(Predictions, self._get(f"/experiments/{part(id)}/predictions"))).pending:
+            if time.monotonic() - began > timeout_s:
+                msg = f"{found.pending} predictions of {id} are not computed after {timeout_s:g} s; ask again"
+                raise TimeoutError(msg)
+            time.sleep(every_s)
+        columns = list(Prediction.model_fields)
+        return _numeric(frames.DataFrame([each.model_dump() for each in found.items], columns=columns), columns)
 
     def _all(self: "Client", of: type[T], address: str, /, **filters: str | int | None) -> Iterator[T]:
         """Every item of a list, page after page."""

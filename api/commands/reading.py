@@ -129,7 +129,7 @@ def catalogue(
 
 
 def _print_plugin(found: Catalogue, name: str, *, as_json: bool) -> None:
-    plugins = {each.name: each for kind in type(found).model_fields for each in getattr(found, kind)}
+    plugins = {each.name: each for kind in completion.KINDS for each in getattr(found, kind)}
     if name not in plugins:
         raise CommandError(unknown_name("", "plug-in", name, list(plugins)).message, Exit.NOT_FOUND)
     if as_json:

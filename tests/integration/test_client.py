@@ -29,7 +29,9 @@ class InProcess(httpx2.BaseTransport):
     """The app in this process in place of the network; `lost` answers are served and then lost on the way."""
 
     def __init__(self, store: Store) -> None:
-        self._client = TestClient(create_app(store), raise_server_exceptions=False)
+        app = create_app(store)
+        self._client = TestClient(app, raise_server_exceptions=False)
+        self.close = app.state.physics.close
         self.asked: list[str] = []
         self.lost = 0
         self.busy = 0
@@ -45,7 +47,8 @@ class InProcess(httpx2.BaseTransport):
         if self.lost:
             self.lost -= 1
             raise httpx2.ReadError("the answer was lost")
-        return httpx2.Response(answer.status_code, headers=answer.headers, content=answer.content)
+        decoded = {name: value for name, value in answer.headers.items() if name != "content-encoding"}
+        return httpx2.Response(answer.status_code, headers=decoded, content=answer.content)
 
 
 @pytest.fixture
@@ -118,6 +121,38 @@ def test_simulators_are_a_frame_with_a_column_for_each_tunable(client: Client, f
     assert list(found) == ["repetition", "iteration", "rank", "squared_error", "static_friction", "restitution"]
     assert found["squared_error"].isna().any()  # infinite there, null on the wire
     assert set(client.simulators(experiment.id, iteration=0)["iteration"]) == {0}
+
+
+def predictions(pending: int) -> httpx2.Response:
+    """An answer of the service, with `pending` of two samples not computed yet."""
+    items = [
+        {"repetition": 0, "iteration": k, "simulated_before": None, "simulated_after": 0.5, "fitness": 0.4}
+        for k in range(2 - pending)
+    ]
+    return httpx2.Response(200, json={"experiment": "e", "unit": "m/s", "items": items, "pending": pending})
+
+
+def test_predictions_are_waited_for_until_none_is_pending():
+    answers = [predictions(2), predictions(1), predictions(0)]
+    network = httpx2.MockTransport(lambda _: answers.pop(0))
+
+    with Client("http://127.0.0.1:1", transport=network) as client:
+        found = client.predictions("e", every_s=0)
+
+    assert answers == []
+    assert len(found) == 2
+    assert found["simulated_before"].dtype == float
+    assert found["simulated_before"].isna().all()
+
+
+def test_predictions_that_take_too_long_say_how_many_are_left():
+    network = httpx2.MockTransport(lambda _: predictions(1))
+
+    with (
+        Client("http://127.0.0.1:1", transport=network) as client,
+        pytest.raises(TimeoutError, match="1 predictions of e are not computed"),
+    ):
+        client.predictions("e", every_s=0, timeout_s=0)
 
 
 @pytest.mark.parametrize("method", ["samples", "simulators"])
