@@ -14,6 +14,9 @@ const VIEWS = [
   [/^\/experiments\/([^/]+)$/, "experiment", ["id"]],
 ];
 
+const AWAY = new Set([0, 502, 503, 504]);
+const AGAIN_MS = 2000;
+
 let leaving = new AbortController();
 
 /** What the address asks for: the view's name and its parameters, or nothing. */
@@ -47,9 +50,17 @@ async function route() {
     const { show } = await import(`./views/${view.name}.js`);
     if (!signal.aborted) await show(root, view.parameters, signal);
   } catch (error) {
-    if (!signal.aborted) root.replaceChildren(failed(error, route));
+    if (signal.aborted) return;
+    root.replaceChildren(failed(error, route));
+    if (AWAY.has(error.status)) againOnce(signal);
   }
   if (!signal.aborted) document.title = `${root.querySelector("h1")?.textContent ?? "gaplab"} · gaplab`;
+}
+
+/** A service that is away is asked again by itself. */
+function againOnce(signal) {
+  const timer = setTimeout(route, AGAIN_MS);
+  signal.addEventListener("abort", () => clearTimeout(timer));
 }
 
 document.getElementById("theme").addEventListener("click", switchTheme);
