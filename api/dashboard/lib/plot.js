@@ -2,8 +2,10 @@
 
 import { get } from "./api.js";
 import { h } from "./dom.js";
+import { dressed } from "./look.js";
 import { empty, failed } from "./states.js";
-import { isDark, onTheme } from "./theme.js";
+import { table } from "./table.js";
+import { onTheme } from "./theme.js";
 
 let loaded = null;
 
@@ -23,7 +25,8 @@ function plotly() {
 export function plot(element, kind, query, signal) {
   const canvas = h("div", { class: "plot", role: "img" });
   const caption = h("figcaption");
-  element.replaceChildren(h("figure", {}, canvas, caption));
+  const numbers = h("div");
+  element.replaceChildren(h("figure", {}, canvas, caption, numbers));
   let answer = null;
   const draw = async () => {
     if (!answer || signal.aborted) return;
@@ -34,7 +37,7 @@ export function plot(element, kind, query, signal) {
     const library = await plotly();
     if (signal.aborted) return;
     canvas.querySelector(".state")?.remove();
-    const { data, layout } = themed(answer.figure);
+    const { data, layout } = dressed(answer.figure, canvas);
     await library.react(canvas, data, layout, { displayModeBar: false, responsive: true });
   };
   const refresh = async (changed = query) => {
@@ -43,6 +46,7 @@ export function plot(element, kind, query, signal) {
       answer = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
       canvas.setAttribute("aria-label", answer.alt);
       caption.textContent = answer.caption;
+      numbers.replaceChildren(...(answer.table && !answer.empty ? [counted(answer.table, numbers.querySelector("details")?.open)] : []));
       await draw();
     } catch (error) {
       if (!signal.aborted && !answer) canvas.replaceChildren(failed(error, () => refresh()));
@@ -54,21 +58,6 @@ export function plot(element, kind, query, signal) {
   return refresh;
 }
 
-/** The figure in the colours of the page: its ink, its ground, its lines. */
-function themed({ data, layout }) {
-  const style = getComputedStyle(document.documentElement);
-  const [ink, line] = ["--ink", "--line"].map((each) => style.getPropertyValue(each).trim());
-  const axes = Object.keys(layout).filter((each) => /^[xy]axis\d*$/.test(each));
-  const lined = Object.fromEntries(axes.map((each) => [each, { ...layout[each], gridcolor: line, linecolor: ink, zerolinecolor: line }]));
-  return {
-    data: data.map((each) => (each.meta?.ink && isDark() ? inked(each, ink) : each)),
-    layout: { ...layout, ...lined, paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { ...layout.font, color: ink } },
-  };
-}
-
-function inked(trace, ink) {
-  const shown = { ...trace };
-  if (trace.line) shown.line = { ...trace.line, color: ink };
-  if (trace.marker) shown.marker = { ...trace.marker, color: ink };
-  return shown;
+function counted({ head, rows }, open) {
+  return h("details", { class: "numbers", open }, h("summary", {}, "The numbers"), table("The numbers of the figure", head, rows));
 }
