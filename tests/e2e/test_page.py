@@ -53,7 +53,7 @@ def test_a_running_study_is_cancelled_after_a_question(visit, shared_service):
 
     page.locator(".state-now .cancelled").wait_for()
     assert shared_service.get(f"/studies/{study}")["state"] == "CANCELLED"
-    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Pause").press("Enter")
     page.get_by_text("None of its experiments can be paused now").wait_for()
 
 
