@@ -19,6 +19,7 @@ from tests.experiments import run, toy
 METHODS = {"get", "post", "put", "patch", "delete"}
 ENDPOINTS = {
     "POST /studies",
+    "POST /studies/estimate",
     "GET /studies",
     "GET /studies/{id}",
     "GET /studies/{id}/curves",
@@ -29,6 +30,8 @@ ENDPOINTS = {
     "GET /experiments/{id}/samples",
     "GET /experiments/{id}/simulators",
     "GET /experiments/{id}/misfit",
+    "GET /experiments/{id}/predictions",
+    "GET /experiments/{id}/replay",
     "GET /experiments/{id}/repetitions/{number}/attempts",
     "POST /experiments/{id}/pause",
     "POST /experiments/{id}/resume",
@@ -51,7 +54,10 @@ ENDPOINTS = {
     "GET /comparisons",
     "GET /figures/curves",
     "GET /figures/simulators",
+    "GET /figures/predictions",
     "GET /figures/squared-error",
+    "GET /figures/gait",
+    "GET /figures/toy",
     "POST /sensitivity",
     "GET /sensitivity/{id}",
     "GET /experiments/{id}/export",
@@ -65,6 +71,7 @@ ENDPOINTS = {
 
 OPERATIONS = {
     "submit_study",
+    "estimate_study",
     "list_studies",
     "read_study",
     "edit_study",
@@ -78,12 +85,17 @@ OPERATIONS = {
     "list_samples",
     "list_simulators",
     "read_misfit",
+    "read_predictions",
+    "read_replay",
     "read_curve",
     "read_curves",
     "compare_experiments",
     "draw_curves",
     "draw_simulators",
+    "draw_predictions",
     "draw_squared_error",
+    "draw_gait",
+    "draw_toy",
     "submit_sensitivity",
     "read_sensitivity",
     "read_catalogue",
@@ -209,7 +221,7 @@ def test_real_answers_fit_their_documented_schema(document: dict[str, Any], sqli
     experiment = made["experiments"][0]
     ids = {"studies": made["id"], "experiments": experiment["id"], "sensitivity": experiment["sensitivity"]}
     for name, operation in operations(document):
-        if name.startswith("GET") and "{id}" in name and not name.endswith("/export"):
+        if name.startswith("GET") and "{id}" in name and not name.endswith(("/export", "/replay")):
             path = name.split()[1].format(id=ids[name.split("/")[1]], number=0)
             schema = operation["responses"]["200"]["content"]["application/json"]["schema"]
             assert complaints(document, schema, api.get(path).json()) == [], name
@@ -227,5 +239,6 @@ def test_the_pages_load_everything_from_the_service_itself(api: TestClient, page
         assert api.get(source).status_code == 200, source
 
 
-def test_the_address_of_the_service_leads_to_its_documentation(api: TestClient):
-    assert "swagger" in api.get("/").text
+def test_the_page_of_the_service_leads_to_its_documentation(api: TestClient):
+    assert 'href="docs"' in api.get("/").text
+    assert "swagger" in api.get("/docs").text

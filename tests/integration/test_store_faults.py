@@ -6,6 +6,7 @@ What is asked is read from the supervisor's own source, so that nothing new is f
 import ast
 from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 from ray.exceptions import RayTaskError, WorkerCrashedError
@@ -57,7 +58,7 @@ class Trying(Here):
     """Runs everything that may happen to a repetition: the second of the first experiment loses its first worker."""
 
     lost = False
-    late = set()
+    late: ClassVar = set()
     """The modules whose leases have run out: much time passes before each supervisor, and none while it works."""
 
     def __init__(self, store):

@@ -103,6 +103,21 @@ def recorded(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str
     return session.execute(query).all()
 
 
+def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, float]:
+    """Of each experiment, the best recorded fitness of a repetition so far, on average over those that have one."""
+    of_one = (
+        select(func.max(IterationRow.recorded_fitness))
+        .where(IterationRow.repetition_id == RepetitionRow.id)
+        .scalar_subquery()
+    )
+    query = select(RepetitionRow.experiment_id, of_one).where(RepetitionRow.experiment_id.in_(experiments))
+    found: dict[str, list[float]] = {}
+    for experiment, best in session.execute(query):
+        if best is not None:
+            found.setdefault(experiment, []).append(best)
+    return {experiment: sum(each) / len(each) for experiment, each in found.items()}
+
+
 @dataclass(frozen=True)
 class Best:
     """The best simulator of one iteration, and the controller that was evolved in it.
