@@ -110,6 +110,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     problems.install(app)
     for module in MODULES:
         app.include_router(module.router)
+    figures.install(app)
     dashboard.install(app)
     documentation.install(app)
     return app

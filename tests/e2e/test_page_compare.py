@@ -102,7 +102,7 @@ def test_the_address_holds_everything(archive, ids, visit):
 def test_what_differs_is_what_the_service_found(archive, ids, visit):
     page = visit(address(archive, *ids, to="1"))
     matrix = page.locator("table.matrix")
-    expect(matrix.get_by_role("caption")).to_contain_text("after 1 real-world evaluation")
+    expect(page.get_by_text("The row against the column")).to_contain_text("after 1 real-world evaluation")
     found = archive.get("/comparisons", experiment=ids, **{"from": 1, "to": 1})
     for pair in found:
         row, column = ids.index(pair["first"]), ids.index(pair["second"])
@@ -121,7 +121,7 @@ def test_what_differs_is_what_the_service_found(archive, ids, visit):
     heads = page.get_by_role("region", name="Pairs").locator("thead th").all_inner_texts()
     assert heads[1:4] == ["At 1", "At 1–5", "At 3–5"]
     page.get_by_role("button", name="3–5", exact=True).click()
-    expect(matrix.get_by_role("caption")).to_contain_text("over 3 to 5")
+    expect(page.get_by_text("The row against the column")).to_contain_text("over 3 to 5")
     expect(page.get_by_role("button", name="3–5", exact=True)).to_have_attribute("aria-pressed", "true")
 
 

@@ -2,8 +2,10 @@
 
 import { get } from "./api.js";
 import { h } from "./dom.js";
+import { dressed } from "./look.js";
 import { empty, failed, loading } from "./states.js";
-import { isDark, onTheme } from "./theme.js";
+import { table } from "./table.js";
+import { onTheme } from "./theme.js";
 
 let loaded = null;
 
@@ -27,10 +29,13 @@ function plotly() {
 export function plot(element, kind, query, signal) {
   const canvas = h("div", { class: "plot" });
   const caption = h("figcaption");
+  const numbers = h("div");
   canvas.append(loading());
-  element.replaceChildren(h("figure", {}, canvas, caption));
+  element.replaceChildren(h("figure", {}, canvas, caption, numbers));
   let answer = null;
+  let drawn = false;
   const say = (words) => {
+    drawn = false;
     globalThis.Plotly?.purge(canvas);
     for (const each of ["role", "aria-label"]) canvas.removeAttribute(each);
     canvas.replaceChildren(words);
@@ -46,17 +51,19 @@ export function plot(element, kind, query, signal) {
     canvas.querySelector(".state")?.remove();
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", answer.alt);
-    const { data, layout } = themed(answer.figure);
+    const { data, layout } = dressed(answer.figure, canvas);
     await library.react(canvas, data, layout, { displayModeBar: false, responsive: true });
+    drawn = true;
   };
   const refresh = async (changed = query) => {
     query = changed;
     try {
       answer = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
       caption.textContent = answer.caption;
+      numbers.replaceChildren(...(answer.table && !answer.empty ? [counted(answer.table, numbers.querySelector("details")?.open)] : []));
       await draw();
     } catch (error) {
-      if (!signal.aborted && !answer) say(failed(error, () => refresh()));
+      if (!signal.aborted && !drawn) say(failed(error, () => refresh()));
     }
   };
   onTheme(draw, signal);
@@ -65,21 +72,6 @@ export function plot(element, kind, query, signal) {
   return refresh;
 }
 
-/** The figure in the colours of the page: its ink, its ground, its lines. */
-function themed({ data, layout }) {
-  const style = getComputedStyle(document.documentElement);
-  const [ink, line] = ["--ink", "--line"].map((each) => style.getPropertyValue(each).trim());
-  const axes = Object.keys(layout).filter((each) => /^[xy]axis\d*$/.test(each));
-  const lined = Object.fromEntries(axes.map((each) => [each, { ...layout[each], gridcolor: line, linecolor: ink, zerolinecolor: line }]));
-  return {
-    data: data.map((each) => (each.meta?.ink && isDark() ? inked(each, ink) : each)),
-    layout: { ...layout, ...lined, paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { ...layout.font, color: ink } },
-  };
-}
-
-function inked(trace, ink) {
-  const shown = { ...trace };
-  if (trace.line) shown.line = { ...trace.line, color: ink };
-  if (trace.marker) shown.marker = { ...trace.marker, color: ink };
-  return shown;
+function counted({ head, rows }, open) {
+  return h("details", { class: "numbers", open }, h("summary", {}, "The numbers"), table("The numbers of the figure", head, rows));
 }

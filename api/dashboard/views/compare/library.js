@@ -48,6 +48,11 @@ export function library(signal) {
     get: (id) => experiments.get(id) ?? null,
     keep, shelve, study, anew, fetch,
     name: (id) => spoken(experiments.get(id)?.name ?? id),
+    /** Their names by id, as the figure has them: of two that are alike each carries its id. */
+    names(ids) {
+      const names = ids.map(this.name);
+      return new Map(ids.map((id, at) => [id, names.indexOf(names[at]) === names.lastIndexOf(names[at]) ? names[at] : `${names[at]} (${id.slice(0, 8)})`]));
+    },
     place: (id) => studies.get(experiments.get(id)?.study) ?? null,
   };
 }

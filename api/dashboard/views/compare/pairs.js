@@ -12,12 +12,13 @@ const NAMES = { student: "Student", welch: "Welch", mann_whitney: "Mann–Whitne
 export function pairs(view, ids, results, open) {
   const { test, experiments } = view.choice;
   const short = (id) => letter(experiments.indexOf(id));
+  const names = view.books.names(experiments);
   const chosen = results.at(-1);
   const order = [...results].sort((one, other) => one.range[0] - other.range[0] || one.range[1] - other.range[1]);
   const columns = ["Pair", ...order.map(({ range }) => `At ${spoken(range)}`), `Difference at ${spoken(chosen.range)}`, "d", "n",
     ...Object.values(NAMES).map((name) => `${name}, p after Holm`)];
   const rows = chosen.pairs.map((pair, at) => [
-    `${short(pair.first)} ${view.books.name(pair.first)} − ${short(pair.second)} ${view.books.name(pair.second)}`,
+    `${short(pair.first)} ${names.get(pair.first)} − ${short(pair.second)} ${names.get(pair.second)}`,
     ...order.map((each) => told(each.pairs[at], test)),
     size(pair.difference), size(pair.effect_size), `${pair.n_first}, ${pair.n_second}`,
     ...Object.keys(NAMES).map((each) => probability(pair[each].p_holm)),

@@ -70,7 +70,7 @@ async function fill(place, view, { ids, range, last, anew }, wanted) {
     if (!wanted()) return;
     const results = asked.map((each, at) => ({ range: each, pairs: found[at] }));
     const open = place.querySelector("details")?.open ?? false;
-    place.replaceChildren(matrix(view, ids, results.at(-1)), pairs(view, ids, results, open));
+    place.replaceChildren(...matrix(view, ids, results.at(-1)), pairs(view, ids, results, open));
   } catch (error) {
     if (wanted() && !view.signal.aborted) place.replaceChildren(failed(error, () => fill(place, view, { ids, range, last, anew }, wanted)));
   }

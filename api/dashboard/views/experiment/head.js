@@ -56,12 +56,13 @@ function trail({ experiment, signal }) {
 function factsOf(experiment) {
   const { progress } = experiment;
   const failed = progress.failed ? `, ${count(progress.failed)} failed` : "";
+  const saved = progress.rollouts_saved ? `, ${count(progress.rollouts_saved)} not needed` : "";
   const broken = progress.rollouts_failed ? `, physics failed in ${count(progress.rollouts_failed)}` : "";
   return [
     ["Done", `${Math.floor(100 * fraction(progress))} %`],
     ["Repetitions", `${count(progress.completed)} of ${count(progress.repetitions)}${failed}`],
     ["Iterations", `${count(progress.iterations_done)} of ${count(progress.iterations)}`],
-    ["Rollouts", `${count(progress.rollouts_done)}, ${count(progress.rollouts_saved)} saved, of ${count(progress.rollouts)}${broken}`],
+    ["Rollouts", `${count(progress.rollouts_done)} of ${count(progress.rollouts)}${saved}${broken}`],
     ...times(experiment),
     ["Priority", experiment.priority],
     ["At once", experiment.max_parallel === null ? "any number" : `at most ${count(experiment.max_parallel)}`],
