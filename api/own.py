@@ -14,12 +14,13 @@ START_WITHIN_S = 120.0
 
 
 @contextmanager
-def own_service(database_url: str, log: Path) -> Iterator[Client]:
+def own_service(database_url: str, log: Path, *, workers: bool = True) -> Iterator[Client]:
     """A client of a real service, a process of its own that is ended in order at the end.
 
     Args:
-        database_url: of its database.
+        database_url: of its database, which one without workers does not migrate.
         log: gets what it says.
+        workers: whether it computes as well as answers.
 
     Raises:
         CommandError: it does not start.
@@ -27,7 +28,8 @@ def own_service(database_url: str, log: Path) -> Iterator[Client]:
     port = _free_port()
     environment = {"GAPLAB_DATABASE_URL": database_url, "GAPLAB_PORT": str(port), "GAPLAB_HOST": "127.0.0.1"}
     with log.open("ab") as output:
-        process = start("api.cli", "serve", environment=environment, log=output)
+        module = ("api.cli", "serve") if workers else ("api",)
+        process = start(*module, environment=environment, log=output)
         try:
             with Client(f"http://127.0.0.1:{port}") as client:
                 deadline = time.monotonic() + START_WITHIN_S
