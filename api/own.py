@@ -3,9 +3,10 @@
 import socket
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import IO
 
 from api.client import Client
@@ -17,18 +18,19 @@ START_WITHIN_S = 120.0
 
 
 @contextmanager
-def own_service(database_url: str, log: Path) -> Iterator[Client]:
+def own_service(database_url: str, log: Path, *, workers: bool = True) -> Iterator[Client]:
     """A client of a real service, a process of its own that is ended in order at the end.
 
     Args:
-        database_url: of its database.
+        database_url: of its database, which one without workers does not migrate.
         log: gets what it says.
+        workers: whether it computes as well as answers.
 
     Raises:
         CommandError: it does not start.
     """
     with log.open("ab") as output:
-        process, url = _started(database_url, output)
+        process, url = _started(database_url, output, workers=workers)
         try:
             with Client(url) as client:
                 _wait_until_ready(client, process, log)
@@ -76,12 +78,13 @@ def local_service(folder: str | Path = "results/local", *, plugins: str | Path |
 
 
 def _started(
-    database_url: str, log: IO[bytes], added: dict[str, str] | None = None
+    database_url: str, log: IO[bytes], added: Mapping[str, str] = MappingProxyType({}), *, workers: bool = True
 ) -> tuple["subprocess.Popen[bytes]", str]:
     """A service's process, and where it will answer."""
     port = _free_port()
     environment = {"GAPLAB_DATABASE_URL": database_url, "GAPLAB_PORT": str(port), "GAPLAB_HOST": "127.0.0.1"}
-    process = start("api.cli", "serve", environment=environment | (added or {}), log=log)
+    module = ("api.cli", "serve") if workers else ("api",)
+    process = start(*module, environment=environment | dict(added), log=log)
     return process, f"http://127.0.0.1:{port}"
 
 

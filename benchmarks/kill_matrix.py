@@ -7,61 +7,34 @@ store are the real ones; only Ray is left out, so that repetitions run within th
 
 import argparse
 import os
-import shutil
 import signal
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from hashlib import sha256
-from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import sleep
 from typing import Any
 
-import psycopg
 from rich.console import Console
 from rich.table import Table
 from sqlalchemy import select
 from sqlalchemy.engine.default import DefaultDialect
 
-import migrations
+from benchmarks.databases import Databases
 from benchmarks.supervisor import postgres
-from schemas.lifecycle import State
-from schemas.spec import ExperimentSpec
-from services import execution, experiments
+from benchmarks.without_ray import SPEC, work
+from services import execution
 from services.core import loop
-from services.execution import Claim
-from services.simulation import setting
 from services.store.models import CheckpointRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
 from services.store.repository import checkpoints, steps
 from services.store.session import Store
-from workers import supervisor
-from workers.checkpoints import Recorder, recorded
-from workers.repetition import batches
-from workers.run import Run
+from workers.checkpoints import Recorder
 from workers.supervisor import Supervisor
-
-SPEC = ExperimentSpec.model_validate(
-    {
-        "strategy": {"name": "informative", "options": {"simulators": 3}},
-        "robot": "toy_function",
-        "optimizer": {"name": "steady_state", "options": {"population": 4}},
-        "iterations": 1,
-        "repetitions": 2,
-        "budget": {"controller_evaluations": 6, "selection_evaluations": 6, "simulator_evaluations": 6},
-    }
-)
-"""Every kind of step, each with checkpoints."""
 
 CHANCE = {"owner", "epoch", "attempts", "losses", "error", "seconds"}
 CHANCE |= {"heartbeat_at", "started_at", "ended_at", "measured_at"}
 """Columns that say how it went, and not what came of it."""
-
-OPEN = (State.QUEUED, State.RUNNING)
-
-ROUNDS = 2_000
-"""More than any run takes."""
 
 Wrap = Callable[[Callable[[], None], Callable[[], None]], None]
 """Puts what happens before and after a function into it."""
@@ -98,81 +71,6 @@ POINTS: dict[str, Wrap] = {
     "requeue of what was lost": around(execution, "requeue_lost"),
 }
 """Where the process may die; each of them before and after."""
-
-
-class HereRun(Run):
-    """A run whose repetition is computed by this process."""
-
-    def receive(self) -> None:
-        """The next batch, or the end."""
-        batch = next(self.stream, None)
-        self.begun, self.ended = True, batch is None
-        self.received += batch or ()
-
-    def cancel(self) -> None:
-        """What computes it ends with its next delivery."""
-        self.stream.close()
-
-
-class NoChecks:
-    """Sensitivity checks are left to Ray."""
-
-    def step(self) -> None:
-        """None runs."""
-
-    def heartbeat(self) -> None:
-        """None is held."""
-
-    def hand_back(self) -> None:
-        """None was taken."""
-
-
-class Here(Supervisor):
-    """The supervisor as it is, but for Ray; every answer of a simulator is a checkpoint."""
-
-    def __init__(self, store: Store) -> None:
-        super().__init__(store, lambda: 2)
-        self._checks = NoChecks()  # type: ignore[assignment]
-
-    def _launch(self, claim: Claim) -> Run:
-        stream = batches(recorded(setting(claim.spec, claim.number), claim.log, claim.checkpoints, 0.0))
-        return HereRun(claim, stream)  # type: ignore[arg-type]
-
-    def _receive(self) -> None:
-        for run in self._runs:
-            if not run.over:
-                run.receive()
-
-
-class Stop:
-    """An Event that is set after some looks at it."""
-
-    def __init__(self, looks: int) -> None:
-        self._looks = looks
-
-    def is_set(self) -> bool:
-        """Whether that many looks were taken."""
-        self._looks -= 1
-        return self._looks < 0
-
-    def wait(self, seconds: float) -> None:
-        """As an Event."""
-        sleep(seconds)
-
-
-def work(url: str) -> None:
-    """What a supervisor does from its start to the end of all that is queued; it is told to stop once on the way."""
-    supervisor.HEARTBEAT_S = supervisor.WAIT_S = 0.0
-    store = Store(url)
-    execution.requeue_lost(store, stale_after_s=-1.0)  # half a minute has passed since the last one died
-    Here(store).serve(Stop(8))  # type: ignore[arg-type]
-    last = Here(store)
-    for _ in range(ROUNDS):
-        last.step()
-        with store.reading() as session:
-            if not session.scalars(select(RepetitionRow.id).where(RepetitionRow.state.in_(OPEN))).all():
-                return
-    sys.exit("it does not come to an end")
 
 
 def in_a_child(task: Callable[[], None]) -> int:
@@ -240,51 +138,6 @@ def results(url: str) -> str:
     return digest.hexdigest()
 
 
-class Databases:
-    """New databases in which the experiment is queued: copies of one."""
-
-    def __init__(self, folder: Path, server: str | None) -> None:
-        self._folder = folder
-        self._server = server
-        self._numbers = count()
-        self._template = self._url("template")
-        if server:
-            self._execute('CREATE DATABASE "kill_template"')
-        migrations.upgrade(self._template)
-        store = Store(self._template)
-        experiments.submit_experiment(store, SPEC)
-        store.dispose()
-
-    def new(self) -> str:
-        """The URL of one."""
-        name = str(next(self._numbers))
-        if self._server:
-            self._execute(f'CREATE DATABASE "kill_{name}" TEMPLATE "kill_template"')
-        else:
-            shutil.copy(self._folder / "template.db", self._folder / f"{name}.db")
-        return self._url(name)
-
-    def drop(self, url: str) -> None:
-        """It is of no use any more."""
-        if self._server:
-            self._execute(f'DROP DATABASE "{url.partition("?")[0].rpartition("/")[2]}" WITH (FORCE)')
-
-    def close(self) -> None:
-        """Drop the template."""
-        self.drop(self._template)
-
-    def _url(self, name: str) -> str:
-        if not self._server:
-            return f"sqlite:///{self._folder / name}.db"
-        place, mark, query = self._server.partition("?")
-        return f"{place.rpartition('/')[0]}/kill_{name}{mark}{query}"
-
-    def _execute(self, statement: str) -> None:
-        assert self._server
-        with psycopg.connect(self._server, autocommit=True) as connection:
-            connection.execute(statement)
-
-
 def spread(total: int, wanted: int) -> list[int]:
     """So many occurrences of `total`, evenly over all of them."""
     if total <= wanted:
@@ -332,7 +185,7 @@ def main() -> int:
         for name in (arguments.only,) if arguments.only else ("SQLite", "Postgres"):
             on_postgres = name == "Postgres"
             server = (arguments.postgres or stack.enter_context(postgres(folder))) if on_postgres else None
-            databases = Databases(folder, server)
+            databases = Databases(folder, server, SPEC)
             found[name] = rows(databases, arguments.kills)
             databases.close()
     table = Table("killed", *found, title="kills survived with equal results")

@@ -109,21 +109,21 @@ class Found:
     seconds: float = 0.0
 
 
-def _places(value: object) -> Iterator[tuple[Any, Any]]:
+def places(value: object) -> Iterator[tuple[Any, Any]]:
     """Every place inside the spec: what holds it, and its key there."""
     if isinstance(value, dict | list):
         for key in list(value) if isinstance(value, dict) else range(len(value)):
             yield value, key
-            yield from _places(value[key])
+            yield from places(value[key])
 
 
 def mutated(spec: dict[str, Any], rng: random.Random) -> dict[str, Any]:
     """The spec with one to three mutations."""
     found = copy.deepcopy(spec)
     for _ in range(rng.randint(1, 3)):
-        if not (places := list(_places(found))):
+        if not (found_places := list(places(found))):
             break
-        parent, key = rng.choice(places)
+        parent, key = rng.choice(found_places)
         match rng.choice(("replace", "replace", "remove", "add", "swap")):
             case "replace":
                 parent[key] = copy.deepcopy(rng.choice(VALUES))
@@ -134,7 +134,7 @@ def mutated(spec: dict[str, Any], rng: random.Random) -> dict[str, Any]:
                     rng.choice(OUTSIDE)
                 )
             case _:
-                other, place = rng.choice(places)
+                other, place = rng.choice(found_places)
                 parent[key] = copy.deepcopy(other[place])
     return found
 

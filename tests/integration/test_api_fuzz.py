@@ -11,23 +11,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from api.app import create_app
+from benchmarks.mutated_specs import EXPERIMENT, places
 from migrations import upgrade
 from schemas.problems import Problem
 from services.store.session import Store
-
-WHOLE: dict[str, Any] = {
-    "name": "whole",
-    "strategy": {"name": "simulated_fit_and_informative", "options": {"simulators": 5, "fit_weight": 1.0}},
-    "iterations": 2,
-    "repetitions": 2,
-    "robot": {"name": "toy_function", "options": {}},
-    "engine": {"name": "analytic", "options": {}},
-    "optimizer": {"name": "steady_state", "options": {"population": 10, "mutation_scale": 0.3}},
-    "tunables": ["restitution", {"name": "static_friction", "lower": 0.0, "upper": 1.5}],
-    "reality": {"engine": "analytic", "parameters": {"static_friction": 1.0}},
-    "budget": {"preset": "smoke", "controller_evaluations": 60},
-    "seed": 3,
-}
 
 ANYTHING = st.recursive(
     st.none()
@@ -42,23 +29,14 @@ ANYTHING = st.recursive(
 )
 
 
-def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """The path to every value inside a spec."""
-    if isinstance(value, dict | list):
-        inner = value.items() if isinstance(value, dict) else enumerate(value)
-        return [path] * bool(path) + [each for key, item in inner for each in places(item, (*path, key))]
-    return [path]
-
-
 @st.composite
 def mutated_specs(draw: st.DrawFn) -> dict[str, Any]:
     """A valid spec in which up to three things are replaced, removed or added."""
-    spec = copy.deepcopy(WHOLE)
+    spec = copy.deepcopy(EXPERIMENT)
     for _ in range(draw(st.integers(1, 3))):
-        *parents, last = draw(st.sampled_from(places(spec)))
-        target = spec
-        for key in parents:
-            target = target[key]
+        if not (found := list(places(spec))):
+            break
+        target, last = draw(st.sampled_from(found))
         match draw(st.sampled_from(["replace", "remove", "add"])):
             case "replace":
                 target[last] = draw(ANYTHING)
@@ -66,8 +44,6 @@ def mutated_specs(draw: st.DrawFn) -> dict[str, Any]:
                 del target[last]
             case "add" if isinstance(target, dict):
                 target[draw(st.text(max_size=8))] = draw(ANYTHING)
-        if not places(spec):
-            break
     return spec
 
 

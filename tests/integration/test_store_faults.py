@@ -11,7 +11,7 @@ from typing import ClassVar
 import pytest
 from ray.exceptions import RayTaskError, WorkerCrashedError
 
-from benchmarks.kill_matrix import SPEC, Here, HereRun, Stop
+from benchmarks.without_ray import OPEN, SPEC, Here, HereRun, Stop
 from schemas.lifecycle import State
 from schemas.spec import ExperimentSpec
 from services import execution, experiments, sensitivity
@@ -28,7 +28,6 @@ from workers.checkpoints import recorded
 from workers.repetition import batches
 
 MODULES = {"execution": execution, "sensitivity": sensitivity}
-OPEN = (State.QUEUED, State.RUNNING)
 
 
 def asked_by_the_supervisor():
