@@ -1,7 +1,7 @@
 """Who is let in: every request is asked for its token before anything else looks at it.
 
 Reading wants a reader's token, and whatever else a method does a runner's. That follows from the method, so that no new
-route can forget it.
+route can forget it; but for what is asked with a body and changes nothing.
 """
 
 from urllib.parse import urlsplit
@@ -19,10 +19,16 @@ from services.settings import Settings
 OPEN = {"/livez", "/readyz"}
 """For whoever keeps the service alive; they tell nothing else."""
 
+ASSETS = "/assets/"
+"""Files of the page at `/`, which like the page hold no data: it asks its reader for the token."""
+
 WITHOUT_A_STORE = "/metrics"
 """Says that the database is away, and nothing of what is in it then, also to whoever cannot be known."""
 
 READING = {"GET", "HEAD", "OPTIONS"}
+
+ASKING = {"/studies/estimate"}
+"""Reading, though it is a POST: the question is too long for an address."""
 
 
 class Access:
@@ -44,7 +50,7 @@ class Access:
             await self.app(scope, receive, send)
             return
         request = Request(scope)
-        if scope["path"] in OPEN:
+        if scope["path"] in OPEN or scope["path"] == "/" or scope["path"].startswith(ASSETS):
             request.state.caller = ANYONE
             await self.app(scope, receive, send)
             return
@@ -66,7 +72,8 @@ class Access:
         caller = authenticate(request.app.state.store, token, required=self._required)
         if caller.token is None and self._by_name:
             _refuse_other_sites(request)
-        role = Role.READER if request.method in READING else Role.RUNNER
+        reads = request.method in READING or request.scope["path"] in ASKING
+        role = Role.READER if reads else Role.RUNNER
         demand(caller, role, f"{request.method} here")
         return caller
 

@@ -1,8 +1,10 @@
 """The application: routes, problems, limits and the pages that document them, put together."""
 
+import os
 from importlib.metadata import version
 
 from fastapi import FastAPI
+from fastapi.middleware.gzip import GZipMiddleware
 
 from api import documentation, problems
 from api.access import Access
@@ -14,6 +16,8 @@ from api.routes import (
     archives,
     catalogue,
     curves,
+    dashboard,
+    estimates,
     events,
     experiments,
     figures,
@@ -40,6 +44,7 @@ TAGS = [
     {"name": "studies", "description": "experiments that belong together to be compared"},
     {"name": "experiments", "description": "one strategy under one setting, repeated"},
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
+    {"name": "figures", "description": "to look at, and to put into papers"},
     {"name": "events", "description": "what happens to experiments, as it happens"},
     {"name": "archives", "description": "everything of an experiment or a study as one file, and back"},
     {"name": "sensitivity", "description": "what tunables do to fitness, checked before anything is tuned"},
@@ -49,6 +54,7 @@ TAGS = [
 
 MODULES = (
     studies,
+    estimates,
     experiments,
     life_cycle,
     provenance,
@@ -87,7 +93,9 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     limits = limits or Limits()
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
     app.state.feed = Feed(store)
+    app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
     app.state.metrics = Metrics(store, app.state.feed)
+    app.add_middleware(GZipMiddleware, minimum_size=20_000, compresslevel=4)
     app.add_middleware(BodyLimit, most_bytes=limits.body_bytes)
     app.add_middleware(Access, settings=settings)
     app.add_middleware(Headers)
@@ -95,5 +103,6 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     problems.install(app)
     for module in MODULES:
         app.include_router(module.router)
+    dashboard.install(app)
     documentation.install(app)
     return app

@@ -91,7 +91,7 @@ def baselines(found: Sequence[Curve]) -> list[str]:
 
 def catalogue(plugins: Catalogue) -> list[Table]:
     """Every kind of plug-in as a table."""
-    return [_plugins(kind, getattr(plugins, kind)) for kind in type(plugins).model_fields]
+    return [_plugins(kind, getattr(plugins, kind)) for kind in type(plugins).model_fields if kind != "budgets"]
 
 
 def sensitivity(found: SensitivityRead) -> Table:

@@ -4,7 +4,7 @@ from typing import Any
 
 from fastapi import FastAPI
 from fastapi.openapi.docs import get_redoc_html, get_swagger_ui_html
-from fastapi.responses import HTMLResponse, RedirectResponse
+from fastapi.responses import HTMLResponse
 from fastapi.staticfiles import StaticFiles
 
 from api.access import OPEN
@@ -16,16 +16,11 @@ ASSETS = "/assets/docs"
 
 
 def install(app: FastAPI) -> None:
-    """Serve /docs and /redoc, lead / to /docs, and describe problems in /openapi.json."""
+    """Serve /docs and /redoc, and describe problems in /openapi.json."""
     app.mount(ASSETS, StaticFiles(packages=[("fastapi_offline", "static")]), name="docs_assets")
-    app.add_api_route("/", _landing, include_in_schema=False)
     app.add_api_route("/docs", _docs, include_in_schema=False)
     app.add_api_route("/redoc", _redoc, include_in_schema=False)
     _describe_problems(app)
-
-
-def _landing() -> RedirectResponse:
-    return RedirectResponse("docs")
 
 
 def _docs() -> HTMLResponse:

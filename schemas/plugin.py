@@ -52,11 +52,23 @@ class PluginRead(Frozen):
     )
 
 
+class BudgetRead(Frozen):
+    """A named budget: what a spec has that leaves these numbers out."""
+
+    name: str
+    iterations: int
+    repetitions: int
+    controller_evaluations: int
+    selection_evaluations: int
+    simulator_evaluations: int
+
+
 class Catalogue(Frozen):
-    """Every plug-in that this service has."""
+    """Every plug-in that this service has, and the named budgets."""
 
     strategies: tuple[PluginRead, ...]
     robots: tuple[PluginRead, ...]
     engines: tuple[PluginRead, ...]
     tunables: tuple[PluginRead, ...]
     optimizers: tuple[PluginRead, ...]
+    budgets: tuple[BudgetRead, ...] = ()

@@ -51,6 +51,9 @@ class ExperimentRead(Frozen):
     priority: int = Field(default=0, description="the higher is computed first")
     max_parallel: int | None = Field(default=None, description="repetitions that run at once; null: any number")
     progress: Progress
+    best_fitness: float | None = Field(
+        default=None, description="the best recorded fitness of a repetition so far, on average over repetitions"
+    )
     reasons: tuple[str, ...] = Field(default=(), description="why repetitions failed, each reason once")
     sensitivity: str | None = Field(default=None, description="id of the check of what its tunables do to fitness")
     warnings: tuple[str, ...] = Field(

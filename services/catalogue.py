@@ -1,6 +1,9 @@
 """Everything that this service can be asked to run."""
 
-from schemas.plugin import Catalogue
+from dataclasses import asdict
+
+from schemas.plugin import BudgetRead, Catalogue
+from services.budgets import PRESETS
 from services.core.optimizers import optimizers
 from services.core.robots import robots
 from services.core.strategies import strategies
@@ -16,4 +19,5 @@ def catalogue() -> Catalogue:
         engines=engines.describe(),
         tunables=tunables.describe(),
         optimizers=optimizers.describe(),
+        budgets=tuple(BudgetRead(name=name, **asdict(preset)) for name, preset in PRESETS.items()),
     )

@@ -41,12 +41,14 @@ class Engine(Plugin):
         install: the line that installs it.
         honours: the World fields that change what it computes, like `material.dynamic_friction`.
         batch: rollouts that one call should ask for, if there is a choice; 1 where a call costs little beside one.
+        usual_rollout_s: seconds that a rollout usually takes, to estimate with before any was measured.
     """
 
     library: ClassVar[str | None] = None
     install: ClassVar[str] = ""
     honours: ClassVar[frozenset[str]]
     batch: ClassVar[int] = 1
+    usual_rollout_s: ClassVar[float] = 0.02
 
     @classmethod
     @abstractmethod

@@ -1,5 +1,12 @@
-"""One definition of each figure, drawn for the browser and for the file.
+"""One definition of each figure, for the page, the notebook and the file.
 
-`definition` says what is in the figure of curves, `style` how its lines are told apart; `html` and `svg` draw it, and
-decide nothing. Their libraries are imported when something is drawn.
+A figure is a value (`marks.Figure`): panels of marks (lines with bands, points, levels, bars, arrows, labels), what
+their axes are called, a caption that says n and what the bands are, and a sentence for those who cannot see it. `style`
+says how marks are told apart, `words` how names and numbers are written. Renderers know marks and nothing else: `chart`
+is for Plotly, `html` for a page that needs nothing else, `files` for SVG, PNG and PDF.
+
+To add a figure, write one file here: a function that takes what is to be shown, as schemas or plain values, and gives a
+`Figure`; `squared_error` is a short one to begin from. Every renderer then draws it. For its address, add an endpoint
+`/figures/NAME` that returns `api.figures.answer(figure, query)`, as those in `api/routes/figures.py` do; its query is
+an `api.figures.Drawing` with parameters of its own.
 """

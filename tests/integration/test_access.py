@@ -66,9 +66,9 @@ def test_beyond_loopback_a_token_is_needed_even_where_none_was_ever_made(sqlite_
 @pytest.mark.parametrize(
     ("role", "permitted"),
     [
-        (Role.READER, {"read"}),
-        (Role.RUNNER, {"read", "submit", "check", "edit", "cancel"}),
-        (Role.ADMIN, {"read", "submit", "check", "edit", "cancel", "reveal"}),
+        (Role.READER, {"read", "estimate"}),
+        (Role.RUNNER, {"read", "estimate", "submit", "check", "edit", "cancel"}),
+        (Role.ADMIN, {"read", "estimate", "submit", "check", "edit", "cancel", "reveal"}),
     ],
 )
 def test_each_role_may_do_what_it_is_for_and_no_more(store: Store, api: TestClient, role: Role, permitted: set[str]):
@@ -76,6 +76,7 @@ def test_each_role_may_do_what_it_is_for_and_no_more(store: Store, api: TestClie
     headers = bearer(store, role)
     answers = {
         "read": api.get(f"/experiments/{made}", headers=headers),
+        "estimate": api.post("/studies/estimate", json={"robot": "toy_function"}, headers=headers),
         "submit": api.post("/experiments", json=TOY, headers=headers),
         "check": api.post("/sensitivity", json={"robot": "toy_function"}, headers=headers),
         "edit": api.patch(f"/experiments/{made}", json={"name": "x"}, headers=headers | {"If-Match": "*"}),
@@ -90,7 +91,9 @@ def test_each_role_may_do_what_it_is_for_and_no_more(store: Store, api: TestClie
         assert "insufficient_scope" in answers[name].headers["www-authenticate"]
 
 
-def test_every_route_wants_a_token_but_the_two_for_health(sqlite_store: Store, lite: TestClient):
+def test_every_route_wants_a_token_but_those_for_health_and_the_files_of_the_page(
+    sqlite_store: Store, lite: TestClient
+):
     create_token(sqlite_store, Role.ADMIN)
     document = create_app(sqlite_store).openapi()
     routes = [(method, path) for path, operations in document["paths"].items() for method in operations]
@@ -100,7 +103,12 @@ def test_every_route_wants_a_token_but_the_two_for_health(sqlite_store: Store, l
         path: lite.request(method, path.format(id="x", number=0)).status_code for method, path in [*routes, *pages]
     }
 
-    assert {path for path, status in found.items() if status != 401} == {"/livez", "/readyz"}
+    assert {path for path, status in found.items() if status != 401} == {
+        "/livez",
+        "/readyz",
+        "/",
+        "/assets/docs/swagger-ui.css",
+    }
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from tests.experiments import run, toy
 METHODS = {"get", "post", "put", "patch", "delete"}
 ENDPOINTS = {
     "POST /studies",
+    "POST /studies/estimate",
     "GET /studies",
     "GET /studies/{id}",
     "GET /studies/{id}/curves",
@@ -63,6 +64,7 @@ ENDPOINTS = {
 
 OPERATIONS = {
     "submit_study",
+    "estimate_study",
     "list_studies",
     "read_study",
     "edit_study",
@@ -223,5 +225,6 @@ def test_the_pages_load_everything_from_the_service_itself(api: TestClient, page
         assert api.get(source).status_code == 200, source
 
 
-def test_the_address_of_the_service_leads_to_its_documentation(api: TestClient):
-    assert "swagger" in api.get("/").text
+def test_the_page_of_the_service_leads_to_its_documentation(api: TestClient):
+    assert 'href="docs"' in api.get("/").text
+    assert "swagger" in api.get("/docs").text

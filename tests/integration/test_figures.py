@@ -1,84 +1,100 @@
-"""The figure of curves: what is in it, and that both drawings show it."""
-
-import re
-import xml.etree.ElementTree as ET
-from html.parser import HTMLParser
+"""The figure of curves: what is in it."""
 
 import pytest
 
-from schemas.curves import Curve, CurvePoint
-from schemas.lifecycle import State
-from services.figures.definition import curves_figure
-from services.figures.html import render_html
+from schemas.curves import CurvePoint
+from services.figures.curves import Abscissa, curves_figure
+from services.figures.marks import Arrow, Axis, Bars, Figure, Label, Level, Line, Points
 from services.figures.style import COLORS, style_of
-from services.figures.svg import render_svg
-
-SVG = "{http://www.w3.org/2000/svg}"
-
-
-def point(evaluations: int, mean: float | None, n: int = 30, sd: float | None = 0.1) -> CurvePoint:
-    ends = (mean - 0.2, mean + 0.2) if mean is not None and sd is not None else (None, None)
-    return CurvePoint(evaluations=evaluations, n=n, mean=mean, sd=sd, lower=ends[0], upper=ends[1], values=(mean,))
+from services.figures.words import limits, power
+from tests.figures import DIRECT, RISING, curve, point
 
 
-def curve(name: str, *points: CurvePoint, direct: bool = False, unit: str = "m/s") -> Curve:
-    return Curve(
-        experiment=f"id-of-{name[:20]}",
-        name=name,
-        strategy="s",
-        state=State.RUNNING,
-        unit=unit,
-        direct=direct,
-        points=points,
-    )
+def lines(figure: Figure) -> list[Line]:
+    return [mark for mark in figure.panels[0].marks if isinstance(mark, Line)]
 
 
-RISING = curve("simulated_fit", point(0, 0.9), point(1, 1.2), point(2, 1.3))
-DIRECT = curve("direct", point(0, 1.33, n=100, sd=0.1), direct=True)
+def levels(figure: Figure) -> list[Level]:
+    return [mark for mark in figure.panels[0].marks if isinstance(mark, Level)]
 
 
 def test_a_curve_becomes_a_line_with_its_interval_and_the_baseline_a_level_with_its_sd():
     figure = curves_figure([RISING, DIRECT])
 
-    (series,), (baseline,) = figure.series, figure.baselines
-    assert series.name == "Simulated fit"
-    assert [each.mean for each in series.points] == [0.9, 1.2, 1.3]
-    assert series.points[1].upper == pytest.approx(1.4)
-    assert (baseline.level.lower, baseline.level.upper) == pytest.approx((1.23, 1.43))
-    assert figure.y_label == "Fitness in reality (m/s)"
-    assert figure.span == 2
+    (line,), (level,), (panel,) = lines(figure), levels(figure), figure.panels
+    assert line.name == "Simulated fit"
+    assert (line.x, line.y) == ((0, 1, 2), (0.9, 1.2, 1.3))
+    assert line.upper[1] == pytest.approx(1.4)
+    assert line.hover[0] == "0.900 ± 0.100 (n = 30)"
+    assert (level.value, level.lower, level.upper) == pytest.approx((1.33, 1.23, 1.43))
+    assert level.style.ink
+    assert panel.y.label == "Fitness in reality (m/s)"
+    assert panel.x.label == "Number of real-world evaluations"
+    assert panel.x.limits == pytest.approx((-0.04, 2.04))
 
 
 def test_fewer_than_five_repetitions_are_drawn_with_their_sd():
     few = curves_figure([curve("a", point(0, 1.0, n=4)), DIRECT])
 
-    assert "standard deviation" in few.note
-    assert few.series[0].points[0].upper == pytest.approx(1.1)
+    assert "standard deviation" in few.caption
+    assert lines(few)[0].upper[0] == pytest.approx(1.1)
 
 
-def test_the_note_says_n_and_what_the_bands_are():
-    interval = curves_figure([RISING, DIRECT]).note.replace("\N{NO-BREAK SPACE}", " ")
-    deviation = curves_figure([curve("a", point(0, 1, n=2), point(1, 1, n=5))], band="sd").note
+def test_the_caption_says_n_and_what_the_bands_are():
+    interval = curves_figure([RISING, DIRECT]).caption.replace("\N{NO-BREAK SPACE}", " ")
+    deviation = curves_figure([curve("a", point(0, 1, n=2), point(1, 1, n=5))], band="sd").caption
 
     assert "Mean over 30 repetitions; bands: 95 % interval of the mean." in interval
     assert "1.33 ± 0.10 SD (n = 100)" in interval
-    assert "2\N{EN DASH}5 repetitions" in deviation
+    assert "2\N{EN DASH}5\N{NO-BREAK SPACE}repetitions" in deviation
     assert "standard deviation" in deviation
+
+
+def test_a_sentence_tells_what_cannot_be_seen():
+    told = curves_figure([RISING, DIRECT]).alt
+
+    assert told == (
+        "Fitness in reality (m/s) against number of real-world evaluations: "
+        "Simulated fit goes from 0.9 to 1.3; Direct is at 1.33."
+    )
+    assert "no results yet" in curves_figure([]).alt
 
 
 def test_points_that_no_repetition_has_reached_are_left_out_and_one_repetition_has_no_band():
     figure = curves_figure([curve("a", point(0, 1.0, n=1, sd=None), point(1, None, n=0, sd=None))])
 
-    (only,) = figure.series[0].points
-    assert (only.mean, only.lower, only.upper) == (1.0, None, None)
-    assert render_svg(figure)
-    assert render_html(figure)
+    (line,) = lines(figure)
+    assert (line.y, line.lower, line.upper) == ((1.0,), (None,), (None,))
+    assert "Mean over 1\N{NO-BREAK SPACE}repetition;" in figure.caption
+
+
+def test_each_repetition_has_a_thin_line_behind_the_mean_if_asked_for():
+    values = ((0.8, 1.0), (1.1, None))
+    points = [point(at, 0.9).model_copy(update={"values": each}) for at, each in enumerate(values)]
+    figure = curves_figure([curve("a", *points), curve("b")], each=True)
+
+    (thin,) = [mark for mark in lines(figure) if mark.faint]
+    assert thin.x == (0, 1, None, 0, 1, None)
+    assert thin.y == (0.8, 1.1, None, 1.0, None, None)
+    assert "Thin lines: single repetitions." in figure.caption
+
+
+def test_curves_are_drawn_against_what_they_cost_where_that_is_known():
+    cost = Abscissa("Time (h)", "Time: of everything.", {(RISING.experiment, 0): 2.5, (RISING.experiment, 2): 7.0})
+    figure = curves_figure([RISING, DIRECT], against=cost)
+
+    (line,) = lines(figure)
+    assert (line.x, line.y) == ((2.5, 7.0), (0.9, 1.3))
+    assert figure.panels[0].x.label == "Time (h)"
+    assert not figure.panels[0].x.whole
+    assert "Time: of everything." in figure.caption
+    assert levels(figure)
 
 
 def test_the_frame_shows_the_means_however_wide_a_band_is():
     wild = CurvePoint(evaluations=1, n=2, mean=1.2, sd=0.1, lower=-50, upper=50, values=(1.1, 1.3))
-    least, most = curves_figure([curve("a", point(0, 1.0), wild)], band="interval").limits
-    tame = curves_figure([RISING]).limits
+    least, most = curves_figure([curve("a", point(0, 1.0), wild)], band="interval").panels[0].y.limits
+    tame = curves_figure([RISING]).panels[0].y.limits
 
     assert 0.7 < least < 1.0
     assert 1.2 < most < 1.5
@@ -89,14 +105,14 @@ def test_the_frame_shows_the_means_however_wide_a_band_is():
 def test_experiments_of_one_name_are_told_apart_by_their_ids():
     first, second = RISING, RISING.model_copy(update={"experiment": "another-id"})
 
-    names = [each.name for each in curves_figure([first, second]).series]
+    names = [each.name for each in lines(curves_figure([first, second]))]
 
     assert names == ["Simulated fit (id-of-si)", "Simulated fit (another-)"]
 
 
 def test_units_are_shown_only_where_all_curves_share_one():
-    assert curves_figure([RISING, curve("b", unit="m")]).y_label == "Fitness in reality"
-    assert curves_figure([curve("b", unit="1")]).y_label == "Fitness in reality"
+    assert curves_figure([RISING, curve("b", unit="m")]).panels[0].y.label == "Fitness in reality"
+    assert curves_figure([curve("b", unit="1")]).panels[0].y.label == "Fitness in reality"
 
 
 def test_thirty_six_lines_differ_in_more_than_colour():
@@ -106,55 +122,39 @@ def test_thirty_six_lines_differ_in_more_than_colour():
     assert len({each.dash for each in styles[:6]}) == len({each.marker for each in styles[:6]}) == len(COLORS)
 
 
-def test_the_same_figure_is_the_same_bytes():
-    figure = curves_figure([RISING, DIRECT], title="twice")
-
-    assert render_svg(figure) == render_svg(figure)
-    assert render_html(figure) == render_html(figure)
-
-
-def test_the_page_fetches_nothing_from_elsewhere():
-    found: list[str] = []
-
-    class Sources(HTMLParser):
-        def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]):
-            found.extend(f"{tag} {value}" for name, value in attrs if name in {"src", "href"})
-
-    page = render_html(curves_figure([RISING, DIRECT]))
-    Sources().feed(page)
-
-    assert found == []
-    assert re.search(r'"modeBarButtonsToRemove": *\["sendChartToCloud"', page)
+@pytest.mark.parametrize("wrong", [float("nan"), float("inf")])
+def test_no_mark_takes_a_number_that_json_does_not_have(wrong: float):
+    for make in (
+        lambda: Line("a", (0,), (wrong,)),
+        lambda: Line("a", (0,), (0,), lower=(wrong,), upper=(0,)),
+        lambda: Points("a", (wrong,), (0,)),
+        lambda: Level("a", wrong),
+        lambda: Bars("a", ((0, wrong, 0),)),
+        lambda: Arrow((0, 0), (0, wrong)),
+        lambda: Label("a", 0, wrong),
+        lambda: Axis("a", (0, wrong)),
+    ):
+        with pytest.raises(ValueError, match="None"):
+            make()
 
 
-def test_the_page_has_its_numbers_in_a_table_for_those_who_cannot_see_the_lines():
-    page = render_html(curves_figure([RISING, DIRECT], title="The title"))
-
-    assert "<h1>The title</h1>" in page
-    row = re.search(r'<tr><th scope="row">Simulated fit</th>(.*?)</tr>', page)
-    assert row
-    assert re.findall(r"<td>(.*?)</td>", row[1]) == ["0.900 ± 0.100 (30)", "1.200 ± 0.100 (30)", "1.300 ± 0.100 (30)"]
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["<script>alert(1)</script>", "a $\\frac{ b", "--> x", "\x01\x1b[31m", "%", "_a_b^c_", "x" * 200, "{braces}"],
-)
-def test_hostile_names_are_only_text(name: str):
-    figure = curves_figure([curve(name, point(0, 1.0), point(1, 2.0))], title=name)
-
-    page, drawing = render_html(figure), render_svg(figure)
-
-    assert "<script>alert" not in page
-    assert ET.fromstring(drawing).tag == f"{SVG}svg"
+def test_parts_of_a_mark_are_equally_long_and_limits_go_up():
+    with pytest.raises(ValueError, match=r"\[1, 2\]"):
+        Points("a", (0, 1), (0,))
+    with pytest.raises(ValueError, match="go up"):
+        Axis("a", (1, 1))
+    with pytest.raises(ValueError, match="above 0"):
+        Axis("a", (0, 1), log=True)
 
 
-@pytest.mark.parametrize(
-    "curves", [[], [curve("a")], [DIRECT], [curve(f"line {each}", point(0, each)) for each in range(40)]]
-)
-def test_figures_of_nothing_of_a_baseline_alone_and_of_very_many_lines_are_drawn(curves: list[Curve]):
-    figure = curves_figure(curves)
+def test_limits_have_room_for_one_value_and_for_none():
+    assert limits([None]) == (0.0, 1.0)
+    assert limits([0.0, 1.0, None]) == pytest.approx((-0.05, 1.05))
+    for value in (0.0, 5.0, -3.0):
+        least, most = limits([value])
+        assert least < value < most
 
-    assert figure.empty == (not any(each.points for each in curves))
-    assert ET.fromstring(render_svg(figure)).tag == f"{SVG}svg"
-    assert ("no results yet" in render_html(figure)) == figure.empty
+
+@pytest.mark.parametrize(("value", "written"), [(1e-6, "10⁻⁶"), (0.01, "0.01"), (3e5, "3·10⁵"), (10.0, "10")])
+def test_values_of_a_logarithmic_axis_are_written_as_in_papers(value: float, written: str):
+    assert power(value) == written

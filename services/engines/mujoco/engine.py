@@ -35,6 +35,7 @@ class MuJoCo(Engine):
     name = "mujoco"
     source = "https://mujoco.org, version 4.0; docs/engines.md"
     library = "mujoco"
+    usual_rollout_s = 0.002
     install = "pip install 'gaplab[mujoco]'"
     Options = MuJoCoOptions
     options: MuJoCoOptions

@@ -11,6 +11,7 @@ from schemas.records import ExperimentRead, RepetitionRead, StudyRead
 from services.store.models import ExperimentRow, RepetitionRow, StudyRow
 from services.store.repository.experiments import experiments_of, open_studies
 from services.store.repository.progress import Tally, reasons, tallies
+from services.store.repository.results import best_recorded
 from services.store.repository.sensitivity import Warned, warned
 
 
@@ -28,7 +29,8 @@ def read_experiments(
 def _read(
     session: Session, rows: Sequence[ExperimentRow], progress: Mapping[str, Tally], *, reveal: bool
 ) -> tuple[ExperimentRead, ...]:
-    failed, warnings = reasons(session, [row.id for row in rows]), warned(session, rows)
+    ids = [row.id for row in rows]
+    failed, warnings, best = reasons(session, ids), warned(session, rows), best_recorded(session, ids)
     secret = frozenset() if reveal else hidden(session, rows)
     return tuple(
         _experiment(
@@ -36,6 +38,7 @@ def _read(
             progress.get(row.id, Tally()),
             failed.get(row.id, ()),
             warnings.get(row.id, Warned()),
+            best=best.get(row.id),
             secret=row.id in secret,
         )
         for row in rows
@@ -94,7 +97,7 @@ def state_of(states: Collection[State]) -> State:
 
 
 def _experiment(
-    row: ExperimentRow, tally: Tally, failed: tuple[str, ...], warned: Warned, *, secret: bool
+    row: ExperimentRow, tally: Tally, failed: tuple[str, ...], warned: Warned, *, best: float | None, secret: bool
 ) -> ExperimentRead:
     return ExperimentRead(
         id=row.id,
@@ -108,6 +111,7 @@ def _experiment(
         priority=-row.precedence,
         max_parallel=row.max_parallel,
         progress=tally.progress(),
+        best_fitness=best,
         reasons=failed,
         sensitivity=warned.check,
         warnings=(*warned.warnings, *_refusal(row, tally)),

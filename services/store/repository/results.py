@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import case, select, tuple_
+from sqlalchemy import case, func, select, tuple_
 from sqlalchemy.orm import Session
 
 from schemas.records import MeasurementKind, SampleRead, SimulatorRead
@@ -101,6 +101,21 @@ def recorded(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str
         .where(RepetitionRow.experiment_id.in_(experiments), row.recorded_fitness.is_not(None))
     )
     return session.execute(query).all()
+
+
+def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, float]:
+    """Of each experiment, the best recorded fitness of a repetition so far, on average over those that have one."""
+    of_one = (
+        select(func.max(IterationRow.recorded_fitness))
+        .where(IterationRow.repetition_id == RepetitionRow.id)
+        .scalar_subquery()
+    )
+    query = select(RepetitionRow.experiment_id, of_one).where(RepetitionRow.experiment_id.in_(experiments))
+    found: dict[str, list[float]] = {}
+    for experiment, best in session.execute(query):
+        if best is not None:
+            found.setdefault(experiment, []).append(best)
+    return {experiment: sum(each) / len(each) for experiment, each in found.items()}
 
 
 @dataclass(frozen=True)

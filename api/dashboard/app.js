@@ -1,0 +1,74 @@
+/** The page: a bar, and one view at a time, chosen by the address after `#`. */
+
+import { h } from "./lib/dom.js";
+import { failed, loading } from "./lib/states.js";
+import { switchTheme } from "./lib/theme.js";
+
+const VIEWS = [
+  [/^\/$/, "list", []],
+  [/^\/new$/, "new", []],
+  [/^\/compare$/, "compare", []],
+  [/^\/replay$/, "replay", []],
+  [/^\/toy$/, "toy", []],
+  [/^\/studies\/([^/]+)$/, "study", ["id"]],
+  [/^\/experiments\/([^/]+)$/, "experiment", ["id"]],
+];
+
+const AWAY = new Set([0, 502, 503, 504]);
+const AGAIN_MS = 2000;
+
+let leaving = new AbortController();
+
+/** What the address asks for: the view's name and its parameters, or nothing. */
+function wanted() {
+  const [path, query] = (location.hash.slice(1) || "/").split("?");
+  for (const [pattern, name, keys] of VIEWS) {
+    const found = pattern.exec(path);
+    if (!found) continue;
+    const parameters = new URLSearchParams(query);
+    keys.forEach((key, at) => parameters.set(key, decodeURIComponent(found[at + 1])));
+    return { name, parameters };
+  }
+  return null;
+}
+
+/** Show the view of the address; what the former one had running ends. */
+async function route() {
+  leaving.abort();
+  leaving = new AbortController();
+  const { signal } = leaving;
+  const root = h("div", { class: "view" }, loading());
+  const main = document.getElementById("main");
+  main.replaceChildren(root);
+  const view = wanted();
+  for (const link of document.querySelectorAll("nav [data-view]")) {
+    if (link.dataset.view === view?.name) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+  try {
+    if (!view) throw new Error(`There is no page ${location.hash.slice(1)} here.`);
+    const { show } = await import(`./views/${view.name}.js`);
+    if (!signal.aborted) await show(root, view.parameters, signal);
+  } catch (error) {
+    if (signal.aborted) return;
+    root.replaceChildren(failed(error, route));
+    if (AWAY.has(error.status)) againOnce(signal);
+  }
+  if (!signal.aborted) document.title = `${root.querySelector("h1")?.textContent ?? "gaplab"} · gaplab`;
+}
+
+/** A service that is away is asked again by itself. */
+function againOnce(signal) {
+  const timer = setTimeout(route, AGAIN_MS);
+  signal.addEventListener("abort", () => clearTimeout(timer));
+}
+
+document.getElementById("theme").addEventListener("click", switchTheme);
+document.querySelector(".skip").addEventListener("click", (event) => {
+  event.preventDefault();  // the address after `#` is the view's
+  document.getElementById("main").focus();
+});
+addEventListener("hashchange", () => {
+  route().then(() => document.getElementById("main").focus({ preventScroll: true }));
+});
+route();

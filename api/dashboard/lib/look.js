@@ -1,0 +1,63 @@
+/** Charts of the service in the page's own look: its ink, its lines, its letters, light or dark. */
+
+import { isDark } from "./theme.js";
+
+/** Colours of lines that are too dark on a dark ground, each as it is there. */
+const LIGHTER = {
+  "0,114,178": "86,172,230", "213,94,0": "255,140,66", "0,158,115": "64,201,160",
+  "204,121,167": "230,160,201", "230,159,0": "242,183,64", "86,180,233": "170,220,250",
+};
+const LARGE_PX = 600;
+
+/** The chart as it is drawn in `canvas`. */
+export function dressed({ data, layout }, canvas) {
+  const style = getComputedStyle(document.documentElement);
+  const [ink, line, raised, font] = ["--ink", "--line", "--raised", "--font"].map((each) => style.getPropertyValue(each).trim());
+  const least = parseFloat(getComputedStyle(canvas).minHeight) || 0;
+  const axis = (each) => ({
+    showline: true, linecolor: ink, linewidth: 1, ticks: "outside", ticklen: 4, tickcolor: ink, gridcolor: line, zerolinecolor: line,
+    showgrid: layout[each].showgrid ?? each.startsWith("y"), ...layout[each],
+  });
+  return {
+    data: data.map((each) => worn(each, ink)),
+    layout: {
+      ...layout,
+      ...Object.fromEntries(Object.keys(layout).filter((each) => /^[xy]axis\d*$/.test(each)).map((each) => [each, axis(each)])),
+      annotations: (layout.annotations ?? []).map((each) => (each.name === "ink" ? { ...each, arrowcolor: ink } : each)),
+      height: Math.max(layout.height ?? 0, least),
+      autosize: true,
+      paper_bgcolor: "transparent",
+      plot_bgcolor: "transparent",
+      font: { family: font, size: canvas.clientWidth < LARGE_PX ? 12 : 13, color: ink },
+      hoverlabel: { bgcolor: raised, bordercolor: line, font: { color: ink, family: font } },
+    },
+  };
+}
+
+function worn(trace, ink) {
+  const own = trace.meta?.ink;
+  const color = (each) => (typeof each === "string" ? (own ? ofInk(each, ink) : isDark() ? lighter(each) : each) : each);
+  const shown = { ...trace };
+  if (trace.line) shown.line = { ...trace.line, color: color(trace.line.color) };
+  if (trace.marker) shown.marker = { ...trace.marker, color: color(trace.marker.color) };
+  if (trace.fillcolor) shown.fillcolor = color(trace.fillcolor);
+  return shown;
+}
+
+/** The red, green, blue and opacity of a colour like `#0072B2` or `rgba(0, 114, 178, 0.1)`. */
+function parts(color) {
+  if (color.startsWith("#")) return [...[1, 3, 5].map((at) => parseInt(color.slice(at, at + 2), 16)), 1];
+  const [red, green, blue, opacity = 1] = color.match(/[\d.]+/g)?.map(Number) ?? [];
+  return [red, green, blue, opacity];
+}
+
+function lighter(color) {
+  const [red, green, blue, opacity] = parts(color);
+  const found = LIGHTER[`${red},${green},${blue}`];
+  return found ? `rgba(${found},${Math.min(1, opacity < 1 ? opacity * 1.4 : 1)})` : color;
+}
+
+function ofInk(color, ink) {
+  const [red, green, blue] = parts(ink);
+  return `rgba(${red},${green},${blue},${parts(color)[3]})`;
+}

@@ -1,0 +1,77 @@
+/** Figures: defined by the service, drawn here by Plotly in the page's own colours. */
+
+import { get } from "./api.js";
+import { h } from "./dom.js";
+import { dressed } from "./look.js";
+import { empty, failed, loading } from "./states.js";
+import { table } from "./table.js";
+import { onTheme } from "./theme.js";
+
+let loaded = null;
+
+/** Plotly, fetched when the first figure is drawn; if that fails, with the next one. */
+function plotly() {
+  loaded ??= new Promise((resolve, reject) => {
+    const src = `assets/plotly/plotly.min.js?v=${document.documentElement.dataset.plotly}`;
+    const fail = () => {
+      loaded = null;
+      reject(new Error("What draws figures could not be loaded."));
+    };
+    document.head.append(h("script", { src, onload: () => resolve(globalThis.Plotly), onerror: fail }));
+  });
+  return loaded;
+}
+
+/**
+ * Draw `/figures/{kind}` into `element`, with its caption and its words for those who do not see it.
+ * Returns a function that draws it anew, with another query if one is given.
+ */
+export function plot(element, kind, query, signal) {
+  const canvas = h("div", { class: "plot" });
+  const caption = h("figcaption");
+  const numbers = h("div");
+  canvas.append(loading());
+  element.replaceChildren(h("figure", {}, canvas, caption, numbers));
+  let answer = null;
+  let drawn = false;
+  const say = (words) => {
+    drawn = false;
+    globalThis.Plotly?.purge(canvas);
+    for (const each of ["role", "aria-label"]) canvas.removeAttribute(each);
+    canvas.replaceChildren(words);
+  };
+  const draw = async () => {
+    if (!answer || signal.aborted) return;
+    if (answer.empty) {
+      say(empty("Nothing to draw yet."));
+      return;
+    }
+    const library = await plotly();
+    if (signal.aborted) return;
+    canvas.querySelector(".state")?.remove();
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", answer.alt);
+    const { data, layout } = dressed(answer.figure, canvas);
+    await library.react(canvas, data, layout, { displayModeBar: false, responsive: true });
+    drawn = true;
+  };
+  const refresh = async (changed = query) => {
+    query = changed;
+    try {
+      answer = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
+      caption.textContent = answer.caption;
+      numbers.replaceChildren(...(answer.table && !answer.empty ? [counted(answer.table, numbers.querySelector("details")?.open)] : []));
+      await draw();
+    } catch (error) {
+      if (!signal.aborted && !drawn) say(failed(error, () => refresh()));
+    }
+  };
+  onTheme(draw, signal);
+  signal.addEventListener("abort", () => globalThis.Plotly?.purge(canvas));
+  refresh();
+  return refresh;
+}
+
+function counted({ head, rows }, open) {
+  return h("details", { class: "numbers", open }, h("summary", {}, "The numbers"), table("The numbers of the figure", head, rows));
+}

@@ -1,0 +1,34 @@
+/** Another name or other notes; nobody's change is written over unseen. */
+
+import { patch, Problem } from "../../lib/api.js";
+import { ask } from "../../lib/dialog.js";
+
+const CHANGED_MEANWHILE = 412;
+
+/** Ask for them, and send them with the tag of what was looked at. */
+export function edit(page) {
+  const { name, notes } = page.experiment;
+  let tag = page.tag;
+  const act = async (values) => {
+    try {
+      await patch(`/experiments/${page.id}`, { name: values.name, notes: values.notes || null }, { "If-Match": tag });
+    } catch (error) {
+      if (error.status !== CHANGED_MEANWHILE) throw error;
+      await page.look();
+      tag = page.tag;
+      const { name: theirs, notes: written } = page.experiment;
+      const detail = `Somebody changed it meanwhile: its name is “${theirs}”, its notes are “${written ?? ""}”. Save again to write over that.`;
+      throw new Problem({ status: error.status, title: error.title, detail });
+    }
+    await page.look();
+  };
+  ask({
+    title: "Edit name and notes",
+    fields: [
+      { name: "name", label: "Name", value: name, required: true, maxlength: 200, autocomplete: "off" },
+      { name: "notes", label: "Notes", value: notes, multiline: true, rows: 5, maxlength: 10000 },
+    ],
+    action: "Save",
+    act,
+  }, page.signal);
+}

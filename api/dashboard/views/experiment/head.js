@@ -1,0 +1,92 @@
+/** The head of an experiment: what it is, how far it is, and what may be asked of it. */
+
+import { get } from "../../lib/api.js";
+import { h, refill } from "../../lib/dom.js";
+import { download } from "../../lib/downloads.js";
+import { age, count, duration, spoken } from "../../lib/format.js";
+import { pill } from "../../lib/pill.js";
+import { edit } from "./editing.js";
+import { verbs } from "./verbs.js";
+
+const ENDED = ["COMPLETED", "FAILED", "CANCELLED"];
+
+/** The head's element, and `update()` for when `page.experiment` is another. */
+export function head(page) {
+  const title = h("h1");
+  const state = h("span", { class: "state-now", role: "status" });
+  const notes = h("p", { class: "notes" });
+  const bar = h("progress", { max: 1, "aria-label": "Progress" });
+  const facts = h("dl", { class: "facts" });
+  const remarks = h("div", { class: "remarks" });
+  const asked = verbs(page);
+  const update = () => {
+    const { experiment } = page;
+    title.textContent = spoken(experiment.name);
+    document.title = `${title.textContent} · gaplab`;
+    notes.textContent = experiment.notes ?? "";
+    notes.hidden = !experiment.notes;
+    refill(state, experiment.state, () => pill(experiment.state));
+    bar.value = fraction(experiment.progress);
+    refill(facts, JSON.stringify([experiment.progress, experiment.priority, experiment.max_parallel, experiment.state, minute()]), () => factsOf(experiment));
+    refill(remarks, JSON.stringify([experiment.warnings, experiment.reasons]), () => remarksOf(experiment));
+    asked.update();
+  };
+  const pen = h("button", { type: "button", class: "quiet small", onclick: () => edit(page) }, "Edit name and notes");
+  update();
+  const element = h("header", { class: "experiment-head" }, trail(page),
+    h("div", { class: "titled" }, title, state, pen), notes, bar, facts, remarks, asked.element, links(page));
+  return { element, update };
+}
+
+/** How much of the work is behind it, between 0 and 1; of rollouts, which is where the time goes. */
+export function fraction(progress) {
+  return progress.rollouts ? Math.min(1, (progress.rollouts_done + progress.rollouts_saved) / progress.rollouts) : 0;
+}
+
+/** Times are told in minutes and hours: what they say is put right each minute. */
+const minute = () => Math.floor(Date.now() / 60_000);
+
+function trail({ experiment, signal }) {
+  if (!experiment.study) return h("nav", { "aria-label": "Place", class: "trail" }, h("a", { href: "#/" }, "Experiments"));
+  const study = h("a", { href: `#/studies/${experiment.study}` }, `study ${experiment.study}`);
+  get(`/studies/${experiment.study}`, {}, signal).then(({ name }) => { study.textContent = name; }, () => {});
+  return h("nav", { "aria-label": "Place", class: "trail" }, h("a", { href: "#/" }, "Experiments"), " / ", study);
+}
+
+function factsOf(experiment) {
+  const { progress } = experiment;
+  const failed = progress.failed ? `, ${count(progress.failed)} failed` : "";
+  const saved = progress.rollouts_saved ? `, ${count(progress.rollouts_saved)} not needed` : "";
+  const broken = progress.rollouts_failed ? `, physics failed in ${count(progress.rollouts_failed)}` : "";
+  return [
+    ["Done", `${Math.floor(100 * fraction(progress))} %`],
+    ["Repetitions", `${count(progress.completed)} of ${count(progress.repetitions)}${failed}`],
+    ["Iterations", `${count(progress.iterations_done)} of ${count(progress.iterations)}`],
+    ["Rollouts", `${count(progress.rollouts_done)} of ${count(progress.rollouts)}${saved}${broken}`],
+    ...times(experiment),
+    ["Priority", experiment.priority],
+    ["At once", experiment.max_parallel === null ? "any number" : `at most ${count(experiment.max_parallel)}`],
+  ].map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, String(value))));
+}
+
+function times({ state, progress, created_at: created, started_at: started, ended_at: ended }) {
+  if (ENDED.includes(state) && ended) {
+    const took = started ? [["Took", duration((Date.parse(ended) - Date.parse(started)) / 1000)]] : [];
+    return [["Ended", age(ended)], ...took];
+  }
+  const left = progress.seconds_left === null ? "not known yet" : duration(progress.seconds_left);
+  return [["Time left", state === "RUNNING" ? left : "–"], started ? ["Began", age(started)] : ["Submitted", age(created)]];
+}
+
+function remarksOf({ warnings, reasons }) {
+  const list = (words, each, kind) => each.length ? h("div", { class: `remark ${kind}` }, h("strong", {}, words), h("ul", {}, ...each.map((one) => h("li", {}, one)))) : null;
+  return [list("Warnings", warnings, "warned"), list("Why repetitions failed", reasons, "broken")].filter(Boolean);
+}
+
+function links({ id, experiment }) {
+  const toy = experiment.spec.robot?.name === "toy_function";
+  return h("p", { class: "links" },
+    h("a", { href: `#/compare?experiments=${id}` }, "Compare with others"), " ",
+    toy ? h("a", { href: `#/toy?experiment=${id}` }, "Step through the function") : null, " ",
+    download("Archive of everything (.zip)", `/experiments/${id}/export`, {}, `gaplab-${id}.zip`));
+}

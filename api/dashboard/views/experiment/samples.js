@@ -1,0 +1,52 @@
+/** Every real-world evaluation, page by page, each with the way to its replay. */
+
+import { get, search } from "../../lib/api.js";
+import { h } from "../../lib/dom.js";
+import { number } from "../../lib/format.js";
+import { empty } from "../../lib/states.js";
+import { table } from "../../lib/table.js";
+
+const MANY = 25;
+const KINDS = ["measured", "probed"];
+const COLUMNS = ["Repetition", "Iteration", "What for", "Fitness in reality", "Measured by", "When", "Look"];
+
+/** The table, with what it is limited to above and its pages beneath. */
+export function samples(page) {
+  const place = h("div");
+  const kind = h("select", {}, ...[["", "samples and probes"], ["sample", "samples, which are learned from"], ["probe", "probes, which are only looked at"]]
+    .map(([value, words]) => h("option", { value }, words)));
+  const repetition = h("input", { type: "number", min: 0, max: 1000000, step: 1, placeholder: "all", class: "short" });
+  const cursors = [null];  // of this page and those before it
+  let next = null;
+  const load = async () => {
+    const query = { limit: MANY, cursor: cursors.at(-1), kind: kind.value, repetition: repetition.value };
+    const found = await get(`/experiments/${page.id}/samples`, query, page.signal);
+    next = found.next;
+    const rows = found.items.map((each) => row(page, each));
+    place.replaceChildren(rows.length ? table("Real-world evaluations", COLUMNS, rows) : empty("Nothing was tried in reality yet."));
+    back.disabled = cursors.length < 2;
+    on.disabled = !next;
+    where.textContent = `Page ${cursors.length}`;
+  };
+  const turn = (change) => {
+    change();
+    load().catch((error) => { where.textContent = error.message; });
+  };
+  const back = h("button", { type: "button", class: "quiet small", disabled: true, onclick: () => turn(() => cursors.pop()) }, "Before");
+  const on = h("button", { type: "button", class: "quiet small", disabled: true, onclick: () => turn(() => cursors.push(next)) }, "After");
+  const where = h("span", { role: "status" });
+  const limited = h("p", { class: "options", onchange: () => turn(() => cursors.splice(1)) },
+    h("label", {}, "Show ", kind), h("label", {}, "Repetition ", repetition));
+  page.parts.add(place, KINDS, load);
+  return [limited, place, h("p", { class: "pages" }, back, where, on)];
+}
+
+function row({ id, experiment }, each) {
+  const kind = each.kind === "sample" ? "sample" : "transfer";
+  const at = { experiment: id, repetition: each.repetition, iteration: each.iteration };
+  const toy = experiment.spec.robot?.name === "toy_function";
+  const words = `${toy ? "Step" : "Replay"}, repetition ${each.repetition}, iteration ${each.iteration}`;
+  const link = h("a", { href: toy ? `#/toy${search(at)}` : `#/replay${search({ ...at, kind })}`, "aria-label": words }, toy ? "Step" : "Replay");
+  return [String(each.repetition), String(each.iteration), each.kind, each.fitness === null ? "physics failed" : number(each.fitness),
+    each.measured_by, new Date(each.measured_at).toLocaleString(), link];
+}

@@ -1,0 +1,86 @@
+"""What a study would cost: checked and resolved like one that is submitted, and not stored."""
+
+from collections import defaultdict
+from collections.abc import Mapping
+
+from schemas.estimates import EngineCost, EstimateRead, ExperimentCost
+from schemas.plugin import PluginRef
+from schemas.spec import ExperimentSpec, StudySpec
+from services.admission import check_extent
+from services.engines import engines
+from services.resolution import expected_rollouts, is_direct, resolve_study
+from services.settings import Limits
+from services.store.repository import costs, supervisors
+from services.store.session import Store
+
+LOOKED_AT = 100
+"""Experiments, the newest, whose times are what a rollout is expected to take."""
+
+SILENT_S = 60.0
+"""A supervisor that was not heard of for so long does not work."""
+
+Key = tuple[str, str]
+"""Robot and engine, with their options."""
+
+
+def estimate(store: Store, spec: StudySpec, *, limits: Limits | None = None, cores: int = 1) -> EstimateRead:
+    """What the study would take on so many cores.
+
+    Raises:
+        InvalidSpec: with everything that is wrong with it, as if it were submitted.
+        StoreUnavailable: the database cannot be used now.
+    """
+    resolved = resolve_study(spec)
+    check_extent(resolved, limits)
+    with store.reading() as session:
+        measured = _measured(costs.latest(session, LOOKED_AT))
+        working = sum(age < SILENT_S for age in supervisors.ages(session))
+    found = tuple(_experiment(each, _cost(each, measured)) for each in resolved)
+    total = sum(each.core_seconds for each in found)
+    shared = min(cores, len(resolved) * (spec.max_parallel or cores))
+    return EstimateRead(
+        experiments=found,
+        engines=tuple({cost.engine: cost for cost in (_cost(each, measured) for each in resolved)}.values()),
+        rollouts=sum(each.rollouts for each in found),
+        core_seconds=total,
+        cores=shared,
+        seconds=total / shared,
+        supervisors=working,
+    )
+
+
+def _measured(found: tuple[tuple[dict[str, object], float, int], ...]) -> dict[Key, float]:
+    """Seconds a rollout; of what was computed by two engines only the simulator's counts, which has nearly all."""
+    seconds: dict[Key, float] = defaultdict(float)
+    rollouts: dict[Key, int] = defaultdict(int)
+    for spec, took, count in found:
+        key = (_text(spec["robot"]), _text(spec["engine"]))
+        seconds[key] += took
+        rollouts[key] += count
+    return {key: seconds[key] / count for key, count in rollouts.items() if count and seconds[key]}
+
+
+def _cost(spec: ExperimentSpec, measured: Mapping[Key, float]) -> EngineCost:
+    engine = spec.reality.engine if is_direct(spec) else spec.engine
+    assert engine is not None  # the spec is resolved
+    known = measured.get((_text(spec.robot), _text(engine)))
+    usual = engines[engine.name].usual_rollout_s
+    return EngineCost(engine=engine.name, seconds_per_rollout=known or usual, measured=known is not None)
+
+
+def _experiment(spec: ExperimentSpec, cost: EngineCost) -> ExperimentCost:
+    repetitions = spec.repetitions or 0
+    rollouts = expected_rollouts(spec) * repetitions
+    return ExperimentCost(
+        name=spec.name or spec.strategy.name,
+        strategy=spec.strategy.name,
+        engine=cost.engine,
+        repetitions=repetitions,
+        iterations=0 if is_direct(spec) else spec.iterations or 0,
+        rollouts=rollouts,
+        core_seconds=rollouts * cost.seconds_per_rollout,
+    )
+
+
+def _text(ref: object) -> str:
+    return PluginRef.model_validate(ref).model_dump_json()

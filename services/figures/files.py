@@ -1,0 +1,155 @@
+"""Figures as files for papers, by matplotlib: SVG, PNG and PDF, the same bytes for the same figure.
+
+Text is of 8 pt at the width that is asked for, which is that of one column of a paper unless said otherwise.
+"""
+
+from io import BytesIO
+from threading import Lock
+from typing import TYPE_CHECKING, Any, Literal
+
+from services.figures.lettering import FAMILY, shown
+from services.figures.marks import Axis, Figure, Points
+from services.figures.painting import paint
+from services.figures.style import INK
+from services.figures.surroundings import Beneath, surround
+from services.figures.words import power
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Canvas
+
+FileFormat = Literal["svg", "png", "pdf"]
+
+COLUMN_IN = 3.5
+"""The width of one column in most journals; of two it is 7.2."""
+
+DPI = 300
+SIZE_PT = 8
+PANEL_IN, LOW_IN = 2.1, 1.1
+"""Height of a row of panels, where there is one and where there are several."""
+
+LOOK: Any = {
+    "svg.hashsalt": "gaplab",
+    "pdf.fonttype": 42,  # letters as TrueType: publishers refuse type 3
+    "text.parse_math": False,  # names may have dollars in them
+    "font.family": FAMILY,
+    "font.size": SIZE_PT,
+    "axes.titlesize": SIZE_PT,
+    "axes.edgecolor": INK,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "legend.fontsize": SIZE_PT,
+}
+
+METADATA: dict[str, dict[str, Any]] = {
+    "svg": {"Creator": "gaplab", "Date": None},
+    "pdf": {"Creator": "gaplab", "Producer": None, "CreationDate": None},
+    "png": {"Software": None},
+}
+"""No moment and no version: the same figure is the same bytes."""
+
+_matplotlib = Lock()  # its settings are global to the process, and an API has many threads
+
+
+def render_file(figure: Figure, kind: FileFormat, *, width_in: float = COLUMN_IN, caption: bool = True) -> bytes:
+    """The figure as a file; an SVG has its letters as paths, so that it looks alike everywhere.
+
+    Args:
+        figure: what is drawn.
+        kind: of the file.
+        width_in: its width in inches.
+        caption: whether it is drawn beneath; a paper has one of its own.
+    """
+    from matplotlib import rc_context
+
+    with _matplotlib, rc_context(LOOK):
+        canvas = _canvas(figure, width_in, caption=caption)
+        target = BytesIO()
+        described = {"Title": figure.title or figure.name} | ({"Description": figure.alt} if kind != "pdf" else {})
+        canvas.savefig(target, format=kind, dpi=DPI, metadata=METADATA[kind] | described)
+    return target.getvalue()
+
+
+def _canvas(figure: Figure, width_in: float, *, caption: bool) -> "Canvas":
+    from matplotlib.figure import Figure as Canvas
+
+    beneath = Beneath.of(figure, width_in, caption=caption)
+    height = _height(figure, width_in) + beneath.above_in + beneath.height_in
+    canvas = Canvas(figsize=(width_in, height), layout="constrained")
+    rows = len(_rows(figure))
+    share: Any = "col" if figure.share_x else False
+    grid = canvas.subplots(
+        rows, figure.columns, squeeze=False, sharex=share, gridspec_kw={"height_ratios": _rows(figure)}
+    )
+    shades = [
+        each for panel in figure.panels for mark in panel.marks if isinstance(mark, Points) for each in mark.shades
+    ]
+    scale = (min(shades), max(shades)) if shades else (0.0, 1.0)
+    for index, axes in enumerate(grid.flat):
+        if index >= len(figure.panels):
+            axes.set_visible(False)
+            continue
+        panel = figure.panels[index]
+        last = not figure.share_x or index + figure.columns >= len(figure.panels)
+        _set_up(axes, panel.x, panel.y, labelled=last)
+        if panel.square:
+            axes.set_box_aspect(1)
+        if panel.title:
+            axes.set_title(shown(panel.title), loc="left")
+        paint(panel, axes, scale)
+    if figure.empty:
+        canvas.text(0.5, 0.6, shown(figure.nothing), ha="center", color="#777777")
+    surround(canvas, figure, beneath)
+    _settle(canvas)
+    return canvas
+
+
+def _settle(canvas: "Canvas") -> None:
+    """Lay everything out, without the last digits: the solver does not find the same ones each time."""
+    engine = canvas.get_layout_engine()
+    assert engine is not None
+    engine.execute(canvas)
+    canvas.set_layout_engine("none")
+    for axes in canvas.axes:
+        left, bottom, width, height = axes.get_position(original=True).bounds
+        axes.set_position((round(left, 6), round(bottom, 6), round(width, 6), round(height, 6)))
+
+
+def _rows(figure: Figure) -> list[float]:
+    starts = range(0, len(figure.panels), figure.columns)
+    return [max(panel.height for panel in figure.panels[start : start + figure.columns]) for start in starts]
+
+
+def _height(figure: Figure, width_in: float) -> float:
+    rows = _rows(figure)
+    if figure.panels[0].square:
+        return sum(rows) * min(0.86 * width_in / figure.columns + 0.3, 3.4)
+    return sum(rows) * LOW_IN + 0.3 if len(rows) > 1 else PANEL_IN
+
+
+def _set_up(axes: "Axes", x: Axis, y: Axis, *, labelled: bool) -> None:
+    axes.set(ylabel=shown(y.label), xlim=x.limits, ylim=y.limits)
+    if labelled:
+        axes.set_xlabel(shown(x.label))
+    _ticks(axes.xaxis, x)
+    _ticks(axes.yaxis, y)
+    axes.grid(axis="y", color="#e6e6e6", linewidth=0.5)
+    axes.set_axisbelow(True)
+
+
+def _ticks(axis: Any, of: Axis) -> None:  # noqa: ANN401 - either of an axes' two, which are of two types
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
+    if of.log:
+        getattr(axis.axes, f"set_{axis.axis_name}scale")("log")
+        getattr(axis.axes, f"set_{axis.axis_name}lim")(of.limits)
+        axis.set_major_locator(LogLocator(numticks=6))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: power(value)))
+        axis.set_minor_formatter(NullFormatter())
+    elif of.ticks:
+        axis.set_ticks([at for at, _ in of.ticks], [shown(words) for _, words in of.ticks])
+    elif of.whole:
+        axis.set_major_locator(MaxNLocator(nbins=11, integer=True))

@@ -1,0 +1,58 @@
+"""The API alone, without Ray: `python -m api` on a database that is there already."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+
+import httpx2
+
+from tests.e2e.service import wait_until
+
+
+class Api:
+    """`python -m api` on a free port of loopback.
+
+    Attributes:
+        url: where it answers.
+        http: a client of it.
+    """
+
+    def __init__(self, database_url, log):
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self._port = probe.getsockname()[1]
+        self.url = f"http://127.0.0.1:{self._port}"
+        self.http = httpx2.Client(base_url=self.url, timeout=60)
+        self._log = log
+        self._environment = os.environ | {"GAPLAB_DATABASE_URL": database_url, "GAPLAB_PORT": str(self._port)}
+        self._process = None
+
+    def start(self):
+        with self._log.open("ab") as log:
+            command = [sys.executable, "-m", "api"]
+            self._process = subprocess.Popen(command, env=self._environment, stdout=log, stderr=log)
+        wait_until(self._answers, 120, lambda: self._log.read_text())
+        return self
+
+    def kill(self):
+        self._process.send_signal(signal.SIGKILL)
+        self._process.wait()
+
+    def close(self):
+        self.http.close()
+        if self._process and self._process.poll() is None:
+            self._process.send_signal(signal.SIGTERM)
+            self._process.wait(40)
+
+    def get(self, path, **query):
+        answer = self.http.get(path, params=query)
+        assert answer.status_code == 200, answer.text
+        return answer.json()
+
+    def _answers(self):
+        try:
+            return self.http.get("/livez").status_code == 200
+        except httpx2.TransportError:
+            return False

@@ -1,0 +1,130 @@
+"""A real Chromium that looks at the page, found on this machine and strict about errors; and axe."""
+
+import os
+import re
+import shutil
+from pathlib import Path
+
+import axe_playwright_python
+from playwright.sync_api import sync_playwright
+
+VARIABLE = "GAPLAB_CHROMIUM"
+"""Of the environment: the browser to use, for one that is not on the path."""
+
+SCREENSHOTS = "GAPLAB_SCREENSHOTS"
+"""Of the environment: the folder that screenshots are kept in; without it they are not taken."""
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+    "--disable-dev-shm-usage",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",  # WebGL without a graphics card
+    "--enable-unsafe-swiftshader",
+]
+
+MISSING = f"""the tests of the page need a Chromium, and there is none on this machine. Install it with
+`apt-get install chromium`, or with `.venv/bin/playwright install --with-deps chromium-headless-shell`,
+or name one in {VARIABLE}."""
+
+AXE = Path(axe_playwright_python.__file__).with_name("axe.min.js")
+SERIOUS = {"serious", "critical"}
+
+
+def chromium(playwright):
+    """The path of a Chromium; a failure that says what to install, where there is none."""
+    found = os.environ.get(VARIABLE) or next(filter(None, map(shutil.which, (*NAMES, "/usr/bin/chromium"))), None)
+    if found is None and Path(playwright.chromium.executable_path).is_file():
+        found = playwright.chromium.executable_path
+    assert found is not None, MISSING
+    assert Path(found).is_file(), f"there is no {found}: {MISSING}"
+    return found
+
+
+class Chromium:
+    """One browser; each `visit` has a context of its own, and what goes wrong in it is kept until `check`."""
+
+    def __init__(self):
+        self._playwright = sync_playwright().start()
+        try:
+            path = chromium(self._playwright)
+            self._browser = self._playwright.chromium.launch(executable_path=path, args=FLAGS)
+        except BaseException:
+            self._playwright.stop()
+            raise
+        self._contexts = []
+        self._troubles = []
+        self._forgiven = []
+
+    def visit(self, url, *, dark=False, width=1280, height=900):
+        """A page at the address, in light or dark, as wide as a screen or a phone."""
+        context = self._browser.new_context(
+            color_scheme="dark" if dark else "light",
+            viewport={"width": width, "height": height},
+            reduced_motion="reduce",
+        )
+        context.grant_permissions(["clipboard-read", "clipboard-write"])
+        context.set_default_timeout(60_000)
+        self._contexts.append(context)
+        page = context.new_page()
+        page.on("console", lambda said: said.type == "error" and self._note(f"console: {said.text}"))
+        page.on("pageerror", lambda error: self._note(f"error: {error}"))
+        page.on("requestfailed", self._failed)
+        page.on("response", lambda answer: answer.status >= 400 and self._note(f"{answer.status} {answer.url}"))
+        page.goto(url)
+        return page
+
+    def forgive(self, *patterns):
+        """What a test causes on purpose: troubles that match one of these do not fail it."""
+        self._forgiven += patterns
+
+    def end(self):
+        """Close what the test opened; fail it if anything went wrong there."""
+        for context in self._contexts:
+            context.close()
+        troubles = [each for each in self._troubles if not any(re.search(one, each) for one in self._forgiven)]
+        self._contexts, self._troubles, self._forgiven = [], [], []
+        assert not troubles, "\n".join(troubles)
+
+    def close(self):
+        self._browser.close()
+        self._playwright.stop()
+
+    def _failed(self, request):
+        if request.failure != "net::ERR_ABORTED":  # a view that is left stops what it asked for
+            self._note(f"{request.failure} {request.url}")
+
+    def _note(self, trouble):
+        self._troubles.append(trouble)
+
+
+def axe(page):
+    """Assert that axe finds nothing serious or critical in what the page shows."""
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    found = page.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
+    serious = [
+        f"{each['id']}: {node['html']} ({node.get('failureSummary', '')})"
+        for each in found["violations"]
+        if each["impact"] in SERIOUS
+        for node in each["nodes"]
+    ]
+    assert not serious, "\n".join(serious)
+
+
+def screenshot(page, name):
+    """Keep what the page looks like, if a folder for that is named."""
+    if folder := os.environ.get(SCREENSHOTS):
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        page.screenshot(path=Path(folder) / f"{name}.png", full_page=True)
+
+
+def fits(page):
+    """Assert that nothing is wider than the window: no phone scrolls sideways."""
+    wide = page.evaluate("() => document.documentElement.scrollWidth - document.documentElement.clientWidth")
+    assert wide <= 0, f"{wide} px wider than the window"

@@ -1,0 +1,75 @@
+"""Fixtures of the tests in a browser.
+
+`visit(address, dark=…, width=…)` opens the page in Chromium, and fails the test if the console, a script or a request
+reports an error; `visit.forgive(pattern, …)` names those that a test causes. `archive` is the API alone on a database
+with ended studies, `api` the same on that of `sqlite_store`, which a test fills as workers would, `shared_service` the
+real service with workers.
+"""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from benchmarks.filling import fill
+from services.archives import import_archive
+from services.store.session import Store
+from tests.e2e.api_alone import Api
+from tests.e2e.browser import Chromium
+from tests.e2e.service import Service
+
+STUDY = Path(__file__).parents[2] / "docs" / "studies" / "mujoco-in-mujoco.zip"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Of a module, not of all tests: Playwright keeps an event loop running, which others could not run beside."""
+    browser = Chromium()
+    yield browser
+    browser.close()
+
+
+@pytest.fixture
+def visit(browser):
+    """Opens the page at an address."""
+
+    def open_page(address, **how):
+        return browser.visit(address, **how)
+
+    open_page.forgive = browser.forgive
+    yield open_page
+    browser.end()
+
+
+@pytest.fixture
+def api(sqlite_url, tmp_path):
+    """The API alone on the database of `sqlite_store`, to which a test writes as workers would."""
+    api = Api(sqlite_url, tmp_path / "api.log").start()
+    yield api
+    api.kill()  # an end in order would wait for the page's stream
+    api.close()
+
+
+@pytest.fixture(scope="session")
+def archive(folder, sqlite_template):
+    """The API on a database with seventy made-up experiments and the study that is published with this repository."""
+    file = folder / "archive.db"
+    shutil.copy(sqlite_template, file)
+    store = Store(f"sqlite:///{file}")
+    fill(store, 70)
+    with STUDY.open("rb") as archived:
+        import_archive(store, archived)
+    store.dispose()
+    api = Api(f"sqlite:///{file}", folder / "archive.log").start()
+    yield api
+    api.close()
+
+
+@pytest.fixture(scope="session")
+def shared_service(folder):
+    """The real service, with workers, for all tests of the page."""
+    place = folder / "service"
+    place.mkdir()
+    service = Service(place).start()
+    yield service
+    service.close()

@@ -1,0 +1,180 @@
+"""The comparison of any experiments, in a real Chromium: what is chosen is in the address, and what differs is said."""
+
+from itertools import islice
+
+import pytest
+from playwright.sync_api import expect
+
+from services import execution, experiments
+from tests.e2e.browser import axe, fits, screenshot
+from tests.experiments import some_log, toy
+
+SLOW_MS = 120_000
+STUDY = "MuJoCo in MuJoCo"
+
+
+@pytest.fixture(autouse=True)
+def temporary(visit):
+    visit.forgive("422", "40[04]")
+
+
+@pytest.fixture
+def study(archive):
+    """The published study, with seven experiments."""
+    return archive.get("/studies", text=STUDY)["items"][0]
+
+
+@pytest.fixture
+def ids(study):
+    return [each["id"] for each in study["experiments"]]
+
+
+def address(api, *experiments, **query):
+    tail = "".join(f"&{name}={value}" for name, value in query.items())
+    return f"{api.url}/#/compare?experiments={','.join(experiments)}{tail}"
+
+
+def fragment(page):
+    return page.evaluate("() => location.hash")
+
+
+def lines(page):
+    """The curves that are drawn: those with points."""
+    return page.locator(".large .scatterlayer .trace:has(.point)")
+
+
+def test_a_study_is_found_as_one_types_and_added_by_keyboard(archive, study, ids, visit):
+    page = visit(f"{archive.url}/#/compare")
+    expect(page.get_by_text("Choose experiments above")).to_be_visible()
+    field = page.get_by_role("combobox", name="Add experiments")
+    field.fill("mujoco in")
+    expect(page.get_by_role("option", name="study, all 7 experiments")).to_be_visible()
+    field.press("ArrowDown")
+    expect(page.get_by_role("option", name=STUDY).first).to_have_attribute("aria-selected", "true")
+    field.press("Enter")
+    chosen = page.get_by_role("list", name="Experiments that are compared").get_by_role("listitem")
+    expect(chosen).to_have_count(7)
+    assert fragment(page) == f"#/compare?experiments={','.join(ids)}"
+    expect(lines(page)).to_have_count(6, timeout=SLOW_MS)
+
+    page.get_by_role("button", name="Remove Known fit").click()
+    expect(chosen).to_have_count(6)
+    expect(lines(page)).to_have_count(5, timeout=SLOW_MS)
+    assert ids[5] not in fragment(page)
+    page.go_back()
+    expect(chosen).to_have_count(7)
+    page.go_back()
+    expect(chosen).to_have_count(0)
+    field.fill("no such thing")
+    expect(page.get_by_role("option", name="Nothing has that in its name or id.")).to_be_visible()
+    axe(page)
+
+
+def test_the_address_holds_everything(archive, ids, visit):
+    page = visit(address(archive, *ids[:3]))
+    expect(lines(page)).to_have_count(3, timeout=SLOW_MS)
+    page.get_by_role("radio", name="Time").check()
+    page.get_by_label("each real evaluation costs").fill("90")
+    page.get_by_label("Band").select_option("sd")
+    page.get_by_label("Each repetition").check()
+    page.get_by_label("Test").select_option("welch")
+    page.get_by_label("from", exact=True).fill("2")
+    page.get_by_label("to", exact=True).fill("4")
+    page.get_by_label("to", exact=True).press("Tab")
+    wanted = f"#/compare?experiments={','.join(ids[:3])}&x=time&cost_s=90&band=sd&each=true&test=welch&from=2&to=4"
+    expect(page.get_by_text("over 2 to 4 real-world evaluations")).to_be_attached()
+    assert fragment(page) == wanted
+    page.get_by_role("button", name="Copy the link").click()
+    expect(page.get_by_role("button", name="Copied")).to_be_visible()
+
+    other = visit(page.evaluate("() => navigator.clipboard.readText()"))
+    expect(other.get_by_role("radio", name="Time")).to_be_checked()
+    expect(other.get_by_label("each real evaluation costs")).to_have_value("90")
+    expect(other.get_by_label("Band")).to_have_value("sd")
+    expect(other.get_by_label("Each repetition")).to_be_checked()
+    expect(other.get_by_label("Test")).to_have_value("welch")
+    expect(other.get_by_label("from", exact=True)).to_have_value("2")
+    expect(other.get_by_text("over 2 to 4 real-world evaluations")).to_be_attached(timeout=SLOW_MS)
+    expect(other.locator(".large .xtitle")).to_contain_text("ime", timeout=SLOW_MS)
+    assert fragment(other) == wanted
+
+
+def test_what_differs_is_what_the_service_found(archive, ids, visit):
+    page = visit(address(archive, *ids, to="1"))
+    matrix = page.locator("table.matrix")
+    expect(page.get_by_text("The row against the column")).to_contain_text("after 1 real-world evaluation")
+    found = archive.get("/comparisons", experiment=ids, **{"from": 1, "to": 1})
+    for pair in found:
+        row, column = ids.index(pair["first"]), ids.index(pair["second"])
+        here = matrix.locator("tbody tr").nth(row).locator("td").nth(column)
+        there = matrix.locator("tbody tr").nth(column).locator("td").nth(row)
+        p = pair["student"]["p_holm"]
+        words = ("higher", "lower") if pair["difference"] > 0 else ("lower", "higher")
+        expect(here).to_contain_text(words[0] if p < 0.05 else "n. s.")
+        expect(there).to_contain_text(words[1] if p < 0.05 else "n. s.")
+        expect(here).to_contain_text("p < 0.001" if p < 0.001 else f"p = {p:.3f}")
+    assert any(pair["student"]["p_holm"] < 0.05 for pair in found)
+
+    page.get_by_text("Every pair, at every range").click()
+    rows = page.get_by_role("region", name="Pairs").locator("tbody tr")
+    expect(rows).to_have_count(len(found))
+    heads = page.get_by_role("region", name="Pairs").locator("thead th").all_inner_texts()
+    assert heads[1:4] == ["At 1", "At 1–5", "At 3–5"]
+    page.get_by_role("button", name="3–5", exact=True).click()
+    expect(page.get_by_text("The row against the column")).to_contain_text("over 3 to 5")
+    expect(page.get_by_role("button", name="3–5", exact=True)).to_have_attribute("aria-pressed", "true")
+
+
+def test_what_should_not_be_compared_is_warned_of(archive, ids, visit):
+    toys = archive.get("/experiments", text="experiment", limit=10)["items"]
+    other = next(each for each in toys if each["spec"]["robot"]["name"] == "toy_function")
+    page = visit(address(archive, ids[0], other["id"]))
+    warned = page.locator(".remark.warned")
+    expect(warned).to_contain_text("Different robots: A: quadruped; B: toy_function")
+    expect(warned).to_contain_text("Different realities")
+    page.get_by_role("button", name="Remove").nth(2).click()
+    expect(warned).to_have_count(0)
+
+
+def test_a_reality_that_is_hidden_is_not_taken_for_the_same(api, sqlite_store, visit):
+    first, second = (experiments.submit_experiment(sqlite_store, toy(name=name)).id for name in ("one", "two"))
+    page = visit(address(api, first, second, "nowhere"))
+    expect(page.locator(".remark.warned")).to_contain_text("hidden until their experiments have ended")
+    expect(page.get_by_text("There is no experiment nowhere")).to_be_visible()
+    visit.forgive("404")
+
+
+def test_it_grows_as_an_experiment_goes_on(api, sqlite_store, visit):
+    submitted = experiments.submit_experiment(sqlite_store, toy(name="growing", repetitions=2))
+    claims = execution.claim(sqlite_store, "tests", 2)
+    logs = [some_log(2, recorded) for recorded in (1.0, 1.5)]
+    page = visit(address(api, submitted.id))
+    for iteration in range(3):
+        for claim, log in zip(claims, logs, strict=True):
+            for step in islice(log, 5 if iteration else 3):
+                assert execution.record(sqlite_store, claim, step)
+        expect(page.locator(".large .point")).to_have_count(1 + iteration, timeout=SLOW_MS)
+    for claim in claims:
+        assert execution.complete(sqlite_store, claim)
+    expect(page.locator(".chosen .pill.completed")).to_be_visible(timeout=SLOW_MS)
+
+
+def test_its_figure_is_saved_in_every_format(archive, ids, visit):
+    page = visit(address(archive, *ids, band="sd", x="rollouts"))
+    for words, begins in (("SVG", b"<?xml"), ("PNG", b"\x89PNG"), ("PDF", b"%PDF"), ("CSV", b"experiment,")):
+        with page.expect_download(timeout=SLOW_MS) as saved:
+            page.get_by_role("link", name=words).click()
+        assert saved.value.path().read_bytes().startswith(begins)
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_it_is_accessible_and_fits_a_phone(archive, ids, visit, dark):
+    for width in (1280, 375):
+        page = visit(address(archive, *ids), dark=dark, width=width)
+        expect(lines(page)).to_have_count(6, timeout=SLOW_MS)
+        expect(page.locator("table.matrix")).to_be_visible()
+        page.get_by_text("Every pair, at every range").click()
+        axe(page)
+        fits(page)
+        page.get_by_text("Every pair, at every range").click()
+        screenshot(page, f"compare-{'dark' if dark else 'light'}-{width}")

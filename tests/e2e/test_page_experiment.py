@@ -1,0 +1,243 @@
+"""The view of an experiment, in a real Chromium: it grows as results come in, and asks what the state permits."""
+
+import json
+import re
+from itertools import islice
+
+import httpx2
+import pytest
+from playwright.sync_api import expect
+
+from schemas.events import EventKind
+from schemas.lifecycle import PERMITTED
+from services import execution, experiments
+from tests.e2e.browser import axe, fits, screenshot
+from tests.experiments import some_log, toy
+
+SLOW_MS = 120_000
+NAME = "simulated_fit"
+
+
+@pytest.fixture(autouse=True)
+def temporary(visit):
+    visit.forgive("422", "40[04]")
+
+
+@pytest.fixture
+def ended(archive):
+    """The address of an experiment that has everything."""
+    found = archive.get("/experiments", text=NAME, strategy=NAME, limit=500)["items"]
+    return next(each for each in found if each["spec"]["robot"]["name"] == "quadruped")
+
+
+def address(api, experiment, **query):
+    tail = "&".join(f"{name}={value}" for name, value in query.items())
+    return f"{api.url}/#/experiments/{experiment}{'?' if tail else ''}{tail}"
+
+
+def steps(store, claim, log):
+    for step in log:
+        assert execution.record(store, claim, step)
+
+
+def markers(page):
+    """The points of the curve that are drawn."""
+    return page.locator(".figure-curves .scatterlayer .point").count()
+
+
+def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api, sqlite_store, visit):
+    submitted = experiments.submit_experiment(sqlite_store, toy(name="growing", repetitions=2, iterations=3))
+    claims = execution.claim(sqlite_store, "tests", 2)
+    logs = [some_log(3, recorded) for recorded in (1.0, 1.5)]
+    for claim, log in zip(claims, logs, strict=True):
+        steps(sqlite_store, claim, islice(log, 3))  # number 0
+    page = visit(address(api, submitted.id))
+    page.evaluate("() => { window.untouched = true; }")
+    expect(page.get_by_role("heading", level=1)).to_have_text("Growing")
+    expect(page.locator(".state-now")).to_contain_text("running")
+    expect(page.locator(".figure-curves .point")).to_have_count(1, timeout=SLOW_MS)
+
+    for iteration in (1, 2):
+        for claim, log in zip(claims, logs, strict=True):
+            steps(sqlite_store, claim, islice(log, 5))
+        expect(page.locator(".figure-curves .point")).to_have_count(1 + iteration, timeout=SLOW_MS)
+    happened = page.locator(".events li")
+    expect(happened.first).to_contain_text("Repetition 1, iteration 2: the controller reaches", timeout=SLOW_MS)
+    expect(page.locator(".facts")).to_contain_text("6 of 8")
+
+    for claim, log in zip(claims, logs, strict=True):
+        steps(sqlite_store, claim, log)
+        assert execution.complete(sqlite_store, claim)
+    expect(page.locator(".state-now")).to_contain_text("completed", timeout=SLOW_MS)
+    expect(happened.first).to_contain_text("Completed")
+    expect(page.get_by_role("tabpanel").locator("tbody .pill.completed")).to_have_count(2)
+    assert page.evaluate("() => window.untouched")
+
+
+def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api, sqlite_store, visit):
+    submitted = experiments.submit_experiment(sqlite_store, toy(repetitions=1))
+    (claim,) = execution.claim(sqlite_store, "tests", 1)
+    log = some_log()
+    steps(sqlite_store, claim, islice(log, 3))
+    visit.forgive("ERR_", "net::")
+    page = visit(address(api, submitted.id))
+    expect(page.locator(".figure-curves .point")).to_have_count(1, timeout=SLOW_MS)
+    api.kill()
+    expect(page.locator("#connection")).not_to_be_empty(timeout=SLOW_MS)
+    expect(page.locator(".figure-curves .point")).to_have_count(1)
+    steps(sqlite_store, claim, log)
+    assert execution.complete(sqlite_store, claim)
+    api.start()
+    expect(page.locator(".figure-curves .point")).to_have_count(3, timeout=SLOW_MS)
+    expect(page.locator(".state-now")).to_contain_text("completed", timeout=SLOW_MS)
+    expect(page.locator("#connection")).to_be_empty()
+
+
+def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api, sqlite_store, visit):
+    submitted = experiments.submit_experiment(sqlite_store, toy())
+    page = visit(address(api, submitted.id))
+    verbs = page.get_by_role("group", name="Ask of this experiment")
+    state = page.locator(".state-now")
+    verbs.get_by_role("button", name="Resume").press("Enter")
+    expect(page.locator(".verbs .said")).to_contain_text("queued cannot be resumed, only one that is pausing or paused")
+
+    verbs.get_by_role("button", name="Pause").click()
+    expect(state).to_contain_text("paused")
+    verbs.get_by_role("button", name="Resume").click()
+    expect(state).to_contain_text("queued")
+
+    verbs.get_by_role("button", name="Change its turn").click()
+    page.get_by_label("Priority").fill("7")
+    page.get_by_label("Repetitions at once").fill("2")
+    page.get_by_role("button", name="Change it", exact=True).click()
+    expect(page.locator(".facts")).to_contain_text("at most 2")
+    assert api.get(f"/experiments/{submitted.id}")["priority"] == 7
+
+    verbs.get_by_role("button", name="Cancel").click()
+    page.get_by_role("button", name="Back").click()
+    assert api.get(f"/experiments/{submitted.id}")["state"] == "QUEUED"
+    verbs.get_by_role("button", name="Cancel").press("Enter")
+    page.get_by_role("button", name="Cancel it").press("Enter")
+    expect(state).to_contain_text("cancelled")
+    expect(verbs.get_by_role("button", name="Pause")).to_have_attribute("aria-disabled", "true")
+
+
+def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api, sqlite_store, visit):
+    submitted = experiments.submit_experiment(sqlite_store, toy(repetitions=1))
+    (claim,) = execution.claim(sqlite_store, "tests", 1)
+    steps(sqlite_store, claim, some_log())
+    assert execution.complete(sqlite_store, claim)
+    page = visit(address(api, submitted.id))
+    page.get_by_role("button", name="Extend").click()
+    page.get_by_label("Repetitions in all").fill("2")
+    page.get_by_role("button", name="Extend it").click()
+    expect(page.locator(".state-now")).to_contain_text("queued")
+    expect(page.locator(".facts")).to_contain_text("1 of 2")
+    page.get_by_role("button", name="Stop").click()
+    page.get_by_role("button", name="Stop it").click()
+    expect(page.locator(".state-now")).to_contain_text("completed")
+
+
+def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api, sqlite_store, visit):
+    submitted = experiments.submit_experiment(sqlite_store, toy(name="mine"))
+    visit.forgive("412")
+    page = visit(address(api, submitted.id))
+    page.get_by_role("button", name="Edit name and notes").click()
+    page.get_by_label("Notes", exact=True).fill("On the second robot")
+    theirs = api.http.patch(f"/experiments/{submitted.id}", json={"name": "theirs"}, headers={"If-Match": "*"})
+    assert theirs.status_code == 200
+    page.get_by_role("button", name="Save").click()
+    expect(page.get_by_role("dialog").get_by_role("alert")).to_contain_text("“theirs”")
+    page.get_by_label("Name", exact=True).fill("<b>ours</b>")
+    page.get_by_role("button", name="Save").click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("<b>ours</b>")
+    expect(page.locator(".notes")).to_have_text("On the second robot")
+
+
+def test_what_failed_is_said_with_its_reason_and_attempts(api, sqlite_store, visit):
+    submitted = experiments.submit_experiment(sqlite_store, toy(repetitions=1))
+    (claim,) = execution.claim(sqlite_store, "tests", 1)
+    assert execution.fail(sqlite_store, claim, "a foot fell off")
+    page = visit(address(api, submitted.id))
+    expect(page.locator(".state-now")).to_contain_text("failed")
+    expect(page.locator(".remark.broken")).to_contain_text("a foot fell off")
+    page.get_by_role("button", name="Attempts at repetition 0: 1").click()
+    attempts = page.get_by_role("region", name="Attempts at repetition 0")
+    expect(attempts).to_contain_text("a foot fell off")
+
+
+def test_there_is_nothing_yet_or_no_such_experiment(api, sqlite_store, visit):
+    submitted = experiments.submit_experiment(sqlite_store, toy())
+    page = visit(address(api, submitted.id, tab="samples"))
+    expect(page.get_by_role("tabpanel")).to_contain_text("Nothing was tried in reality yet.")
+    expect(page.locator(".figure-curves")).to_contain_text("Nothing to draw yet.", timeout=SLOW_MS)
+    axe(page)
+    visit.forgive("404")
+    page.goto(f"{api.url}/#/experiments/nowhere")
+    expect(page.get_by_role("alert")).to_contain_text("nowhere")
+
+
+def test_details_are_reached_by_keyboard_and_are_in_the_address(archive, ended, visit):
+    page = visit(address(archive, ended["id"], tab="samples"))
+    panel = page.get_by_role("tabpanel")
+    expect(panel.locator("tbody tr")).to_have_count(25)
+    first = panel.locator("tbody tr").first.inner_text()
+    replay = panel.get_by_role("link", name="Replay").first.get_attribute("href")
+    assert replay == f"#/replay?experiment={ended['id']}&repetition=0&iteration=0&kind=transfer"
+    panel.get_by_role("button", name="After").click()
+    expect(page.get_by_text("Page 2")).to_be_visible()
+    assert panel.locator("tbody tr").first.inner_text() != first
+    panel.get_by_label("Show").select_option("sample")
+    expect(panel.locator("tbody")).not_to_contain_text("probe")
+
+    page.get_by_role("tab", name="Real-world samples").press("ArrowRight")
+    expect(page.get_by_role("tab", name="Misfit")).to_be_focused()
+    expect(panel.get_by_role("row")).to_have_count(7)
+    assert page.evaluate("() => location.hash").endswith("?tab=misfit")
+    page.get_by_role("tab", name="Misfit").press("End")
+    expect(panel.locator("code")).to_contain_text('"seed": 2012')
+    panel.get_by_role("button", name="Copy the spec").click()
+    expect(panel.get_by_role("button", name="Copied")).to_be_visible()
+    assert json.loads(page.evaluate("() => navigator.clipboard.readText()")) == ended["spec"]
+
+
+def test_its_files_are_saved(archive, ended, visit):
+    page = visit(address(archive, ended["id"]))
+    with page.expect_download() as archived:
+        page.get_by_role("link", name="Archive of everything").click()
+    assert archived.value.suggested_filename.endswith(".zip")
+    with page.expect_download() as saved:
+        page.locator(".figure-curves").get_by_role("link", name="CSV").click()
+    assert saved.value.path().read_text().startswith("experiment,name,strategy,repetition")
+    links = page.locator(".figures .files a, .figure-curves .files a")
+    expect(links).to_have_count(3 * 3 + 4)
+    drawn = httpx2.get(f"{archive.url}/{links.first.get_attribute('href')}", timeout=120)
+    assert drawn.status_code == 200
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_it_is_accessible_and_fits_a_phone(archive, ended, visit, dark):
+    shade = "dark" if dark else "light"
+    for width in (1280, 375):
+        page = visit(address(archive, ended["id"]), dark=dark, width=width)
+        expect(page.locator(".figure-curves .point")).to_have_count(6, timeout=SLOW_MS)
+        for figure in page.locator(".figures > section").all():
+            figure.scroll_into_view_if_needed()
+            expect(figure.locator(".plot .main-svg").first).to_be_visible(timeout=SLOW_MS)
+        expect(page.get_by_role("tabpanel").locator("tbody tr")).to_have_count(20)
+        axe(page)
+        fits(page)
+        screenshot(page, f"experiment-{shade}-{width}")
+
+
+def test_the_page_knows_every_state_and_event_of_the_service(archive, visit):
+    visit.forgive("404")
+    page = visit(f"{archive.url}/#/experiments/nowhere")
+    folder = "./assets/dashboard/views/experiment"
+    permitted = page.evaluate(f"() => import('{folder}/verbs.js').then((module) => module.PERMITTED)")
+    assert {verb: set(states) for verb, states in permitted.items()} == {
+        verb.value: {each.value for each in states} for verb, states in PERMITTED.items()
+    }
+    words = page.evaluate(f"() => import('{folder}/words.js').then((module) => module.KINDS)")
+    assert set(words) == {each.value for each in EventKind}
+    assert not [each for each in words if re.search(r"[A-Z]", each)]

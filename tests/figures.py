@@ -1,0 +1,108 @@
+"""Curves and figures for the tests of figures."""
+
+from schemas.curves import Curve, CurvePoint
+from schemas.lifecycle import State
+from services.figures.curves import curves_figure
+from services.figures.marks import (
+    Arrow,
+    Axis,
+    Bars,
+    Diagonal,
+    Figure,
+    Label,
+    Level,
+    Line,
+    Panel,
+    Points,
+    Table,
+)
+from services.figures.style import style_of
+
+NAMES = [
+    "<script>alert(1)</script>",
+    "a $\\frac{ b",
+    "--> x",
+    "\x01\x1b[31m",
+    "%",
+    "_a_b^c_",
+    "x" * 200,
+    "{braces}",
+    "%{y}</script>",
+    "走る 🤖",
+]
+"""Names that a careless renderer takes for something else."""
+
+
+def point(evaluations: int, mean: float | None, n: int = 30, sd: float | None = 0.1) -> CurvePoint:
+    ends = (mean - 0.2, mean + 0.2) if mean is not None and sd is not None else (None, None)
+    values = (mean,) if n < 2 else (mean, None if mean is None else mean + 0.1)
+    return CurvePoint(evaluations=evaluations, n=n, mean=mean, sd=sd, lower=ends[0], upper=ends[1], values=values)
+
+
+def curve(name: str, *points: CurvePoint, direct: bool = False, unit: str = "m/s") -> Curve:
+    return Curve(
+        experiment=f"id-of-{name[:20]}",
+        name=name,
+        strategy="s",
+        state=State.RUNNING,
+        unit=unit,
+        direct=direct,
+        points=points,
+    )
+
+
+RISING = curve("simulated_fit", point(0, 0.9), point(1, 1.2), point(2, 1.3))
+DIRECT = curve("direct", point(0, 1.33, n=100, sd=0.1), direct=True)
+
+_X, _Y = Axis("time (s)", (0, 4)), Axis("height (m)", (-1, 2))
+
+EVERYTHING = Figure(
+    name="everything",
+    title="Every mark",
+    panels=(
+        Panel(
+            (
+                Bars("reality", ((0, 1, 0), (2, 3.5, 1)), style_of(1), 0.3),
+                Level("landing", 2.5, upright=True, lower=2.4, upper=2.6),
+            ),
+            _X,
+            Axis("", (-0.5, 1.5), ticks=((0, "left"), (1, "right"))),
+            title="Footfall",
+            height=0.5,
+        ),
+        Panel(
+            (
+                Line(
+                    "simulator", (0, 1, None, 3, 4), (0, 1, None, 1, 0.5), style_of(0), hover=("a", "b", "", "c", "d")
+                ),
+                Line("simulator", (0, 2, 4), (0.1, 0.2, 0.1), style_of(0), faint=True),
+                Line("steps", (0, 2, 4), (-0.5, 0.2, 0.1), style_of(2), (-1, 0, 0), (0, 0.3, 0.2), steps=True),
+                Level("mean", 0.5, lower=0.4, upper=0.6),
+                Diagonal("equal"),
+                Points("tuned", (1, 2, 3), (0.5, 1, 1.5), style_of(3), shades=(0, 1, 2), shades_label="Iteration"),
+                Points("truth", (2,), (1.8,), style_of(4), size=2, hollow=True),
+                Arrow((1, 0), (3, 1), style_of(5)),
+                Arrow((1, 0), (3, -0.5)),
+                Label("here", 1, 0, beside=True),
+            ),
+            _X,
+            _Y,
+        ),
+        Panel((Line("error", (0, 2, 4), (1e-6, 1e-3, 20)),), _X, Axis("squared error", (1e-7, 100), log=True)),
+    ),
+    caption="Two repetitions; bands: what is between.",
+    alt="A figure with every kind of mark.",
+    share_x=True,
+    table=Table(("", "a"), (("b", "1"),)),
+)
+
+FIGURES = [
+    curves_figure([RISING, DIRECT], title="curves", each=True),
+    curves_figure([]),
+    curves_figure([curve("a")]),
+    curves_figure([DIRECT]),
+    curves_figure([curve(f"line {each}", point(0, each)) for each in range(40)]),
+    curves_figure([curve("alone", point(0, 1.0, n=1, sd=None), point(1, None, n=0, sd=None))]),
+    EVERYTHING,
+]
+"""What every renderer must draw."""

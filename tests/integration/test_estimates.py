@@ -1,0 +1,125 @@
+"""What a study would cost is what it then costs; and asking stores nothing."""
+
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import update
+
+from api.app import create_app
+from schemas.spec import StudySpec
+from services import experiments
+from services.engines import engines
+from services.estimates import estimate
+from services.execution import claim
+from services.settings import Limits, Settings
+from services.store.models import RepetitionRow, SupervisorRow
+from services.store.session import Store
+from tests.experiments import run, some_log, toy
+
+STUDY = {
+    "robot": "toy_function",
+    "strategies": ["simulated_fit", "informative", "direct"],
+    "iterations": 3,
+    "repetitions": 4,
+    "direct_repetitions": 9,
+    "budget": "smoke",
+}
+
+
+def test_the_rollouts_are_those_that_the_submitted_study_has(store: Store):
+    spec = StudySpec.model_validate(STUDY)
+
+    found = estimate(store, spec)
+
+    assert experiments.list_studies(store).items == ()
+    study = experiments.submit_study(store, spec)
+    assert found.rollouts == study.progress.rollouts
+    assert [each.rollouts for each in found.experiments] == [each.progress.rollouts for each in study.experiments]
+    assert [each.repetitions for each in found.experiments] == [4, 4, 9]
+    assert [each.iterations for each in found.experiments] == [3, 3, 0]
+
+
+def test_the_time_is_that_of_rollouts_measured_here_with_the_same_robot_and_engine(store: Store):
+    spec = StudySpec.model_validate(STUDY)
+    before = estimate(store, spec, cores=2)
+    made = experiments.submit_experiment(store, toy(repetitions=1))
+    (one,) = claim(store, "me", 1)
+    run(store, one)
+    with store.transaction() as session:
+        session.execute(update(RepetitionRow).values(seconds=30.0, rollouts_done=600))
+
+    after = estimate(store, spec, cores=2)
+
+    usual = engines["analytic"].usual_rollout_s
+    assert made.progress.repetitions == 1
+    assert [(each.seconds_per_rollout, each.measured) for each in before.engines] == [(usual, False)]
+    assert [(each.engine, each.seconds_per_rollout, each.measured) for each in after.engines] == [
+        ("analytic", 0.05, True)
+    ]
+    assert after.core_seconds == pytest.approx(after.rollouts * 0.05)
+    assert after.seconds == pytest.approx(after.core_seconds / 2)
+
+
+def test_the_direct_baseline_is_computed_by_the_engine_of_reality(sqlite_store: Store):
+    spec = {
+        "strategies": ["random", "direct"],
+        "engine": "pybullet",
+        "reality": {"engine": "mujoco"},
+        "budget": "smoke",
+    }
+
+    found = estimate(sqlite_store, StudySpec.model_validate(spec))
+
+    assert [each.engine for each in found.experiments] == ["pybullet", "mujoco"]
+    assert {each.engine for each in found.engines} == {"pybullet", "mujoco"}
+
+
+def test_few_at_once_take_as_long_as_few_cores(sqlite_store: Store):
+    spec = StudySpec.model_validate(STUDY | {"max_parallel": 1})
+
+    assert estimate(sqlite_store, spec, cores=16).cores == 3
+
+
+def test_only_supervisors_that_were_heard_of_lately_work(store: Store):
+    long_ago = datetime.now(UTC) - timedelta(hours=1)
+    with store.transaction() as session:
+        session.add(SupervisorRow(owner="works"))
+        session.add(SupervisorRow(owner="gone", started_at=long_ago, heartbeat_at=long_ago))
+
+    assert estimate(store, StudySpec.model_validate(STUDY)).supervisors == 1
+
+
+def test_what_is_wrong_is_told_with_its_places_as_on_submission(sqlite_store: Store):
+    api = TestClient(create_app(sqlite_store, limits=Limits(repetitions=10)))
+    bad = STUDY | {
+        "tunables": [{"name": "static_friction", "lower": 2.0, "upper": 1.0}],
+        "strategies": ["simulatd_fit"],
+    }
+
+    for body in (bad, STUDY, {"iterations": "many"}):
+        told, refused = api.post("/studies/estimate", json=body), api.post("/studies", json=body)
+
+        assert told.status_code == refused.status_code == 422
+        assert told.json()["errors"] == refused.json()["errors"]
+    pointers = {each["pointer"] for each in api.post("/studies/estimate", json=bad).json()["errors"]}
+    assert "/strategies/0" in pointers
+
+
+def test_cores_are_the_workers_that_the_service_was_given(sqlite_store: Store):
+    api = TestClient(create_app(sqlite_store, Settings(workers=3)), base_url="http://127.0.0.1:8000")
+
+    assert api.post("/studies/estimate", json=STUDY).json()["cores"] == 3
+
+
+def test_the_best_fitness_of_an_experiment_is_the_mean_of_its_repetitions_best(store: Store):
+    made = experiments.submit_experiment(store, toy(repetitions=2))
+    assert experiments.read_experiment(store, made.id).best_fitness is None
+
+    for recorded in (1.0, 2.0):
+        (one,) = claim(store, "me", 1)
+        run(store, one, some_log(recorded=recorded))
+
+    (listed,) = experiments.list_experiments(store).items
+    assert listed.best_fitness == experiments.read_experiment(store, made.id).best_fitness
+    assert listed.best_fitness == pytest.approx((3.0 + 4.0) / 2)

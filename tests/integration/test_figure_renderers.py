@@ -1,0 +1,155 @@
+"""Every renderer draws every kind of figure, and the same one alike."""
+
+import json
+import re
+import xml.etree.ElementTree as ET
+from html.parser import HTMLParser
+from io import BytesIO
+
+import matplotlib.image
+import numpy as np
+import pytest
+from plotly.graph_objects import Figure as Chart
+
+from services.figures.chart import chart
+from services.figures.curves import curves_figure
+from services.figures.files import COLUMN_IN, DPI, render_file
+from services.figures.html import render_html
+from services.figures.marks import Figure
+from services.figures.style import INK
+from tests.figures import DIRECT, EVERYTHING, FIGURES, NAMES, RISING, curve, point
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+EVERY = pytest.mark.parametrize("figure", FIGURES, ids=range(len(FIGURES)))
+
+
+def render_svg(figure: Figure) -> str:
+    return render_file(figure, "svg").decode()
+
+
+def pixels(figure: Figure, **how: object) -> np.ndarray:
+    return matplotlib.image.imread(BytesIO(render_file(figure, "png", **how)))
+
+
+@EVERY
+def test_plotly_takes_the_chart_and_json_has_all_its_numbers(figure: Figure):
+    drawn = json.loads(json.dumps(chart(figure), allow_nan=False))
+
+    assert len(Chart(drawn).data) == len(drawn["data"])
+    texts = [each["text"] for each in drawn["layout"]["annotations"]]
+    assert ("no results yet" in texts) == figure.empty
+
+
+@EVERY
+def test_every_mark_leaves_ink_on_paper(figure: Figure):
+    picture = pixels(figure)
+
+    assert picture.shape[1] == pytest.approx(COLUMN_IN * DPI, abs=1)
+    assert (picture[:, :, :3].min(axis=2) < 0.9).mean() > 0.01
+    edge = np.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])[:, :3]
+    assert edge.min() > 0.99, "something is cut off at the edge"
+
+
+@EVERY
+def test_drawings_are_whole_documents_and_the_same_bytes_each_time(figure: Figure):
+    drawing, document = render_svg(figure), render_file(figure, "pdf")
+
+    assert ET.fromstring(drawing).tag == f"{SVG}svg"
+    assert document.startswith(b"%PDF")
+    assert document.rstrip().endswith(b"%%EOF")
+    assert b"/Type3" not in document
+    assert b"/CreationDate" not in document
+    assert b"/TrueType" in document or b"/CIDFontType2" in document
+    assert (render_svg(figure), render_file(figure, "pdf")) == (drawing, document)
+    assert render_file(figure, "png") == render_file(figure, "png")
+
+
+@EVERY
+def test_the_page_is_the_same_each_time_and_says_everything_in_words(figure: Figure):
+    page = render_html(figure)
+
+    assert page == render_html(figure)
+    assert figure.empty == ("no results yet" in page.partition("<script>Plotly")[2])
+    assert 'role="img" aria-label="' in page
+
+
+def test_marks_in_the_colour_of_text_say_so_and_the_page_decides_on_the_rest():
+    drawn = chart(EVERYTHING)
+
+    for trace in drawn["data"]:
+        inked = INK in (trace.get("line", {}).get("color"), trace["marker"].get("color") if "marker" in trace else None)
+        assert inked == (trace.get("meta") == {"ink": True}), trace["name"]
+    assert [each.get("name") for each in drawn["layout"]["annotations"] if each["showarrow"]] == [None, "ink"]
+    assert "template" not in drawn["layout"]
+    for foreign in ("font", "bgcolor", "gridcolor", "linecolor"):
+        assert foreign not in json.dumps(drawn["layout"])
+
+
+def test_a_name_stands_in_the_legend_once_and_in_the_order_of_the_marks():
+    drawn = [each for each in chart(EVERYTHING)["data"] if each["showlegend"]]
+    first = sorted((each for each in drawn if each["xaxis"] == "x2"), key=lambda each: each["legendrank"])
+
+    assert len({each["name"] for each in drawn}) == len(drawn)
+    assert [each["name"] for each in first] == ["simulator", "steps", "mean", "equal", "tuned", "truth"]
+
+
+def test_panels_one_above_another_share_their_horizontal_axis():
+    layout = chart(EVERYTHING)["layout"]
+
+    assert layout["xaxis3"]["matches"] == layout["xaxis2"]["matches"] == "x"
+    assert layout["xaxis3"]["title"]["text"] == "time (s)"
+    assert layout["xaxis"]["title"]["text"] == ""
+    assert layout["yaxis"]["domain"][0] > layout["yaxis2"]["domain"][1] > layout["yaxis3"]["domain"][1]
+    assert layout["yaxis3"]["type"] == "log"
+    assert layout["yaxis3"]["range"] == [-7, 2]
+
+
+def test_the_chart_of_a_study_is_a_few_kilobytes():
+    curves = [curve(f"strategy {each}", *(point(at, 0.1 + at / 7) for at in range(11))) for each in range(7)]
+
+    assert len(json.dumps(chart(curves_figure(curves)))) < 15_000
+
+
+def test_a_file_is_as_wide_as_asked_for_and_without_its_caption_lower():
+    figure = curves_figure([RISING, DIRECT], title="wide")
+
+    assert pixels(figure, width_in=7.2).shape[1] == 2160
+    assert pixels(figure, caption=False).shape[0] < pixels(figure).shape[0]
+
+
+def test_the_page_fetches_nothing_from_elsewhere():
+    found: list[str] = []
+
+    class Sources(HTMLParser):
+        def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]):
+            found.extend(f"{tag} {value}" for name, value in attrs if name in {"src", "href"})
+
+    page = render_html(curves_figure([RISING, DIRECT]))
+    Sources().feed(page)
+
+    assert found == []
+    assert re.search(r'"modeBarButtonsToRemove": *\["sendChartToCloud"', page)
+
+
+def test_the_page_has_its_numbers_in_a_table_for_those_who_cannot_see_the_lines():
+    page = render_html(curves_figure([RISING, DIRECT], title="The title"))
+
+    assert "<h1>The title</h1>" in page
+    row = re.search(r'<tr><th scope="row">Simulated fit</th>(.*?)</tr>', page)
+    assert row
+    assert re.findall(r"<td>(.*?)</td>", row[1]) == ["0.900 ± 0.100 (30)", "1.200 ± 0.100 (30)", "1.300 ± 0.100 (30)"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_hostile_names_are_only_text(name: str):
+    figure = curves_figure([curve(name, point(0, 1.0), point(1, 2.0))], title=name)
+
+    page, drawing, trace = render_html(figure), render_svg(figure), chart(figure)["data"][-1]
+
+    assert "<script>alert" not in page
+    assert page.count("</script>") == 2
+    assert "<" not in trace["name"]
+    assert ET.fromstring(drawing).tag == f"{SVG}svg"
+    assert render_file(figure, "pdf")
+    assert render_file(figure, "png")
