@@ -3,18 +3,21 @@
 import json
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from html.parser import HTMLParser
 from io import BytesIO
 
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib import rc_context
 from plotly.graph_objects import Figure as Chart
 
 from services.figures.chart import chart
 from services.figures.curves import curves_figure
-from services.figures.files import COLUMN_IN, DPI, render_file
+from services.figures.files import COLUMN_IN, DPI, LOOK, FileFormat, render_file
 from services.figures.html import render_html
+from services.figures.lettering import lines, shortened, width_in
 from services.figures.marks import Figure
 from services.figures.style import INK
 from tests.figures import DIRECT, EVERYTHING, FIGURES, NAMES, RISING, curve, point
@@ -38,7 +41,7 @@ def test_plotly_takes_the_chart_and_json_has_all_its_numbers(figure: Figure):
 
     assert len(Chart(drawn).data) == len(drawn["data"])
     texts = [each["text"] for each in drawn["layout"]["annotations"]]
-    assert ("no results yet" in texts) == figure.empty
+    assert (figure.nothing in texts) == figure.empty
 
 
 @EVERY
@@ -52,7 +55,7 @@ def test_every_mark_leaves_ink_on_paper(figure: Figure):
 
 
 @EVERY
-def test_drawings_are_whole_documents_and_the_same_bytes_each_time(figure: Figure):
+def test_drawings_are_whole_documents_with_letters_that_publishers_take(figure: Figure):
     drawing, document = render_svg(figure), render_file(figure, "pdf")
 
     assert ET.fromstring(drawing).tag == f"{SVG}svg"
@@ -61,8 +64,12 @@ def test_drawings_are_whole_documents_and_the_same_bytes_each_time(figure: Figur
     assert b"/Type3" not in document
     assert b"/CreationDate" not in document
     assert b"/TrueType" in document or b"/CIDFontType2" in document
-    assert (render_svg(figure), render_file(figure, "pdf")) == (drawing, document)
-    assert render_file(figure, "png") == render_file(figure, "png")
+
+
+@pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
+@pytest.mark.parametrize("figure", [FIGURES[0], EVERYTHING, FIGURES[8]], ids=lambda each: each.name)
+def test_the_same_figure_is_the_same_bytes(figure: Figure, kind: FileFormat):
+    assert render_file(figure, kind) == render_file(figure, kind)
 
 
 @EVERY
@@ -70,7 +77,7 @@ def test_the_page_is_the_same_each_time_and_says_everything_in_words(figure: Fig
     page = render_html(figure)
 
     assert page == render_html(figure)
-    assert figure.empty == ("no results yet" in page.partition("<script>Plotly")[2])
+    assert figure.empty == (figure.nothing in page.partition("<script>Plotly")[2])
     assert 'role="img" aria-label="' in page
 
 
@@ -118,6 +125,23 @@ def test_a_file_is_as_wide_as_asked_for_and_without_its_caption_lower():
     assert pixels(figure, caption=False).shape[0] < pixels(figure).shape[0]
 
 
+@pytest.mark.parametrize("words", ["a title of many words " * 9, "x" * 200])
+def test_long_titles_are_broken_and_long_names_shortened_in_their_middle(words: str):
+    first, second = (curve(words, point(0, 1.0)).model_copy(update={"experiment": each}) for each in "ab")
+    figure = replace(curves_figure([first, second]), title=words, caption=words)
+
+    picture = pixels(figure)
+
+    edge = np.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])[:, :3]
+    assert edge.min() > 0.99, "something is cut off at the edge"
+    with rc_context(LOOK):
+        short = shortened("abcdefghij" * 5, 8, 1.0)
+        assert width_in(short, 8) <= 1.0
+        assert "".join(lines(words, 8, 1.0)).replace(" ", "") == words.replace(" ", "")
+        assert max(width_in(each, 8) for each in lines(words, 8, 1.0)) <= 1.0
+    assert (short[:3], short[-3:]) == ("abc", "hij")
+
+
 def test_the_page_fetches_nothing_from_elsewhere():
     found: list[str] = []
 
@@ -152,4 +176,3 @@ def test_hostile_names_are_only_text(name: str):
     assert "<" not in trace["name"]
     assert ET.fromstring(drawing).tag == f"{SVG}svg"
     assert render_file(figure, "pdf")
-    assert render_file(figure, "png")
