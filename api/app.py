@@ -102,5 +102,6 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     for module in MODULES:
         app.include_router(module.router)
     dashboard.install(app)
+    figures.install(app)
     documentation.install(app)
     return app
