@@ -4,6 +4,7 @@ import os
 from importlib.metadata import version
 
 from fastapi import FastAPI
+from fastapi.middleware.gzip import GZipMiddleware
 
 from api import documentation, problems
 from api.access import Access
@@ -94,6 +95,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     app.state.feed = Feed(store)
     app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
     app.state.metrics = Metrics(store, app.state.feed)
+    app.add_middleware(GZipMiddleware, minimum_size=20_000, compresslevel=4)
     app.add_middleware(BodyLimit, most_bytes=limits.body_bytes)
     app.add_middleware(Access, settings=settings)
     app.add_middleware(Headers)

@@ -1,13 +1,14 @@
 """The page at `/`: static files, open since they hold no data; what they show they ask of the API like any client."""
 
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
 from fastapi import FastAPI
 from fastapi.responses import HTMLResponse
-from fastapi.staticfiles import StaticFiles
 
+from api.assets import Assets
 from api.pages import page
 
 FILES: Final = Path(__file__).parents[1] / "dashboard"
@@ -16,8 +17,8 @@ FILES: Final = Path(__file__).parents[1] / "dashboard"
 def install(app: FastAPI) -> None:
     """Serve the page, its modules, and Plotly from its installed package."""
     app.add_api_route("/", _index, include_in_schema=False)
-    app.mount("/assets/dashboard", StaticFiles(directory=FILES), name="dashboard")
-    app.mount("/assets/plotly", StaticFiles(packages=[("plotly", "package_data")]), name="plotly")
+    app.mount("/assets/dashboard", Assets(directory=FILES), name="dashboard")
+    app.mount("/assets/plotly", Assets(packages=[("plotly", "package_data")]), name="plotly")
 
 
 def _index() -> HTMLResponse:
@@ -26,4 +27,4 @@ def _index() -> HTMLResponse:
 
 @cache
 def _html() -> str:
-    return (FILES / "index.html").read_text(encoding="utf-8")
+    return (FILES / "index.html").read_text(encoding="utf-8").replace("{plotly}", version("plotly"))

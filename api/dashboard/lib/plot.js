@@ -3,17 +3,21 @@
 import { get } from "./api.js";
 import { h } from "./dom.js";
 import { dressed } from "./look.js";
-import { empty, failed } from "./states.js";
+import { empty, failed, loading } from "./states.js";
 import { table } from "./table.js";
 import { onTheme } from "./theme.js";
 
 let loaded = null;
 
-/** Plotly, fetched when the first figure is drawn. */
+/** Plotly, fetched when the first figure is drawn; if that fails, with the next one. */
 function plotly() {
   loaded ??= new Promise((resolve, reject) => {
-    const script = h("script", { src: "assets/plotly/plotly.min.js", onload: () => resolve(globalThis.Plotly), onerror: reject });
-    document.head.append(script);
+    const src = `assets/plotly/plotly.min.js?v=${document.documentElement.dataset.plotly}`;
+    const fail = () => {
+      loaded = null;
+      reject(new Error("What draws figures could not be loaded."));
+    };
+    document.head.append(h("script", { src, onload: () => resolve(globalThis.Plotly), onerror: fail }));
   });
   return loaded;
 }
@@ -23,20 +27,28 @@ function plotly() {
  * Returns a function that draws it anew, with another query if one is given.
  */
 export function plot(element, kind, query, signal) {
-  const canvas = h("div", { class: "plot", role: "img" });
+  const canvas = h("div", { class: "plot" });
   const caption = h("figcaption");
   const numbers = h("div");
+  canvas.append(loading());
   element.replaceChildren(h("figure", {}, canvas, caption, numbers));
   let answer = null;
+  const say = (words) => {
+    globalThis.Plotly?.purge(canvas);
+    for (const each of ["role", "aria-label"]) canvas.removeAttribute(each);
+    canvas.replaceChildren(words);
+  };
   const draw = async () => {
     if (!answer || signal.aborted) return;
     if (answer.empty) {
-      canvas.replaceChildren(empty("Nothing to draw yet."));
+      say(empty("Nothing to draw yet."));
       return;
     }
     const library = await plotly();
     if (signal.aborted) return;
     canvas.querySelector(".state")?.remove();
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", answer.alt);
     const { data, layout } = dressed(answer.figure, canvas);
     await library.react(canvas, data, layout, { displayModeBar: false, responsive: true });
   };
@@ -44,12 +56,11 @@ export function plot(element, kind, query, signal) {
     query = changed;
     try {
       answer = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
-      canvas.setAttribute("aria-label", answer.alt);
       caption.textContent = answer.caption;
       numbers.replaceChildren(...(answer.table && !answer.empty ? [counted(answer.table, numbers.querySelector("details")?.open)] : []));
       await draw();
     } catch (error) {
-      if (!signal.aborted && !answer) canvas.replaceChildren(failed(error, () => refresh()));
+      if (!signal.aborted && !answer) say(failed(error, () => refresh()));
     }
   };
   onTheme(draw, signal);

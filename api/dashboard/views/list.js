@@ -6,7 +6,7 @@ import { follow } from "../lib/live.js";
 import { rows } from "../lib/rows.js";
 import { empty, loading } from "../lib/states.js";
 import { addressOf, filters, isFiltered, wantedBy } from "./list/filters.js";
-import { COLUMNS, experimentRow, studyRow } from "./list/rows.js";
+import { experimentRow, heads, studyRow } from "./list/rows.js";
 import { selectionBar } from "./list/selection.js";
 
 const AT_ONCE = 20;
@@ -43,8 +43,7 @@ class List {
     Object.assign(this, { signal, unit, open: new Set(), items: [], next: null, wanted: null, turn: 0 });
     const body = h("tbody");
     this.fill = rows(body, (each) => `${each.value.id} ${each.nested ?? ""}`, (each) => (each.value.experiments ? studyRow(each, this) : experimentRow(each, this)));
-    const heads = COLUMNS.map(([words, key]) => h("th", { scope: "col", class: key }, words || h("span", { class: "away" }, "Select")));
-    this.table = h("table", { class: "list" }, h("caption", { class: "away" }, "Studies and experiments"), h("thead", {}, h("tr", {}, ...heads)), body);
+    this.table = h("table", { class: "list" }, h("caption", { class: "away" }, "Studies and experiments"), h("thead", {}, h("tr", {}, ...heads())), body);
     this.more = h("button", { type: "button", class: "quiet more", onclick: () => this.lengthen() }, "Show more");
     this.bar = selectionBar(() => this.draw());
     this.note = h("div", {}, loading());

@@ -27,12 +27,11 @@ export function draftOf(spec, catalogue) {
   };
 }
 
-/** Every strategy of the catalogue, those that were named ticked; one that was named twice is there twice. */
+/** Those that were named, ticked and in their order, one that was named twice twice; then the others of the catalogue. */
 function strategiesOf(named, catalogue) {
-  return catalogue.strategies.flatMap(({ name }) => {
-    const found = named?.filter((each) => each.name === name) ?? [{ name, options: {} }];
-    return found.length ? found.map((each) => ({ ...each, on: true })) : [{ name, options: {}, on: false }];
-  });
+  const all = catalogue.strategies.map(({ name }) => ({ name, options: {} }));
+  const others = named ? all.filter(({ name }) => !named.some((each) => each.name === name)) : [];
+  return [...(named ?? all).map((each) => ({ ...each, on: true })), ...others.map((each) => ({ ...each, on: false }))];
 }
 
 function tunablesOf(named, catalogue) {

@@ -77,7 +77,7 @@ export function optionFields(plugin, options, pointer, { places, changed }) {
       changed();
     };
     if (schema.type === "boolean") return h("p", { class: "field" }, tickField(`${spoken(name)}: ${schema.description}`, options[name] ?? schema.default, set));
-    const hint = `${schema.description ?? ""}${usual ? ` (${usual})` : ""}`;
+    const hint = schema.description ?? "";
     const choices = schema.enum ? [["", `${spoken(usual)}, as usual`], ...schema.enum.map((each) => [each, spoken(each)])] : null;
     const attributes = choices ? {} : { placeholder: usual, inputmode: "decimal" };
     return field({ label: spoken(name), hint, value: options[name], set, places, choices, pointer: () => (pointer() === null ? null : `${pointer()}/options/${name}`), ...attributes });

@@ -76,10 +76,11 @@ function choice(form, label, ref, plugins, pointer, own = null) {
     Object.assign(ref, { name, options: {} });
     form.remake();
   };
+  const options = optionFields(chosen, ref.options, () => pointer, form);
   const absent = plugins.filter((each) => !each.available).map((each) => h("p", { class: "note" }, spoken(each.name), " is ", h("code", {}, each.note)));
   return [
     field({ label, hint: chosen?.summary ?? "", value: ref.name, set, pointer, places: form.places, choices: own === null ? names : [["", own], ...names] }),
-    ...absent, optionFields(chosen, ref.options, () => pointer, form)];
+    ...absent, options ? h("details", { open: Object.keys(ref.options).length > 0 }, h("summary", {}, `Options of ${spoken(ref.name)}`), options) : null];
 }
 
 /** What is tuned, between which bounds. */

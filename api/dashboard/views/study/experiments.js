@@ -2,7 +2,7 @@
 
 import { h } from "../../lib/dom.js";
 import { rows } from "../../lib/rows.js";
-import { COLUMNS, experimentRow } from "../list/rows.js";
+import { experimentRow, heads } from "../list/rows.js";
 import { selectionBar } from "../list/selection.js";
 
 /** The table, and `update()` for when `page.study` is another. */
@@ -12,8 +12,7 @@ export function experiments(page) {
   const list = { unit: page.unit, ticked: () => { bar.update(); update(); } };
   const fill = rows(body, (each) => each.value.id, (each) => experimentRow(each, list));
   const update = () => fill(page.study.experiments.map((value) => ({ value, nested: true })));
-  const heads = COLUMNS.map(([words, key]) => h("th", { scope: "col", class: key }, words || h("span", { class: "away" }, "Select")));
-  const table = h("table", { class: "list flat" }, h("caption", { class: "away" }, "Experiments"), h("thead", {}, h("tr", {}, ...heads)), body);
+  const table = h("table", { class: "list flat" }, h("caption", { class: "away" }, "Experiments"), h("thead", {}, h("tr", {}, ...heads())), body);
   update();
   return { element: h("section", { "aria-labelledby": "experiments-of" }, h("h2", { id: "experiments-of" }, "Experiments"), bar.element, table), update };
 }

@@ -1,0 +1,113 @@
+"""Files of the page: small on the way, and not sent twice."""
+
+import json
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from api.routes.dashboard import FILES
+from schemas.spec import StudySpec
+from services.catalogue import catalogue
+from services.resolution import resolve_study
+from services.store.session import Store
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+PRESETS = {each["name"]: each["spec"] for each in json.loads((FILES / "presets.json").read_text())}
+
+
+@pytest.fixture
+def api(sqlite_store: Store) -> TestClient:
+    return TestClient(create_app(sqlite_store))
+
+
+def test_plotly_is_sent_compressed_under_an_address_that_is_kept_for_good(api: TestClient):
+    (path,) = {
+        f"/assets/plotly/plotly.min.js?v={each}" for each in api.get("/").text.split('data-plotly="')[1].split('"')[:1]
+    }
+
+    packed = api.get(path, headers={"accept-encoding": "gzip"})
+    plain = api.get(path, headers={"accept-encoding": "identity"})
+
+    assert packed.headers["content-encoding"] == "gzip"
+    assert "content-encoding" not in plain.headers
+    assert packed.content == plain.content
+    assert int(packed.headers["content-length"]) < int(plain.headers["content-length"]) / 2
+    assert "immutable" in packed.headers["cache-control"]
+    assert packed.headers["content-security-policy"].startswith("default-src 'none'")
+
+
+@pytest.mark.parametrize("encoding", ["gzip", "identity"])
+def test_a_module_that_has_not_changed_is_not_sent_again(api: TestClient, encoding: str):
+    first = api.get("/assets/dashboard/app.js", headers={"accept-encoding": encoding})
+    headers = {"accept-encoding": encoding, "if-none-match": first.headers["etag"]}
+
+    again = api.get("/assets/dashboard/app.js", headers=headers)
+
+    assert first.headers["cache-control"] == again.headers["cache-control"] == "no-cache"
+    assert first.headers["vary"] == "Accept-Encoding"
+    assert (again.status_code, again.content) == (304, b"")
+
+
+def test_a_module_is_script_also_where_it_is_compressed(api: TestClient):
+    for path in ("app.js", "views/list.js"):
+        answer = api.get(f"/assets/dashboard/{path}", headers={"accept-encoding": "gzip"})
+
+        assert answer.headers["content-type"].startswith("text/javascript")
+        assert answer.text == (FILES / path).read_text()
+
+
+def test_nothing_outside_the_folder_is_served(api: TestClient):
+    for path in ("/assets/dashboard/../app.py", "/assets/dashboard/%2e%2e/app.py", "/assets/dashboard/no.js"):
+        assert api.get(path).status_code == 404
+
+
+def test_long_lists_are_sent_compressed(api: TestClient):
+    for _ in range(4):
+        api.post("/studies", json={"robot": "toy_function", "budget": "smoke"})
+
+    answer = api.get("/studies", headers={"accept-encoding": "gzip"})
+
+    assert answer.headers["content-encoding"] == "gzip"
+    assert len(answer.content) > 3 * int(answer.headers["content-length"])
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_start_of_the_form_can_be_submitted(name: str):
+    assert resolve_study(StudySpec.model_validate(PRESETS[name]))
+
+
+@pytest.mark.parametrize("file", ["toy", "quadruped", "weights", "figure_4"])
+def test_the_starts_of_the_form_are_the_examples(file: str):
+    example = json.loads((EXAMPLES / f"{file}.json").read_text())
+
+    same = [
+        spec
+        for spec in PRESETS.values()
+        if resolve_study(StudySpec.model_validate(spec)) == resolve_study(StudySpec.model_validate(example))
+    ]
+
+    assert len(same) == 1
+
+
+def test_the_catalogue_has_the_named_budgets():
+    found = {each.name: each for each in catalogue().budgets}
+
+    assert list(found) == ["smoke", "desk", "paper"]
+    assert (found["paper"].iterations, found["paper"].repetitions, found["paper"].controller_evaluations) == (
+        10,
+        40,
+        10_000,
+    )
+
+
+@pytest.mark.parametrize("path", sorted(FILES.rglob("*.*")), ids=lambda path: path.name)
+def test_files_of_the_page_are_short_and_say_what_they_are(path: Path):
+    text = path.read_text()
+
+    if path.suffix in {".js", ".css"}:
+        assert len(text.splitlines()) <= 250
+        assert text.startswith("/*")
+    assert "http://" not in text.replace("http://www.w3.org/", "")
+    assert "https://" not in text
