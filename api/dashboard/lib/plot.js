@@ -33,6 +33,7 @@ export function plot(element, kind, query, signal) {
   canvas.append(loading());
   element.replaceChildren(h("figure", {}, canvas, caption, numbers));
   let answer = null;
+  let asked = 0;
   const say = (words) => {
     globalThis.Plotly?.purge(canvas);
     for (const each of ["role", "aria-label"]) canvas.removeAttribute(each);
@@ -54,13 +55,16 @@ export function plot(element, kind, query, signal) {
   };
   const refresh = async (changed = query) => {
     query = changed;
+    const mine = ++asked;
     try {
-      answer = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
+      const found = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
+      if (mine !== asked) return;  // another query has overtaken it
+      answer = found;
       caption.textContent = answer.caption;
       numbers.replaceChildren(...(answer.table && !answer.empty ? [counted(answer.table, numbers.querySelector("details")?.open)] : []));
       await draw();
     } catch (error) {
-      if (!signal.aborted && !answer) say(failed(error, () => refresh()));
+      if (!signal.aborted && !answer) say(failed(error, () => refresh(), "h3"));
     }
   };
   onTheme(draw, signal);

@@ -28,7 +28,7 @@ export function sections(signal) {
       await part.load();
       part.filled = true;
     } catch (error) {
-      if (!signal.aborted && !part.filled) part.element.replaceChildren(failed(error, () => again(part)));
+      if (!signal.aborted && !part.filled) part.element.replaceChildren(failed(error, () => again(part), "h3"));
     }
     if (part.filled) await rest(REST * (performance.now() - began), signal);
     part.busy = false;

@@ -5,6 +5,7 @@ import { h, refill } from "../../lib/dom.js";
 import { download } from "../../lib/downloads.js";
 import { age, count, duration, spoken } from "../../lib/format.js";
 import { pill } from "../../lib/pill.js";
+import { fraction } from "../../lib/progress.js";
 import { edit } from "./editing.js";
 import { verbs } from "./verbs.js";
 
@@ -37,11 +38,6 @@ export function head(page) {
   const element = h("header", { class: "experiment-head" }, trail(page),
     h("div", { class: "titled" }, title, state, pen), h("p", { class: "what" }, what(page.experiment)), notes, bar, facts, remarks, asked.element, links(page));
   return { element, update };
-}
-
-/** How much of the work is behind it, between 0 and 1; of rollouts, which is where the time goes. */
-export function fraction(progress) {
-  return progress.rollouts ? Math.min(1, (progress.rollouts_done + progress.rollouts_saved) / progress.rollouts) : 0;
 }
 
 const percent = (progress) => `${Math.floor(100 * fraction(progress))} %`;
