@@ -24,7 +24,7 @@ function plotly() {
 
 /**
  * Draw `/figures/{kind}` into `element`, with its caption and its words for those who do not see it.
- * Returns a function that draws it anew, with another query if one is given.
+ * Returns a function that draws it anew, with another query if one is given; its `drawn` is when it was drawn at first.
  */
 export function plot(element, kind, query, signal) {
   const canvas = h("div", { class: "plot" });
@@ -69,8 +69,7 @@ export function plot(element, kind, query, signal) {
   };
   onTheme(draw, signal);
   signal.addEventListener("abort", () => globalThis.Plotly?.purge(canvas));
-  refresh();
-  return refresh;
+  return Object.assign(refresh, { drawn: refresh() });
 }
 
 function counted({ head, rows }, open) {
