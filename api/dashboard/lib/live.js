@@ -3,45 +3,61 @@
 import { events } from "./api.js";
 
 const EVERY_MS = 1000;
+const MANY = 1000;
 
 /**
  * Call `refresh(some)` soon after events that fit `query`, at most once a second however many come, with all that came
- * since the last call; and once after a break, with none. It is not called again before it has ended. What it throws is ignored:
- * the next event, or the service's return, calls it again. The bar says when the service is away.
+ * since the last call; with none after a break, or after more than anybody wants to look at one by one. It is not called
+ * again before it has ended, and again if it failed. A page that nobody sees waits until somebody does. The bar says when
+ * the service is away.
  */
 export function follow(query, refresh, signal) {
   let some = [];
+  let due = false;
   let timer = null;
   let busy = false;
   let away = false;
   const run = async () => {
     timer = null;
-    if (signal.aborted || busy) return;
-    busy = true;
-    const taken = some;
+    if (signal.aborted || busy || document.hidden) return;
+    const taken = some.length > MANY ? [] : some;
     some = [];
+    busy = true;
+    due = false;
     try {
       await refresh(taken);
     } catch (error) {
-      if (!signal.aborted) console.warn(error.message);
+      if (signal.aborted) return;
+      console.warn(error.message);
+      some = taken.length ? [...taken, ...some] : [];
+      due = true;
     }
     busy = false;
-    if (some.length) soon();
+    if (due) soon();
   };
   const soon = () => {
+    due = true;
     timer ??= setTimeout(run, EVERY_MS);
+  };
+  const happened = (event) => {
+    if (some.length <= MANY) some.push(event);
+    soon();
   };
   const connected = (is) => {
     if (signal.aborted) return;
     announce(is);
-    if (is && away) run();
+    if (is && away) {
+      some = [];
+      soon();
+    }
     away = !is;
   };
+  document.addEventListener("visibilitychange", () => { if (due) soon(); }, { signal });
   signal.addEventListener("abort", () => {
     clearTimeout(timer);
     announce(true);
   });
-  events(query, (event) => { some.push(event); soon(); }, connected, signal).catch(() => {});
+  events(query, happened, connected, signal).catch(() => {});
 }
 
 /** Say in the bar whether the service is there. */

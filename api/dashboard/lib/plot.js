@@ -33,8 +33,10 @@ export function plot(element, kind, query, signal) {
   canvas.append(loading());
   element.replaceChildren(h("figure", {}, canvas, caption, numbers));
   let answer = null;
+  let drawn = false;
   let asked = 0;
   const say = (words) => {
+    drawn = false;
     globalThis.Plotly?.purge(canvas);
     for (const each of ["role", "aria-label"]) canvas.removeAttribute(each);
     canvas.replaceChildren(words);
@@ -52,6 +54,7 @@ export function plot(element, kind, query, signal) {
     canvas.setAttribute("aria-label", answer.alt);
     const { data, layout } = dressed(answer.figure, canvas);
     await library.react(canvas, data, layout, { displayModeBar: false, responsive: true });
+    drawn = true;
   };
   const refresh = async (changed = query) => {
     query = changed;
@@ -64,7 +67,7 @@ export function plot(element, kind, query, signal) {
       numbers.replaceChildren(...(answer.table && !answer.empty ? [counted(answer.table, numbers.querySelector("details")?.open)] : []));
       await draw();
     } catch (error) {
-      if (!signal.aborted && !answer) say(failed(error, () => refresh(), "h3"));
+      if (!signal.aborted && !drawn) say(failed(error, () => refresh(), "h3"));
     }
   };
   onTheme(draw, signal);

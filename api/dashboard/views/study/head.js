@@ -2,7 +2,7 @@
 
 import { h, refill } from "../../lib/dom.js";
 import { download } from "../../lib/downloads.js";
-import { age, count, duration, fixed } from "../../lib/format.js";
+import { age, count, duration, fixed, spoken } from "../../lib/format.js";
 import { pill } from "../../lib/pill.js";
 import { progressBar } from "../../lib/progress.js";
 import { say } from "../../lib/rows.js";
@@ -49,7 +49,7 @@ function factsOf({ study, unit }) {
     ["Experiments", `${count(ended)} of ${count(experiments.length)} ended`],
     ["Repetitions", `${count(progress.completed)} of ${count(progress.repetitions)}${failed}`],
     ["Rollouts", `${count(progress.rollouts_done)}, ${count(progress.rollouts_saved)} saved, of ${count(progress.rollouts)}`],
-    ...(best ? [["Best fitness", `${fixed(best.best_fitness)} ${unit(best)} by ${best.name}`]] : []),
+    ...(best ? [["Best fitness", `${fixed(best.best_fitness)} ${unit(best)} by ${spoken(best.name)}`]] : []),
     ...times(study),
   ];
 }

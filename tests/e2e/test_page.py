@@ -1,0 +1,90 @@
+"""The page on a real service: a study from the form to its end, called off, and in sight while the service dies."""
+
+import pytest
+
+from tests.e2e.browser import axe, screenshot
+from tests.e2e.service import wait_until
+
+LONG_MS = 240_000
+AWAY = ("ERR_CONNECTION_REFUSED", "ERR_CONNECTION_RESET", "ERR_EMPTY_RESPONSE", "ERR_INCOMPLETE_CHUNKED_ENCODING")
+
+SLOW = {
+    "name": "slow",
+    "robot": "toy_function",
+    "strategies": ["simulated_fit_and_informative", "known_fit", "direct"],
+    "budget": {"controller_evaluations": 1_500, "selection_evaluations": 300},
+    "iterations": 2,
+    "repetitions": 4,
+    "seed": 5,
+}
+
+
+def test_a_study_is_submitted_by_the_form_and_finishes_while_one_watches(visit, shared_service):
+    page = visit(f"{shared_service.url}/#/new")
+    page.get_by_role("button", name="Toy function, quickly").click()
+    page.get_by_label("Name", exact=True).fill("by the form")
+    page.get_by_label("Iterations").fill("3")
+    page.get_by_text("rollouts at most").wait_for()
+
+    page.get_by_role("button", name="Submit the study").click()
+
+    page.get_by_role("heading", name="by the form").wait_for()
+    page.locator(".state-now .completed").wait_for(timeout=LONG_MS)
+    page.locator(".plot .scatterlayer .trace").first.wait_for()
+    page.locator("table .percent", has_text="100 %").nth(6).wait_for()
+    axe(page)
+    screenshot(page, "study-live")
+    (study,) = shared_service.get("/studies", text="by the form")["items"]
+    assert {each["spec"]["iterations"] for each in study["experiments"]} == {3}
+    assert len(study["experiments"]) == 7
+
+
+def test_a_running_study_is_cancelled_after_a_question(visit, shared_service):
+    study = shared_service.post("/studies", SLOW | {"name": "to be cancelled"})["id"]
+    page = visit(f"{shared_service.url}/#/studies/{study}")
+    page.locator(".state-now .running").wait_for(timeout=LONG_MS)
+
+    page.get_by_role("button", name="Cancel…").click()
+    page.get_by_role("button", name="Back").click()
+    assert shared_service.get(f"/studies/{study}")["state"] == "RUNNING"
+    page.get_by_role("button", name="Cancel…").click()
+    axe(page)
+    page.get_by_role("button", name="Cancel it").click()
+
+    page.locator(".state-now .cancelled").wait_for()
+    assert shared_service.get(f"/studies/{study}")["state"] == "CANCELLED"
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_text("None of its experiments can be paused now").wait_for()
+
+
+@pytest.mark.parametrize("view", ["", "#/studies/{}"])
+def test_killed_and_started_again_the_service_is_followed_by_a_page_that_stayed_open(visit, shared_service, view):
+    visit.forgive(*AWAY)
+    study = shared_service.post("/studies", SLOW | {"name": f"outlives its service {len(view)}"})["id"]
+    page = visit(f"{shared_service.url}/{view.format(study)}")
+    page.get_by_text(f"outlives its service {len(view)}").wait_for()
+
+    shared_service.kill()
+    wait_until(lambda: not shared_service.processes(), 60, shared_service.processes)
+    page.get_by_text("The service is away").wait_for()
+    screenshot(page, "away")
+    axe(page)
+    shared_service.start()
+
+    page.wait_for_function("() => document.getElementById('connection').textContent === ''")
+    place = page.locator(".state-now") if view else page.locator("tr.study", has_text="outlives its service").first
+    place.locator(".completed").wait_for(timeout=LONG_MS)
+
+
+def test_a_page_that_is_opened_before_its_service_answers_comes_by_itself(visit, shared_service):
+    visit.forgive(*AWAY)
+    page = visit(shared_service.url)
+    page.get_by_role("heading", name="Studies and experiments").wait_for()
+    shared_service.stop()
+    page.get_by_role("link", name="New study").first.click()
+    page.get_by_role("heading", name="The service does not answer").wait_for()
+    axe(page)
+
+    shared_service.start()
+
+    page.get_by_role("button", name="Submit the study").wait_for()

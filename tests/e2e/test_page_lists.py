@@ -1,0 +1,207 @@
+"""The page without workers: lists, filters, a study, the form and its errors; for eyes, ears, keyboards and phones."""
+
+import json
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+
+from tests.e2e.api_alone import Api
+from tests.e2e.browser import axe, fits, screenshot
+
+PUBLISHED = "MuJoCo in MuJoCo"
+QUEUED = {"robot": "toy_function", "strategies": ["random", "direct"], "budget": "smoke"}
+REFUSED = ("422",)
+
+
+@pytest.fixture(scope="session")
+def published(archive):
+    """The study that is published with this repository."""
+    return archive.get("/studies", text=PUBLISHED)["items"][0]
+
+
+def address(archive, view, published):
+    return f"{archive.url}/{view.format(published['id'])}"
+
+
+@pytest.mark.parametrize(
+    ("view", "ready"),
+    [
+        ("", ".list tbody tr"),
+        ("#/?show=experiments&state=CANCELLED", ".list tbody tr"),
+        ("#/studies/{}", ".plot .scatterlayer .trace"),
+        ("#/new", ".panel .big"),
+        ("#/nowhere", ".failed h1"),
+    ],
+)
+def test_every_view_can_be_used_in_light_in_dark_and_on_a_phone(visit, archive, published, view, ready):
+    name = view.strip("#/").split("/")[0].split("?")[0] or "list"
+    for mode, how in {"light": {}, "dark": {"dark": True}, "phone": {"width": 375, "height": 760}}.items():
+        page = visit(address(archive, view, published), **how)
+        page.locator(ready).first.wait_for()
+
+        axe(page)
+        fits(page)
+        screenshot(page, f"{name}-{mode}")
+
+
+def test_studies_are_found_opened_ticked_and_compared(visit, archive, published):
+    page = visit(archive.url)
+    page.locator("tr.study").nth(10).wait_for()
+
+    page.get_by_label("Search by name or id").fill("mujoco")
+    page.locator("tr.study").nth(1).wait_for(state="detached")
+    page.get_by_role("button", name=f"Experiments of {PUBLISHED}").press("Enter")
+    page.locator("tr.nested").nth(6).wait_for()
+    page.get_by_label("Select known_fit").check()
+    page.get_by_label("Select direct").check()
+    half = page.get_by_label(f"Select {PUBLISHED}").evaluate("box => box.indeterminate")
+    found = page.get_by_role("link", name="Compare", exact=True).last.get_attribute("href")
+
+    assert half
+    ids = parse_qs(urlsplit(found.removeprefix("#")).query)["experiments"][0].split(",")
+    wanted = {each["id"] for each in published["experiments"] if each["name"] in {"known_fit", "direct"}}
+    assert set(ids) == wanted
+    assert "text=mujoco" in page.url
+    page.reload()
+    page.locator("tr.study").first.wait_for()
+    assert page.locator("tr.study").count() == 1
+
+
+def test_experiments_are_filtered_sorted_and_shown_page_by_page(visit, archive):
+    page = visit(archive.url)
+    page.get_by_role("button", name="Experiments", exact=True).click()
+    page.locator("tr.experiment").nth(19).wait_for()
+    assert page.locator("tr.experiment").count() == 20
+
+    page.get_by_role("button", name="Show more").click()
+    page.locator("tr.experiment").nth(59).wait_for()
+    page.get_by_label("State").select_option("CANCELLED")
+    page.locator("tr.experiment").nth(1).wait_for(state="detached")
+    assert page.locator("tr.experiment").get_by_role("link").all_text_contents() == ["Informative"]
+    page.get_by_label("Strategy").select_option("direct")
+    page.get_by_text("Nothing here is like that").wait_for()
+    page.get_by_role("link", name="Show everything").click()
+
+    page.locator("tr.study").nth(5).wait_for()
+
+
+def test_what_is_submitted_and_cancelled_elsewhere_is_seen(visit, archive):
+    page = visit(archive.url)
+    page.locator("tr.study").first.wait_for()
+    page.wait_for_timeout(1_000)  # until it listens
+
+    made = archive.http.post("/studies", json=QUEUED | {"name": "from elsewhere"}).json()["id"]
+    row = page.locator("tr.study", has_text="from elsewhere")
+    row.locator(".queued").wait_for()
+    archive.http.post(f"/studies/{made}/cancel")
+
+    row.locator(".cancelled").wait_for()
+
+
+def test_a_study_is_renamed_and_nobody_is_written_over(visit, archive):
+    visit.forgive("412")
+    made = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
+    page = visit(f"{archive.url}/#/studies/{made}")
+    page.get_by_role("button", name="Edit name and notes").click()
+    archive.http.patch(f"/studies/{made}", json={"notes": "of somebody else"}, headers={"If-Match": "*"})
+    page.get_by_label("Name", exact=True).fill("second name")
+
+    page.get_by_role("button", name="Save").click()
+    page.get_by_text("Somebody changed it meanwhile").wait_for()
+    axe(page)
+    page.get_by_role("button", name="Save").click()
+
+    page.get_by_role("heading", name="second name").wait_for()
+    assert archive.get(f"/studies/{made}")["name"] == "second name"
+    archive.http.post(f"/studies/{made}/cancel")
+
+
+def test_errors_stand_beside_their_fields_until_they_are_right(visit, archive):
+    visit.forgive(*REFUSED)
+    page = visit(f"{archive.url}/#/new")
+    page.locator(".panel .big").wait_for()
+
+    page.get_by_label("Iterations").fill("many")
+    page.get_by_label("Restitution from").fill("-1")
+    page.get_by_label("Static friction", exact=True).last.fill("99")
+    page.locator(".trouble", has_text="whole number").or_(page.locator(".trouble", has_text="integer")).wait_for()
+    page.get_by_label("Iterations").fill("")
+    page.locator(".trouble", has_text="static_friction is 0 to 10, not 99").wait_for()
+    page.locator(".trouble", has_text="restitution is 0 to 0.9, not -1").wait_for()
+    axe(page)
+    screenshot(page, "new-errors")
+    assert page.locator("[aria-invalid]").count() == 2
+    page.get_by_role("button", name="Submit the study").click()
+    page.get_by_text("It was not submitted").wait_for()
+    page.get_by_label("Restitution from").fill("")
+    page.get_by_label("Static friction", exact=True).last.fill("0.5")
+
+    page.locator(".panel .big").wait_for()
+    assert page.locator("[aria-invalid]").count() == 0
+
+
+def test_the_form_holds_every_start_and_what_one_copies_is_what_it_submits(visit, archive):
+    page = visit(f"{archive.url}/#/new")
+    page.locator(".starts button").first.wait_for()
+    names = page.locator(".starts button").all_text_contents()
+    assert len(names) == 5
+
+    for name in names:
+        page.get_by_role("button", name=name, exact=True).click()
+        spec = json.loads(page.locator("#panel-json code").text_content())
+        answer = archive.http.post("/studies/estimate", json=spec)
+        assert answer.status_code == 200, answer.text
+        page.get_by_text(f"{answer.json()['rollouts']:,} rollouts at most").wait_for()
+    page.get_by_role("tab", name="Python").click()
+    compile(page.locator("#panel-python code").text_content(), "the page", "exec")
+    page.get_by_role("tab", name="curl").press("ArrowLeft")
+    page.locator("#panel-json").get_by_role("button", name="Copy").click()
+    assert json.loads(page.evaluate("() => navigator.clipboard.readText()")) == spec
+
+
+def test_a_strategy_is_compared_with_itself_under_other_options(visit, archive):
+    page = visit(f"{archive.url}/#/new")
+    page.get_by_role("button", name="None", exact=True).click()
+    box = page.locator(".strategy", has_text="Known fit")
+    box.get_by_role("checkbox").check()
+    box.get_by_text("Options", exact=True).click()
+    box.get_by_label("Spread").fill("0.5")
+
+    box.get_by_role("button", name="Once more").click()
+    page.locator(".strategy", has_text="Known fit").nth(1).get_by_label("Spread").fill("0.1")
+
+    page.get_by_text("rollouts at most").wait_for()
+    spec = json.loads(page.locator("#panel-json code").text_content())
+    assert spec["strategies"] == [
+        {"name": "known_fit", "options": {"spread": 0.5}},
+        {"name": "known_fit", "options": {"spread": 0.1}},
+    ]
+
+
+def test_the_keyboard_reaches_the_content_and_the_theme_is_remembered(visit, archive):
+    page = visit(archive.url)
+    page.locator("tr.study").first.wait_for()
+
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    assert page.evaluate("() => document.activeElement.id") == "main"
+    page.get_by_role("button", name="Switch between light and dark").press("Enter")
+    page.reload()
+
+    page.locator("tr.study").first.wait_for()
+    assert page.evaluate("() => document.documentElement.dataset.theme") == "dark"
+
+
+def test_an_empty_service_says_how_to_begin(visit, sqlite_url, tmp_path):
+    api = Api(sqlite_url, tmp_path / "api.log").start()
+    try:
+        page = visit(api.url)
+        page.get_by_text("Nothing was submitted yet").wait_for()
+        axe(page)
+        screenshot(page, "empty")
+
+        page.get_by_role("link", name="Submit a study").click()
+
+        page.get_by_text("No worker is running now").wait_for()
+    finally:
+        api.close()
