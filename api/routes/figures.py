@@ -5,17 +5,20 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, FastAPI, Query, Request, Response
 from pydantic import Field, model_validator
 
-from api.dependencies import Id, StoreDep
+from api.dependencies import Id, PhysicsDep, StoreDep
 from api.figures import Drawing, answer, responses
+from api.problems import documented
 from schemas.figures import FigureRead
 from services import experiments, reports
 from services.core.errors import NotFound
 from services.efforts import abscissa
 from services.figures.curves import Band, curves_figure
 from services.figures.marks import Figure
+from services.figures.predictions import predictions_figure
 from services.figures.simulators import simulators_figure
 from services.figures.squared_error import squared_error_figure
 from services.figures.words import spoken
+from services.predictions import predictions
 from services.store.session import Store
 from services.tuned import tunings
 
@@ -93,6 +96,23 @@ def draw_simulators(store: StoreDep, query: Annotated[SimulatorsDrawing, Query()
     columns = query.columns or (2 if narrow else 3)
     figure = simulators_figure(found.simulators, found.dimensions, truth=found.truth, title=title, columns=columns)
     return answer(figure, query)
+
+
+@router.get(
+    "/predictions",
+    summary="Draw what simulators predicted",
+    response_model=FigureRead,
+    responses=responses() | documented(404, 422, 429),
+)
+def draw_predictions(store: StoreDep, physics: PhysicsDep, query: Annotated[ExperimentDrawing, Query()]) -> Response:
+    """The fitness of every sample of an experiment in simulation, before and after tuning on it, against reality.
+
+    About two seconds are computed for each question; ask again while some samples are pending, as its caption says.
+    """
+    found = predictions(store, physics, query.experiment)
+    name = spoken(experiments.read_experiment(store, query.experiment).name)
+    title = name if query.title is None else query.title
+    return answer(predictions_figure(found.items, unit=found.unit, pending=found.pending, title=title), query)
 
 
 def install(app: FastAPI) -> None:

@@ -1,6 +1,7 @@
 """Figures over HTTP: every kind in every format, and what is said of those that are none."""
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from io import BytesIO
 
 import matplotlib.image
@@ -12,6 +13,8 @@ from api.app import create_app
 from api.figures import MEDIA_TYPES
 from schemas.spec import StudySpec
 from services import execution, experiments
+from services.core.loop import repetition
+from services.simulation import setting
 from services.store.session import Store
 from tests.experiments import run
 
@@ -29,8 +32,10 @@ HIDDEN = 0.7319462853
 
 
 @pytest.fixture
-def api(sqlite_store: Store) -> TestClient:
-    return TestClient(create_app(sqlite_store))
+def api(sqlite_store: Store) -> Iterator[TestClient]:
+    app = create_app(sqlite_store)
+    yield TestClient(app)
+    app.state.physics.close()
 
 
 @pytest.fixture
@@ -111,12 +116,27 @@ def test_reality_is_in_the_figure_of_simulators_once_all_of_the_study_have_ended
     assert "once its experiments have ended" in running.json()["caption"]
 
 
+def test_predictions_are_drawn_as_they_are_computed(sqlite_store: Store, api: TestClient):
+    spec = STUDY | {"strategy": "simulated_fit", "repetitions": 1}
+    spec = {name: value for name, value in spec.items() if name != "strategies"}
+    made = api.post("/experiments", json=spec).json()["id"]
+    (claim,) = execution.claim(sqlite_store, "test", limit=1)
+    run(sqlite_store, claim, repetition(setting(claim.spec, claim.number)))
+
+    found = api.get("/figures/predictions", params={"experiment": made, "format": "json"}).json()
+
+    traces = {each["name"]: each for each in found["figure"]["data"]}
+    assert len(traces["After tuning on it"]["x"]) == len(traces["Before tuning on it"]["y"]) == 2
+    assert "2\N{NO-BREAK SPACE}samples of 1\N{NO-BREAK SPACE}repetition" in found["caption"]
+    assert found["title"] == "Two <b>ways</b>"
+
+
 def test_an_experiment_that_has_not_begun_is_an_empty_figure(api: TestClient):
     made = api.post("/experiments", json={"strategy": "random", "robot": "toy_function", "budget": "smoke"}).json()[
         "id"
     ]
 
-    for kind in KINDS:
+    for kind in (*KINDS, "predictions"):
         found = api.get(f"/figures/{kind}", params={"experiment": made, "format": "json"}).json()
         assert found["empty"] is True
         assert "no results yet" in found["alt"]
@@ -128,11 +148,11 @@ def test_a_figure_that_is_none_is_not_found_and_the_answer_says_which_there_are(
     assert found.status_code == 404
     assert found.headers["content-type"] == "application/problem+json"
     assert "'curvs'" in found.json()["detail"]
-    assert all(each in found.json()["detail"] for each in KINDS)
+    assert all(each in found.json()["detail"] for each in (*KINDS, "predictions", "gait", "toy"))
     assert api.post("/figures/curves").status_code == 405
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [*KINDS, "predictions"])
 def test_an_unknown_experiment_is_not_found(api: TestClient, kind: str):
     assert api.get(f"/figures/{kind}?experiment=nope").status_code == 404
 
