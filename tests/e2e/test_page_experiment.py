@@ -66,6 +66,7 @@ def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api, sqlite_st
         assert execution.complete(sqlite_store, claim)
     expect(page.locator(".state-now")).to_contain_text("completed")
     expect(happened.first).to_contain_text("Completed")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
     expect(page.get_by_role("tabpanel").locator("tbody .pill.completed")).to_have_count(2)
     assert page.evaluate("() => window.untouched")
 
@@ -157,6 +158,7 @@ def test_what_failed_is_said_with_its_reason_and_attempts(api, sqlite_store, vis
     page = visit(address(api, submitted.id))
     expect(page.locator(".state-now")).to_contain_text("failed")
     expect(page.locator(".remark.broken")).to_contain_text("a foot fell off")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
     page.get_by_role("button", name="Attempts at repetition 0: 1").click()
     attempts = page.get_by_role("region", name="Attempts at repetition 0")
     expect(attempts).to_contain_text("a foot fell off")
@@ -165,8 +167,9 @@ def test_what_failed_is_said_with_its_reason_and_attempts(api, sqlite_store, vis
 def test_there_is_nothing_yet_or_no_such_experiment(api, sqlite_store, visit):
     submitted = experiments.submit_experiment(sqlite_store, toy())
     page = visit(address(api, submitted.id, tab="samples"))
-    expect(page.get_by_role("tabpanel")).to_contain_text("Nothing was tried in reality yet.")
     expect(page.locator(".figure-curves")).to_contain_text("Nothing to draw yet.")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
+    expect(page.get_by_role("tabpanel")).to_contain_text("Nothing was tried in reality yet.")
     axe(page)
     visit.forgive("404")
     page.goto(f"{api.url}/#/experiments/nowhere")
