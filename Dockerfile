@@ -6,6 +6,7 @@ RUN useradd --create-home gaplab
 
 COPY pyproject.toml constraints.txt README.md LICENSE ./
 COPY api api
+COPY gaplab gaplab
 COPY migrations migrations
 COPY schemas schemas
 COPY services services

@@ -25,6 +25,9 @@ lint: .venv/installed-dev  ## style, types, dependencies and the arrows between 
 bench: .venv/installed-dev  ## the table of speeds, as ratios within one run
 	$(BIN)/python -m benchmarks
 
+docs: .venv/installed-dev  ## the reference in docs/reference/, written out of the code
+	$(BIN)/python -m docs.generate
+
 soak: .venv/installed-dev  ## a thousand random faults on the real service, and whether it kept its word: about two hours
 	$(BIN)/python -m tests.soak $(if $(FAULTS),--faults $(FAULTS)) $(if $(SEED),--seed $(SEED))
 
@@ -42,4 +45,4 @@ clean:  ## remove the environment and what tools cached; results stay
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
 	touch $@
 
-.PHONY: help demo serve test lint bench soak clean
+.PHONY: help demo serve test lint bench docs soak clean

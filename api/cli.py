@@ -6,12 +6,38 @@ import typer
 
 from api import display
 from api.client import ServiceError, ServiceUnreachable
-from api.commands import editing, history, keeping, life_cycle, reading, service, submitting, tokens
+from api.commands import (
+    drawing,
+    editing,
+    helping,
+    history,
+    keeping,
+    life_cycle,
+    reading,
+    service,
+    submitting,
+    tokens,
+    watching,
+)
 from api.commands.base import app
 from api.exits import CommandError, Exit, code_of
 from services.core.errors import GaplabError
 
-__all__ = ["app", "editing", "history", "keeping", "life_cycle", "main", "reading", "service", "submitting", "tokens"]
+__all__ = [
+    "app",
+    "drawing",
+    "editing",
+    "helping",
+    "history",
+    "keeping",
+    "life_cycle",
+    "main",
+    "reading",
+    "service",
+    "submitting",
+    "tokens",
+    "watching",
+]
 
 
 def main() -> None:

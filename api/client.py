@@ -2,25 +2,30 @@
 
 with Client("http://127.0.0.1:8000") as gaplab:
     study = gaplab.submit({"robot": "toy_function", "budget": "smoke"})
-    for study in gaplab.watch(study.id):
-        print(study.progress.rollouts_done)
+    gaplab.wait(study.id)
     curves = gaplab.curves([study.id])
+
+Programs import it from `gaplab`.
 """
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import httpx2
 from pydantic import BaseModel
 
 from api.clients.archives import Archives
 from api.clients.connection import Connection
+from api.clients.errors import ExperimentFailed as ExperimentFailed
+from api.clients.errors import ExtraMissing as ExtraMissing
 from api.clients.errors import ServiceError as ServiceError
 from api.clients.errors import ServiceUnreachable as ServiceUnreachable
-from api.clients.errors import is_for_good
+from api.clients.figures import Figures
+from api.clients.frames import Frames
 from api.clients.history import History
 from api.clients.life_cycle import LifeCycle, part
+from api.clients.waiting import Waiting
 from schemas.curves import Comparison, Curve
 from schemas.editing import Edit
 from schemas.misfit import MisfitRead
@@ -30,17 +35,16 @@ from schemas.sensitivity import SensitivityRead, SensitivitySpec
 from schemas.spec import ExperimentSpec, StudySpec
 
 Spec = ExperimentSpec | StudySpec | Mapping[str, Any]
-FigureFormat = Literal["html", "svg"]
 
 NOT_CHECKED = {"name", "strategy", "strategies", "direct_repetitions", "priority", "max_parallel"}
 """What a spec has beside the settings that a sensitivity check takes."""
 
 
-class Client(LifeCycle, History, Archives, Connection):
+class Client(LifeCycle, Waiting, Frames, Figures, History, Archives, Connection):
     """A connection to a service.
 
     Args:
-        url: of the service.
+        url: of the service; left out: GAPLAB_URL, or this machine.
         token: to show; left out: GAPLAB_TOKEN, or none.
         timeout_s: for which an answer is waited.
         transport: instead of the network, for tests.
@@ -108,40 +112,17 @@ class Client(LifeCycle, History, Archives, Connection):
             check = self._read(SensitivityRead, self._get(f"/sensitivity/{part(check.id)}"))
         return check
 
-    def watch(self, id: str, *, every_s: float = 1.0, patience_s: float = 60.0) -> Iterator[ExperimentRead | StudyRead]:  # noqa: A002
-        """A study or an experiment again and again, until it has ended; the last one is what it ended as.
-
-        A service that is away for less than `patience_s` is waited for.
-        """
-        current = self.find(id)
-        again = self.study if isinstance(current, StudyRead) else self.experiment
-        yield current
-        heard_at = time.monotonic()
-        while not current.state.ended:
-            time.sleep(every_s)
-            try:
-                current = again(id)
-            except (ServiceError, ServiceUnreachable) as error:
-                if is_for_good(error) or time.monotonic() - heard_at > patience_s:
-                    raise
-                continue
-            heard_at = time.monotonic()
-            yield current
-
     def curves(self, ids: Sequence[str]) -> tuple[Curve, ...]:
         """The curves of experiments, and of all experiments of studies, in this order."""
-        return self._read(tuple[Curve, ...], self._get("/curves", experiment=self._experiments_of(ids)))
+        return self.curves_of(self._experiments_of(ids))
+
+    def curves_of(self, experiments: Sequence[str]) -> tuple[Curve, ...]:
+        """The same of ids that are known to be of experiments: one request."""
+        return self._read(tuple[Curve, ...], self._get("/curves", experiment=list(experiments)))
 
     def curves_csv(self, ids: Sequence[str]) -> str:
         """The same as CSV."""
         return self._get("/curves", experiment=self._experiments_of(ids), format="csv").text
-
-    def figure(self, ids: Sequence[str], format: FigureFormat) -> str:  # noqa: A002 - as the API says
-        """The curves of studies and experiments, drawn."""
-        found = [self.find(each) for each in ids]
-        studies = [each.id for each in found if isinstance(each, StudyRead)]
-        experiments = [each.id for each in found if isinstance(each, ExperimentRead)]
-        return self._get("/figures/curves", study=studies, experiment=experiments, format=format).text
 
     def compare(self, experiments: Sequence[str], first: int, last: int) -> tuple[Comparison, ...]:
         """Every pair of experiments, at the counts of real-world evaluations from `first` to `last`, pooled."""

@@ -87,7 +87,7 @@ def _show(name: str, study: StudyRead, client: Client, folder: Path, console: Co
     for line in findings(client, curves):
         console.print(escape(line))
     for kind in ("html", "svg"):
-        (folder / f"{name}.{kind}").write_text(client.figure([study.id], kind), "utf-8")
+        client.figure(study.id).save(folder / f"{name}.{kind}")
     console.print(f"Figure: {escape(str(folder / name))}.html and .svg")
 
 

@@ -94,6 +94,17 @@ def catalogue(plugins: Catalogue) -> list[Table]:
     return [_plugins(kind, getattr(plugins, kind)) for kind in type(plugins).model_fields if kind != "budgets"]
 
 
+def plugin(found: PluginRead) -> list[Table | str]:
+    """All about a plug-in: what it is, where it comes from, its options."""
+    about = [f"[bold]{found.name}[/]", escape(found.summary), f"source: {escape(found.source)}"]
+    about += [escape(found.note)] if found.note else []
+    about += [f"{name}: {escape(str(value))}" for name, value in found.details.items()]
+    options = _table("option", "default", "meaning")
+    for name, schema in found.options.get("properties", {}).items():
+        options.add_row(name, escape(str(schema.get("default", "-"))), escape(schema.get("description", "")))
+    return [*about, options if options.row_count else "no options"]
+
+
 def sensitivity(found: SensitivityRead) -> Table:
     """What each tunable does to fitness, a line each."""
     table = _table("tunable", "over", f"effect, {found.unit}", "of the spread", "roughness", "nan", "verdict")

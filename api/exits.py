@@ -20,11 +20,20 @@ class Exit(IntEnum):
     INTERRUPTED = 130
 
 
-EXPLAINED = (
-    "Exit codes: 0 done; 1 the service or what was watched failed; 2 wrong use of the command; 3 no service answers; "
-    "4 no such id; 5 invalid spec or request; 6 its state forbids it; 7 a file cannot be read or written, or is not "
-    "JSON; 8 the token does not permit it, or there is none; 130 interrupted."
-)
+MEANINGS = {
+    Exit.OK: "done",
+    Exit.FAILED: "the service or what was watched failed",
+    Exit.USAGE: "wrong use of the command",
+    Exit.UNREACHABLE: "no service answers",
+    Exit.NOT_FOUND: "no such id",
+    Exit.INVALID: "invalid spec or request",
+    Exit.CONFLICT: "its state forbids it",
+    Exit.FILE: "a file cannot be read or written, or is not JSON",
+    Exit.DENIED: "the token does not permit it, or there is none",
+    Exit.INTERRUPTED: "interrupted",
+}
+
+EXPLAINED = f"Exit codes: {'; '.join(f'{code.value} {meaning}' for code, meaning in MEANINGS.items())}."
 
 BY_STATUS = {
     401: Exit.DENIED,

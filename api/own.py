@@ -1,14 +1,17 @@
 """A service of one's own: on a free port of this machine, for as long as it is wanted."""
 
 import socket
+import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 from api.client import Client
 from api.exits import CommandError, Exit
 from api.launch import end, start
+from services.plugins import VARIABLE
 
 START_WITHIN_S = 120.0
 
@@ -25,22 +28,76 @@ def own_service(database_url: str, log: Path, *, workers: bool = True) -> Iterat
     Raises:
         CommandError: it does not start.
     """
-    port = _free_port()
-    environment = {"GAPLAB_DATABASE_URL": database_url, "GAPLAB_PORT": str(port), "GAPLAB_HOST": "127.0.0.1"}
     with log.open("ab") as output:
+<<<<<<< HEAD
         module = ("api.cli", "serve") if workers else ("api",)
         process = start(*module, environment=environment, log=output)
+=======
+        process, url = _started(database_url, output)
+>>>>>>> client
         try:
-            with Client(f"http://127.0.0.1:{port}") as client:
-                deadline = time.monotonic() + START_WITHIN_S
-                while not client.ready():
-                    if process.poll() is not None or time.monotonic() > deadline:
-                        msg = f"the service does not start: {_last_line(log)} ({log} says more)"
-                        raise CommandError(msg, Exit.FAILED)
-                    time.sleep(0.2)
+            with Client(url) as client:
+                _wait_until_ready(client, process, log)
                 yield client
         finally:
             end(process)
+
+
+class LocalService(Client):
+    """A client of a service that `local_service` started; closing it ends the service."""
+
+    def __init__(self, url: str, process: "subprocess.Popen[bytes]") -> None:
+        super().__init__(url)
+        self._process = process
+
+    def close(self) -> None:
+        """Close the connection, and end the service in order; what it has computed is kept."""
+        super().close()
+        end(self._process)
+
+
+def local_service(folder: str | Path = "results/local", *, plugins: str | Path | None = None) -> LocalService:
+    """A service on this machine, with its workers, and the client of it; it ends when that is closed, or with Python.
+
+    Args:
+        folder: for its database and its log; made if it is not there. A later service there goes on with both.
+        plugins: a folder with plug-ins of one's own; left out: GAPLAB_PLUGINS.
+
+    Raises:
+        CommandError: it does not start; the message says why.
+    """
+    home = Path(folder).absolute()
+    home.mkdir(parents=True, exist_ok=True)
+    log = home / "service.log"
+    added = {} if plugins is None else {VARIABLE: str(Path(plugins).absolute())}
+    with log.open("ab") as output:
+        process, url = _started(f"sqlite:///{home / 'gaplab.db'}", output, added)
+    service = LocalService(url, process)
+    try:
+        _wait_until_ready(service, process, log)
+    except BaseException:
+        service.close()
+        raise
+    return service
+
+
+def _started(
+    database_url: str, log: IO[bytes], added: dict[str, str] | None = None
+) -> tuple["subprocess.Popen[bytes]", str]:
+    """A service's process, and where it will answer."""
+    port = _free_port()
+    environment = {"GAPLAB_DATABASE_URL": database_url, "GAPLAB_PORT": str(port), "GAPLAB_HOST": "127.0.0.1"}
+    process = start("api.cli", "serve", environment=environment | (added or {}), log=log)
+    return process, f"http://127.0.0.1:{port}"
+
+
+def _wait_until_ready(client: Client, process: "subprocess.Popen[bytes]", log: Path) -> None:
+    deadline = time.monotonic() + START_WITHIN_S
+    while not client.ready():
+        if process.poll() is not None or time.monotonic() > deadline:
+            msg = f"the service does not start: {_last_line(log)} ({log} says more)"
+            raise CommandError(msg, Exit.FAILED)
+        time.sleep(0.2)
 
 
 def _free_port() -> int:

@@ -8,6 +8,7 @@ import uvicorn
 
 from api.app import create_app
 from api.exits import CommandError, Exit
+from services import plugins
 from services.access import demand_token_beyond_loopback
 from services.settings import Limits, Settings
 from services.store.session import Store
@@ -40,8 +41,10 @@ def serve_api(settings: Settings, listener: socket.socket) -> None:
     Raises:
         Unauthenticated: the host is more than loopback, and no token lets anyone in.
         StoreUnavailable: the database cannot tell.
+        PluginBroken: a plug-in from outside cannot be used.
     """
     end_in_order()
+    plugins.load()
     refuse_strangers(settings)
     store, limits = Store(settings.database_url), Limits.from_environment()
     try:

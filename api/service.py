@@ -11,7 +11,7 @@ from time import monotonic
 
 from api.launch import end, start
 from api.server import end_in_order, listen, refuse_strangers, serve_api
-from services import logs
+from services import logs, plugins
 from services.core.errors import StoreUnavailable
 from services.settings import Settings
 
@@ -41,9 +41,11 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
         CommandError: the address is taken.
         StoreUnavailable: the database cannot be migrated.
         Unauthenticated: the host is more than loopback, and no token lets anyone in.
+        PluginBroken: a plug-in from outside cannot be used.
     """
     logs.configure()
     end_in_order()
+    plugins.load()
     listener = listen(settings.host, settings.port)
     migrate(settings.database_url)
     refuse_strangers(settings)

@@ -21,6 +21,9 @@ class Provenance(Frozen):
     processor: str
     system: str
     spec_version: int
+    plugins: dict[str, str] = Field(
+        default={}, description="files of plug-ins from outside gaplab, each with a hash of its content"
+    )
 
 
 class ProvenanceUse(Frozen):

@@ -9,7 +9,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from schemas.provenance import Provenance
+from services.core.outside import file_of
 from services.engines import engines
+from services.engines.base import Engine
+from services.plugins import digest, digests
 from services.store.models import SPEC_VERSION
 
 CODE = ("schemas", "services", "workers")
@@ -31,6 +34,7 @@ def versions() -> Versions:
         "gaplab": f"{_version('gaplab')} ({_digest()})",
         "Python": platform.python_version(),
         "machine": platform.machine(),
+        "plug-ins": digest(),
         **{name: _version(name) for name in LIBRARIES},
         **{each.library: _version(each.library) for each in engines.values() if each.library},
     }
@@ -46,16 +50,21 @@ def provenance() -> Provenance:
         dirty=None if (changed := _git("status", "--porcelain", "--untracked-files=no")) is None else bool(changed),
         python=platform.python_version(),
         libraries={name: _version(name) for name in LIBRARIES},
-        engines={name: _engine(each.library) for name, each in sorted(engines.items())},
+        engines={name: _engine(each) for name, each in sorted(engines.items())},
         architecture=platform.machine(),
         processor=_processor(),
         system=platform.platform(),
         spec_version=SPEC_VERSION,
+        plugins=digests(),
     )
 
 
-def _engine(library: str | None) -> str:
-    return f"{library} {_version(library)}" if library else "of gaplab's own"
+def _engine(engine: type[Engine]) -> str:
+    """What changes when its numbers may."""
+    library = f"{engine.library} {_version(engine.library)}" if engine.library else None
+    if (file := file_of(engine)) is not None:
+        return f"{file} {digests()[file]}" + (f", {library}" if library else "")
+    return library or "of gaplab's own"
 
 
 @cache

@@ -7,8 +7,8 @@ import sys
 from collections.abc import Callable
 from threading import Event
 
-from services import logs
-from services.core.errors import ClusterUnusable, StoreUnavailable
+from services import logs, plugins
+from services.core.errors import ClusterUnusable, PluginBroken, StoreUnavailable
 from services.settings import Settings
 from services.store.session import Store
 
@@ -67,7 +67,8 @@ def main(arguments: list[str]) -> int:
         return 2
     try:
         settings = Settings.from_environment()
-    except ValueError as error:
+        plugins.load()
+    except (ValueError, PluginBroken) as error:
         sys.stderr.write(f"{error}\n")
         return 2
     return COMMANDS[arguments[0]](settings)

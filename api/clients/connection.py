@@ -12,6 +12,7 @@ import httpx2
 from pydantic import TypeAdapter, ValidationError
 
 from api.clients.errors import ServiceError, ServiceUnreachable, problem_of
+from services.settings import Settings
 
 T = TypeVar("T")
 
@@ -19,14 +20,17 @@ LOOPBACK = {"127.0.0.1", "localhost", "::1"}
 """This machine: no proxy of the environment leads to it."""
 
 PAUSES_S = (0.2, 1.0, 3.0)
-"""Before each further try of a request whose answer was lost."""
+"""Before each further try of a request whose answer was lost, or that the service could not serve just then."""
+
+PASSING = {502, 503, 504}
+"""Answers that pass: the database is away for a moment, or the service behind a proxy."""
 
 
 class Connection:
     """A connection to a service.
 
     Args:
-        url: of the service.
+        url: of the service; left out: GAPLAB_URL, or this machine.
         token: to show; left out: GAPLAB_TOKEN, or none.
         timeout_s: for which an answer is waited.
         transport: instead of the network, for tests.
@@ -36,13 +40,13 @@ class Connection:
 
     def __init__(
         self,
-        url: str,
+        url: str | None = None,
         *,
         token: str | None = None,
         timeout_s: float = 60.0,
         transport: httpx2.BaseTransport | None = None,
     ) -> None:
-        self.url = url
+        self.url = url = Settings.from_environment().url if url is None else url
         shown = token or os.environ.get("GAPLAB_TOKEN")
         headers = {"Authorization": f"Bearer {shown}"} if shown else {}
         try:
@@ -72,26 +76,33 @@ class Connection:
     def ready(self) -> bool:
         """Whether the service answers and its database can be used."""
         try:
-            self._get("/readyz")
+            self._request("GET", "/readyz")
         except (ServiceError, ServiceUnreachable):
             return False
         return True
 
     def _get(self, path: str, **parameters: str | int | Sequence[str] | None) -> httpx2.Response:
+        """What is read changes nothing, so it is asked for again if the answer is lost."""
         given = {name: value for name, value in parameters.items() if value is not None}
-        return self._request("GET", path, params=given)
+        return self._patiently("GET", path, params=given)
 
     def _create(self, path: str, body: Mapping[str, Any]) -> httpx2.Response:
         """POST what creates something. If the answer is lost it is asked again: its key lets it be done only once."""
-        headers = {"Idempotency-Key": uuid4().hex}
+        return self._patiently("POST", path, json=body, headers={"Idempotency-Key": uuid4().hex})
+
+    def _patiently(self, method: str, path: str, **request: Any) -> httpx2.Response:  # noqa: ANN401 - as `_request`
+        """A request that may be made more than once."""
         for pause_s in PAUSES_S:
             try:
-                return self._request("POST", path, json=body, headers=headers)
+                return self._request(method, path, **request)
             except ServiceUnreachable as error:
-                if isinstance(error.__cause__, httpx2.ConnectError | httpx2.InvalidURL):
+                if isinstance(error.__cause__, httpx2.ConnectError | httpx2.InvalidURL | httpx2.UnsupportedProtocol):
+                    raise
+            except ServiceError as error:
+                if error.problem.status not in PASSING:
                     raise
             time.sleep(pause_s)
-        return self._request("POST", path, json=body, headers=headers)
+        return self._request(method, path, **request)
 
     def _request(
         self,

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from api import completion
 from api.client import Client
 from api.exits import EXPLAINED
 from schemas.records import ExperimentRead, StudyRead
@@ -18,7 +19,11 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-Id = Annotated[str, typer.Argument(metavar="ID", help="of a study or an experiment")]
+Id = Annotated[str, typer.Argument(metavar="ID", help="of a study or an experiment", autocompletion=completion.ids)]
+Ids = Annotated[
+    list[str], typer.Argument(metavar="ID...", help="of studies or experiments", autocompletion=completion.ids)
+]
+AsJson = Annotated[bool, typer.Option("--json", help="print one JSON document, for programs")]
 Url = Annotated[
     str | None,
     typer.Option("--url", help="where the service is; left out: GAPLAB_URL, or this machine", show_default=False),

@@ -4,7 +4,8 @@ from typing import Annotated
 
 import typer
 
-from api.commands.base import Id, Url, app, connect
+from api.commands.base import AsJson, Id, Url, app, connect
+from api.document import document
 from schemas.editing import Edit
 
 
@@ -13,6 +14,7 @@ def edit(
     id: Id,  # noqa: A002 - as the API says
     name: Annotated[str | None, typer.Option(help="a new name", show_default=False)] = None,
     notes: Annotated[str | None, typer.Option(help="new notes; empty takes them away", show_default=False)] = None,
+    as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Give a study or an experiment another name, or notes."""
@@ -21,4 +23,7 @@ def edit(
         changes["notes"] = notes or None
     with connect(url) as client:
         edited = client.edit(id, Edit.model_validate(changes))
+    if as_json:
+        document(edited)
+        return
     typer.echo(f"{edited.id}: {edited.name}" + (f" ({edited.notes})" if edited.notes else ""))

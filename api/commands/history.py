@@ -1,13 +1,15 @@
 """What happened, and under what."""
 
+from collections.abc import Iterable
 from typing import Annotated
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 
-from api import display
-from api.commands.base import Id, Url, app, connect
+from api import completion, display
+from api.commands.base import AsJson, Id, Url, app, connect
+from api.document import document
 from schemas.events import EventKind, EventRead
 from schemas.provenance import ProvenanceRead
 from schemas.records import StudyRead
@@ -15,27 +17,34 @@ from schemas.records import StudyRead
 
 @app.command()
 def events(
-    id: Annotated[str | None, typer.Argument(metavar="[ID]", help="of a study or an experiment")] = None,  # noqa: A002
+    id: Annotated[  # noqa: A002 - as the API says
+        str | None,
+        typer.Argument(metavar="[ID]", help="of a study or an experiment", autocompletion=completion.ids),
+    ] = None,
     follow: Annotated[bool, typer.Option("--follow", help="go on with what happens, for ever")] = False,
     kind: Annotated[list[EventKind] | None, typer.Option(help="only of this kind; repeat it for several")] = None,
     after: Annotated[int, typer.Option(min=0, help="number of the last event that is known")] = 0,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="print one JSON document; with --follow, one in each line")
+    ] = False,
     url: Url = None,
 ) -> None:
     """Print what happened to an experiment, a study, or all of them: a line an event."""
-    console = display.console()
     with connect(url) as client:
         found = client.find(id) if id else None
         of = {"study" if isinstance(found, StudyRead) else "experiment": found.id} if found else {}
         kinds = [each.value for each in kind or []]
-        for each in client.events(follow=follow, kind=kinds, after=after, **of):
-            console.print(_line(each), soft_wrap=True)
+        _print(client.events(follow=follow, kind=kinds, after=after, **of), as_json=as_json, follow=follow)
 
 
 @app.command("accept-versions")
-def accept_versions(id: Id, url: Url = None) -> None:  # noqa: A002 - as the API says
+def accept_versions(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A002 - as the API says
     """Let an experiment go on under other engine versions than it was begun with."""
     with connect(url) as client:
         found = client.accept_versions(id)
+    if as_json:
+        document(found)
+        return
     typer.echo(f"{found.id} goes on under the versions of the next supervisor.")
 
 
@@ -47,6 +56,19 @@ def print_provenance(found: ProvenanceRead, console: Console) -> None:
         engines = ", ".join(f"{name} ({library})" for name, library in under.engines.items())
         software = f"gaplab {under.gaplab}{commit}, Python {under.python}, {engines}"
         console.print(f"computed with {software}; {under.processor}, {under.system}", markup=False, soft_wrap=True)
+
+
+def _print(found: Iterable[EventRead], *, as_json: bool, follow: bool) -> None:
+    """A line an event, as they come; or, if they end, one document."""
+    if as_json and not follow:
+        document(found)
+        return
+    console = display.console()
+    for each in found:
+        if as_json:
+            document(each, line=True)
+        else:
+            console.print(_line(each), soft_wrap=True)
 
 
 def _line(event: EventRead) -> str:

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from api.commands.base import Id, Url, app, connect
+from api.commands.base import AsJson, Id, Url, app, connect
+from api.document import document
 from services.settings import Settings
 from services.store.backup import backup as copy
 
@@ -16,6 +17,7 @@ def export(
     to: Annotated[
         Path | None, typer.Option(help="file that must not be there yet; left out: gaplab-ID.zip", show_default=False)
     ] = None,
+    as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Write everything of a study or an experiment into one archive of JSON and Parquet."""
@@ -29,14 +31,20 @@ def export(
         except BaseException:
             file.unlink(missing_ok=True)
             raise
+    if as_json:
+        document({"file": str(file), "bytes": file.stat().st_size})
+        return
     typer.echo(f"Wrote {file}.")
 
 
 @app.command("import")
-def import_(file: Annotated[Path, typer.Argument(help="an archive")], url: Url = None) -> None:
+def import_(file: Annotated[Path, typer.Argument(help="an archive")], as_json: AsJson = False, url: Url = None) -> None:
     """Store what is in an archive; nothing of it is run."""
     with connect(url) as client, file.open("rb") as source:
         stored = client.import_(source)
+    if as_json:
+        document(stored)
+        return
     typer.echo(stored.study or stored.experiments[0])
     for old, new in stored.renamed.items():
         typer.echo(f"{old} was taken here: it is {new} now", err=True)
@@ -45,7 +53,12 @@ def import_(file: Annotated[Path, typer.Argument(help="an archive")], url: Url =
 
 
 @app.command()
-def backup(file: Annotated[Path, typer.Argument(help="for the copy; must not be there yet")]) -> None:
+def backup(
+    file: Annotated[Path, typer.Argument(help="for the copy; must not be there yet")], as_json: AsJson = False
+) -> None:
     """Copy the SQLite database of GAPLAB_DATABASE_URL, though the service writes to it, into a file to start from."""
     size = copy(Settings.from_environment().database_url, file)
+    if as_json:
+        document({"file": str(file), "bytes": size})
+        return
     typer.echo(f"Wrote {file}: {size:,} bytes, checked.")

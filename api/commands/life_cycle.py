@@ -4,38 +4,39 @@ from typing import Annotated
 
 import typer
 
-from api.commands.base import Id, Url, app, connect
+from api.commands.base import AsJson, Id, Url, app, connect
+from api.document import document
 from schemas.records import ExperimentRead, StudyRead
 
 Total = typer.Option(min=1, help="in all, not what is added; left out: as many as there are")
 
 
 @app.command()
-def pause(id: Id, url: Url = None) -> None:  # noqa: A002 - as the API says
+def pause(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A002 - as the API says
     """Let an experiment or a study finish the steps under way and give its cores back, until it is resumed."""
     with connect(url) as client:
-        _say(client.pause(id))
+        _say(client.pause(id), as_json=as_json)
 
 
 @app.command()
-def resume(id: Id, url: Url = None) -> None:  # noqa: A002 - as the API says
+def resume(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A002 - as the API says
     """Go on with an experiment or a study that was paused."""
     with connect(url) as client:
-        _say(client.resume(id))
+        _say(client.resume(id), as_json=as_json)
 
 
 @app.command()
-def stop(id: Id, url: Url = None) -> None:  # noqa: A002 - as the API says
+def stop(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A002 - as the API says
     """Let an experiment or a study finish the steps under way, and complete it with what is there."""
     with connect(url) as client:
-        _say(client.stop(id))
+        _say(client.stop(id), as_json=as_json)
 
 
 @app.command()
-def cancel(id: Id, url: Url = None) -> None:  # noqa: A002 - as the API says
+def cancel(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A002 - as the API says
     """Call an experiment off, or all of a study that has not ended; what is stored stays."""
     with connect(url) as client:
-        typer.echo(f"Cancelled {client.cancel(id).name}.")
+        _say(client.cancel(id), as_json=as_json)
 
 
 @app.command()
@@ -43,12 +44,16 @@ def extend(
     id: Id,  # noqa: A002 - as the API says
     iterations: Annotated[int | None, Total] = None,
     repetitions: Annotated[int | None, Total] = None,
+    as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Add iterations or repetitions to a completed experiment; what is there stands."""
     with connect(url) as client:
-        _say(client.extend(id, iterations=iterations, repetitions=repetitions))
+        _say(client.extend(id, iterations=iterations, repetitions=repetitions), as_json=as_json)
 
 
-def _say(found: ExperimentRead | StudyRead) -> None:
+def _say(found: ExperimentRead | StudyRead, *, as_json: bool) -> None:
+    if as_json:
+        document(found)
+        return
     typer.echo(f"{found.name} is {found.state}.")

@@ -6,20 +6,25 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from api import display
-from api.commands.base import Id, Url, app, connect, experiments_of, print_warnings
+from api import completion, display
+from api.client import Client
+from api.commands.base import AsJson, Id, Ids, Url, app, connect, experiments_of, print_warnings
 from api.commands.history import print_provenance
+from api.document import document
 from api.exits import CommandError, Exit
 from api.files import read_spec
 from schemas.lifecycle import State
 from schemas.misfit import MisfitRead
+from schemas.plugin import Catalogue
 from schemas.records import ExperimentRead, StudyRead
+from services.core.errors import unknown_name
 
 
 @app.command("list")
 def list_(
     experiments: Annotated[bool, typer.Option("--experiments", help="experiments in place of studies")] = False,
     limit: Annotated[int, typer.Option(min=1, max=500)] = 20,
+    as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """List the newest studies, and the experiments that belong to none."""
@@ -29,15 +34,21 @@ def list_(
             alone = [each for each in found if isinstance(each, ExperimentRead) and each.study is None]
             found = [*client.studies(limit=limit).items, *alone]
     newest = sorted(found, key=lambda each: each.created_at, reverse=True)[:limit]
+    if as_json:
+        document(newest)
+        return
     display.console().print(display.overview(newest) if newest else "Nothing yet; `gaplab submit` starts something.")
 
 
 @app.command()
-def show(id: Id, url: Url = None) -> None:  # noqa: A002 - as the API says
+def show(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A002 - as the API says
     """Show a study's experiments, or an experiment's repetitions."""
     console = display.console()
     with connect(url) as client:
         found = client.find(id)
+        if as_json:
+            document(_all_of(client, found))
+            return
         console.print(display.overview([found]))
         console.print(display.numbers(found.progress))
         if isinstance(found, StudyRead):
@@ -52,21 +63,25 @@ def show(id: Id, url: Url = None) -> None:  # noqa: A002 - as the API says
 
 @app.command()
 def curve(
-    ids: Annotated[list[str], typer.Argument(metavar="ID...", help="of studies or experiments")],
+    ids: Ids,
     csv: Annotated[bool, typer.Option("--csv", help="print comma-separated values")] = False,
     svg: Annotated[Path | None, typer.Option(help="draw into this file")] = None,
     html: Annotated[Path | None, typer.Option(help="draw into this file")] = None,
+    as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Print curves: recorded fitness, mean ± SD, by number of real-world evaluations; or draw them."""
     with connect(url) as client:
-        if csv:
+        if as_json:
+            document(client.curves(ids))
+        elif csv:
             typer.echo(client.curves_csv(ids), nl=False)
-        if svg:
-            _write(svg, client.figure(ids, "svg"))
-        if html:
-            _write(html, client.figure(ids, "html"))
-        if not (csv or svg or html):
+        for format, path in (("svg", svg), ("html", html)):  # noqa: A001 - as the API says
+            if path:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(client.figure(*ids).content(format))
+                typer.echo(f"Wrote {path}.", err=as_json)
+        if not (as_json or csv or svg or html):
             found = client.curves(ids)
             display.console().print(display.curves(found), *display.baselines(found))
 
@@ -74,14 +89,19 @@ def curve(
 @app.command()
 def sensitivity(
     spec: Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or - to read standard input")],
+    as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Check what the tunables of a spec do: whether they change fitness, how much, and how smoothly."""
     with connect(url) as client:
         found = client.check(read_spec(spec))
+    if as_json:
+        document(found)
     if found.state is not State.COMPLETED:
         msg = f"the check {found.id} ended as {found.state}: {found.reason}"
         raise CommandError(msg, Exit.FAILED)
+    if as_json:
+        return
     console = display.console()
     console.print(display.sensitivity(found))
     for each in found.warnings:
@@ -89,16 +109,45 @@ def sensitivity(
 
 
 @app.command()
-def catalogue(url: Url = None) -> None:
-    """List the strategies, robots, engines, tunables and optimizers, and their options."""
+def catalogue(
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="[NAME]", help="of a plug-in, for all about it", autocompletion=completion.plugins),
+    ] = None,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """List the strategies, robots, engines, tunables and optimizers; or say all about one."""
     with connect(url) as client:
-        display.console().print(*display.catalogue(client.catalogue()))
+        found = client.catalogue()
+    if name is not None:
+        _print_plugin(found, name, as_json=as_json)
+    elif as_json:
+        document(found)
+    else:
+        display.console().print(*display.catalogue(found))
 
 
-def _write(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, "utf-8")
-    typer.echo(f"Wrote {path}.")
+def _print_plugin(found: Catalogue, name: str, *, as_json: bool) -> None:
+    plugins = {each.name: each for kind in completion.KINDS for each in getattr(found, kind)}
+    if name not in plugins:
+        raise CommandError(unknown_name("", "plug-in", name, list(plugins)).message, Exit.NOT_FOUND)
+    if as_json:
+        document(plugins[name])
+    else:
+        display.console().print(*display.plugin(plugins[name]), soft_wrap=True)
+
+
+def _all_of(client: Client, found: ExperimentRead | StudyRead) -> dict[str, object]:
+    """What `show` shows, for programs."""
+    if isinstance(found, StudyRead):
+        return {"study": found}
+    return {
+        "experiment": found,
+        "repetitions": client.repetitions(found.id),
+        "provenance": client.provenance(found.id),
+        "misfit": client.misfit(found.id),
+    }
 
 
 def _print_misfit(found: MisfitRead, console: Console) -> None:

@@ -6,7 +6,8 @@ import typer
 
 from api import display
 from api.client import Client
-from api.commands.base import Url, app, connect, experiments_of, print_warnings
+from api.commands.base import AsJson, Url, app, connect, experiments_of, print_warnings
+from api.document import document
 from api.exits import CommandError, Exit
 from api.files import read_spec
 from api.watch import follow
@@ -18,28 +19,34 @@ from schemas.records import ExperimentRead, StudyRead
 def submit(
     spec: Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or - to read standard input")],
     watch: Annotated[bool, typer.Option("--watch", help="stay, and show the progress")] = False,
+    as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Submit an experiment, or a study if the spec names several strategies or none."""
     with connect(url) as client:
         submitted = client.submit(read_spec(spec))
-        console = display.console()
-        console.print(submitted.id, markup=False)
-        if watch:
-            _finish(_watched(client, submitted.id))
+        if not as_json:
+            typer.echo(submitted.id)
+        ended = watched(client, submitted.id, quiet=as_json) if watch else submitted
+    if as_json:
+        document(ended)
+    if watch:
+        finish(ended, quiet=as_json)
 
 
-def _watched(client: Client, id: str) -> ExperimentRead | StudyRead:  # noqa: A002 - as the API says
+def watched(client: Client, id: str, *, quiet: bool) -> ExperimentRead | StudyRead:  # noqa: A002 - as the API says
+    """What it ended as, after its progress was shown; if quiet, on standard error."""
     try:
-        return follow(client.watch(id), display.console())
+        return follow(client.watch(id), display.console(stderr=quiet))
     except KeyboardInterrupt:
         msg = f"it goes on without you; `gaplab show {id}` says how far it is"
         raise CommandError(msg, Exit.INTERRUPTED) from None
 
 
-def _finish(ended: ExperimentRead | StudyRead) -> None:
-    """Say how it ended; a failure is one for the shell as well."""
-    typer.echo(f"{ended.name}: {ended.state}; {display.numbers(ended.progress)}.")
+def finish(ended: ExperimentRead | StudyRead, *, quiet: bool) -> None:
+    """Say how it ended, unless quiet; a failure is one for the shell as well."""
+    if not quiet:
+        typer.echo(f"{ended.name}: {ended.state}; {display.numbers(ended.progress)}.")
     reasons = {reason for each in experiments_of(ended) for reason in each.reasons}
     for reason in sorted(reasons):
         typer.echo(f"  {reason}", err=True)

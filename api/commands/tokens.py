@@ -10,7 +10,8 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from api import display
-from api.commands.base import app
+from api.commands.base import AsJson, app
+from api.document import document
 from schemas.access import Role
 from services import access
 from services.settings import Settings
@@ -26,6 +27,7 @@ app.add_typer(tokens, name="token")
 def create(
     role: Annotated[Role, typer.Option(help="what it permits: reading; running too; revealing reality too")],
     name: Annotated[str | None, typer.Option(help="of whoever will use it", show_default=False)] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Make a token, and print it this once: only its digest is stored."""
     from api.service import migrate
@@ -33,15 +35,21 @@ def create(
     migrate(Settings.from_environment().database_url)
     with _store() as store:
         made = access.create_token(store, role, name)
+    if as_json:
+        document({"token": made.token, "secret": made.secret})
+        return
     typer.echo(f"{made.token.id} ({made.token.name}, {role.value}); this is shown once, for GAPLAB_TOKEN:", err=True)
     typer.echo(made.secret)
 
 
 @tokens.command("list")
-def list_() -> None:
+def list_(as_json: AsJson = False) -> None:
     """List the tokens, without their secrets."""
     with _store() as store:
         found = access.list_tokens(store)
+    if as_json:
+        document(found)
+        return
     table = Table("id", "name", "role", "made", "last used", "revoked", box=SIMPLE_HEAD)
     for each in found:
         moments = map(_minute, (each.created_at, each.last_used_at, each.revoked_at))
@@ -50,10 +58,16 @@ def list_() -> None:
 
 
 @tokens.command()
-def revoke(id: Annotated[str, typer.Argument(metavar="ID", help="as listed")]) -> None:  # noqa: A002 - as listed
+def revoke(
+    id: Annotated[str, typer.Argument(metavar="ID", help="as listed")],  # noqa: A002 - as listed
+    as_json: AsJson = False,
+) -> None:
     """Revoke a token; it admits nobody from the next request on."""
     with _store() as store:
         access.revoke_token(store, id)
+    if as_json:
+        document({"id": id, "revoked": True})
+        return
     typer.echo(f"Revoked {id}.")
 
 

@@ -14,6 +14,7 @@
     ├── InvalidArchive       a file that is no archive of ours, or one that was damaged or made to harm
     ├── Unsupported          another kind of database is needed for what was asked
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
+    ├── PluginBroken         a file of plug-ins from outside cannot be used
     └── EngineError
         ├── EngineUnavailable    the engine's library is not installed
         └── EngineInterrupted    its process died, or was ended for taking too long
@@ -118,6 +119,10 @@ class Unsupported(GaplabError):
 
 class ClusterUnusable(GaplabError):
     """Ray is unreachable, or one of its nodes would compute other numbers, or none."""
+
+
+class PluginBroken(GaplabError):
+    """A file of plug-ins cannot be used; the message says which, and why."""
 
 
 class EngineError(GaplabError):

@@ -1,4 +1,4 @@
-"""Plug-ins: one file in a folder is one plug-in, found by being there."""
+"""Plug-ins: one file in a folder is one plug-in, found by being there; `outside` finds those that are not gaplab's."""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -11,7 +11,8 @@ from pydantic import ValidationError
 
 from schemas.base import Frozen
 from schemas.plugin import PluginRead, PluginRef
-from services.core.errors import InvalidSpec, Violation, unknown_name
+from services.core import outside
+from services.core.errors import InvalidSpec, PluginBroken, Violation, unknown_name
 
 
 class NoOptions(Frozen):
@@ -41,7 +42,7 @@ class Plugin:
         return PluginRead(
             name=cls.name,
             summary=summary,
-            source=cls.source,
+            source=_source(cls),
             options=cls.Options.model_json_schema(),
             details=cls.details(),
         )
@@ -56,7 +57,10 @@ P = TypeVar("P", bound=Plugin)
 
 
 class Registry(Mapping[str, type[P]], Generic[P]):
-    """The plug-ins of one kind, by name, in alphabetical order; every module of `package` is imported at first use."""
+    """The plug-ins of one kind, by name, in alphabetical order.
+
+    At first use every module of `package` is imported, and every one from outside; that raises PluginBroken.
+    """
 
     def __init__(self, kind: str, package: str, base: type[P]) -> None:
         self.kind = kind
@@ -78,6 +82,12 @@ class Registry(Mapping[str, type[P]], Generic[P]):
             and not isabstract(each)
             and hasattr(each, "name")
         }
+        for each in outside.classes(self._base):
+            if each.name in found:
+                of = outside.file_of(found[each.name]) or "gaplab itself"
+                msg = f"{outside.file_of(each)} has a {self.kind} called {each.name!r}, as {of} has: call it otherwise"
+                raise PluginBroken(msg)
+            found[each.name] = each
         return dict(sorted(found.items()))
 
     def __getitem__(self, name: str) -> type[P]:
@@ -117,6 +127,12 @@ class Registry(Mapping[str, type[P]], Generic[P]):
     def describe(self) -> tuple[PluginRead, ...]:
         """Every plug-in, as the catalogue lists it."""
         return tuple(plugin.describe() for plugin in self.values())
+
+
+def _source(plugin: type[Plugin]) -> str:
+    """Where it says that it comes from, or its file, for one from outside that does not say."""
+    file = outside.file_of(plugin)
+    return f"{file} of GAPLAB_PLUGINS" if file and plugin.source == Plugin.source else plugin.source
 
 
 def _option_violation(plugin: type[Plugin], error: dict[str, Any], pointer: str) -> Violation:

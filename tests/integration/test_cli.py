@@ -1,90 +1,28 @@
 """The command, against a service in a thread: what it prints, and how it ends."""
 
-import io
 import json
 import re
-import sys
 import threading
 import time
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
-import uvicorn
-from fastapi import FastAPI
 
-from api.app import create_app
-from api.cli import main
 from api.client import Client, ServiceError, ServiceUnreachable
 from api.exits import Exit
-from api.server import listen
 from services import execution, sensitivity
 from services.core.optimizers.steady_state import SteadyState
 from services.core.sensitivity import Effort, check
 from services.simulation import subject
 from services.store.session import Store
+from tests.commands import Gaplab, served
 from tests.experiments import run, some_log
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SMOKE = str(EXAMPLES / "smoke.json")
-
-
-class Said(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-Gaplab = Callable[..., Said]
-
-
-@contextmanager
-def served(app: Callable[..., Any]) -> Iterator[str]:
-    """The address of a service of this app in a thread."""
-    listener = listen("127.0.0.1", 0)
-    server = uvicorn.Server(uvicorn.Config(app, log_level="critical", lifespan="off"))
-    thread = threading.Thread(target=server.run, args=([listener],))
-    thread.start()
-    yield f"http://127.0.0.1:{listener.getsockname()[1]}"
-    server.should_exit = True
-    thread.join()
-    listener.close()
-
-
-@pytest.fixture(scope="module")
-def service() -> Iterator[tuple[FastAPI, str]]:
-    """A service without workers, and without a database yet."""
-    app = create_app(Store("sqlite://"))
-    with served(app) as address:
-        yield app, address
-
-
-@pytest.fixture
-def url(service: tuple[FastAPI, str], sqlite_store: Store) -> str:
-    """Where the service answers from this test's database."""
-    app, address = service
-    app.state.store = sqlite_store
-    return address
-
-
-@pytest.fixture
-def gaplab(url: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Gaplab:
-    """Runs the command as a shell would."""
-    monkeypatch.setenv("GAPLAB_URL", url)
-
-    def command(*arguments: str, stdin: str = "") -> Said:
-        monkeypatch.setattr(sys, "argv", ["gaplab", *arguments])
-        monkeypatch.setattr(sys, "stdin", io.StringIO(stdin))
-        with pytest.raises(SystemExit) as ended:
-            main()
-        printed = capsys.readouterr()
-        assert "Traceback" not in printed.out + printed.err
-        return Said(int(ended.value.code or 0), printed.out, printed.err)
-
-    return command
 
 
 def finish(store: Store) -> None:

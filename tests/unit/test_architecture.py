@@ -7,9 +7,14 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-OURS = ("schemas", "services", "workers", "api", "migrations")
+OURS = ("schemas", "services", "workers", "api", "migrations", "gaplab")
 MODULES = sorted(path.relative_to(ROOT) for top in OURS for path in (ROOT / top).rglob("*.py"))
 PHYSICS = {"pybullet", "mujoco", "numba", "sapien"}
+ON_DEMAND = {
+    "pandas",
+    "plotly",
+    "IPython",
+}  # heavy, or not installed everywhere: never at the top of a module of the API
 
 # code in -> what of ours it may import, and what of others; the first prefix that fits counts
 ARROWS = {
@@ -34,8 +39,12 @@ ARROWS = {
             "fastapi_offline",
             "anyio",
             "prometheus_client",
+            "pandas",  # these three only inside the functions that need them
+            "plotly",
+            "IPython",
         },
     ),
+    "gaplab": (("schemas", "services.core", "services.engines", "api"), set()),
     "migrations": (
         ("services.core.errors", "services.settings", "services.store", "migrations"),
         {"alembic", "sqlalchemy"},
@@ -84,6 +93,14 @@ def test_only_the_workers_know_ray_and_nobody_imports_physics_at_the_top(path):
 
     assert "ray" not in tops
     assert not tops & PHYSICS
+
+
+@pytest.mark.parametrize("path", [each for each in MODULES if each.parts[0] == "api"], ids=str)
+def test_the_api_imports_what_only_notebooks_need_where_it_is_needed(path):
+    top = [node for node in ast.parse((ROOT / path).read_text()).body if isinstance(node, ast.Import | ast.ImportFrom)]
+    names = {alias.name for node in top for alias in node.names} | {getattr(node, "module", None) or "" for node in top}
+
+    assert not {name.partition(".")[0] for name in names} & ON_DEMAND
 
 
 @pytest.mark.parametrize("path", [each for each in MODULES if "versions" not in each.parts], ids=str)

@@ -27,8 +27,9 @@ _INSERT: dict[str, _Insert] = {"sqlite": sqlite.insert, "postgresql": postgresql
 
 
 def id_of(under: Provenance) -> str:
-    """The id of a provenance: it follows from the facts."""
-    return sha256(json.dumps(under.model_dump(mode="json"), sort_keys=True).encode()).hexdigest()[:16]
+    """The id of a provenance: it follows from the facts; that there are no plug-ins from outside is none."""
+    facts = under.model_dump(mode="json", exclude=None if under.plugins else {"plugins"})
+    return sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def decisive(under: Provenance, engines: Sequence[str]) -> str:

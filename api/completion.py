@@ -1,0 +1,60 @@
+"""What the shell offers while an argument is typed; a service that does not answer at once has nothing to offer."""
+
+from collections.abc import Callable, Iterator
+
+from api.client import Client, ServiceError, ServiceUnreachable
+
+PATIENCE_S = 1.5
+"""A shell that waits longer for an offer seems to hang."""
+
+MOST = 50
+KINDS = ("strategies", "robots", "engines", "tunables", "optimizers")
+
+
+def ids(incomplete: str) -> list[tuple[str, str]]:
+    """The newest studies and experiments, each with its name and state."""
+    return _offered(lambda client: _newest(client, incomplete))
+
+
+def kinds(incomplete: str) -> list[str]:
+    """The kinds of plug-ins."""
+    return [each for each in KINDS if each.startswith(incomplete)]
+
+
+def plugins(incomplete: str) -> list[tuple[str, str]]:
+    """Every plug-in by its name, with what it is."""
+
+    def found(client: Client) -> Iterator[tuple[str, str]]:
+        catalogue = client.catalogue()
+        for kind in KINDS:
+            for each in getattr(catalogue, kind):
+                if each.name.startswith(incomplete):
+                    yield each.name, each.summary
+
+    return _offered(found)
+
+
+def _newest(client: Client, incomplete: str) -> Iterator[tuple[str, str]]:
+    for page in (client.studies(limit=MOST), client.experiments(limit=MOST)):
+        for each in page.items:
+            if each.id.startswith(incomplete):
+                yield each.id, f"{each.name} ({each.state})"
+
+
+def _offered(of: Callable[[Client], Iterator[tuple[str, str]]]) -> list[tuple[str, str]]:
+    try:
+        with Client(timeout_s=PATIENCE_S) as client:
+            return list(of(client))
+    except (ServiceError, ServiceUnreachable, ValueError):
+        return []
+
+
+def figures(incomplete: str) -> list[str]:
+    """The kinds of figures, as the service documents them."""
+
+    def found(client: Client) -> Iterator[tuple[str, str]]:
+        for kind in client.figure_kinds():
+            if kind.startswith(incomplete):
+                yield kind, ""
+
+    return [kind for kind, _ in _offered(found)]

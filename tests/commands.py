@@ -1,0 +1,32 @@
+"""The command and a service in a thread, for the tests of both."""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import uvicorn
+
+from api.server import listen
+
+
+class Said(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+Gaplab = Callable[..., Said]
+
+
+@contextmanager
+def served(app: Callable[..., Any]) -> Iterator[str]:
+    """The address of a service of this app in a thread."""
+    listener = listen("127.0.0.1", 0)
+    server = uvicorn.Server(uvicorn.Config(app, log_level="critical", lifespan="off"))
+    thread = threading.Thread(target=server.run, args=([listener],))
+    thread.start()
+    yield f"http://127.0.0.1:{listener.getsockname()[1]}"
+    server.should_exit = True
+    thread.join()
+    listener.close()

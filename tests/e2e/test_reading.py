@@ -1,0 +1,107 @@
+"""Notebooks, tutorial and how-tos, run as their readers run them, on one real service that has their plug-ins."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+from api.own import LocalService
+from tests.e2e.reading import (
+    DOCUMENTS,
+    NOTEBOOKS,
+    ROOT,
+    blocks,
+    plugins_of_documents,
+    plugins_of_notebooks,
+    script,
+    service_with,
+)
+
+LEAVES = {"tutorial": ["curves.svg", "curves.pdf", "curves.html", "study.zip"], "scripts": ["ended.json"]}
+"""Files that a document promises."""
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalService]:
+    with service_with(tmp_path_factory.mktemp("reading"), plugins_of_notebooks() | plugins_of_documents()) as found:
+        yield found
+
+
+def outputs_of(path: Path, folder: Path) -> list[Any]:
+    """What the cells of a notebook show, run from its first to its last."""
+    notebook = nbformat.read(path, as_version=4)
+    NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(folder)}}).execute()
+    return [output for cell in notebook.cells for output in cell.get("outputs", ())]
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
+def test_a_notebook_runs_from_its_first_cell_to_its_last(
+    path: Path, service: LocalService, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("GAPLAB_URL", service.url)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
+
+    shown = outputs_of(path, tmp_path)
+
+    data = [output["data"] for output in shown if "data" in output]
+    assert any("image/svg+xml" in each for each in data)  # a figure
+    assert any("<progress" in each.get("text/html", "") for each in data)  # its progress
+    assert any("COMPLETED" in each.get("text/plain", "") for each in data)
+    assert not [output for output in shown if output["output_type"] == "stream" and output["name"] == "stderr"]
+
+
+def test_there_are_three():
+    assert [path.stem for path in NOTEBOOKS] == ["compare", "own_robot", "own_strategy"]
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_no_output_is_kept_in_git(path: Path):
+    notebook = nbformat.read(path, as_version=4)
+
+    nbformat.validate(notebook)
+    assert [cell for cell in notebook.cells if cell.get("outputs") or cell.get("execution_count")] == []
+    assert set(notebook.metadata) == {"kernelspec", "language_info"}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Where a reader is: in a clone, with the commands on the path."""
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    commands = tmp_path / "commands"
+    commands.mkdir()
+    for name, call in {"gaplab": "-m api.cli", "python": ""}.items():
+        (commands / name).write_text(f'#!/bin/sh\nexec "{sys.executable}" {call} "$@"\n')
+        (commands / name).chmod(0o755)
+    return tmp_path
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.stem)
+def test_what_a_document_says_can_be_done(path: Path, service: LocalService, folder: Path):
+    environment = os.environ | {
+        "GAPLAB_URL": service.url,
+        "PATH": os.pathsep.join([str(folder / "commands"), os.environ["PATH"]]),
+        "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
+    }
+
+    run = ["bash", "-c", script(path)]
+    done = subprocess.run(run, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False)
+
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert [name for name in LEAVES.get(path.stem, ()) if not (folder / name).stat().st_size] == []
+    assert "Traceback" not in done.stderr
+
+
+def test_the_documents_have_code_and_what_is_not_run_says_why():
+    every = {path.stem: blocks(path) for path in DOCUMENTS}
+
+    assert sum(not each.skipped for found in every.values() for each in found) > 12
+    assert {"spread.py", "tug.py", "motor_torque.py", "molasses.py"} == set(plugins_of_documents())
+    assert all(text.count("```") % 2 == 0 for text in (path.read_text() for path in DOCUMENTS))

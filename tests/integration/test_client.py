@@ -1,0 +1,390 @@
+"""The client as programs and notebooks use it: frames, waiting, figures, errors; no line of it is HTTP to its user."""
+
+import json
+import sys
+import threading
+import time
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import httpx2
+import pytest
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from api.clients import connection, frames
+from gaplab import Client, ExperimentFailed, ServiceError, ServiceUnreachable
+from schemas.access import Role
+from services import access, execution
+from services.store.session import Store
+from tests.experiments import run, some_log
+
+SMALL = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 3}
+BOTH = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "smoke", "repetitions": 3}
+
+
+class InProcess(httpx2.BaseTransport):
+    """The app in this process in place of the network; `lost` answers are served and then lost on the way."""
+
+    def __init__(self, store: Store) -> None:
+        app = create_app(store)
+        self._client = TestClient(app, raise_server_exceptions=False)
+        self.close = app.state.physics.close
+        self.asked: list[str] = []
+        self.lost = 0
+        self.busy = 0
+
+    def handle_request(self, request: httpx2.Request) -> httpx2.Response:
+        self.asked.append(f"{request.method} {request.url.path}")
+        if self.busy:
+            self.busy -= 1
+            return httpx2.Response(503, json={"type": "about:blank", "title": "t", "status": 503, "detail": "busy"})
+        headers = {name: value for name, value in request.headers.items() if name != "host"}
+        url = request.url.raw_path.decode()
+        answer = self._client.request(request.method, url, content=request.read(), headers=headers)
+        if self.lost:
+            self.lost -= 1
+            raise httpx2.ReadError("the answer was lost")
+        decoded = {name: value for name, value in answer.headers.items() if name != "content-encoding"}
+        return httpx2.Response(answer.status_code, headers=decoded, content=answer.content)
+
+
+@pytest.fixture
+def network(sqlite_store: Store) -> InProcess:
+    return InProcess(sqlite_store)
+
+
+@pytest.fixture
+def client(network: InProcess) -> Iterator[Client]:
+    with Client("http://127.0.0.1:1", transport=network) as found:
+        yield found
+
+
+@pytest.fixture
+def finish(sqlite_store: Store) -> Callable[[], None]:
+    """Runs whatever is queued."""
+
+    def work() -> None:
+        while claims := execution.claim(sqlite_store, "test", limit=10):
+            for number, claim in enumerate(claims):
+                iterations = 0 if claim.spec.strategy.name == "direct" else claim.spec.iterations
+                run(sqlite_store, claim, some_log(iterations, recorded=1 + number / 10))
+
+    return work
+
+
+def test_a_curve_is_a_frame_of_its_points_or_of_its_repetitions(client: Client, finish: Callable[[], None]):
+    study = client.submit(BOTH)
+    finish()
+
+    points, values = client.curve(study.id), client.curve(study.id, each=True)
+
+    (curve, direct) = client.curves([study.id])
+    assert list(points["experiment"].unique()) == [each.id for each in study.experiments]
+    assert len(points) == len(curve.points) + len(direct.points)
+    assert points["mean"].iloc[0] == curve.points[0].mean
+    assert points["evaluations"].dtype.kind == "i"
+    assert len(values) == sum(len(point.values) for each in (curve, direct) for point in each.points)
+    assert values.groupby(["experiment", "evaluations"])["fitness"].mean().notna().all()
+
+
+def test_samples_come_whole_however_many_pages_they_are(
+    client: Client, finish: Callable[[], None], network: InProcess, monkeypatch: pytest.MonkeyPatch
+):
+    experiment = client.submit(SMALL)
+    finish()
+    whole = client.samples(experiment.id)
+    monkeypatch.setattr(frames, "MOST", 2)
+    network.asked.clear()
+
+    by_twos = client.samples(experiment.id)
+
+    assert by_twos.equals(whole)
+    assert len(network.asked) == -(-len(whole) // 2)
+    assert list(whole["kind"].unique()) == ["probe", "sample"]
+    assert {"repetition", "iteration", "fitness", "measured_at", "gene_0"} <= set(whole)
+    assert whole["fitness"].dtype == float
+    only = client.samples(experiment.id, repetition=1, kind="sample")
+    assert set(only["repetition"]) == {1}
+    assert set(only["kind"]) == {"sample"}
+    assert only["fitness"].isna().any()  # a measurement that failed
+
+
+def test_simulators_are_a_frame_with_a_column_for_each_tunable(client: Client, finish: Callable[[], None]):
+    experiment = client.submit(SMALL | {"tunables": ["static_friction", "restitution"]})
+    finish()
+
+    found = client.simulators(experiment.id)
+
+    assert list(found) == ["repetition", "iteration", "rank", "squared_error", "static_friction", "restitution"]
+    assert found["squared_error"].isna().any()  # infinite there, null on the wire
+    assert set(client.simulators(experiment.id, iteration=0)["iteration"]) == {0}
+
+
+def predictions(pending: int) -> httpx2.Response:
+    """An answer of the service, with `pending` of two samples not computed yet."""
+    items = [
+        {"repetition": 0, "iteration": k, "simulated_before": None, "simulated_after": 0.5, "fitness": 0.4}
+        for k in range(2 - pending)
+    ]
+    return httpx2.Response(200, json={"experiment": "e", "unit": "m/s", "items": items, "pending": pending})
+
+
+def test_predictions_are_waited_for_until_none_is_pending():
+    answers = [predictions(2), predictions(1), predictions(0)]
+    network = httpx2.MockTransport(lambda _: answers.pop(0))
+
+    with Client("http://127.0.0.1:1", transport=network) as client:
+        found = client.predictions("e", every_s=0)
+
+    assert answers == []
+    assert len(found) == 2
+    assert found["simulated_before"].dtype == float
+    assert found["simulated_before"].isna().all()
+
+
+def test_predictions_that_take_too_long_say_how_many_are_left():
+    network = httpx2.MockTransport(lambda _: predictions(1))
+
+    with (
+        Client("http://127.0.0.1:1", transport=network) as client,
+        pytest.raises(TimeoutError, match="1 predictions of e are not computed"),
+    ):
+        client.predictions("e", every_s=0, timeout_s=0)
+
+
+@pytest.mark.parametrize("method", ["samples", "simulators"])
+def test_nothing_yet_is_an_empty_frame_with_the_same_columns(client: Client, method: str):
+    found = getattr(client, method)(client.submit(SMALL).id)
+
+    assert found.empty
+    assert {"repetition", "iteration"} <= set(found)
+
+
+def test_without_pandas_the_message_is_the_line_that_installs_it(client: Client, monkeypatch: pytest.MonkeyPatch):
+    id = client.submit(SMALL).id  # noqa: A001
+    monkeypatch.setitem(sys.modules, "pandas", None)
+
+    with pytest.raises(ImportError, match=r"pip install 'gaplab\[notebook\]'"):
+        client.curve(id)
+    assert client.curves([id])
+
+
+def test_waiting_gives_what_it_ended_as(client: Client, finish: Callable[[], None]):
+    experiment = client.submit(SMALL)
+    worker = threading.Timer(0.3, finish)
+    worker.start()
+
+    ended = client.wait(experiment.id, every_s=0.1)
+
+    worker.join()
+    assert ended.id == experiment.id
+    assert ended.state == "COMPLETED"
+
+
+def test_waiting_shows_progress_on_standard_error_if_asked(
+    client: Client, finish: Callable[[], None], capsys: pytest.CaptureFixture[str]
+):
+    experiment = client.submit(SMALL)
+    finish()
+
+    client.wait(experiment.id, progress=True)
+    client.wait(experiment.id)
+
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("COMPLETED") == 1
+
+
+def test_waiting_for_what_fails_raises_with_its_reason(client: Client, sqlite_store: Store):
+    experiment = client.submit(SMALL)
+    for claim in execution.claim(sqlite_store, "test", limit=10):
+        execution.fail(sqlite_store, claim, "ValueError: the robot fell apart")
+
+    with pytest.raises(ExperimentFailed, match="ended as FAILED; ValueError: the robot fell apart") as failed:
+        client.wait(experiment.id)
+
+    assert failed.value.ended.id == experiment.id
+
+
+def test_waiting_for_what_is_cancelled_raises_too(client: Client):
+    study = client.submit(BOTH)
+    client.cancel(study.id)
+
+    with pytest.raises(ExperimentFailed, match="ended as CANCELLED"):
+        client.wait(study.id)
+
+
+def test_waiting_has_an_end_if_asked(client: Client):
+    id = client.submit(SMALL).id  # noqa: A001
+
+    with pytest.raises(TimeoutError, match=r"is QUEUED after 0\.1 s; it goes on"):
+        client.wait(id, timeout_s=0.1, every_s=0.1)
+
+
+def test_a_notebook_gets_one_display_that_is_replaced(
+    client: Client, finish: Callable[[], None], monkeypatch: pytest.MonkeyPatch
+):
+    shown: list[str] = []
+    handle = SimpleNamespace(update=lambda html: shown.append(html.data))
+
+    def show(html: Any, display_id: bool) -> Any:
+        assert display_id
+        shown.append(html.data)
+        return handle
+
+    monkeypatch.setattr("IPython.get_ipython", lambda: SimpleNamespace(kernel=object()))
+    monkeypatch.setattr("IPython.display.display", show)
+    study = client.submit(BOTH | {"name": "a <b> & c"})
+    worker = threading.Timer(0.3, finish)
+    worker.start()
+
+    client.wait(study.id, every_s=0.1)
+
+    worker.join()
+    assert len(shown) > 1
+    assert "QUEUED" in shown[0]
+    assert shown[-1].count("COMPLETED") == 3
+    assert "a &lt;b&gt; &amp; c" in shown[0]
+    assert shown[-1].count("<progress") == 3
+
+
+def test_a_figure_shows_itself_and_saves_itself_by_its_suffix(
+    client: Client, finish: Callable[[], None], tmp_path: Any, network: InProcess
+):
+    study = client.submit(BOTH)
+    finish()
+
+    figure = client.figure(study.id, title="Mine")
+    shown = figure._repr_mimebundle_()
+    asked = len(network.asked)
+    svg, html = figure.save(tmp_path / "new" / "mine.svg"), figure.save(str(tmp_path / "mine.HTML"))
+
+    assert ET.fromstring(shown["image/svg+xml"]).tag.endswith("svg")
+    assert svg.read_text() == shown["image/svg+xml"]
+    assert "Mine" in html.read_text()
+    assert len(network.asked) == asked + 1  # what was drawn is kept
+    assert repr(figure) == f"<figure curves of {study.id}>" == shown["text/plain"]
+
+
+def test_a_figure_can_be_gone_on_with_in_plotly(client: Client, finish: Callable[[], None]):
+    study = client.submit(BOTH)
+    finish()
+
+    found = client.figure(study.id).plotly()
+
+    assert found.data
+    assert "evaluations" in found.layout.xaxis.title.text
+
+
+def test_the_client_knows_which_kinds_of_figures_there_are(client: Client):
+    assert "curves" in client.figure_kinds()
+
+
+def test_a_figure_of_an_unknown_format_or_kind_or_id_is_a_sentence(client: Client, tmp_path: Any):
+    id = client.submit(SMALL).id  # noqa: A001
+
+    with pytest.raises(ValueError, match="there is no format 'docx' of figures; there is svg, png"):
+        client.figure(id).save(tmp_path / "mine.docx")
+    with pytest.raises(ServiceError) as unknown:
+        client.figure(id, kind="portrait").content("svg")
+    with pytest.raises(ServiceError, match="there is no"):
+        client.figure("nope")
+
+    assert unknown.value.problem.status == 404
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_read_is_asked_for_again_if_the_answer_is_lost_or_the_service_busy(
+    client: Client, network: InProcess, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(connection, "PAUSES_S", (0.0, 0.0, 0.0))
+    id = client.submit(SMALL).id  # noqa: A001
+    network.asked.clear()
+    network.lost, network.busy = 1, 1
+
+    assert client.experiment(id).id == id
+    assert len(network.asked) == 3
+
+    network.busy = 4
+    with pytest.raises(ServiceError, match="busy"):
+        client.experiment(id)
+
+
+def test_what_is_submitted_while_answers_are_lost_exists_once(
+    client: Client, network: InProcess, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(connection, "PAUSES_S", (0.0, 0.0, 0.0))
+    network.lost, network.busy = 2, 1
+
+    submitted = client.submit(SMALL)
+
+    assert [each.id for each in client.experiments().items] == [submitted.id]
+
+
+def test_a_verb_whose_answer_is_lost_is_not_asked_for_again(client: Client, network: InProcess):
+    id = client.submit(SMALL).id  # noqa: A001
+    client.find(id)
+    network.asked.clear()
+    find = network.handle_request
+
+    def lose_the_verb(request: httpx2.Request) -> httpx2.Response:
+        network.lost = int(request.method == "POST")
+        return find(request)
+
+    network.handle_request = lose_the_verb  # type: ignore[method-assign]
+    with pytest.raises(ServiceUnreachable):
+        client.cancel(id)
+
+    assert [each for each in network.asked if each.startswith("POST")] == [f"POST /experiments/{id}/cancel"]
+
+
+def test_a_spec_with_several_mistakes_raises_with_a_line_for_each(client: Client):
+    with pytest.raises(ServiceError) as refused:
+        client.submit({"strategy": "simulated_fti", "robot": "quadruppet"})
+
+    lines = sorted(str(refused.value).splitlines())
+    assert [line.partition(":")[0] for line in lines] == ["/robot", "/strategy"]
+    assert "did you mean 'simulated_fit'?" in lines[1]
+    assert refused.value.problem.errors[0].nearest
+
+
+def test_with_a_token_it_is_the_same_and_without_one_it_says_so(
+    sqlite_store: Store, network: InProcess, monkeypatch: pytest.MonkeyPatch
+):
+    secret = access.create_token(sqlite_store, Role.RUNNER, "me").secret
+    monkeypatch.delenv("GAPLAB_TOKEN", raising=False)
+
+    with Client("http://gaplab.example", token=secret, transport=network) as mine:
+        id = mine.submit(SMALL).id  # noqa: A001
+        assert mine.samples(id).empty
+        assert mine.curve(id)["mean"].isna().all()
+    with Client("http://gaplab.example", transport=network) as nobody, pytest.raises(ServiceError, match="token") as no:
+        nobody.submit(SMALL)
+    assert no.value.problem.status == 401
+
+    monkeypatch.setenv("GAPLAB_TOKEN", secret)
+    with Client("http://gaplab.example", transport=network) as from_the_environment:
+        assert from_the_environment.find(id).id == id
+
+
+def test_the_service_of_the_environment_is_the_one_that_is_meant(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("GAPLAB_URL", "http://127.0.0.1:7")
+
+    with Client() as client:
+        assert client.url == "http://127.0.0.1:7"
+        began = time.monotonic()
+        with pytest.raises(ServiceUnreachable, match="no service answers"):
+            client.studies()
+        assert time.monotonic() - began < 60  # it is not waited for
+
+
+def test_events_and_lists_are_values_that_json_can_hold(client: Client):
+    study = client.submit(BOTH)
+
+    kinds = [each.kind for each in client.events(follow=False, study=study.id)]
+
+    assert kinds.count("submitted") == 2
+    assert json.dumps([each.model_dump(mode="json") for each in client.studies().items])

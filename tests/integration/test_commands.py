@@ -1,0 +1,349 @@
+"""Every command, found by introspection: a JSON document of each that prints something; help, completion, watching."""
+
+import io
+import json
+import os
+import re
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from rich.console import Console
+
+from api import completion
+from api.cli import app
+from api.client import Client, ServiceError, ServiceUnreachable
+from api.exits import MEANINGS, Exit
+from api.monitor import looks, spark, watch
+from services import execution
+from services.store.session import Store
+from tests.commands import Gaplab
+from tests.experiments import run, some_log
+
+STUDY = {
+    "name": "all [of] it",
+    "strategies": ["random", "direct"],
+    "robot": "toy_function",
+    "budget": "smoke",
+    "repetitions": 3,
+    "tunables": ["static_friction", "dynamic_friction"],
+}
+UNTIL_STOPPED = {"serve", "demo"}
+"""They run until they are stopped or for minutes, and what they print is their log."""
+
+
+def commands(of: Any = None, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Every command with its name, those of groups too."""
+    command = of or typer.main.get_command(app)
+    if hasattr(command, "commands"):
+        for part, each in command.commands.items():
+            yield from commands(each, f"{name} {part}".strip())
+    else:
+        yield name, command
+
+
+NAMES = [name for name, _ in commands()]
+
+
+@pytest.fixture
+def finish(sqlite_store: Store) -> Callable[[], None]:
+    """Runs whatever is queued."""
+
+    def work() -> None:
+        while claims := execution.claim(sqlite_store, "test", limit=10):
+            for number, claim in enumerate(claims):
+                iterations = 0 if claim.spec.strategy.name == "direct" else claim.spec.iterations
+                run(sqlite_store, claim, some_log(iterations, recorded=1 + number / 10))
+
+    return work
+
+
+@pytest.fixture
+def study(gaplab: Gaplab) -> str:
+    return gaplab("submit", "-", stdin=json.dumps(STUDY)).out.strip()
+
+
+def test_every_command_that_prints_something_has_the_option():
+    lacking = {name for name, command in commands() if "--json" not in {o for p in command.params for o in p.opts}}
+
+    assert lacking == UNTIL_STOPPED
+    assert len(NAMES) > 20
+
+
+@pytest.fixture
+def said() -> dict[str, Any]:
+    """The document of each command that was asked."""
+    return {}
+
+
+@pytest.fixture
+def ask(gaplab: Gaplab, said: dict[str, Any]) -> Callable[..., Any]:
+    """Gives the document that a command prints."""
+
+    def document(name: str, *arguments: str, stdin: str = "") -> Any:
+        answer = gaplab(*name.split(), *arguments, "--json", stdin=stdin)
+        assert answer.code == 0, (name, answer)
+        said[name] = json.loads(answer.out)
+        return said[name]
+
+    return document
+
+
+def test_every_command_prints_one_document_and_nothing_else(
+    ask: Callable[..., Any],
+    said: dict[str, Any],
+    sqlite_url: str,
+    finish: Callable[[], None],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
+
+    live_and_die(ask, finish)
+    look(ask, *(each["id"] for each in said["list"][::-1]))
+    keep(ask, said["list"][-1]["id"], tmp_path)
+    token = ask("token create", "--role", "reader", "--name", "me")
+    monkeypatch.setenv("GAPLAB_TOKEN", ask("token create", "--role", "admin")["secret"])
+    assert token["token"]["id"] in {each["id"] for each in ask("token list")}
+    assert ask("token revoke", token["token"]["id"]) == {"id": token["token"]["id"], "revoked": True}
+    assert set(ask("help")) == {str(each.value) for each in Exit}
+
+    elsewhere = {"sensitivity", "accept-versions"}  # want a worker, and an experiment under way
+    assert set(said) | elsewhere == set(NAMES) - UNTIL_STOPPED
+
+
+def live_and_die(ask: Callable[..., Any], finish: Callable[[], None]) -> None:
+    study = ask("submit", "-", stdin=json.dumps(STUDY))
+    id, experiment = study["id"], study["experiments"][0]["id"]  # noqa: A001
+    assert ask("pause", id)["state"] == "PAUSED"
+    assert ask("resume", id)["state"] == "QUEUED"
+    assert ask("edit", id, "--name", "another")["name"] == "another"
+    finish()
+    assert ask("watch", id)["state"] == "COMPLETED"
+    assert ask("extend", experiment, "--iterations", "3")["state"] == "QUEUED"
+    assert ask("stop", experiment)["state"] == "COMPLETED"
+    other = ask("submit", "-", stdin=json.dumps(STUDY | {"strategies": ["random"]}))["id"]
+    assert ask("cancel", other)["state"] == "CANCELLED"
+    assert [each["id"] for each in ask("list")] == [other, id]
+
+
+def look(ask: Callable[..., Any], id: str, other: str) -> None:  # noqa: A002
+    assert set(ask("show", id)) == {"study"}
+    experiments = [each["id"] for each in ask("show", id)["study"]["experiments"]]
+    assert set(ask("show", experiments[0])) == {"experiment", "repetitions", "provenance", "misfit"}
+    assert [each["experiment"] for each in ask("curve", id)] == experiments
+    assert "strategies" in ask("catalogue")
+    assert ask("catalogue", "random")["name"] == "random"
+    assert {each["kind"] for each in ask("events", id)} > {"submitted", "completed"}
+    assert {each["kind"] for each in ask("events", other)} == {"submitted", "cancelled"}
+
+
+def keep(ask: Callable[..., Any], id: str, folder: Path) -> None:  # noqa: A002
+    archive, figure, copy = (str(folder / name) for name in ("a.zip", "f.svg", "copy.db"))
+    assert ask("export", id, "--to", archive)["file"] == archive
+    assert ask("import", archive)["renamed"]
+    assert ask("figure", "curves", id, "--out", figure)[0]["bytes"] == Path(figure).stat().st_size
+    assert ask("backup", copy)["bytes"] > 0
+
+
+def test_versions_are_accepted_in_a_document(gaplab: Gaplab, study: str, sqlite_store: Store):
+    (claim, *_) = execution.claim(sqlite_store, "test", limit=1)
+
+    said = gaplab("accept-versions", claim.experiment_id, "--json")
+
+    assert json.loads(said.out)["id"] == claim.experiment_id
+
+
+def test_a_failure_is_on_standard_error_and_the_document_is_not_half_there(gaplab: Gaplab):
+    said = gaplab("show", "nope", "--json")
+
+    assert said.code == Exit.NOT_FOUND
+    assert said.out == ""
+
+
+def test_a_failed_experiment_is_a_document_and_still_a_failure_for_the_shell(
+    gaplab: Gaplab, study: str, sqlite_store: Store
+):
+    for claim in execution.claim(sqlite_store, "test", limit=10):
+        execution.fail(sqlite_store, claim, "ValueError: the robot fell apart")
+
+    said = gaplab("watch", study, "--json")
+
+    assert said.code == Exit.FAILED
+    assert json.loads(said.out)["state"] == "FAILED"
+    assert "the robot fell apart" in said.err
+
+
+def test_help_explains_every_exit_code(gaplab: Gaplab):
+    said = gaplab("help", "exit-codes").out
+
+    assert set(MEANINGS) == set(Exit)
+    assert [int(line.split()[0]) for line in said.splitlines()] == [each.value for each in Exit]
+    assert "watch" in gaplab("help").out
+    assert gaplab("help", "nonsense").code == Exit.USAGE
+
+
+def test_a_figure_is_drawn_into_as_many_files_as_one_names(
+    gaplab: Gaplab, study: str, finish: Callable[[], None], tmp_path: Path
+):
+    finish()
+    files = [tmp_path / "new" / f"a.{suffix}" for suffix in ("svg", "png", "pdf", "html", "json")]
+
+    out = [argument for file in files for argument in ("-o", str(file))]
+    said = gaplab("figure", "curves", study, *out, "--set", "title=A title", "-s", "each=true")
+
+    assert said.code == 0, said.err
+    assert said.out == "".join(f"Wrote {file}.\n" for file in files)
+    svg, png, pdf, html, data = (file.read_bytes() for file in files)
+    assert png.startswith(b"\x89PNG")
+    assert pdf.startswith(b"%PDF")
+    assert b"A title" in svg
+    assert b"A title" in html
+    assert json.loads(data)["title"] == "A title"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "says"),
+    [
+        (["curves", "STUDY", "-o", "a.docx"], Exit.USAGE, "has no suffix of a figure"),
+        (["curves", "STUDY", "-o", "a.svg", "--set", "band"], Exit.USAGE, "NAME=VALUE"),
+        (["curves", "STUDY", "-o", "a.svg", "--set", "band=wide"], Exit.INVALID, "band"),
+        (["portrait", "STUDY", "-o", "a.svg"], Exit.NOT_FOUND, "portrait"),
+        (["curves", "nope", "-o", "a.svg"], Exit.NOT_FOUND, "nope"),
+    ],
+)
+def test_a_figure_that_cannot_be_drawn_is_a_sentence_and_no_file(  # noqa: PLR0917
+    gaplab: Gaplab,
+    study: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    code: int,
+    says: str,
+):
+    monkeypatch.chdir(tmp_path)
+
+    said = gaplab("figure", *(study if each == "STUDY" else each for each in arguments))
+
+    assert said.code == code
+    assert says in said.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_all_about_one_plug_in(gaplab: Gaplab):
+    said = gaplab("catalogue", "simulated_fit_and_informative")
+
+    assert "informative_weight" in said.out
+    assert "of their weighted standard deviation" in said.out
+    assert "did you mean 'random'" in gaplab("catalogue", "randon").err
+
+
+def test_ids_and_plug_ins_are_completed(url: str, study: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("GAPLAB_URL", url)
+
+    assert dict(completion.ids(study[:3]))[study] == "all [of] it (QUEUED)"
+    assert len(completion.ids("")) == 3  # the study and its two experiments
+    assert [name for name, _ in completion.plugins("simulated_fit_and")] == [
+        "simulated_fit_and_informative",
+        "simulated_fit_and_unique",
+    ]
+    assert "curves" in completion.figures("cu")
+
+
+def test_where_no_service_answers_nothing_is_offered(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("GAPLAB_URL", "http://127.0.0.1:9")
+
+    assert completion.ids("") == []
+    assert completion.plugins("") == []
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_shell_gets_a_script_and_the_script_gets_commands_and_ids(url: str, study: str, shell: str):
+    def ask(**environment: str) -> str:
+        command = [sys.executable, "-c", "import sys; sys.argv[0] = 'gaplab'; from api.cli import main; main()"]
+        shown = os.environ | {"GAPLAB_URL": url} | environment
+        done = subprocess.run(command, env=shown, capture_output=True, text=True, check=False)
+        assert "Traceback" not in done.stderr
+        return done.stdout
+
+    script = ask(_GAPLAB_COMPLETE=f"source_{shell}")
+
+    assert f"_GAPLAB_COMPLETE=complete_{shell}" in script
+    typed = {"bash": {"COMP_WORDS": "gaplab show ", "COMP_CWORD": "2"}}.get(
+        shell, {"_TYPER_COMPLETE_ARGS": "gaplab show ", "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
+    )
+    assert study in ask(_GAPLAB_COMPLETE=f"complete_{shell}", **typed)
+
+
+def test_in_a_log_watching_is_lines(gaplab: Gaplab, study: str, finish: Callable[[], None]):
+    worker = threading.Timer(0.3, finish)
+    worker.start()
+
+    said = gaplab("watch", study, "--every", "0.1")
+
+    worker.join()
+    assert said.code == 0
+    assert "all [of] it: COMPLETED" in said.out.splitlines()[-1]
+    assert "\x1b" not in said.out
+
+
+def test_in_a_terminal_it_is_a_view_of_curves_and_repetitions(url: str, study: str, finish: Callable[[], None]):
+    screen = Console(force_terminal=True, width=140, file=io.StringIO(), highlight=False)
+    worker = threading.Timer(0.4, finish)
+    worker.start()
+
+    with Client(url) as client:
+        ended = watch(looks(client, study, every_s=0.1, patience_s=10), screen)
+
+    worker.join()
+    shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", screen.file.getvalue())
+    assert ended.state == "COMPLETED"
+    assert "QUEUED" in shown
+    assert "fitness in reality, m/s" in shown
+    assert re.search(r"random .* COMPLETED .* ▁▄█ 3\.20±0\.20 after 2 +███ ", shown)  # three repetitions
+
+
+class Shaky(Client):
+    """A client whose service is away for some of its answers."""
+
+    def __init__(self, url: str, away: list[Exception]) -> None:
+        super().__init__(url)
+        self.away = away
+
+    def study(self, id: str) -> Any:  # noqa: A002
+        if self.away and self.seen:
+            raise self.away.pop(0)
+        self.seen = True
+        return super().study(id)
+
+    seen = False
+
+
+def test_the_view_survives_a_service_that_is_away_and_says_so(url: str, study: str, finish: Callable[[], None]):
+    screen = Console(force_terminal=True, width=140, file=io.StringIO(), highlight=False)
+    finish_soon = threading.Timer(0.5, finish)
+    finish_soon.start()
+
+    with Shaky(url, [ServiceUnreachable("away"), ServiceUnreachable("away")]) as client:
+        ended = watch(looks(client, study, every_s=0.1, patience_s=60), screen)
+
+    finish_soon.join()
+    assert ended.state == "COMPLETED"
+    assert "the service has not answered for" in screen.file.getvalue()
+
+
+def test_it_is_waited_for_only_so_long_and_a_refusal_not_at_all(url: str, study: str):
+    with Shaky(url, [ServiceUnreachable("away")] * 99) as client, pytest.raises(ServiceUnreachable):
+        list(looks(client, study, every_s=0.05, patience_s=0.1))
+    with Client(url) as client, pytest.raises(ServiceError):
+        next(looks(client, "nope", every_s=0.1, patience_s=60))
+
+
+def test_numbers_become_blocks():
+    assert spark([0, 1, 2], 0, 2) == "▁▅█"
+    assert spark([3, 3], 3, 3) == "▁▁"

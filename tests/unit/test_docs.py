@@ -1,0 +1,94 @@
+"""The documents: no link is dead, and the reference is what the code says."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import nbformat
+import pytest
+
+from docs.generate import FOLDER, pages
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = sorted(
+    path
+    for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("services/**/*.md"))
+    if ".venv" not in path.parts
+)
+NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
+LINK = re.compile(r"\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\s*\)")
+FENCED = re.compile(r"^(```|~~~).*?^\1", re.MULTILINE | re.DOTALL)
+
+
+def prose(path: Path) -> str:
+    """A document, or a notebook's Markdown, without blocks of code."""
+    if path.suffix == ".ipynb":
+        cells = nbformat.read(path, as_version=4).cells
+        return "\n\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
+    return FENCED.sub("", path.read_text())
+
+
+def anchors(path: Path) -> set[str]:
+    """Of its headings, as GitHub makes them."""
+    found: set[str] = set()
+    for heading in re.findall(r"^#+ (.*)$", prose(path), re.MULTILINE):
+        plain = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading).replace("`", "").lower()
+        slug = re.sub(r"[^\w\- ]", "", plain).replace(" ", "-")
+        repeated = next(n for n in range(1000) if (f"{slug}-{n}" if n else slug) not in found)
+        found.add(f"{slug}-{repeated}" if repeated else slug)
+    return found
+
+
+def dead(path: Path) -> list[str]:
+    """Its links that lead nowhere; those to other hosts are not followed."""
+    wrong = []
+    for link in LINK.findall(re.sub(r"`[^`\n]*`", "", prose(path))):
+        if re.match(r"(https?|mailto):", link):
+            continue
+        name, _, anchor = link.partition("#")
+        target = (path.parent / name).resolve() if name else path
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            wrong.append(link)
+    return wrong
+
+
+@pytest.mark.parametrize("path", [*DOCUMENTS, *NOTEBOOKS], ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_no_link_is_dead(path: Path):
+    assert dead(path) == []
+
+
+def test_dead_links_would_be_found(tmp_path: Path):
+    (tmp_path / "other.md").write_text("# A `heading` of two\n\n# A heading of two\n")
+    document = tmp_path / "a.md"
+    document.write_text(
+        "# Here\n[a](other.md) [b](gone.md) [c](#here) [d](#there) [e](other.md#a-heading-of-two) "
+        "[f](other.md#a-heading-of-two-1) [g](other.md#no) `[h](code.md)` [i](https://example.org/x)\n"
+        "```sh\n[j](code.md)\n```\n"
+    )
+
+    assert dead(document) == ["gone.md", "#there", "other.md#no"]
+
+
+def test_every_document_is_reached_from_the_index():
+    index = ROOT / "docs" / "README.md"
+    linked = {(index.parent / link.partition("#")[0]).resolve() for link in LINK.findall(prose(index))}
+    beside = {path for path in DOCUMENTS if path.parent.name in {"docs", "how-to", "reference"}} - {index}
+
+    assert beside - linked == set()
+    assert "(docs/README.md)" in (ROOT / "README.md").read_text()
+
+
+def test_the_reference_is_what_the_code_says():
+    kept = {path.name: path.read_text() for path in FOLDER.glob("*.md")}
+
+    assert {name for name, text in pages().items() if kept.get(name) != text} == set(), "run `make docs`"
+    assert set(kept) == set(pages())
+
+
+def test_documents_name_no_path_of_a_machine():
+    listed = subprocess.run(
+        ["git", "ls-files", "docs", "examples"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    texts = [ROOT / name for name in listed.stdout.split() if name.endswith((".md", ".ipynb"))]
+
+    assert [path for path in texts if re.search(r"(/home|/Users|/work)/\w", path.read_text())] == []

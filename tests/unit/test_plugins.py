@@ -1,0 +1,216 @@
+"""Plug-ins from outside: found in a folder, told apart by their content, refused with a sentence if they are broken."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from schemas.plugin import PluginRef
+from services import plugins
+from services.core import outside
+from services.core.errors import PluginBroken
+from services.core.registry import Registry
+from services.core.strategies.base import Strategy
+from services.core.tunables.base import Tunable
+from services.engines.base import Engine
+
+CAREFUL = '''
+"""A strategy."""
+
+import numpy as np
+
+from gaplab.plugins import Strategy
+
+
+class Careful(Strategy):
+    """Stays in the middle."""
+
+    name = "careful"
+    searches = False
+
+    def select(self, belief, search, rng):
+        return (belief.space.lower + belief.space.upper) / 2
+'''
+
+Put = Callable[..., Path]
+
+
+@pytest.fixture
+def put(tmp_path: Path) -> Iterator[Put]:
+    """Writes files into a folder, and lets plug-ins be looked for there."""
+
+    def write(folder: str = "mine", /, **files: str) -> Path:
+        home = tmp_path / folder
+        home.mkdir(exist_ok=True)
+        for name, text in files.items():
+            (home / f"{name}.py").write_text(text)
+        outside.look_in((*outside.folders(), home))
+        return home
+
+    yield write
+    outside.look_in(())
+
+
+def strategies() -> Registry[Strategy]:
+    return Registry("strategy", "services.core.strategies", Strategy)
+
+
+def test_a_file_in_the_folder_is_a_plug_in_among_gaplabs_own(put: Put):
+    put(careful=CAREFUL)
+
+    found = strategies()
+
+    assert "careful" in found
+    assert "informative" in found
+    assert list(found) == sorted(found)
+    assert found["careful"].describe().source == "careful.py of GAPLAB_PLUGINS"
+    assert found["random"].describe().source.startswith("Paper")
+    assert isinstance(found.create(PluginRef(name="careful")), Strategy)
+
+
+def test_it_belongs_to_its_kind_only(put: Put):
+    put(careful=CAREFUL)
+
+    assert "careful" not in Registry("tunable", "services.core.tunables", Tunable)
+
+
+def test_files_import_from_each_other_and_one_with_an_underscore_is_only_for_that(put: Put):
+    put(
+        _middle=CAREFUL.replace('"careful"', '"hidden"'),
+        careful="from gaplab_plugins._middle import Careful as Middle\n\n\n"
+        'class Careful(Middle):\n    """The same."""\n\n    name = "careful"\n',
+    )
+
+    assert "careful" in strategies()
+    assert "hidden" not in strategies()
+
+
+def test_folders_are_several_but_a_file_has_one_place(put: Put):
+    put("mine", careful=CAREFUL)
+    put("yours", brave=CAREFUL.replace("areful", "rave").replace("crave", "brave"))
+    assert {"careful", "brave"} <= set(strategies())
+
+    put("yours", careful=CAREFUL)
+
+    with pytest.raises(PluginBroken, match=r"careful\.py is in .*mine and in .*yours"):
+        list(strategies())
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("def (", r"broken\.py cannot be imported: SyntaxError"),
+        ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"),
+        ("1 / 0", "ZeroDivisionError"),
+        (CAREFUL.replace('"careful"', '"random"'), "has a strategy called 'random', as gaplab itself has"),
+        (CAREFUL.replace("def select", "def choose"), r"Careful in broken\.py does not define select"),
+        (CAREFUL.replace('    name = "careful"\n', ""), "has no name, by which specs would call it"),
+        (CAREFUL.replace("searches = False", "Options = 7"), "cannot be described: AttributeError"),
+    ],
+)
+def test_a_broken_file_is_a_sentence(put: Put, text: str, says: str):
+    put(broken=text)
+
+    with pytest.raises(PluginBroken, match=says):
+        list(strategies())
+
+
+def test_a_folder_that_is_not_there_is_a_sentence(tmp_path: Path):
+    outside.look_in((tmp_path / "nowhere",))
+    try:
+        with pytest.raises(PluginBroken, match=r"there is no folder .*nowhere"):
+            list(strategies())
+    finally:
+        outside.look_in(())
+
+
+def test_what_is_in_the_folder_has_a_hash_and_files_that_python_keeps_have_none(put: Put):
+    home = put(careful=CAREFUL)
+    list(strategies())
+    before, digest = plugins.digests(), plugins.digest()
+
+    (home / "careful.py").write_text(CAREFUL + "\n# another\n")
+
+    assert set(before) == {"careful.py"}
+    assert plugins.digests()["careful.py"] != before["careful.py"]
+    assert plugins.digest() != digest
+
+
+def test_without_folders_there_is_nothing_to_tell():
+    assert plugins.digests() == {}
+    assert plugins.digest() == "none"
+
+
+ELSEWHERE = """
+from services.versions import provenance, versions
+from services.catalogue import catalogue
+from services.store.repository.provenance import decisive
+
+found = provenance()
+print("careful" in [each.name for each in catalogue().strategies])
+print(sorted(found.plugins) == ["careful.py", "glide.py"])
+print(versions()["plug-ins"])
+print(decisive(found, ["glide"]))
+"""
+
+GLIDE = '''
+"""An engine."""
+
+from services.engines.analytic import Analytic
+
+
+class Glide(Analytic):
+    """The analytic engine by another name."""
+
+    name = "glide"
+'''
+
+
+def test_every_process_with_the_variable_has_them_and_an_engines_content_decides_who_goes_on(tmp_path: Path):
+    home = tmp_path / "mine"
+    home.mkdir()
+    (home / "careful.py").write_text(CAREFUL)
+    (home / "glide.py").write_text(GLIDE)
+
+    def ask() -> list[str]:
+        environment = os.environ | {"GAPLAB_PLUGINS": "mine", "PYTHONPATH": str(Path(__file__).parents[2])}
+        command = [sys.executable, "-c", ELSEWHERE]
+        done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout.splitlines()
+
+    before = ask()
+    (home / "glide.py").write_text(GLIDE.replace("another name", "yet another name"))
+    after = ask()
+
+    assert before[:2] == after[:2] == ["True", "True"]
+    assert before[2] != after[2]
+    assert before[3] != after[3]
+    assert before[3].startswith("glide (glide.py ")
+
+
+@pytest.mark.parametrize("module", ["api", "workers"])
+def test_a_process_does_not_start_with_a_broken_plug_in(tmp_path: Path, module: str):
+    (tmp_path / "broken.py").write_text("1 / 0")
+    environment = os.environ | {"GAPLAB_PLUGINS": str(tmp_path), "GAPLAB_DATABASE_URL": "sqlite://", "GAPLAB_PORT": "1"}
+    arguments = ["serve"] if module == "workers" else []
+
+    done = subprocess.run(
+        [sys.executable, "-m", module, *arguments], env=environment, capture_output=True, text=True, check=False
+    )
+
+    assert done.returncode != 0
+    assert "broken.py cannot be imported: ZeroDivisionError" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_what_plug_ins_are_written_with_is_there():
+    import gaplab.plugins
+
+    assert gaplab.plugins.Strategy is Strategy
+    assert gaplab.plugins.Engine is Engine
+    assert gaplab.plugins.frozen([1]).dtype == np.float64
