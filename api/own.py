@@ -29,12 +29,7 @@ def own_service(database_url: str, log: Path, *, workers: bool = True) -> Iterat
         CommandError: it does not start.
     """
     with log.open("ab") as output:
-<<<<<<< HEAD
-        module = ("api.cli", "serve") if workers else ("api",)
-        process = start(*module, environment=environment, log=output)
-=======
-        process, url = _started(database_url, output)
->>>>>>> client
+        process, url = _started(database_url, output, workers=workers)
         try:
             with Client(url) as client:
                 _wait_until_ready(client, process, log)
@@ -82,12 +77,13 @@ def local_service(folder: str | Path = "results/local", *, plugins: str | Path |
 
 
 def _started(
-    database_url: str, log: IO[bytes], added: dict[str, str] | None = None
+    database_url: str, log: IO[bytes], added: dict[str, str] | None = None, *, workers: bool = True
 ) -> tuple["subprocess.Popen[bytes]", str]:
     """A service's process, and where it will answer."""
     port = _free_port()
     environment = {"GAPLAB_DATABASE_URL": database_url, "GAPLAB_PORT": str(port), "GAPLAB_HOST": "127.0.0.1"}
-    process = start("api.cli", "serve", environment=environment | (added or {}), log=log)
+    module = ("api.cli", "serve") if workers else ("api",)
+    process = start(*module, environment=environment | (added or {}), log=log)
     return process, f"http://127.0.0.1:{port}"
 
 
