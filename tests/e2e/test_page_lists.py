@@ -5,6 +5,8 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 
+from schemas.access import Role
+from services.access import create_token
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import axe, fits, screenshot
 
@@ -160,8 +162,10 @@ def test_the_form_holds_every_start_and_what_one_copies_is_what_it_submits(visit
 
 
 def test_a_strategy_is_compared_with_itself_under_other_options(visit, archive):
+    visit.forgive(*REFUSED)
     page = visit(f"{archive.url}/#/new")
     page.get_by_role("button", name="None", exact=True).click()
+    page.locator(".trouble", has_text="at least 1 item").wait_for()
     box = page.locator(".strategy", has_text="Known fit")
     box.get_by_role("checkbox").check()
     box.get_by_text("Options", exact=True).click()
@@ -203,5 +207,28 @@ def test_an_empty_service_says_how_to_begin(visit, sqlite_url, tmp_path):
         page.get_by_role("link", name="Submit a study").click()
 
         page.get_by_text("No worker is running now").wait_for()
+    finally:
+        api.close()
+
+
+def test_a_service_with_tokens_asks_for_one_and_a_reader_may_look_and_estimate(
+    visit, sqlite_store, sqlite_url, tmp_path
+):
+    visit.forgive("401", "403")
+    token = create_token(sqlite_store, Role.READER).secret
+    api = Api(sqlite_url, tmp_path / "api.log").start()
+    try:
+        page = visit(api.url)
+        page.get_by_role("heading", name="A token, please").wait_for()
+        axe(page)
+        screenshot(page, "token")
+
+        page.get_by_label("Token").fill(token)
+        page.get_by_role("button", name="Go on").click()
+
+        page.get_by_role("link", name="Submit a study").click()
+        page.get_by_text("rollouts at most").wait_for()
+        page.get_by_role("button", name="Submit the study").click()
+        page.get_by_text("The token does not permit this").wait_for()
     finally:
         api.close()
