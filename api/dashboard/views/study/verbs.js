@@ -6,6 +6,8 @@ import { h } from "../../lib/dom.js";
 import { count } from "../../lib/format.js";
 import { PERMITTED } from "../experiment/verbs.js";
 
+const CONFLICT = 409;
+
 const VERBS = [["pause", "Pause", "paused"], ["resume", "Resume", "resumed"], ["stop", "Stop…", "stopped"], ["cancel", "Cancel…", "cancelled"], ["extend", "Extend…", "extended"]];
 
 /** The experiments that permit the verb. */
@@ -65,7 +67,22 @@ function cancel(page) {
   }, page.signal);
 }
 
-/** Experiments are extended one by one; the direct baseline has no iterations to add. */
+/** Experiments are extended one by one; the direct baseline has no iterations to add, and one that is large enough is left alone. */
+async function enlarge(some, wanted) {
+  const refused = [];
+  for (const { id, strategy, spec } of some) {
+    const total = (name) => Math.max(spec[name], Number(wanted[name]));
+    const iterations = strategy === "direct" ? {} : { iterations: total("iterations") };
+    try {
+      await post(`/experiments/${id}/extend`, { ...iterations, repetitions: total("repetitions") });
+    } catch (error) {
+      if (error.status !== CONFLICT) throw error;
+      refused.push(error);
+    }
+  }
+  if (refused.length === some.length) throw refused[0];
+}
+
 function extend(page) {
   const some = willing(page.study, "extend");
   const iterations = Math.max(...some.map((each) => each.spec.iterations));
@@ -80,10 +97,7 @@ function extend(page) {
     ],
     action: "Extend it",
     act: async (values) => {
-      for (const { id, spec } of some) {
-        const larger = (name) => Math.max(spec[name], Number(values[name]));
-        await post(`/experiments/${id}/extend`, { iterations: larger("iterations"), repetitions: larger("repetitions") });
-      }
+      await enlarge(some, values);
       await page.look();
     },
   }, page.signal);
