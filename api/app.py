@@ -25,9 +25,12 @@ from api.routes import (
     life_cycle,
     metrics,
     provenance,
+    replay_figures,
+    replays,
     sensitivity,
     studies,
 )
+from services.physics import Physics
 from services.settings import Limits, Settings
 from services.store.session import Store
 
@@ -44,6 +47,7 @@ TAGS = [
     {"name": "studies", "description": "experiments that belong together to be compared"},
     {"name": "experiments", "description": "one strategy under one setting, repeated"},
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
+    {"name": "replays", "description": "what controllers do, computed when it is asked for"},
     {"name": "figures", "description": "to look at, and to put into papers"},
     {"name": "events", "description": "what happens to experiments, as it happens"},
     {"name": "archives", "description": "everything of an experiment or a study as one file, and back"},
@@ -61,7 +65,9 @@ MODULES = (
     events,
     curves,
     figures,
+    replay_figures,
     archives,
+    replays,
     sensitivity,
     catalogue,
     health,
@@ -93,6 +99,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     limits = limits or Limits()
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
     app.state.feed = Feed(store)
+    app.state.physics = Physics()
     app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
     app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(GZipMiddleware, minimum_size=20_000, compresslevel=4)
@@ -103,6 +110,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     problems.install(app)
     for module in MODULES:
         app.include_router(module.router)
+    figures.install(app)
     dashboard.install(app)
     documentation.install(app)
     return app

@@ -13,6 +13,7 @@ from schemas.base import Frozen
 from services.access import Caller, demand
 from services.admission import Admission, Once
 from services.core.errors import NotFound
+from services.physics import Physics
 from services.store.session import Store
 
 R = TypeVar("R", bound=Frozen)
@@ -53,6 +54,12 @@ def _caller(request: Request) -> Caller:
     return caller
 
 
+def _physics(request: Request) -> Physics:
+    """The process of the app that computes what is asked for while somebody waits."""
+    physics: Physics = request.app.state.physics
+    return physics
+
+
 def _admission(request: Request, key: IdempotencyKey = None) -> Admission:
     """Who submits, within which limits, and under which key."""
     return Admission(_caller(request).token, request.app.state.limits, key)
@@ -60,6 +67,7 @@ def _admission(request: Request, key: IdempotencyKey = None) -> Admission:
 
 StoreDep = Annotated[Store, Depends(_store)]
 CallerDep = Annotated[Caller, Depends(_caller)]
+PhysicsDep = Annotated[Physics, Depends(_physics)]
 AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]
 

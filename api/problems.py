@@ -17,6 +17,7 @@ from services.core.errors import (
     Changed,
     ConditionMissing,
     Conflict,
+    EngineInterrupted,
     EngineUnavailable,
     Forbidden,
     GaplabError,
@@ -44,6 +45,7 @@ KINDS: dict[type[GaplabError], tuple[int, str, str]] = {
     InvalidArchive: (422, "invalid-archive", "This archive cannot be read"),
     StoreUnavailable: (503, "store-unavailable", "The database cannot be used now"),
     EngineUnavailable: (422, "engine-unavailable", "An engine is not installed here"),
+    EngineInterrupted: (503, "engine-interrupted", "The physics ended before it answered"),
 }
 
 INVALID_REQUEST = (422, "invalid-request", "This cannot be answered as it is asked")
@@ -112,7 +114,7 @@ def of_gaplab(request: Request, error: Exception) -> JSONResponse:
 
 def _headers(request: Request, error: Exception) -> dict[str, str]:
     match error:
-        case StoreUnavailable():
+        case StoreUnavailable() | EngineInterrupted():
             return {"Retry-After": "5"}
         case LimitReached(retry_after_s=int(seconds)):
             return {"Retry-After": str(seconds)}

@@ -74,8 +74,9 @@ class Server(uvicorn.Server):
     """Uvicorn, that ends event streams when it is told to stop: it would wait for them for ever."""
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """End the streams, answer the requests under way, and close."""
+        """End the streams and the physics, answer the requests under way, and close."""
         self.config.app.state.feed.close()
+        self.config.app.state.physics.close()
         await super().shutdown(sockets)
 
 

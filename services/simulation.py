@@ -19,7 +19,7 @@ from services.core.strategies import strategies
 from services.core.tunables import tunables
 from services.core.tunables.base import Tunable
 from services.core.types import Budget, Space
-from services.core.world import World
+from services.core.world import Recording, World
 from services.engines import engines
 from services.engines.base import Engine
 
@@ -40,6 +40,11 @@ class Simulation:
         worlds = [self._world(tuple(row)) for row in parameters.tolist()]
         motions = [self._robot.motion(genome) for genome in genomes]
         return self._robot.fitness(self._engine.rollouts(worlds, motions))
+
+    def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:
+        """The rollout of one genome in one simulator, looked at at these times besides, and the world it was in."""
+        world = self._world(tuple(parameters.tolist()))
+        return world, self._engine.record(world, self._robot.motion(genome), times_s)
 
     def _edited(self, values: tuple[float, ...]) -> World:
         world = self._robot.world

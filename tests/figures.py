@@ -2,6 +2,7 @@
 
 from schemas.curves import Curve, CurvePoint
 from schemas.lifecycle import State
+from schemas.predictions import Prediction
 from services.figures.curves import curves_figure
 from services.figures.marks import (
     Arrow,
@@ -16,6 +17,9 @@ from services.figures.marks import (
     Points,
     Table,
 )
+from services.figures.predictions import predictions_figure
+from services.figures.simulators import Dimension, Tuned, simulators_figure
+from services.figures.squared_error import squared_error_figure
 from services.figures.style import style_of
 
 NAMES = [
@@ -96,6 +100,40 @@ EVERYTHING = Figure(
     table=Table(("", "a"), (("b", "1"),)),
 )
 
+DIMENSIONS = (
+    Dimension("static_friction", "1", 0, 1.5),
+    Dimension("dynamic_friction", "1", 0.2, 1.5),
+    Dimension("body_mass", "kg", 1, 5),
+    Dimension("motor_force", "N", 1, 9),
+)
+"""Four tunables."""
+
+TRUTH = {"static_friction": 1.0, "dynamic_friction": 0.8}
+"""Where reality is, as far as it is known."""
+
+
+def tuned(dimensions: int, repetitions: int = 3, iterations: int = 2) -> list[Tuned]:
+    return [
+        Tuned(repetition, iteration, tuple(each.lower + 0.1 * (1 + repetition) for each in DIMENSIONS[:dimensions]))
+        for repetition in range(repetitions)
+        for iteration in range(iterations + 1)
+    ]
+
+
+def prediction(before: float | None, after: float | None, fitness: float | None, repetition: int = 0) -> Prediction:
+    return Prediction(
+        repetition=repetition, iteration=1, simulated_before=before, simulated_after=after, fitness=fitness
+    )
+
+
+PREDICTIONS = [
+    prediction(0.5, 0.9, 1.0),
+    prediction(1.5, 1.1, 1.0, 1),
+    prediction(None, 0.3, 0.3),
+    prediction(1, 1, None),
+]
+ERRORS = {1: {0: 1e-6, 1: 1e-4, 2: None}, 2: {0: 0.0, 1: 1.0, 2: 0.5}}
+
 FIGURES = [
     curves_figure([RISING, DIRECT], title="curves", each=True),
     curves_figure([]),
@@ -104,5 +142,14 @@ FIGURES = [
     curves_figure([curve(f"line {each}", point(0, each)) for each in range(40)]),
     curves_figure([curve("alone", point(0, 1.0, n=1, sd=None), point(1, None, n=0, sd=None))]),
     EVERYTHING,
+    *(simulators_figure(tuned(each), DIMENSIONS[:each], truth=TRUTH, title="simulators") for each in (1, 2, 3, 4)),
+    simulators_figure(tuned(3), DIMENSIONS[:3], truth=None, columns=2),
+    simulators_figure([], DIMENSIONS[:3], truth=TRUTH, columns=2),
+    predictions_figure(PREDICTIONS, unit="m/s", title="predictions"),
+    predictions_figure(PREDICTIONS[:1]),
+    predictions_figure([], pending=5),
+    squared_error_figure(ERRORS, unit="m/s", title="squared error", each=True),
+    squared_error_figure({1: {0: 0.0}}),
+    squared_error_figure({1: {0: None}}),
 ]
 """What every renderer must draw."""

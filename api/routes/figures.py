@@ -1,19 +1,33 @@
 """Figures to look at and to put into papers."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, FastAPI, Query, Request, Response
 from pydantic import Field, model_validator
 
-from api.dependencies import Id, StoreDep
+from api.dependencies import Id, PhysicsDep, StoreDep
 from api.figures import Drawing, answer, responses
+from api.problems import documented
 from schemas.figures import FigureRead
 from services import experiments, reports
+from services.core.errors import NotFound
+from services.efforts import abscissa
 from services.figures.curves import Band, curves_figure
 from services.figures.marks import Figure
+from services.figures.predictions import predictions_figure
+from services.figures.simulators import simulators_figure
+from services.figures.squared_error import squared_error_figure
+from services.figures.words import spoken
+from services.predictions import predictions
 from services.store.session import Store
+from services.tuned import tunings
 
 router = APIRouter(prefix="/figures", tags=["figures"])
+
+EACH: bool = Field(default=False, description="draw every repetition's line behind the mean or median")
+
+NARROW_IN = 5.0
+"""In a narrower file, panels stand two in a row; else three."""
 
 
 class CurvesDrawing(Drawing):
@@ -25,7 +39,13 @@ class CurvesDrawing(Drawing):
         default=None,
         description="around each curve: 95 % interval of the mean, or SD; left out: SD below five repetitions",
     )
-    each: bool = Field(default=False, description="draw every repetition's line behind the mean")
+    x: Literal["evaluations", "rollouts", "time"] = Field(
+        default="evaluations", description="number of real-world evaluations, or what was spent until then"
+    )
+    cost_s: float = Field(
+        default=0.0, ge=0, le=1e9, description="seconds that one real-world evaluation takes, where x is time"
+    )
+    each: bool = EACH
 
     @model_validator(mode="after")
     def _something_is_drawn(self) -> "CurvesDrawing":
@@ -35,10 +55,76 @@ class CurvesDrawing(Drawing):
         return self
 
 
+class ExperimentDrawing(Drawing):
+    """Which experiment is drawn, and how."""
+
+    experiment: Id
+
+
+class ErrorDrawing(ExperimentDrawing):
+    """Which experiment's squared error is drawn, and how."""
+
+    each: bool = EACH
+
+
+class SimulatorsDrawing(ExperimentDrawing):
+    """Which experiment's simulators are drawn, and how."""
+
+    columns: int | None = Field(default=None, ge=1, le=6, description="panels in a row, at most")
+
+
 @router.get("/curves", summary="Draw curves", response_model=FigureRead, responses=responses())
 def draw_curves(store: StoreDep, query: Annotated[CurvesDrawing, Query()]) -> Response:
     """The paper's Fig. 4 for any studies and experiments: curves with their bands, the direct baseline with its SD."""
     return answer(_curves(store, query), query)
+
+
+@router.get("/squared-error", summary="Draw the squared error", response_model=FigureRead, responses=responses())
+def draw_squared_error(store: StoreDep, query: Annotated[ErrorDrawing, Query()]) -> Response:
+    """The squared error of an experiment's best tuned simulator, by iteration: median and quartiles of repetitions."""
+    found = tunings(store, query.experiment)
+    title = spoken(found.name) if query.title is None else query.title
+    return answer(squared_error_figure(found.errors, unit=found.unit, title=title, each=query.each), query)
+
+
+@router.get("/simulators", summary="Draw tuned simulators", response_model=FigureRead, responses=responses())
+def draw_simulators(store: StoreDep, query: Annotated[SimulatorsDrawing, Query()]) -> Response:
+    """An experiment's best simulators in the space of its tunables; with reality once all of its study have ended."""
+    found = tunings(store, query.experiment)
+    title = spoken(found.name) if query.title is None else query.title
+    narrow = query.format not in {"html", "json"} and query.width < NARROW_IN
+    columns = query.columns or (2 if narrow else 3)
+    figure = simulators_figure(found.simulators, found.dimensions, truth=found.truth, title=title, columns=columns)
+    return answer(figure, query)
+
+
+@router.get(
+    "/predictions",
+    summary="Draw what simulators predicted",
+    response_model=FigureRead,
+    responses=responses() | documented(404, 422, 429),
+)
+def draw_predictions(store: StoreDep, physics: PhysicsDep, query: Annotated[ExperimentDrawing, Query()]) -> Response:
+    """The fitness of every sample of an experiment in simulation, before and after tuning on it, against reality.
+
+    About two seconds are computed for each question; ask again while some samples are pending, as its caption says.
+    """
+    found = predictions(store, physics, query.experiment)
+    name = spoken(experiments.read_experiment(store, query.experiment).name)
+    title = name if query.title is None else query.title
+    return answer(predictions_figure(found.items, unit=found.unit, pending=found.pending, title=title), query)
+
+
+def install(app: FastAPI) -> None:
+    """Let the address of a figure that is none say which there are; after all routes that draw one."""
+    app.add_api_route(f"{router.prefix}/{{kind}}", _draw_nothing, include_in_schema=False)
+
+
+def _draw_nothing(kind: str, request: Request) -> None:
+    prefix = f"{router.prefix}/"
+    kinds = sorted(each.removeprefix(prefix) for each in request.app.openapi()["paths"] if each.startswith(prefix))
+    msg = f"there is no figure {kind[:64]!r}; permitted: {', '.join(kinds)}"
+    raise NotFound(msg)
 
 
 def _curves(store: Store, query: CurvesDrawing) -> Figure:
@@ -46,4 +132,5 @@ def _curves(store: Store, query: CurvesDrawing) -> Figure:
     curves = [curve for each in studies for curve in reports.study_curves(store, each.id)]
     curves += reports.curves(store, query.experiment) if query.experiment else ()
     title = query.title if query.title is not None else ", ".join(each.name for each in studies)
-    return curves_figure(curves, title=title, band=query.band, each=query.each)
+    against = None if query.x == "evaluations" else abscissa(store, curves, query.x, cost_s=query.cost_s)
+    return curves_figure(curves, title=title, band=query.band, against=against, each=query.each)

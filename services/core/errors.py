@@ -15,7 +15,8 @@
     ├── Unsupported          another kind of database is needed for what was asked
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
     └── EngineError
-        └── EngineUnavailable    the engine's library is not installed
+        ├── EngineUnavailable    the engine's library is not installed
+        └── EngineInterrupted    its process died, or was ended for taking too long
 
 Physics that blows up is no error: it is a fitness of nan, which never wins.
 """
@@ -125,6 +126,10 @@ class EngineError(GaplabError):
 
 class EngineUnavailable(EngineError):
     """The library of an engine is not installed; the message says how to install it."""
+
+
+class EngineInterrupted(EngineError):
+    """Physics ended before it answered; nothing else did."""
 
 
 def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -> Violation:

@@ -140,3 +140,20 @@ class Trajectory:
     times_s: FloatArray
     positions_m: FloatArray
     orientations: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A rollout looked at more often than its fitness needs, and in all its joints.
+
+    Attributes:
+        trajectory: to the bit what the rollout gives that is not recorded.
+        times_s: `(k,)`: when it was looked at.
+        poses: `(k, 7)`: position and quaternion x, y, z, w of the base's frame then; nan where the physics failed.
+        angles_rad: `(k, joints)`, in the world's order; None from an engine that does not tell them.
+    """
+
+    trajectory: Trajectory
+    times_s: FloatArray
+    poses: FloatArray
+    angles_rad: FloatArray | None

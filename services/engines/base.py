@@ -2,14 +2,16 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.util import find_spec
 from typing import Any, ClassVar
 
 import numpy as np
 
 from schemas.plugin import PluginRead
+from services.core.arrays import FloatArray
 from services.core.registry import Plugin
-from services.core.world import Motion, Trajectory, World
+from services.core.world import Motion, Recording, Trajectory, World
 
 ALL_FIELDS = frozenset(
     {
@@ -70,6 +72,20 @@ class Engine(Plugin):
             positions_m=np.array([[each.positions_m for each in row] for row in grid]),
             orientations=np.array([[each.orientations for each in row] for row in grid]),
         )
+
+    def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
+        """The very rollout of the motion in the world, looked at at these times besides.
+
+        An engine that can tell the angles of its joints replaces this, which tells of the base alone.
+
+        Args:
+            world: as of `rollout`.
+            motion: as of `rollout`.
+            times_s: `(k,)`, ascending, from 0 to the last observation.
+        """
+        seen = self.rollout(world, replace(motion, observe_s=times_s))
+        poses = np.hstack([seen.positions_m, seen.orientations])
+        return Recording(self.rollout(world, motion), times_s, poses, None)
 
     @classmethod
     def available(cls) -> bool:

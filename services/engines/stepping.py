@@ -2,6 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from typing import Generic, Protocol, TypeVar
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.core.arrays import FloatArray
-from services.core.world import Motion, World
+from services.core.world import Motion, Recording, Trajectory, World
 
 WARM_SCENES = 4
 """Worlds that differ in more than their material are kept warm up to this number; the longest unused one goes."""
@@ -40,6 +41,9 @@ class Scene(Warm, Protocol):
 
     def pose(self) -> FloatArray:
         """`(7,)`: position and quaternion x, y, z, w of the base's frame."""
+
+    def angles(self) -> FloatArray:
+        """`(joints,)`, rad, in the world's order."""
 
 
 S = TypeVar("S", bound=Warm)
@@ -81,6 +85,35 @@ def watch(scene: Scene, advance: Callable[[int], None], motion: Motion) -> Float
         advance: goes on by so many time steps.
         motion: its targets are commanded when they change, and only those that do.
     """
+    return _watch(scene, advance, motion, scene.pose)
+
+
+def record(
+    scene: Scene, advance: Callable[[int], None], motion: Motion, times_s: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """What `watch` sees, `(t, 7)`, and base and joints at other times, `(k, 7 + joints)`.
+
+    Args:
+        scene: as of `watch`.
+        advance: as of `watch`.
+        motion: as of `watch`.
+        times_s: `(k,)`, ascending, up to the last observation.
+    """
+    often = replace(motion, observe_s=np.union1d(motion.observe_s, times_s))
+    seen = _watch(scene, advance, often, lambda: np.append(scene.pose(), scene.angles()))
+    observed, looked = (np.searchsorted(often.observe_s, each) for each in (motion.observe_s, times_s))
+    return seen[observed, :7], seen[looked]
+
+
+def recording(motion: Motion, times_s: FloatArray, poses: FloatArray, seen: FloatArray) -> Recording:
+    """What `record` returned, put together; nan throughout if no physics can have led to the poses."""
+    if not plausible(poses):
+        poses, seen = np.full_like(poses, np.nan), np.full_like(seen, np.nan)
+    trajectory = Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
+    return Recording(trajectory, times_s, seen[:, :7], seen[:, 7:])
+
+
+def _watch(scene: Scene, advance: Callable[[int], None], motion: Motion, look: Callable[[], FloatArray]) -> FloatArray:
     commands = _commands(motion, scene.world.time_step_s)
     observed = _steps(motion.observe_s, scene.world.time_step_s)
     poses: dict[int, FloatArray] = {}
@@ -89,7 +122,7 @@ def watch(scene: Scene, advance: Callable[[int], None], motion: Motion) -> Float
         for actuator, target in commands.get(now, ()):
             scene.command(actuator, target)
         if now in observed:
-            poses[now] = scene.pose()
+            poses[now] = look()
         advance(then - now)
     return np.array([poses[step] for step in observed])
 

@@ -16,6 +16,9 @@ from services.figures.traces import Trace, short, text, traces
 ROW_PX, LOW_ROW_PX = 300, 190
 """Height of a row of panels, where there is one and where there are several."""
 
+SQUARE_PX = {1: 380, 2: 300, 3: 240}
+"""Height of square panels, by how many stand in a row."""
+
 AROUND_PX = 120
 """For labels, legend and margins."""
 
@@ -70,7 +73,13 @@ def _layout(figure: Figure) -> dict[str, Any]:
 
 def _height(figure: Figure) -> int:
     rows = _rows(figure)
-    each = ROW_PX if len(rows) == 1 else LOW_ROW_PX * (1.4 if figure.panels[0].square else 1)
+    each = (
+        SQUARE_PX.get(figure.columns, LOW_ROW_PX)
+        if figure.panels[0].square
+        else ROW_PX
+        if len(rows) == 1
+        else LOW_ROW_PX
+    )
     return round(each * sum(rows)) + AROUND_PX
 
 

@@ -8,10 +8,10 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any, Literal
 
 from services.figures.lettering import FAMILY, shown
-from services.figures.marks import Axis, Figure, Points
+from services.figures.marks import Axis, Figure
 from services.figures.painting import paint
 from services.figures.style import INK
-from services.figures.surroundings import Beneath, surround
+from services.figures.surroundings import Beneath, draw_bar_of_shades, shades_of, surround
 from services.figures.words import power
 
 if TYPE_CHECKING:
@@ -27,6 +27,9 @@ DPI = 300
 SIZE_PT = 8
 PANEL_IN, LOW_IN = 2.1, 1.1
 """Height of a row of panels, where there is one and where there are several."""
+
+SQUARE_IN = 3.2
+"""The greatest height of a square panel."""
 
 LOOK: Any = {
     "svg.hashsalt": "gaplab",
@@ -76,35 +79,47 @@ def render_file(figure: Figure, kind: FileFormat, *, width_in: float = COLUMN_IN
 def _canvas(figure: Figure, width_in: float, *, caption: bool) -> "Canvas":
     from matplotlib.figure import Figure as Canvas
 
-    beneath = Beneath.of(figure, width_in, caption=caption)
-    height = _height(figure, width_in) + beneath.above_in + beneath.height_in
-    canvas = Canvas(figsize=(width_in, height), layout="constrained")
-    rows = len(_rows(figure))
+    rows = _rows(figure)
+    canvas = Canvas(figsize=(width_in, sum(rows) * LOW_IN + 0.3 if len(rows) > 1 else PANEL_IN), layout="constrained")
     share: Any = "col" if figure.share_x else False
-    grid = canvas.subplots(
-        rows, figure.columns, squeeze=False, sharex=share, gridspec_kw={"height_ratios": _rows(figure)}
-    )
-    shades = [
-        each for panel in figure.panels for mark in panel.marks if isinstance(mark, Points) for each in mark.shades
-    ]
-    scale = (min(shades), max(shades)) if shades else (0.0, 1.0)
+    grid = canvas.subplots(len(rows), figure.columns, squeeze=False, sharex=share, gridspec_kw={"height_ratios": rows})
     for index, axes in enumerate(grid.flat):
-        if index >= len(figure.panels):
+        if index < len(figure.panels):
+            _draw(figure, index, axes)
+        else:
             axes.set_visible(False)
-            continue
-        panel = figure.panels[index]
-        last = not figure.share_x or index + figure.columns >= len(figure.panels)
-        _set_up(axes, panel.x, panel.y, labelled=last)
-        if panel.square:
-            axes.set_box_aspect(1)
-        if panel.title:
-            axes.set_title(shown(panel.title), loc="left")
-        paint(panel, axes, scale)
     if figure.empty:
         canvas.text(0.5, 0.6, shown(figure.nothing), ha="center", color="#777777")
-    surround(canvas, figure, beneath)
+    draw_bar_of_shades(canvas, figure)
+    sides = _square(canvas, len(rows)) if figure.panels[0].square else 0.0
+    surround(canvas, figure, Beneath.of(figure, width_in, sides, caption=caption))
     _settle(canvas)
     return canvas
+
+
+def _draw(figure: Figure, index: int, axes: "Axes") -> None:
+    panel = figure.panels[index]
+    _set_up(axes, panel.x, panel.y, labelled=not figure.share_x or index + figure.columns >= len(figure.panels))
+    if panel.title:
+        axes.set_title(shown(panel.title), loc="left")
+    paint(panel, axes, shades_of(figure))
+
+
+def _square(canvas: "Canvas", rows: int) -> float:
+    """Make the canvas so high that its panels are as high as wide.
+
+    Returns:
+        The room in inches that is left free at either side, for no panel is wider than it should be.
+    """
+    engine = canvas.get_layout_engine()
+    assert engine is not None
+    engine.execute(canvas)
+    place = canvas.axes[0].get_position(original=True)
+    width, height = place.width * canvas.get_figwidth(), place.height * canvas.get_figheight()
+    side = min(width, SQUARE_IN)
+    canvas.set_figheight(canvas.get_figheight() + rows * (side - height))
+    columns = canvas.axes[0].get_gridspec().ncols  # type: ignore[union-attr]
+    return columns * (width - side) / 2
 
 
 def _settle(canvas: "Canvas") -> None:
@@ -121,13 +136,6 @@ def _settle(canvas: "Canvas") -> None:
 def _rows(figure: Figure) -> list[float]:
     starts = range(0, len(figure.panels), figure.columns)
     return [max(panel.height for panel in figure.panels[start : start + figure.columns]) for start in starts]
-
-
-def _height(figure: Figure, width_in: float) -> float:
-    rows = _rows(figure)
-    if figure.panels[0].square:
-        return sum(rows) * min(0.86 * width_in / figure.columns + 0.3, 3.4)
-    return sum(rows) * LOW_IN + 0.3 if len(rows) > 1 else PANEL_IN
 
 
 def _set_up(axes: "Axes", x: Axis, y: Axis, *, labelled: bool) -> None:

@@ -100,7 +100,7 @@ def _points(points: Points, axes: "Axes", order: float, shades: tuple[float, flo
     elif points.hollow:
         drawn |= {"facecolors": "none", "edgecolors": look.color, "linewidths": 0.9}
     else:
-        drawn |= {"color": look.color, "edgecolors": "white", "linewidths": 0.3}
+        drawn |= {"color": look.color, "edgecolors": "white", "linewidths": 0.3 * points.size}
     axes.scatter(_floats(points.x), _floats(points.y), label=legend_name(points.name), **drawn)
 
 

@@ -27,6 +27,8 @@ class Beneath:
         legend_in: its height.
         caption: its lines.
         above_in: height of the title.
+        width: of the file.
+        sides: room that is left free at either side.
     """
 
     columns: int
@@ -34,18 +36,20 @@ class Beneath:
     caption: tuple[str, ...]
     above_in: float
     width: float
+    sides: float
 
     @staticmethod
-    def of(figure: Figure, width: float, *, caption: bool) -> "Beneath":
+    def of(figure: Figure, width: float, sides: float = 0.0, *, caption: bool) -> "Beneath":
         """The room that a figure of this width in inches needs."""
         names = _names(figure)
         columns = next((each for each in (4, 3, 2) if _legend_in(names, each) <= width - 2 * MARGIN_IN), 1)
         return Beneath(
             columns=columns,
-            legend_in=ceil(len(names) / columns) * ROW_IN + (2 * MARGIN_IN if names else 0),
+            legend_in=ceil(len(names) / columns) * ROW_IN + (MARGIN_IN if names else 0),
             caption=tuple(lines(figure.caption, CAPTION_PT, width - 2 * MARGIN_IN)) if caption else (),
             above_in=0.2 if figure.title else 0.0,
             width=width,
+            sides=sides,
         )
 
     @property
@@ -55,17 +59,17 @@ class Beneath:
 
 
 def surround(canvas: "Canvas", figure: Figure, room: Beneath) -> None:
-    """Draw title, legend, bar of shades and caption, and keep the panels out of their way."""
-    height = canvas.get_figheight()
+    """Make room for title, legend and caption around the panels, and draw them."""
+    height = canvas.get_figheight() + room.above_in + room.height_in
+    canvas.set_figheight(height)
     bottom, top = room.height_in / height, 1 - room.above_in / height
+    left, side = MARGIN_IN / room.width, room.sides / room.width
     engine: Any = canvas.get_layout_engine()
-    engine.set(rect=(0, bottom, 1, top - bottom), w_pad=0.03, h_pad=0.03)
-    left = MARGIN_IN / room.width
+    engine.set(rect=(side, bottom, 1 - 2 * side, top - bottom))
     if figure.title:
         title = canvas.text(left, 1 - MARGIN_IN / height, shown(figure.title), va="top", weight="bold", size=TITLE_PT)
         title.set_in_layout(False)
     _legend(canvas, _names(figure), room, bottom)
-    _shades(canvas, figure)
     for number, line in enumerate(room.caption):
         y = (LINE_IN * (len(room.caption) - number) + MARGIN_IN) / height
         note = canvas.text(left, y, shown(line), size=CAPTION_PT, color="#555555", va="top")
@@ -97,21 +101,28 @@ def _legend(canvas: "Canvas", names: list[str], room: Beneath, bottom: float) ->
     legend.set_in_layout(False)
 
 
-def _shades(canvas: "Canvas", figure: Figure) -> None:
-    labels = [
-        mark.shades_label for panel in figure.panels for mark in panel.marks if isinstance(mark, Points) and mark.shades
-    ]
-    drawn = [each for axes in canvas.axes for each in axes.collections if each.get_array() is not None]
-    if not labels or not drawn:
-        return
+def shades_of(figure: Figure) -> tuple[float, float]:
+    """The numbers that are drawn lightest and darkest."""
+    values = [value for points in _shaded(figure) for value in points.shades]
+    return (min(values), max(min(values) + 1, *values)) if values else (0.0, 1.0)
+
+
+def draw_bar_of_shades(canvas: "Canvas", figure: Figure) -> None:
+    """Draw what says which number is how dark, beside the panels, if there are shades."""
     from matplotlib.ticker import MaxNLocator
 
-    shown_axes = [each for each in canvas.axes if each.get_visible()]
-    bar = canvas.colorbar(drawn[0], ax=shown_axes, aspect=30, pad=0.02, fraction=0.05)
-    bar.set_label(shown(labels[0]))
+    drawn = [each for axes in canvas.axes for each in axes.collections if each.get_array() is not None]
+    if not drawn:
+        return
+    bar = canvas.colorbar(drawn[0], ax=canvas.axes, aspect=30, pad=0.02, fraction=0.05)
+    bar.set_label(shown(_shaded(figure)[0].shades_label))
     bar.outline.set_visible(False)
     bar.locator = MaxNLocator(nbins=6, integer=True)
     bar.update_ticks()
+
+
+def _shaded(figure: Figure) -> list[Points]:
+    return [mark for panel in figure.panels for mark in panel.marks if isinstance(mark, Points) and mark.shades]
 
 
 def _legend_in(names: list[str], columns: int) -> float:

@@ -100,7 +100,7 @@ def _band(line: Line) -> list[Trace]:
 def _points(points: Points) -> list[Trace]:
     look = points.style
     marker: Trace = {"color": look.color, "symbol": MARKERS[look.marker], "size": round(7 * points.size, 1)}
-    marker |= {"opacity": 0.8}
+    marker |= {"opacity": 0.8 if len(points.y) > 1 else 1}
     if points.hollow:
         marker |= {"symbol": f"{MARKERS[look.marker]}-open", "line": {"width": 1.5}, "opacity": 1}
     trace = (

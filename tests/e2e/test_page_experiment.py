@@ -15,12 +15,8 @@ from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import some_log, toy
 
 SLOW_MS = 120_000
+expect.set_options(timeout=SLOW_MS)
 NAME = "simulated_fit"
-
-
-@pytest.fixture(autouse=True)
-def temporary(visit):
-    visit.forgive("422", "40[04]")
 
 
 @pytest.fixture
@@ -55,21 +51,22 @@ def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api, sqlite_st
     page.evaluate("() => { window.untouched = true; }")
     expect(page.get_by_role("heading", level=1)).to_have_text("Growing")
     expect(page.locator(".state-now")).to_contain_text("running")
-    expect(page.locator(".figure-curves .point")).to_have_count(1, timeout=SLOW_MS)
+    expect(page.locator(".figure-curves .point")).to_have_count(1)
 
     for iteration in (1, 2):
         for claim, log in zip(claims, logs, strict=True):
             steps(sqlite_store, claim, islice(log, 5))
-        expect(page.locator(".figure-curves .point")).to_have_count(1 + iteration, timeout=SLOW_MS)
+        expect(page.locator(".figure-curves .point")).to_have_count(1 + iteration)
     happened = page.locator(".events li")
-    expect(happened.first).to_contain_text("Repetition 1, iteration 2: the controller reaches", timeout=SLOW_MS)
+    expect(happened.first).to_contain_text("Repetition 1, iteration 2: the controller reaches")
     expect(page.locator(".facts")).to_contain_text("6 of 8")
 
     for claim, log in zip(claims, logs, strict=True):
         steps(sqlite_store, claim, log)
         assert execution.complete(sqlite_store, claim)
-    expect(page.locator(".state-now")).to_contain_text("completed", timeout=SLOW_MS)
+    expect(page.locator(".state-now")).to_contain_text("completed")
     expect(happened.first).to_contain_text("Completed")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
     expect(page.get_by_role("tabpanel").locator("tbody .pill.completed")).to_have_count(2)
     assert page.evaluate("() => window.untouched")
 
@@ -81,15 +78,15 @@ def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api, sqlite_s
     steps(sqlite_store, claim, islice(log, 3))
     visit.forgive("ERR_", "net::")
     page = visit(address(api, submitted.id))
-    expect(page.locator(".figure-curves .point")).to_have_count(1, timeout=SLOW_MS)
+    expect(page.locator(".figure-curves .point")).to_have_count(1)
     api.kill()
-    expect(page.locator("#connection")).not_to_be_empty(timeout=SLOW_MS)
+    expect(page.locator("#connection")).not_to_be_empty()
     expect(page.locator(".figure-curves .point")).to_have_count(1)
     steps(sqlite_store, claim, log)
     assert execution.complete(sqlite_store, claim)
     api.start()
-    expect(page.locator(".figure-curves .point")).to_have_count(3, timeout=SLOW_MS)
-    expect(page.locator(".state-now")).to_contain_text("completed", timeout=SLOW_MS)
+    expect(page.locator(".figure-curves .point")).to_have_count(3)
+    expect(page.locator(".state-now")).to_contain_text("completed")
     expect(page.locator("#connection")).to_be_empty()
 
 
@@ -161,6 +158,7 @@ def test_what_failed_is_said_with_its_reason_and_attempts(api, sqlite_store, vis
     page = visit(address(api, submitted.id))
     expect(page.locator(".state-now")).to_contain_text("failed")
     expect(page.locator(".remark.broken")).to_contain_text("a foot fell off")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
     page.get_by_role("button", name="Attempts at repetition 0: 1").click()
     attempts = page.get_by_role("region", name="Attempts at repetition 0")
     expect(attempts).to_contain_text("a foot fell off")
@@ -169,8 +167,9 @@ def test_what_failed_is_said_with_its_reason_and_attempts(api, sqlite_store, vis
 def test_there_is_nothing_yet_or_no_such_experiment(api, sqlite_store, visit):
     submitted = experiments.submit_experiment(sqlite_store, toy())
     page = visit(address(api, submitted.id, tab="samples"))
+    expect(page.locator(".figure-curves")).to_contain_text("Nothing to draw yet.")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
     expect(page.get_by_role("tabpanel")).to_contain_text("Nothing was tried in reality yet.")
-    expect(page.locator(".figure-curves")).to_contain_text("Nothing to draw yet.", timeout=SLOW_MS)
     axe(page)
     visit.forgive("404")
     page.goto(f"{api.url}/#/experiments/nowhere")
@@ -220,10 +219,10 @@ def test_it_is_accessible_and_fits_a_phone(archive, ended, visit, dark):
     shade = "dark" if dark else "light"
     for width in (1280, 375):
         page = visit(address(archive, ended["id"]), dark=dark, width=width)
-        expect(page.locator(".figure-curves .point")).to_have_count(6, timeout=SLOW_MS)
+        expect(page.locator(".figure-curves .point")).to_have_count(6)
         for figure in page.locator(".figures > section").all():
             figure.scroll_into_view_if_needed()
-            expect(figure.locator(".plot .main-svg").first).to_be_visible(timeout=SLOW_MS)
+            expect(figure.locator(".plot .main-svg").first).to_be_visible()
         expect(page.get_by_role("tabpanel").locator("tbody tr")).to_have_count(20)
         axe(page)
         fits(page)

@@ -24,7 +24,7 @@ function plotly() {
 
 /**
  * Draw `/figures/{kind}` into `element`, with its caption and its words for those who do not see it.
- * Returns a function that draws it anew, with another query if one is given.
+ * Returns a function that draws it anew, with another query if one is given; its `drawn` is when it was drawn at first.
  */
 export function plot(element, kind, query, signal) {
   const canvas = h("div", { class: "plot" });
@@ -34,6 +34,7 @@ export function plot(element, kind, query, signal) {
   element.replaceChildren(h("figure", {}, canvas, caption, numbers));
   let answer = null;
   let drawn = false;
+  let asked = 0;
   const say = (words) => {
     drawn = false;
     globalThis.Plotly?.purge(canvas);
@@ -57,19 +58,21 @@ export function plot(element, kind, query, signal) {
   };
   const refresh = async (changed = query) => {
     query = changed;
+    const mine = ++asked;
     try {
-      answer = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
+      const found = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
+      if (mine !== asked) return;  // another query has overtaken it
+      answer = found;
       caption.textContent = answer.caption;
       numbers.replaceChildren(...(answer.table && !answer.empty ? [counted(answer.table, numbers.querySelector("details")?.open)] : []));
       await draw();
     } catch (error) {
-      if (!signal.aborted && !drawn) say(failed(error, () => refresh()));
+      if (!signal.aborted && !drawn) say(failed(error, () => refresh(), "h3"));
     }
   };
   onTheme(draw, signal);
   signal.addEventListener("abort", () => globalThis.Plotly?.purge(canvas));
-  refresh();
-  return refresh;
+  return Object.assign(refresh, { drawn: refresh() });
 }
 
 function counted({ head, rows }, open) {

@@ -10,11 +10,12 @@ import numpy as np
 from pydantic import Field
 
 from schemas.base import Frozen
+from services.core.arrays import FloatArray
 from services.core.errors import EngineUnavailable
-from services.core.world import Material, Motion, Trajectory, World
+from services.core.world import Material, Motion, Recording, Trajectory, World
 from services.engines.base import ALL_FIELDS, Engine
 from services.engines.mujoco.scene import Scene
-from services.engines.stepping import WarmScenes
+from services.engines.stepping import WarmScenes, recording
 
 
 class MuJoCoOptions(Frozen):
@@ -76,6 +77,10 @@ class MuJoCo(Engine):
             poses[:, alike] = scene.poses([worlds[column].material for column in alike], motions)
             left = [column for column in left if column not in alike]
         return Trajectory(motions[0].observe_s, poses[..., :3], poses[..., 3:])
+
+    def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
+        """The same rollout, with its joints."""
+        return recording(motion, times_s, *self._scene(_kind(world)).record(world.material, motion, times_s))
 
     def close(self) -> None:
         """Give all threads up."""

@@ -46,6 +46,7 @@ class Scene:
         self._drives = drives(self.model, world)
         self._dofs = [drive.dof for drive in self._drives]
         self._driven = [world.actuators.index(joint) for joint in driven(world)]
+        self._angles = [POSE.start + int(self.model.joint(each.name).qposadr[0]) for each in world.joints]
         self._models = [self.model]
         self._datas = [self._data() for _ in range(threads)]
         self._start = self._initial()
@@ -67,6 +68,15 @@ class Scene:
                     states = self._rolled(models, controls)
                     found[down, across] = self._seen(states, steps).reshape(-1, len(models), len(steps), 7)
         return found
+
+    def record(self, material: Material, motion: Motion, times_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """`(t, 7)`: what `poses` gives; and base and joints at other times, `(k, 7 + joints)`."""
+        observed = self._steps(motion.observe_s)
+        with _in_force(self._mujoco, *self._callbacks):
+            controls = self._controls([motion], max(1, int(observed[-1])))
+            states = self._rolled(self._painted([material]), controls)
+        looked = np.vstack([self._start, states[0]])[self._steps(times_s)]
+        return self._seen(states, observed)[0], np.hstack([looked[:, POSE][:, TURNED], looked[:, self._angles]])
 
     def close(self) -> None:
         """Give the threads up."""

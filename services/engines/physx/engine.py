@@ -9,11 +9,12 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 
 from schemas.base import Frozen
+from services.core.arrays import FloatArray
 from services.core.errors import EngineUnavailable
-from services.core.world import Material, Motion, Trajectory, World
+from services.core.world import Material, Motion, Recording, Trajectory, World
 from services.engines.base import ALL_FIELDS, Engine
 from services.engines.physx.scene import Scene
-from services.engines.stepping import WarmScenes, plausible, watch
+from services.engines.stepping import WarmScenes, plausible, record, recording, watch
 
 
 class PhysX(Engine):
@@ -51,6 +52,16 @@ class PhysX(Engine):
             poses = np.full_like(poses, np.nan)
             self._scenes.drop(bare)  # nan in a scene stays there
         return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
+
+    def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
+        """The same rollout, with its joints."""
+        bare = replace(world, material=Material())
+        scene = self._scenes[bare]
+        scene.start(world.material)
+        poses, seen = record(scene, scene.step, motion, times_s)
+        if not plausible(poses):
+            self._scenes.drop(bare)
+        return recording(motion, times_s, poses, seen)
 
     def close(self) -> None:
         """Give all scenes up."""

@@ -37,6 +37,8 @@ class Scene:
         for entity in self.robot.entities:
             self._scene.add_entity(entity)
         self.articulation = self.robot.articulation
+        active = self.articulation.active_joints
+        self._places = [active.index(self.robot.links[joint.child].joint) for joint in world.joints]
         self._initial: bytes = self._system.pack()
 
     def start(self, material: Material) -> None:
@@ -62,6 +64,10 @@ class Scene:
         pose = self.articulation.root_pose
         w, x, y, z = pose.q
         return np.array([*pose.p, x, y, z, w], dtype=float)
+
+    def angles(self) -> FloatArray:
+        """`(joints,)`, rad; PhysX counts joints by their distance from the base."""
+        return np.asarray(self.articulation.qpos, dtype=float)[self._places]
 
     def close(self) -> None:
         """Give the scene up; PhysX frees it with the last reference."""

@@ -1,5 +1,6 @@
 """The engine itself: motions in worlds, one server for each kind of world, kept warm."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -9,11 +10,11 @@ import numpy as np
 from schemas.base import Frozen
 from services.core.arrays import FloatArray
 from services.core.errors import EngineUnavailable
-from services.core.world import Material, Motion, Trajectory, World
+from services.core.world import Material, Motion, Recording, Trajectory, World
 from services.engines.base import ALL_FIELDS, Engine
 from services.engines.pybullet.scene import Scene
 from services.engines.pybullet.stick_slip import StickSlip
-from services.engines.stepping import WarmScenes, plausible, watch
+from services.engines.stepping import WarmScenes, plausible, record, recording, watch
 
 
 class PyBullet(Engine):
@@ -47,7 +48,7 @@ class PyBullet(Engine):
         bare = replace(world, material=Material())
         scene = self._scenes[bare]
         try:
-            poses = _roll(scene, world.material, motion)
+            poses = watch(scene, _started(scene, world.material), motion)
         except self._bullet.error:
             poses = np.full((len(motion.observe_s), 7), np.nan)
         if not plausible(poses):
@@ -55,13 +56,26 @@ class PyBullet(Engine):
             self._scenes.drop(bare)  # Bullet drops bodies that it loses sight of: such a scene is spoilt
         return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
 
+    def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
+        """The same rollout, with its joints."""
+        bare = replace(world, material=Material())
+        scene = self._scenes[bare]
+        try:
+            poses, seen = record(scene, _started(scene, world.material), motion, times_s)
+        except self._bullet.error:
+            poses = np.full((len(motion.observe_s), 7), np.nan)
+            seen = np.full((len(times_s), 7 + len(world.joints)), np.nan)
+        if not plausible(poses):
+            self._scenes.drop(bare)
+        return recording(motion, times_s, poses, seen)
+
     def close(self) -> None:
         """Give all servers up."""
         self._scenes.close()
 
 
-def _roll(scene: Scene, material: Material, motion: Motion) -> FloatArray:
-    """`(t, 7)`: position and quaternion of the base at each observation."""
+def _started(scene: Scene, material: Material) -> Callable[[int], None]:
+    """A scene at time 0 in a material; what goes on by so many time steps from there."""
     scene.start(material, max(material.static_friction, material.dynamic_friction))
     switches = material.dynamic_friction < material.static_friction
-    return watch(scene, StickSlip(scene, material).step if switches else scene.step, motion)
+    return StickSlip(scene, material).step if switches else scene.step

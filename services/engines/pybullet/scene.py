@@ -79,6 +79,12 @@ class Scene:
         origin, turn = self.bullet.multiplyTransforms(position, turn, self._from_center_of_mass, UNTURNED)
         return np.array([*origin, *turn])
 
+    def angles(self) -> FloatArray:
+        """`(joints,)`, rad."""
+        joints = range(len(self.world.joints))
+        states = self.bullet.getJointStates(self.robot, joints, physicsClientId=self.client) if joints else ()
+        return np.array([state[0] for state in states], dtype=float)
+
     def close(self) -> None:
         """Give the server up."""
         self.bullet.disconnect(physicsClientId=self.client)

@@ -174,3 +174,27 @@ def measured(session: Session, experiment: str) -> dict[int, list[int]]:
     for repetition, iteration in session.execute(query):
         gathered.setdefault(repetition, []).append(iteration)
     return gathered
+
+
+def efforts(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str, int, int, int, float, bool]]:
+    """What each iteration took, in the order of the log.
+
+    Experiment, repetition, iteration, rollouts, seconds, and whether it has a recorded fitness.
+    """
+    row = IterationRow
+    phases = (row.selection_rollouts, row.tuning_rollouts, row.transfer_rollouts)
+    rollouts = sum((func.coalesce(each, 0) for each in phases[1:]), func.coalesce(phases[0], 0))
+    query = (
+        select(
+            RepetitionRow.experiment_id,
+            RepetitionRow.number,
+            row.number,
+            rollouts,
+            row.seconds,
+            row.recorded_fitness.is_not(None),
+        )
+        .join(RepetitionRow, RepetitionRow.id == row.repetition_id)
+        .where(RepetitionRow.experiment_id.in_(experiments))
+        .order_by(RepetitionRow.experiment_id, RepetitionRow.number, row.number)
+    )
+    return session.execute(query).all()

@@ -72,6 +72,6 @@ async function fill(place, view, { ids, range, last, anew }, wanted) {
     const open = place.querySelector("details")?.open ?? false;
     place.replaceChildren(...matrix(view, ids, results.at(-1)), pairs(view, ids, results, open));
   } catch (error) {
-    if (wanted() && !view.signal.aborted) place.replaceChildren(failed(error, () => fill(place, view, { ids, range, last, anew }, wanted)));
+    if (wanted() && !view.signal.aborted) place.replaceChildren(failed(error, () => fill(place, view, { ids, range, last, anew }, wanted), "h3"));
   }
 }

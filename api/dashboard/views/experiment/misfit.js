@@ -2,7 +2,7 @@
 
 import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
-import { number, spoken } from "../../lib/format.js";
+import { spoken } from "../../lib/format.js";
 import { empty } from "../../lib/states.js";
 import { table } from "../../lib/table.js";
 
@@ -34,4 +34,4 @@ const spread = ({ mean, sd }) => (mean === null ? "–" : `${small(mean)}${sd ==
 
 const bound = (share, sign) => (share ? ` ${sign} ${Math.round(100 * share)} %` : "");
 
-const small = (value) => (value && Math.abs(value) < 0.001 ? value.toExponential(1) : number(value));
+const small = (value) => String(Number(value.toPrecision(3))).replace("-", "−");

@@ -1,0 +1,56 @@
+"""Figures of one controller and of one iteration: its gait, and the toy of the paper's Fig. 3."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+from pydantic import Field
+
+from api.dependencies import Id, PhysicsDep, StoreDep
+from api.figures import Drawing, answer, responses
+from api.problems import documented
+from api.routes.replays import ReplayQuery
+from schemas.figures import FigureRead
+from services.figures.gait import gait_figure
+from services.figures.toy import toy_figure
+from services.replays import Wanted, replay
+from services.toys import toys
+
+router = APIRouter(prefix="/figures", tags=["figures"])
+
+
+class GaitDrawing(Drawing, ReplayQuery):
+    """Whose gait is drawn, and how."""
+
+    experiment: Id
+
+
+class ToyDrawing(Drawing):
+    """Which iterations are drawn, and how."""
+
+    experiment: Id
+    repetition: int = Field(default=0, ge=0, le=1_000_000, description="its number, from 0")
+    iteration: list[Annotated[int, Field(ge=0, le=1_000_000)]] = Field(
+        default=[], max_length=12, description="repeat it for more panels; left out: the last"
+    )
+
+
+@router.get(
+    "/gait", summary="Draw a gait", response_model=FigureRead, responses=responses() | documented(404, 409, 422, 429)
+)
+def draw_gait(store: StoreDep, physics: PhysicsDep, query: Annotated[GaitDrawing, Query()]) -> Response:
+    """A controller's footfalls, height and speed over time, in its simulator and in reality.
+
+    As of a replay, reality is shown of controllers that were measured there; 409 before they are.
+    """
+    wanted = Wanted(query.repetition, query.iteration, query.kind, query.simulator)
+    return answer(gait_figure(replay(store, physics, query.experiment, wanted), title=query.title), query)
+
+
+@router.get("/toy", summary="Draw the toy function", response_model=FigureRead, responses=responses())
+def draw_toy(store: StoreDep, query: Annotated[ToyDrawing, Query()]) -> Response:
+    """The paper's Fig. 3: the true function, tuned approximations, samples and transfer after some iterations.
+
+    The true function is drawn once the experiment has ended, and with it all others of its study.
+    """
+    found = toys(store, query.experiment, query.repetition, query.iteration)
+    return answer(toy_figure(found, title=query.title), query)

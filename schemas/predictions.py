@@ -1,0 +1,27 @@
+"""What simulators said of controllers before and after reality had its say."""
+
+from pydantic import Field
+
+from schemas.base import Frozen
+
+
+class Prediction(Frozen):
+    """The fitness of one sample in the simulators around it; null where the physics failed."""
+
+    repetition: int
+    iteration: int = Field(description="in which it was measured, from 1")
+    simulated_before: float | None = Field(description="in the simulator that was the best before it was measured")
+    simulated_after: float | None = Field(description="in the best of those that were tuned on it and all before it")
+    fitness: float | None = Field(description="as reality measured it; null: the measurement failed")
+
+
+class Predictions(Frozen):
+    """The predictions of an experiment, by repetition and iteration, as far as they are computed.
+
+    Computing goes on with each question: ask again while some are pending.
+    """
+
+    experiment: str
+    unit: str
+    items: tuple[Prediction, ...]
+    pending: int = Field(description="samples that are not computed yet")

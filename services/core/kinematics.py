@@ -1,0 +1,68 @@
+"""Where the bodies of a world are when its base and its joints are known. Quaternions are x, y, z, w."""
+
+import numpy as np
+
+from services.core.arrays import FloatArray
+from services.core.world import Body, Box, World
+
+TOUCHING_M = 0.002
+"""A body whose lowest point is nearer to the ground than this touches it: engines push surfaces apart by less."""
+
+
+def body_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Positions `(k, bodies, 3)` and orientations `(k, bodies, 4)` of the bodies' frames, in the world's order.
+
+    Args:
+        world: its bodies and joints, which are hinges.
+        poses: `(k, 7)` of the base.
+        angles_rad: `(k, joints)`, in the world's order.
+    """
+    names = [body.name for body in world.bodies]
+    positions = np.empty((len(poses), len(names), 3))
+    orientations = np.empty((len(poses), len(names), 4))
+    positions[:, 0], orientations[:, 0] = poses[:, :3], poses[:, 3:]
+    placed = {names[0]}
+    while len(placed) < len(names):
+        for joint, angles in zip(world.joints, angles_rad.T, strict=True):
+            if joint.parent in placed and joint.child not in placed:
+                parent, child = names.index(joint.parent), names.index(joint.child)
+                turn = orientations[:, parent]
+                positions[:, child] = positions[:, parent] + rotated(turn, np.array(joint.origin_m))
+                orientations[:, child] = product(turn, about(np.array(joint.axis), angles))
+                placed.add(joint.child)
+    return positions, orientations
+
+
+def clearances_m(body: Body, positions: FloatArray, orientations: FloatArray) -> FloatArray:
+    """`(k,)`: the height above the ground of the lowest point of the body's shape; below 0 in the ground.
+
+    Args:
+        body: its shape and where that is in its frame.
+        positions: `(k, 3)` of its frame.
+        orientations: `(k, 4)` of its frame.
+    """
+    center = positions[:, 2] + rotated(orientations, np.array(body.center_m))[:, 2]
+    if isinstance(body.shape, Box):
+        edges = np.diag(np.array(body.shape.size_m) / 2)
+        reach = sum(np.abs(rotated(orientations, edge)[:, 2]) for edge in edges)
+        return np.asarray(center - reach)
+    return np.asarray(center - body.shape.radius_m)
+
+
+def about(axis: FloatArray, angles_rad: FloatArray) -> FloatArray:
+    """`(k, 4)`: turns by `(k,)` angles about a unit vector `(3,)`."""
+    half = angles_rad[:, None] / 2
+    return np.hstack([np.sin(half) * axis, np.cos(half)])
+
+
+def product(first: FloatArray, second: FloatArray) -> FloatArray:
+    """`(..., 4)`: the turn `second` within the frame that `first` turned."""
+    (v, w), (u, s) = (first[..., :3], first[..., 3:]), (second[..., :3], second[..., 3:])
+    return np.concatenate([w * u + s * v + np.cross(v, u), w * s - np.sum(v * u, axis=-1, keepdims=True)], axis=-1)
+
+
+def rotated(turns: FloatArray, vector: FloatArray) -> FloatArray:
+    """`(..., 3)`: the vector `(3,)` turned by `(..., 4)`."""
+    v, w = turns[..., :3], turns[..., 3:]
+    across = 2 * np.cross(v, vector)
+    return np.asarray(vector + w * across + np.cross(v, across))

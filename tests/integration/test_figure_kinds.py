@@ -1,0 +1,190 @@
+"""What is in the figures of one experiment: simulators, predictions, squared error, and curves against their cost."""
+
+import pytest
+
+from services import execution, experiments, reports
+from services.core.arrays import frozen
+from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred
+from services.core.types import Tuned as TunedStep
+from services.efforts import abscissa
+from services.figures.marks import Diagonal, Figure, Level, Line, Mark, Points
+from services.figures.predictions import AFTER, BEFORE, predictions_figure
+from services.figures.simulators import MOST, REALITY, simulators_figure
+from services.figures.squared_error import squared_error_figure
+from services.store.session import Store
+from services.tuned import tunings
+from tests.experiments import run, toy
+from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, tuned
+
+
+def marks(figure: Figure, panel: int = 0) -> dict[str, Mark]:
+    return {mark.name: mark for mark in figure.panels[panel].marks}
+
+
+def test_three_tunables_are_drawn_pair_by_pair_and_iterations_from_light_to_dark():
+    figure = simulators_figure(tuned(3), DIMENSIONS[:3], truth=None)
+
+    labels = [(each.x.label, each.y.label) for each in figure.panels]
+    points = marks(figure)["Best simulator of a repetition"]
+    assert labels == [
+        ("Static friction", "Dynamic friction"),
+        ("Static friction", "Body mass (kg)"),
+        ("Dynamic friction", "Body mass (kg)"),
+    ]
+    assert all(each.square for each in figure.panels)
+    assert points.shades == (0, 0, 0, 1, 1, 1, 2, 2, 2)
+    assert points.x[:3] == pytest.approx((0.1, 0.2, 0.3))
+    assert points.y[:3] == pytest.approx((0.3, 0.4, 0.5))
+    assert points.hover[4] == "repetition 1, iteration 1"
+    assert "3\N{NO-BREAK SPACE}repetitions" in figure.caption
+    assert "once its experiments have ended" in figure.caption
+
+
+@pytest.mark.parametrize("tunables", [1, 4])
+def test_one_tunable_or_very_many_are_drawn_against_iterations(tunables: int):
+    figure = simulators_figure(tuned(tunables), DIMENSIONS[:tunables], truth=TRUTH)
+
+    assert [each.x.label for each in figure.panels] == ["Iteration"] * tunables
+    assert marks(figure)["Best simulator of a repetition"].x == (0, 0, 0, 1, 1, 1, 2, 2, 2)
+    assert marks(figure)[REALITY].value == 1.0
+
+
+def test_reality_is_a_point_where_both_are_known_a_level_where_one_is_and_within_the_frame():
+    far = {"static_friction": 9.0, "dynamic_friction": 0.8}
+    figure = simulators_figure(tuned(3), DIMENSIONS[:3], truth=far)
+
+    both, one = marks(figure, 0)[REALITY], marks(figure, 1)[REALITY]
+    assert isinstance(both, Points)
+    assert (both.x, both.y) == ((9.0,), (0.8,))
+    assert isinstance(one, Level)
+    assert (one.value, one.upright) == (9.0, True)
+    assert figure.panels[0].x.limits[1] > 9.0
+    assert "where reality has 9;" in figure.alt
+    assert "ended" not in figure.caption
+
+
+def test_of_very_many_simulators_the_first_repetitions_are_drawn():
+    figure = simulators_figure(tuned(2, repetitions=4000, iterations=1), DIMENSIONS[:2], truth=None)
+
+    assert len(marks(figure)["Best simulator of a repetition"].x) == MOST
+    assert "2500\N{NO-BREAK SPACE}repetitions of 4000" in figure.caption
+
+
+def test_simulators_of_nothing_do_not_tell_where_reality_is():
+    figure = simulators_figure([], DIMENSIONS[:2], truth=TRUTH)
+
+    assert figure.empty
+    assert figure.panels[0].marks == ()
+
+
+def test_predictions_are_drawn_before_and_after_with_the_line_of_agreement():
+    figure = predictions_figure(PREDICTIONS, unit="m/s", pending=2)
+
+    found = marks(figure)
+    (panel,) = figure.panels
+    assert (found[BEFORE].x, found[BEFORE].y) == ((1.0, 1.0), (0.5, 1.5))
+    assert (found[AFTER].x, found[AFTER].y) == ((1.0, 1.0, 0.3), (0.9, 1.1, 0.3))
+    assert any(isinstance(each, Diagonal) for each in panel.marks)
+    assert panel.x.limits == panel.y.limits
+    assert (panel.x.label, panel.y.label) == ("Fitness in reality (m/s)", "Fitness in simulation (m/s)")
+    told = figure.caption.replace("\N{NO-BREAK SPACE}", " ")
+    assert "4 samples of 2 repetitions" in told
+    assert "Before tuning on it: root-mean-square error 0.5 m/s." in told
+    assert "After tuning on it: root-mean-square error 0.082 m/s." in told
+    assert "2 samples left out: a measurement or the physics failed." in told
+    assert "2 samples still being computed." in told
+
+
+def test_predictions_that_are_on_their_way_say_so():
+    assert predictions_figure([], pending=3).nothing == "being computed"
+    assert predictions_figure([]).nothing == "no results yet"
+    assert predictions_figure([]).empty
+
+
+def test_squared_errors_have_their_median_and_quartiles_and_failures_are_counted():
+    figure = squared_error_figure({1: {0: 1.0, 1: 2.0, 2: 9.0}, 2: {0: 4.0, 1: None}}, unit="m/s")
+
+    line = marks(figure)["Best simulator"]
+    assert (line.x, line.y) == ((1, 2), (2.0, 4.0))
+    assert (line.lower, line.upper) == ((1.5, None), (5.5, None))
+    assert figure.panels[0].y.label == "Squared error ((m/s)²)"
+    assert not figure.panels[0].y.log
+    told = figure.caption.replace("\N{NO-BREAK SPACE}", " ")
+    assert "Median over 1\N{EN DASH}3 repetitions" in told
+    assert "1 value left out, for the physics failed." in told
+
+
+def test_squared_errors_of_many_magnitudes_are_on_a_logarithmic_axis_without_zeros():
+    figure = squared_error_figure(ERRORS, each=True)
+
+    (panel,) = figure.panels
+    line, thin = panel.marks
+    assert panel.y.log
+    assert isinstance(line, Line)
+    assert isinstance(thin, Line)
+    assert thin.y == (1e-6, None, None, 1e-4, 1.0, None, None, 0.5, None)
+    assert all(each > 0 for each in line.lower)
+    assert panel.y.limits[0] > 0
+
+
+def test_squared_errors_that_are_all_zero_or_failed_are_drawn_as_they_are():
+    perfect, failed = squared_error_figure({1: {0: 0.0}}), squared_error_figure({1: {0: None}})
+
+    assert marks(perfect)["Best simulator"].y == (0.0,)
+    assert not perfect.panels[0].y.log
+    assert failed.empty
+
+
+def log(first: int, *, iterations: int, fitness: float | None = 1.0):
+    """Every phase of iteration k takes 10 rollouts times what it begins with; the last may have no fitness."""
+    for iteration in range(iterations + 1):
+        genome = frozen([0.5] * 8)
+        if iteration:
+            yield Selected(iteration, genome, Cost(10 * first))
+            yield Measured(iteration, Sample(genome, 1.0))
+        yield TunedStep(iteration, (Simulator(frozen([0.1 * first, 0.5]), 0.25),), Cost(10 * first))
+        yield Transferred(iteration, genome, 1.0, Cost(10 * first))
+        yield Probed(iteration, 1.0, fitness if fitness is not None else float("nan"))
+
+
+@pytest.fixture
+def experiment(sqlite_store: Store) -> str:
+    """Two repetitions of three that have ended, of 20 and 40 rollouts at first, and 30 and 60 with each iteration."""
+    made = experiments.submit_experiment(sqlite_store, toy(repetitions=3)).id
+    for claim in execution.claim(sqlite_store, "test", limit=2):
+        run(sqlite_store, claim, log(claim.number + 1, iterations=2))
+    return made
+
+
+def test_rollouts_are_counted_from_the_start_over_those_that_got_there(sqlite_store: Store, experiment: str):
+    curves = reports.curves(sqlite_store, [experiment])
+
+    found = abscissa(sqlite_store, curves, "rollouts")
+
+    assert found.label == "Rollouts in simulation"
+    assert [found.at[experiment, at] for at in range(3)] == [30, 75, 120]
+
+
+def test_time_is_that_of_evaluations_and_of_simulation_as_measured(sqlite_store: Store, experiment: str):
+    curves = reports.curves(sqlite_store, [experiment])
+
+    simulated, both = (abscissa(sqlite_store, curves, "time", cost_s=each) for each in (0, 3600))
+
+    steps = [3, 8, 13]  # of half a second each
+    assert simulated.label == "Time (s)"
+    assert [simulated.at[experiment, at] for at in range(3)] == pytest.approx([each / 2 for each in steps])
+    assert both.label == "Time (min)"
+    assert both.at[experiment, 2] == pytest.approx(120 + 6.5 / 60)
+    assert "at 3600\N{NO-BREAK SPACE}s each and simulation as it was measured" in both.note
+
+
+def test_reality_is_among_the_simulators_only_once_all_of_its_study_have_ended(sqlite_store: Store, experiment: str):
+    running = tunings(sqlite_store, experiment)
+    experiments.cancel_experiment(sqlite_store, experiment)
+    ended = tunings(sqlite_store, experiment)
+
+    assert running.truth is None
+    assert set(ended.truth or {}) == {"static_friction", "dynamic_friction"}
+    assert ended.errors == {1: {0: 0.25, 1: 0.25}, 2: {0: 0.25, 1: 0.25}}
+    assert [each.name for each in ended.dimensions] == ["static_friction", "dynamic_friction"]
+    assert len(ended.simulators) == 6

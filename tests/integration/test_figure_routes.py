@@ -1,0 +1,179 @@
+"""Figures over HTTP: every kind in every format, and what is said of those that are none."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from io import BytesIO
+
+import matplotlib.image
+import pytest
+from fastapi.testclient import TestClient
+from plotly.graph_objects import Figure
+
+from api.app import create_app
+from api.figures import MEDIA_TYPES
+from schemas.spec import StudySpec
+from services import execution, experiments
+from services.core.loop import repetition
+from services.simulation import setting
+from services.store.session import Store
+from tests.experiments import run
+
+STUDY = {
+    "name": "Two <b>ways</b>",
+    "strategies": ["simulated_fit", "random", "direct"],
+    "robot": "toy_function",
+    "tunables": ["static_friction", "dynamic_friction"],
+    "iterations": 2,
+    "repetitions": 3,
+    "budget": "smoke",
+}
+KINDS = ["curves", "simulators", "squared-error"]
+HIDDEN = 0.7319462853
+
+
+@pytest.fixture
+def api(sqlite_store: Store) -> Iterator[TestClient]:
+    app = create_app(sqlite_store)
+    yield TestClient(app)
+    app.state.physics.close()
+
+
+@pytest.fixture
+def experiment(sqlite_store: Store) -> str:
+    """The first of a study of which only it has ended."""
+    spec = STUDY | {"reality": {"parameters": {"static_friction": HIDDEN, "dynamic_friction": 0.3}}}
+    made = experiments.submit_study(sqlite_store, StudySpec.model_validate(spec)).experiments[0].id
+    for claim in execution.claim(sqlite_store, "test", limit=20):
+        if claim.experiment_id == made:
+            run(sqlite_store, claim)
+    return made
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_is_served_in_every_format(api: TestClient, experiment: str, kind: str):
+    answers = {
+        name: api.get(f"/figures/{kind}", params={"experiment": experiment, "format": name}) for name in MEDIA_TYPES
+    }
+
+    for name, answer in answers.items():
+        assert answer.status_code == 200, answer.text
+        assert answer.headers["content-type"].partition(";")[0] == MEDIA_TYPES[name]
+        policy = answer.headers["content-security-policy"]
+        assert ("script-src" in policy) == (name == "html")
+        assert "default-src 'none'" in policy
+    found = answers["json"].json()
+    assert Figure(found["figure"]).data
+    assert found["empty"] is False
+    assert found["alt"].endswith(".")
+    assert "3\N{NO-BREAK SPACE}repetitions" in found["caption"] or kind == "curves"
+    assert found["table"]["rows"]
+    assert ET.fromstring(answers["svg"].text).tag.endswith("svg")
+    assert answers["pdf"].content.startswith(b"%PDF")
+    assert matplotlib.image.imread(BytesIO(answers["png"].content)).shape[1] == pytest.approx(1050, abs=1)
+    assert answers["pdf"].headers["content-disposition"] == f'inline; filename="gaplab-{kind}.pdf"'
+    assert found["caption"].split(".")[0] in answers["html"].text
+
+
+def test_curves_are_drawn_against_rollouts_and_time_and_with_each_repetition(api: TestClient, experiment: str):
+    asked = {"experiment": experiment, "format": "json"}
+
+    plain, rollouts, time, each = (
+        api.get("/figures/curves", params=asked | how).json()
+        for how in ({}, {"x": "rollouts"}, {"x": "time", "cost_s": 30}, {"each": True})
+    )
+
+    labels = [found["figure"]["layout"]["xaxis"]["title"]["text"] for found in (plain, rollouts, time)]
+    assert labels == ["Number of real-world evaluations", "Rollouts in simulation", "Time (s)"]
+    assert "at 30\N{NO-BREAK SPACE}s each" in time["caption"]
+    assert "Thin lines" in each["caption"]
+    assert len(each["figure"]["data"]) == len(plain["figure"]["data"]) + 1
+
+
+def test_a_study_gives_the_title_unless_it_is_given_and_a_file_its_width(api: TestClient, experiment: str):
+    study = api.get(f"/experiments/{experiment}").json()["study"]
+
+    own = api.get("/figures/curves", params={"study": study, "format": "json"}).json()
+    given = api.get("/figures/curves", params={"study": study, "format": "json", "title": ""}).json()
+    wide = api.get("/figures/curves", params={"study": study, "format": "png", "width": 7.2, "caption": False})
+
+    assert own["title"] == STUDY["name"]
+    assert given["title"] == ""
+    assert matplotlib.image.imread(BytesIO(wide.content)).shape[1] == 2160
+
+
+def test_reality_is_in_the_figure_of_simulators_once_all_of_the_study_have_ended(api: TestClient, experiment: str):
+    study = api.get(f"/experiments/{experiment}").json()["study"]
+    asked = {"experiment": experiment, "format": "json"}
+
+    running = api.get("/figures/simulators", params=asked)
+    api.post(f"/studies/{study}/cancel")
+    ended = api.get("/figures/simulators", params=asked)
+
+    (point,) = [each for each in ended.json()["figure"]["data"] if each["name"] == "Reality"]
+    assert point["x"] == [pytest.approx(HIDDEN, abs=1e-5)]
+    assert "Reality" not in [each["name"] for each in running.json()["figure"]["data"]]
+    assert str(HIDDEN)[:6] not in running.text
+    assert "once its experiments have ended" in running.json()["caption"]
+
+
+def test_predictions_are_drawn_as_they_are_computed(sqlite_store: Store, api: TestClient):
+    spec = STUDY | {"strategy": "simulated_fit", "repetitions": 1}
+    spec = {name: value for name, value in spec.items() if name != "strategies"}
+    made = api.post("/experiments", json=spec).json()["id"]
+    (claim,) = execution.claim(sqlite_store, "test", limit=1)
+    run(sqlite_store, claim, repetition(setting(claim.spec, claim.number)))
+
+    found = api.get("/figures/predictions", params={"experiment": made, "format": "json"}).json()
+
+    traces = {each["name"]: each for each in found["figure"]["data"]}
+    assert len(traces["After tuning on it"]["x"]) == len(traces["Before tuning on it"]["y"]) == 2
+    assert "2\N{NO-BREAK SPACE}samples of 1\N{NO-BREAK SPACE}repetition" in found["caption"]
+    assert found["title"] == "Two <b>ways</b>"
+
+
+def test_an_experiment_that_has_not_begun_is_an_empty_figure(api: TestClient):
+    made = api.post("/experiments", json={"strategy": "random", "robot": "toy_function", "budget": "smoke"}).json()[
+        "id"
+    ]
+
+    for kind in (*KINDS, "predictions"):
+        found = api.get(f"/figures/{kind}", params={"experiment": made, "format": "json"}).json()
+        assert found["empty"] is True
+        assert "no results yet" in found["alt"]
+
+
+def test_a_figure_that_is_none_is_not_found_and_the_answer_says_which_there_are(api: TestClient):
+    found = api.get("/figures/curvs?experiment=x")
+
+    assert found.status_code == 404
+    assert found.headers["content-type"] == "application/problem+json"
+    assert "'curvs'" in found.json()["detail"]
+    assert all(each in found.json()["detail"] for each in (*KINDS, "predictions", "gait", "toy"))
+    assert api.post("/figures/curves").status_code == 405
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "predictions"])
+def test_an_unknown_experiment_is_not_found(api: TestClient, kind: str):
+    assert api.get(f"/figures/{kind}?experiment=nope").status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("path", "name", "permitted"),
+    [
+        ("/figures/curves?study=a&format=bmp", "format", "png"),
+        ("/figures/curves?study=a&x=tim", "x", "rollouts"),
+        ("/figures/curves?study=a&band=se", "band", "interval"),
+        ("/figures/curves?study=a&cost_s=-1", "cost_s", "0"),
+        ("/figures/simulators?experiment=a&width=0", "width", "2.5"),
+        ("/figures/simulators?experiment=a&columns=0", "columns", "1"),
+        ("/figures/squared-error", "experiment", ""),
+        ("/figures/squared-error?experiment=a&colour=red", "colour", ""),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_with_what_is_permitted(api: TestClient, path: str, name: str, permitted: str):
+    answer = api.get(path)
+
+    assert answer.status_code == 422
+    (error,) = answer.json()["errors"]
+    assert error["pointer"] == name
+    assert permitted in str(error)

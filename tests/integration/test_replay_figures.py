@@ -1,0 +1,193 @@
+"""The gait of a controller and the toy of the paper's Fig. 3, from what is stored to every format."""
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from schemas.replays import Replay
+from services import execution, experiments
+from services.core.errors import InvalidSpec, NotFound
+from services.core.loop import repetition
+from services.core.types import Probed, Transferred, Tuned
+from services.engines.analytic import speed
+from services.figures.gait import gait_figure
+from services.figures.marks import Arrow, Bars, Line, Points
+from services.figures.toy import toy_figure
+from services.simulation import setting
+from services.toys import toys
+from tests.experiments import toy
+
+FORMATS = {"html": b"<!doctype", "svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
+
+
+@pytest.fixture(scope="module")
+def replay():
+    """Made up: in simulation the one foot is put down twice, in reality the physics failed."""
+    world = {
+        "engine": "mujoco",
+        "fitness": 0.4,
+        "recorded": None,
+        "shapes": [],
+        "positions_m": [[0.0, 0.0, 0.1], [0.1, 0.0, 0.2], [0.2, 0.0, 0.3]],
+        "orientations": [[0.0, 0.0, 0.0, 1.0]] * 3,
+        "heights_m": [0.1, 0.2, 0.3],
+        "speeds_m_s": [0.3, 0.4, 0.5],
+        "contacts": [[[0.0, 0.5], [1.5, 2.0]]],
+    }
+    failed = {"engine": "mujoco", "fitness": None, "recorded": None, "shapes": []}
+    return Replay.model_validate(
+        {
+            "experiment": "e",
+            "repetition": 0,
+            "iteration": 2,
+            "kind": "transfer",
+            "simulator": 2,
+            "robot": "r",
+            "unit": "m/s",
+            "bodies": ["trunk"],
+            "feet": ["left"],
+            "times_s": [0.0, 1.0, 2.0],
+            "counted_s": [0.5, 2.0],
+            "simulation": world,
+            "reality": failed,
+        }
+    )
+
+
+def marks(figure, kind):
+    return [[mark for mark in panel.marks if isinstance(mark, kind)] for panel in figure.panels]
+
+
+def walked(store, **changes):
+    """The id of an experiment on the toy function that has ended, and the log of its first repetition."""
+    submitted = experiments.submit_experiment(store, toy(repetitions=1, iterations=3, **changes)).id
+    (claim,) = execution.claim(store, "me", 1)
+    log = list(repetition(setting(claim.spec, 0)))
+    for step in log:
+        assert execution.record(store, claim, step)
+    assert execution.complete(store, claim)
+    return submitted, log
+
+
+def test_a_gait_is_footfalls_height_and_speed(replay):
+    figure = gait_figure(replay)
+
+    (feet, _, _), (_, (height,), (pace,)) = marks(figure, Bars), marks(figure, Line)
+    assert [bars.intervals for bars in feet] == [((0.0, 0.5, 0.0), (1.5, 2.0, 0.0))]
+    assert (height.y, pace.y) == ((0.1, 0.2, 0.3), (0.3, 0.4, 0.5))
+    assert "on the ground for 50 % (left) of the time" in figure.alt
+    assert figure.caption.startswith("Fitness in simulation 0.4 m/s.")
+    assert ("Fitness (m/s)", "0.4") in figure.table.rows
+
+
+def test_a_gait_of_which_nothing_moved_is_empty(replay):
+    still = replay.model_copy(update={"simulation": replay.reality})
+
+    figure = gait_figure(still)
+
+    assert figure.empty
+    assert figure.nothing == "the physics failed"
+
+
+def test_the_toy_has_what_the_papers_figure_has(store):
+    experiment, log = walked(store)
+
+    (shown,) = toys(store, experiment, 0, [2])
+
+    tuned = next(step for step in log if isinstance(step, Tuned) and step.iteration == 2)
+    sent = next(step for step in log if isinstance(step, Transferred) and step.iteration == 2)
+    probed = next(step for step in log if isinstance(step, Probed) and step.iteration == 2)
+    assert shown.truth == pytest.approx(speed(np.array(shown.genes), 1.0, 0.8, 0.0), abs=1e-12)
+    assert len(shown.approximations) == len(tuned.simulators)
+    best = speed(np.array(shown.genes), *tuned.simulators[0].parameters, 0.0)
+    assert shown.approximations[0] == pytest.approx(best, abs=1e-12)
+    assert shown.squared_error == tuned.simulators[0].squared_error
+    assert [each.iteration for each in shown.samples] == [1, 2]
+    assert (shown.transfer.gene, shown.transfer.simulated) == (sent.genome[0], sent.fitness)
+    assert shown.transfer.real == probed.fitness
+    error = sum(
+        (np.interp(each.gene, shown.genes, shown.approximations[0]) - each.fitness) ** 2 for each in shown.samples
+    )
+    assert error == pytest.approx(shown.squared_error, abs=1e-3)
+
+
+def test_the_arrow_goes_from_simulation_to_reality(sqlite_store):
+    experiment, _ = walked(sqlite_store)
+    (shown,) = toys(sqlite_store, experiment, 0, [0])
+
+    figure = toy_figure([shown])
+
+    ((arrow,),) = marks(figure, Arrow)
+    sent = shown.transfer
+    assert (arrow.start, arrow.end) == ((sent.gene, sent.simulated), (sent.gene, sent.real))
+    ((truth, best, *others),) = marks(figure, Line)
+    assert (truth.name, best.name, len(others)) == ("Reality", "Simulation", len(shown.approximations) - 1)
+    assert [points.name for points in marks(figure, Points)[0]] == ["Transferred: fittest in simulation"]
+    assert "Iteration 0: after 0 samples" in figure.caption
+
+
+def test_several_iterations_are_panels_and_none_is_the_last(sqlite_store):
+    experiment, _ = walked(sqlite_store)
+
+    figure = toy_figure(toys(sqlite_store, experiment, 0, [0, 1, 2, 3]))
+    (last,) = toys(sqlite_store, experiment, 0, [])
+
+    assert [panel.title for panel in figure.panels] == [f"Iteration {number}" for number in range(4)]
+    assert len({panel.y.limits for panel in figure.panels}) == 1
+    assert last.iteration == 3
+
+
+def test_the_true_function_is_hidden_until_the_experiment_has_ended(sqlite_store):
+    running = experiments.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    (claim,) = execution.claim(sqlite_store, "me", 1)
+    log = repetition(setting(claim.spec, 0))
+    for _ in range(8):
+        execution.record(sqlite_store, claim, next(log))
+
+    (shown,) = toys(sqlite_store, running, 0, [1])
+    figure = toy_figure([shown])
+
+    assert shown.truth is None
+    assert not figure.empty
+    assert "Reality" not in {line.name for line in marks(figure, Line)[0]}
+    assert "once the experiment has ended" in figure.caption
+
+
+def test_what_is_not_there_is_refused_and_what_is_not_yet_there_is_empty(sqlite_store):
+    waiting = experiments.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    walking = experiments.submit_experiment(sqlite_store, toy(robot="quadruped", repetitions=1)).id
+
+    assert toy_figure(toys(sqlite_store, waiting, 0, [])).empty
+    for repetition_, iterations in ((1, [0]), (0, [3])):
+        with pytest.raises(NotFound, match="there is 0 to"):
+            toys(sqlite_store, waiting, repetition_, iterations)
+    with pytest.raises(InvalidSpec, match="'quadruped' is no function of one gene"):
+        toys(sqlite_store, walking, 0, [])
+
+
+def test_the_direct_baseline_has_no_simulators_and_its_fittest_is_in_reality(sqlite_store):
+    experiment = experiments.submit_experiment(sqlite_store, toy(strategy="direct", repetitions=1)).id
+    (claim,) = execution.claim(sqlite_store, "me", 1)
+    for step in repetition(setting(claim.spec, 0)):
+        execution.record(sqlite_store, claim, step)
+    execution.complete(sqlite_store, claim)
+
+    (shown,) = toys(sqlite_store, experiment, 0, [])
+
+    assert (shown.approximations, shown.squared_error) == ((), None)
+    assert shown.transfer.real == pytest.approx(max(shown.truth), rel=1e-3)
+    assert not marks(toy_figure([shown]), Arrow)[0]
+
+
+def test_the_toy_is_answered_in_every_format(sqlite_store):
+    experiment, _ = walked(sqlite_store)
+    api = TestClient(create_app(sqlite_store))
+
+    for format_, begin in FORMATS.items():
+        answer = api.get("/figures/toy", params={"experiment": experiment, "iteration": [0, 3], "format": format_})
+        assert (answer.status_code, answer.content[: len(begin)].lower()) == (200, begin.lower())
+    shown = api.get("/figures/toy", params={"experiment": experiment, "format": "json"}).json()
+    assert {each["name"] for each in shown["figure"]["data"]} >= {"Reality", "Simulation", "Samples"}
+    assert api.get(f"/figures/gait?experiment={experiment}").status_code == 422
+    assert api.get("/figures/toy?experiment=no-such").status_code == 404

@@ -1,0 +1,253 @@
+"""Replays and predictions of what is stored, asked over HTTP."""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from schemas.replays import Replay
+from schemas.spec import ExperimentSpec
+from services import execution, experiments
+from services.core.arrays import frozen
+from services.core.loop import repetition
+from services.core.robots.quadruped import Quadruped
+from services.core.types import Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
+from services.predictions import predictions
+from services.simulation import setting
+from services.store.repository.experiments import get_experiment
+from tests.experiments import run, toy
+
+UNTUNED, BEST = (0.5, 0.3), (1.1, 0.7)
+HIDDEN = {"static_friction": 0.9, "dynamic_friction": 0.6}
+
+
+@pytest.fixture
+def app(sqlite_store):
+    found = create_app(sqlite_store)
+    yield found
+    found.state.physics.close()
+
+
+@pytest.fixture
+def api(app):
+    return TestClient(app)
+
+
+def quadruped(**changes):
+    small = {"strategy": "simulated_fit", "iterations": 2, "repetitions": 2, "budget": "smoke"}
+    named = {"tunables": list(HIDDEN), "reality": {"parameters": HIDDEN}, "engine": "pybullet"}
+    return ExperimentSpec.model_validate(small | named | changes)
+
+
+def walked(store, **changes):
+    """Id and log of an experiment of which one iteration is over, and the next is measured but not tuned."""
+    submitted = experiments.submit_experiment(store, quadruped(**changes)).id
+    (claim,) = execution.claim(store, "me", 1)
+    setting_ = setting(claim.spec, 0)
+    known = Quadruped().known
+    moved = frozen(np.mod(known + 0.05, 1.0))
+
+    def simulated(genome, parameters):
+        return float(setting_.simulate(genome[None], np.array([parameters]))[0, 0])
+
+    log = [
+        Tuned(0, (Simulator(frozen(UNTUNED)), Simulator(frozen(BEST)))),
+        Transferred(0, known, simulated(known, UNTUNED)),
+        Probed(0, setting_.reality(known), 0.1),
+        Selected(1, moved),
+        Measured(1, Sample(moved, setting_.reality(moved))),
+        Tuned(1, (Simulator(frozen(BEST)),)),
+        Transferred(1, moved, simulated(moved, BEST)),
+        Probed(1, setting_.reality(moved), 0.2),
+        Selected(2, known),
+        Measured(2, Sample(known, setting_.reality(known))),
+    ]
+    for step in log:
+        assert execution.record(store, claim, step)
+    return submitted, log, claim
+
+
+def test_a_transferred_controller_walks_in_its_simulator_and_in_reality_as_it_was_recorded(sqlite_store, api):
+    experiment, log, _ = walked(sqlite_store)
+
+    answer = api.get(f"/experiments/{experiment}/replay?iteration=1&kind=transfer")
+
+    assert answer.status_code == 200
+    assert len(answer.content) < 400_000
+    shown = Replay.model_validate_json(answer.content)
+    assert (shown.simulator, shown.counted_s, len(shown.times_s)) == (1, (0.5, 3.0), 151)
+    assert shown.simulation.fitness == shown.simulation.recorded == log[6].fitness
+    assert shown.reality.fitness == shown.reality.recorded == log[7].fitness
+    assert shown.simulation.positions_m[0] == shown.reality.positions_m[0]
+    assert shown.simulation.positions_m[-1] != shown.reality.positions_m[-1]
+    for world in (shown.simulation, shown.reality):
+        assert {len(row) for row in world.positions_m} == {3 * 13}
+        assert {len(row) for row in world.orientations} == {4 * 13}
+        assert len(world.heights_m) == len(world.speeds_m_s) == 151
+        assert [feet[0][0] for feet in world.contacts] == [0, 0, 0, 0]  # it stands, then steps
+        assert all(len(feet) > 2 for feet in world.contacts)
+        counted = [speed for time, speed in zip(shown.times_s, world.speeds_m_s, strict=True) if time >= 0.5]
+        assert np.mean(counted) == pytest.approx(world.fitness, rel=0.2)
+
+
+def test_a_sample_is_shown_in_the_simulator_that_it_was_selected_in_or_in_any_other(sqlite_store, api):
+    experiment, log, _ = walked(sqlite_store)
+    address = f"/experiments/{experiment}/replay?kind=sample&iteration=1"
+
+    own, after = api.get(address).json(), api.get(f"{address}&simulator=1").json()
+
+    assert (own["simulator"], after["simulator"]) == (0, 1)
+    assert own["reality"] == after["reality"]
+    assert own["reality"]["fitness"] == log[4].sample.fitness
+    assert own["simulation"]["recorded"] is None
+    assert own["simulation"]["fitness"] != after["simulation"]["fitness"] == log[6].fitness
+
+
+def test_what_is_not_there_is_not_found_and_what_is_not_yet_there_is_a_conflict(sqlite_store, api):
+    experiment, _, _ = walked(sqlite_store)
+    there = f"/experiments/{experiment}/replay"
+
+    refused = {
+        "/experiments/no-such/replay": (404, "no-such"),
+        f"{there}?repetition=2": (404, "no repetition 2; there is 0 to 1"),
+        f"{there}?iteration=3": (404, "no iteration with a transfer 3; there is 0 to 2"),
+        f"{there}?kind=sample&iteration=0": (404, "no iteration with a sample 0; there is 1 to 2"),
+        f"{there}?simulator=3": (404, "no tuned simulator of iteration 3"),
+        f"{there}?iteration=2": (409, "transferred controller of iteration 2 of repetition 0"),
+        f"{there}?repetition=1": (409, "reality has not been asked yet"),
+        f"{there}?kind=sample&iteration=2&simulator=2": (409, "no simulator of iteration 2"),
+        f"{there}?kind=walk": (422, "kind"),
+    }
+
+    for address, (status, words) in refused.items():
+        answer = api.get(address)
+        assert (answer.status_code, words in answer.json()["detail"]) == (status, True), (address, answer.json())
+
+
+def test_a_robot_without_a_body_has_nothing_to_show(sqlite_store, api):
+    experiment = experiments.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    run(sqlite_store, *execution.claim(sqlite_store, "me", 1))
+
+    answer = api.get(f"/experiments/{experiment}/replay")
+
+    assert answer.status_code == 422
+    assert answer.json()["detail"].startswith("id: the robot 'toy_function' has no body")
+
+
+def test_the_direct_baseline_is_seen_in_reality_alone(sqlite_store, api):
+    experiment = experiments.submit_experiment(sqlite_store, quadruped(strategy="direct")).id
+    (claim,) = execution.claim(sqlite_store, "me", 1)
+    known = Quadruped().known
+    real = setting(claim.spec, 0).reality(known)
+    for step in (Tuned(0, (Simulator(frozen(BEST)),)), Transferred(0, known, real), Probed(0, real, real)):
+        execution.record(sqlite_store, claim, step)
+
+    shown = api.get(f"/experiments/{experiment}/replay").json()
+
+    assert (shown["simulation"], shown["simulator"]) == (None, None)
+    assert shown["reality"]["fitness"] == real
+    assert api.get(f"/experiments/{experiment}/replay?simulator=0").status_code == 404
+
+
+def test_reality_that_an_archive_left_out_is_not_shown(sqlite_store, api):
+    experiment, _, _ = walked(sqlite_store)
+    with sqlite_store.transaction() as session:
+        row = get_experiment(session, experiment)
+        row.spec = row.spec | {"reality": row.spec["reality"] | {"parameters": dict.fromkeys(HIDDEN)}}
+
+    shown = api.get(f"/experiments/{experiment}/replay").json()
+
+    assert shown["reality"] is None
+    assert shown["simulation"]["fitness"] > 0
+
+
+def test_physics_that_fails_has_no_frames(sqlite_store, api):
+    experiment, _, _ = walked(sqlite_store)
+    with sqlite_store.transaction() as session:
+        row = get_experiment(session, experiment)
+        row.spec = row.spec | {"reality": row.spec["reality"] | {"parameters": HIDDEN | {"restitution": 1e200}}}
+
+    shown = api.get(f"/experiments/{experiment}/replay").json()["reality"]
+
+    assert (shown["fitness"], shown["positions_m"], shown["contacts"]) == (None, [], [])
+    assert len(shown["shapes"]) == 18
+
+
+def test_the_gait_is_drawn_in_every_format(sqlite_store, api):
+    experiment, _, _ = walked(sqlite_store)
+    address = f"/figures/gait?experiment={experiment}&iteration=1&kind=sample"
+
+    shown = api.get(f"{address}&format=json").json()
+
+    assert {each["name"] for each in shown["figure"]["data"]} >= {"In simulation", "In reality"}
+    assert not shown["empty"]
+    for format_ in ("html", "svg", "png", "pdf"):
+        assert api.get(f"{address}&format={format_}").status_code == 200
+    assert api.get(f"/figures/gait?experiment={experiment}&repetition=1").status_code == 409
+
+
+def test_a_crash_of_physics_never_ends_the_api(sqlite_store, app, api):
+    experiment, _, _ = walked(sqlite_store)
+    first = api.get(f"/experiments/{experiment}/replay")
+    os.kill(app.state.physics.pid, signal.SIGKILL)
+
+    again = api.get(f"/experiments/{experiment}/replay?iteration=1")
+    while again.status_code == 503:  # asked in the moment of its death
+        assert again.json()["type"] == "urn:gaplab:problem:engine-interrupted"
+        again = api.get(f"/experiments/{experiment}/replay?iteration=1")
+
+    assert (first.status_code, again.status_code) == (200, 200)
+
+
+def test_what_was_computed_once_is_remembered(sqlite_store, app, api):
+    experiment, _, _ = walked(sqlite_store)
+    first = api.get(f"/experiments/{experiment}/replay").content
+    app.state.physics.close()
+
+    assert api.get(f"/experiments/{experiment}/replay").content == first
+    other = api.get(f"/experiments/{experiment}/replay?iteration=1")
+    assert (other.status_code, other.headers["Retry-After"]) == (503, "5")
+
+
+def test_predictions_are_of_the_simulators_before_and_after_a_sample(store, app):
+    experiment = experiments.submit_experiment(store, toy(repetitions=2)).id
+    errors = {}
+    for claim in execution.claim(store, "me", 2):
+        for step in repetition(setting(claim.spec, claim.number)):
+            assert execution.record(store, claim, step)
+            if isinstance(step, Tuned):
+                errors[claim.number, step.iteration] = step.simulators[0].squared_error
+
+    found = predictions(store, app.state.physics, experiment)
+
+    assert (found.pending, found.unit) == (0, "m/s")
+    assert [(each.repetition, each.iteration) for each in found.items] == [(0, 1), (0, 2), (1, 1), (1, 2)]
+    for each in found.items:
+        if each.iteration == 1:  # it was tuned on this one sample
+            assert (each.simulated_after - each.fitness) ** 2 == errors[each.repetition, 1]
+        assert abs(each.simulated_after - each.fitness) <= abs(each.simulated_before - each.fitness) + 1e-9
+
+
+def test_predictions_take_a_while_and_are_pending_meanwhile(sqlite_store, app):
+    experiment, log, claim = walked(sqlite_store)
+    execution.record(sqlite_store, claim, Tuned(2, (Simulator(frozen(BEST)),)))
+
+    first = predictions(sqlite_store, app.state.physics, experiment, seconds=0)
+    second = predictions(sqlite_store, app.state.physics, experiment, seconds=0)
+
+    assert (first.pending, len(first.items), second.pending, len(second.items)) == (1, 1, 0, 2)
+    assert second.items[0] == first.items[0]
+    assert first.items[0].simulated_after == log[6].fitness
+    assert second.items[1].simulated_before == second.items[1].simulated_after  # the same simulator
+
+
+def test_samples_that_nothing_is_tuned_on_yet_have_no_prediction(sqlite_store, api):
+    experiment, _, _ = walked(sqlite_store)
+
+    shown = api.get(f"/experiments/{experiment}/predictions").json()
+
+    assert [each["iteration"] for each in shown["items"]] == [1]
+    assert api.get("/experiments/no-such/predictions").status_code == 404
