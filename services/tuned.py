@@ -18,7 +18,6 @@ class Tunings:
     """The best simulators of an experiment.
 
     Attributes:
-        name: of the experiment.
         unit: of fitness.
         dimensions: its tunables.
         simulators: the best of each iteration of each repetition.
@@ -26,7 +25,6 @@ class Tunings:
         truth: reality's parameters, as far as they are known; None as long as they are hidden.
     """
 
-    name: str
     unit: str
     dimensions: tuple[Dimension, ...]
     simulators: tuple[Tuned, ...]
@@ -50,7 +48,6 @@ def tunings(store: Store, experiment_id: str) -> Tunings:
         if each.iteration:
             errors[each.iteration][each.repetition] = each.squared_error
     return Tunings(
-        name=row.name,
         unit=unit(spec),
         dimensions=_dimensions(spec),
         simulators=tuple(Tuned(each.repetition, each.iteration, tuple(each.parameters)) for each in found),

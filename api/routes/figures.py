@@ -1,5 +1,6 @@
 """Figures to look at and to put into papers."""
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, FastAPI, Query, Request, Response
@@ -19,6 +20,7 @@ from services.figures.simulators import simulators_figure
 from services.figures.squared_error import squared_error_figure
 from services.figures.words import spoken
 from services.predictions import predictions
+from services.resolution import is_direct, spec_of
 from services.store.session import Store
 from services.tuned import tunings
 
@@ -28,6 +30,10 @@ EACH: bool = Field(default=False, description="draw every repetition's line behi
 
 NARROW_IN = 5.0
 """In a narrower file, panels stand two in a row; else three."""
+
+
+DIRECT = "the direct baseline tunes no simulators"
+"""What is said in place of what it does not have."""
 
 
 class CurvesDrawing(Drawing):
@@ -83,19 +89,18 @@ def draw_curves(store: StoreDep, query: Annotated[CurvesDrawing, Query()]) -> Re
 def draw_squared_error(store: StoreDep, query: Annotated[ErrorDrawing, Query()]) -> Response:
     """The squared error of an experiment's best tuned simulator, by iteration: median and quartiles of repetitions."""
     found = tunings(store, query.experiment)
-    title = spoken(found.name) if query.title is None else query.title
-    return answer(squared_error_figure(found.errors, unit=found.unit, title=title, each=query.each), query)
+    figure = squared_error_figure(found.errors, unit=found.unit, title=_title(store, query), each=query.each)
+    return answer(_explained(store, query, figure), query)
 
 
 @router.get("/simulators", summary="Draw tuned simulators", response_model=FigureRead, responses=responses())
 def draw_simulators(store: StoreDep, query: Annotated[SimulatorsDrawing, Query()]) -> Response:
     """An experiment's best simulators in the space of its tunables; with reality once all of its study have ended."""
-    found = tunings(store, query.experiment)
-    title = spoken(found.name) if query.title is None else query.title
+    found, title = tunings(store, query.experiment), _title(store, query)
     narrow = query.format not in {"html", "json"} and query.width < NARROW_IN
     columns = query.columns or (2 if narrow else 3)
     figure = simulators_figure(found.simulators, found.dimensions, truth=found.truth, title=title, columns=columns)
-    return answer(figure, query)
+    return answer(_explained(store, query, figure), query)
 
 
 @router.get(
@@ -110,9 +115,8 @@ def draw_predictions(store: StoreDep, physics: PhysicsDep, query: Annotated[Expe
     About two seconds are computed for each question; ask again while some samples are pending, as its caption says.
     """
     found = predictions(store, physics, query.experiment)
-    name = spoken(experiments.read_experiment(store, query.experiment).name)
-    title = name if query.title is None else query.title
-    return answer(predictions_figure(found.items, unit=found.unit, pending=found.pending, title=title), query)
+    figure = predictions_figure(found.items, unit=found.unit, pending=found.pending, title=_title(store, query))
+    return answer(_explained(store, query, figure), query)
 
 
 def install(app: FastAPI) -> None:
@@ -125,6 +129,17 @@ def _draw_nothing(kind: str, request: Request) -> None:
     kinds = sorted(each.removeprefix(prefix) for each in request.app.openapi()["paths"] if each.startswith(prefix))
     msg = f"there is no figure {kind[:64]!r}; permitted: {', '.join(kinds)}"
     raise NotFound(msg)
+
+
+def _title(store: Store, query: ExperimentDrawing) -> str:
+    return spoken(experiments.read_experiment(store, query.experiment).name) if query.title is None else query.title
+
+
+def _explained(store: Store, query: ExperimentDrawing, figure: Figure) -> Figure:
+    """The figure, which says so if it will always be empty."""
+    if not figure.empty or not is_direct(spec_of(experiments.read_experiment(store, query.experiment).spec)):
+        return figure
+    return replace(figure, nothing=DIRECT, alt=f"Nothing: {DIRECT}.")
 
 
 def _curves(store: Store, query: CurvesDrawing) -> Figure:

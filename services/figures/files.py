@@ -90,6 +90,7 @@ def _canvas(figure: Figure, width_in: float, *, caption: bool) -> "Canvas":
             axes.set_visible(False)
     if figure.empty:
         canvas.text(0.5, 0.6, shown(figure.nothing), ha="center", color="#777777")
+    canvas.align_ylabels()
     draw_bar_of_shades(canvas, figure)
     sides = _square(canvas, len(rows)) if figure.panels[0].square else 0.0
     surround(canvas, figure, Beneath.of(figure, width_in, sides, caption=caption))

@@ -26,15 +26,35 @@ def width_in(text: str, size_pt: float) -> float:
 
 
 def lines(text: str, size_pt: float, width: float) -> list[str]:
-    """The text in lines of at most this width in inches; only a word that is wider goes beyond."""
+    """The text in lines of at most this width in inches; a word that is wider is broken."""
     found = [""]
     for word in text.split(" "):
         longer = f"{found[-1]} {word}".lstrip()
-        if found[-1] and width_in(longer, size_pt) > width:
-            found.append(word)
-        else:
+        if width_in(longer, size_pt) <= width:
             found[-1] = longer
+        else:
+            found += _broken(word, size_pt, width)
     return [each for each in found if each]
+
+
+def shortened(text: str, size_pt: float, width: float) -> str:
+    """The text, with its middle left out if it is wider than so many inches: names are told apart at their ends."""
+    left_out = 0
+    found = text
+    while width_in(found, size_pt) > width and left_out < len(text) - 2:
+        left_out += 1
+        keep = len(text) - left_out
+        found = f"{text[: keep - keep // 2]}…{text[len(text) - keep // 2 :]}"
+    return found
+
+
+def _broken(word: str, size_pt: float, width: float) -> list[str]:
+    found = [""]
+    for each in word:
+        if width_in(found[-1] + each, size_pt) > width:
+            found.append("")
+        found[-1] += each
+    return found
 
 
 @cache

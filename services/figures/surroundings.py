@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import ceil, inf
 from typing import TYPE_CHECKING, Any
 
-from services.figures.lettering import lines, shown, width_in
+from services.figures.lettering import lines, shortened, shown, width_in
 from services.figures.marks import Arrow, Figure, Label, Line, Points
 from services.figures.painting import legend_name
 
@@ -16,6 +16,7 @@ ROW_IN = 0.1445  # of a legend
 HANDLE_IN, BETWEEN_IN = 0.46, 0.16  # beside the words of a legend, and between its columns
 LINE_IN = 0.125  # of a caption
 MARGIN_IN = 0.06
+BOLD = 1.15  # how much wider bold letters are, at most
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class Beneath:
         columns: of the legend.
         legend_in: its height.
         caption: its lines.
-        above_in: height of the title.
+        title: its lines.
         width: of the file.
         sides: room that is left free at either side.
     """
@@ -34,7 +35,7 @@ class Beneath:
     columns: int
     legend_in: float
     caption: tuple[str, ...]
-    above_in: float
+    title: tuple[str, ...]
     width: float
     sides: float
 
@@ -47,10 +48,15 @@ class Beneath:
             columns=columns,
             legend_in=ceil(len(names) / columns) * ROW_IN + (MARGIN_IN if names else 0),
             caption=tuple(lines(figure.caption, CAPTION_PT, width - 2 * MARGIN_IN)) if caption else (),
-            above_in=0.2 if figure.title else 0.0,
+            title=tuple(lines(figure.title, TITLE_PT * BOLD, width - 2 * MARGIN_IN)),
             width=width,
             sides=sides,
         )
+
+    @property
+    def above_in(self) -> float:
+        """Of the title."""
+        return len(self.title) * LINE_IN + 1.25 * MARGIN_IN if self.title else 0.0
 
     @property
     def height_in(self) -> float:
@@ -66,8 +72,9 @@ def surround(canvas: "Canvas", figure: Figure, room: Beneath) -> None:
     left, side = MARGIN_IN / room.width, room.sides / room.width
     engine: Any = canvas.get_layout_engine()
     engine.set(rect=(side, bottom, 1 - 2 * side, top - bottom))
-    if figure.title:
-        title = canvas.text(left, 1 - MARGIN_IN / height, shown(figure.title), va="top", weight="bold", size=TITLE_PT)
+    if room.title:
+        words = "\n".join(map(shown, room.title))
+        title = canvas.text(left, 1 - MARGIN_IN / height, words, va="top", weight="bold", size=TITLE_PT)
         title.set_in_layout(False)
     _legend(canvas, _names(figure), room, bottom)
     for number, line in enumerate(room.caption):
@@ -86,7 +93,7 @@ def _legend(canvas: "Canvas", names: list[str], room: Beneath, bottom: float) ->
     named = [each for each in names if each in found]
     legend = canvas.legend(
         [found[each] for each in named],
-        [shown(each) for each in named],
+        [shortened(shown(each), LEGEND_PT, room.width - 2 * MARGIN_IN - HANDLE_IN) for each in named],
         loc="upper center",
         bbox_to_anchor=(0.5, bottom),
         ncols=room.columns,

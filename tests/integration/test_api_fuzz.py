@@ -119,7 +119,16 @@ def test_no_bytes_make_the_service_fail(api: TestClient, body: bytes):
 @FUZZ
 @given(
     path=st.sampled_from(
-        ["/experiments", "/studies", "/curves", "/comparisons", "/figures/curves", "/experiments/x/samples"]
+        [
+            "/experiments",
+            "/studies",
+            "/curves",
+            "/comparisons",
+            "/figures/curves",
+            "/figures/simulators",
+            "/figures/no-such",
+            "/experiments/x/samples",
+        ]
     ),
     query=st.dictionaries(
         st.sampled_from(["limit", "cursor", "study", "state", "experiment", "format", "from", "to", "repetition"]),

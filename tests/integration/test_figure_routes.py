@@ -2,6 +2,7 @@
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
 
 import matplotlib.image
@@ -140,6 +141,26 @@ def test_an_experiment_that_has_not_begun_is_an_empty_figure(api: TestClient):
         found = api.get(f"/figures/{kind}", params={"experiment": made, "format": "json"}).json()
         assert found["empty"] is True
         assert "no results yet" in found["alt"]
+
+
+def test_the_direct_baseline_says_that_it_tunes_nothing(api: TestClient, experiment: str):
+    study = api.get(f"/experiments/{experiment}").json()["study"]
+    direct = api.get(f"/studies/{study}").json()["experiments"][-1]["id"]
+
+    for kind in ("simulators", "squared-error", "predictions"):
+        found = api.get(f"/figures/{kind}", params={"experiment": direct, "format": "json"}).json()
+        assert (found["empty"], found["title"]) == (True, "Direct")
+        assert found["alt"] == "Nothing: the direct baseline tunes no simulators."
+
+
+def test_files_are_drawn_alike_by_many_threads_at_once(api: TestClient, experiment: str):
+    def draw(kind: str) -> bytes:
+        return api.get(f"/figures/{kind}", params={"experiment": experiment, "format": "svg"}).content
+
+    with ThreadPoolExecutor(4) as threads:
+        together = list(threads.map(draw, KINDS * 2))
+
+    assert together == [draw(kind) for kind in KINDS] * 2
 
 
 def test_a_figure_that_is_none_is_not_found_and_the_answer_says_which_there_are(api: TestClient):

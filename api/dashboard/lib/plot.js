@@ -40,6 +40,7 @@ export function plot(element, kind, query, signal) {
     drawn = false;
     globalThis.Plotly?.purge(canvas);
     for (const each of ["role", "aria-label"]) canvas.removeAttribute(each);
+    canvas.style.height = "";
     canvas.replaceChildren(words);
   };
   const draw = async () => {
@@ -54,6 +55,7 @@ export function plot(element, kind, query, signal) {
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", answer.alt);
     const { data, layout } = dressed(answer.figure, canvas);
+    canvas.style.height = layout.height ? `${layout.height}px` : "";  // Plotly takes the place's height when it is resized
     await library.react(canvas, data, layout, { displayModeBar: false, responsive: true });
     drawn = true;
   };

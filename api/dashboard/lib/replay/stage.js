@@ -8,18 +8,19 @@ import * as side from "./side.js";
 import * as webgl from "./webgl.js";
 
 /**
- * The stage of a world: its `canvas`, `draw(time)`, and `base(time)`, where its base is. `seen(target)` is the camera, whose
- * target `looked(time)` gives.
+ * The stage of a world: its `canvas`, and `draw(time)`, or of the same time as before if it is left out.
+ * `looked(time)` gives what the camera looks at, and how much farther away than usual it has to be.
  */
 export function stage(world, timesS, label, { camera, looked, signal }) {
   const canvas = h("canvas", { class: "stage-canvas", tabindex: "0", role: "img", "aria-label": label });
   const feet = [...new Set(world.shapes.filter((each) => each.role === "foot").map((each) => each.body))];
+  let gl = null;
   let paint = null;
   let palette = null;
   let now = 0;
 
   function begin() {
-    const gl = webgl.context(canvas);
+    gl = webgl.context(canvas);
     paint = gl ? webgl.painter(canvas, gl, world.shapes) : side.painter(canvas, world.shapes);
     palette = colours(canvas.parentElement);
     canvas.dataset.drawn = gl ? "webgl" : "flat";
@@ -41,8 +42,15 @@ export function stage(world, timesS, label, { camera, looked, signal }) {
     draw();
   });
   sizes.observe(canvas);
-  signal.addEventListener("abort", () => sizes.disconnect());
-  onTheme(() => { palette = null; if (paint) { palette = colours(canvas.parentElement); draw(); } }, signal);
+  signal.addEventListener("abort", () => {
+    sizes.disconnect();
+    gl?.getExtension("WEBGL_lose_context")?.loseContext();  // a browser has few of them
+  });
+  onTheme(() => {
+    if (!paint) return;
+    palette = colours(canvas.parentElement);
+    draw();
+  }, signal);
   canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
   canvas.addEventListener("webglcontextrestored", () => { paint = null; draw(); });
   camera.follow(canvas, signal);

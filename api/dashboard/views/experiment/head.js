@@ -101,6 +101,6 @@ function links({ id, experiment }) {
   const toy = experiment.spec.robot?.name === "toy_function";
   return h("p", { class: "links" },
     h("a", { href: `#/compare?experiments=${id}` }, "Compare with others"), " ",
-    toy ? h("a", { href: `#/toy?experiment=${id}` }, "Step through the function") : null, " ",
+    toy ? h("a", { href: `#/toy?experiment=${id}` }, "Step through the function") : h("a", { href: `#/replay?experiment=${id}` }, "Replay a controller"), " ",
     download("Archive of everything (.zip)", `/experiments/${id}/export`, {}, `gaplab-${id}.zip`));
 }

@@ -6,10 +6,10 @@ import { h } from "../../lib/dom.js";
 export function choices({ spec, strategy }, asked, load) {
   const direct = strategy === "direct";
   const iterations = direct ? [0] : Array.from({ length: (spec.iterations ?? 0) + 1 }, (_, number) => number);
-  const kind = select([["transfer", "transferred controller"], ...(direct ? [] : [["sample", "real-world sample"]])], asked.kind);
-  const repetition = h("input", { type: "number", min: 0, max: spec.repetitions - 1, step: 1, value: asked.repetition, class: "short" });
-  const iteration = h("select");
-  const simulator = direct ? null : select([["", "of its own iteration"], ...iterations.map((each) => [String(each), `of iteration ${each}`])], asked.simulator ?? "");
+  const kind = select("Controller", [["transfer", "transferred controller"], ...(direct ? [] : [["sample", "real-world sample"]])], asked.kind);
+  const repetition = h("input", { type: "number", min: 0, max: spec.repetitions - 1, step: 1, value: asked.repetition, class: "short", "aria-label": "Repetition" });
+  const iteration = h("select", { "aria-label": "Iteration" });
+  const simulator = direct ? null : select("Simulator", [["", "of its own iteration"], ...iterations.map((each) => [String(each), `of iteration ${each}`])], asked.simulator ?? "");
 
   /** Samples begin with iteration 1. */
   function offer() {
@@ -32,5 +32,5 @@ export function choices({ spec, strategy }, asked, load) {
     h("label", {}, "Iteration ", iteration), simulator ? h("label", {}, "Simulator ", simulator) : null);
 }
 
-const select = (options, chosen) =>
-  h("select", {}, ...options.map(([value, words]) => h("option", { value, selected: String(chosen) === value }, words)));
+const select = (label, options, chosen) =>
+  h("select", { "aria-label": label }, ...options.map(([value, words]) => h("option", { value, selected: String(chosen) === value }, words)));

@@ -12,7 +12,7 @@ export function player(lengthS, changed, signal) {
   const button = h("button", { type: "button", class: "play", onclick: () => time.play() }, "Play");
   const scrub = h("input", { type: "range", min: 0, max: lengthS, step: FRAME_S, value: 0, "aria-label": "Time", oninput: () => time.to(Number(scrub.value)) });
   const shown = h("output", { class: "time" });
-  const speed = h("select", { onchange: () => time.at(Number(speed.value)) },
+  const speed = h("select", { "aria-label": "Speed", onchange: () => time.at(Number(speed.value)) },
     ...SPEEDS.map(([value, words]) => h("option", { value, selected: value === 1 }, words)));
   const time = clock(lengthS, {
     signal,

@@ -1,0 +1,245 @@
+"""Replays and the toy in a real browser: two worlds on one timeline, and Fig. 3 stepped through."""
+
+from io import BytesIO
+from time import monotonic
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.e2e.browser import axe, fits, screenshot
+
+FLAT = "HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...options) \
+{ return kind === 'webgl2' ? null : get.call(this, kind, ...options); })(HTMLCanvasElement.prototype.getContext)"
+
+
+@pytest.fixture(scope="module")
+def walker(archive):
+    """The id of an experiment with robots that walk."""
+    return archive.get("/experiments", strategy="simulated_fit_and_unique", sort="-created_at")["items"][0]["id"]
+
+
+@pytest.fixture(scope="module")
+def function(archive):
+    """The id of an experiment on the toy function."""
+    found = archive.get("/experiments", limit=500)["items"]
+    return next(each["id"] for each in found if each["spec"]["robot"]["name"] == "toy_function")
+
+
+def replay(visit, archive, walker, query="repetition=0&iteration=1&kind=sample", **how):
+    page = visit(f"{archive.url}/#/replay?experiment={walker}&{query}", **how)
+    page.wait_for_selector(".stage-canvas[data-time]", timeout=120_000)
+    return page
+
+
+def time_of(page):
+    return float(page.locator(".stage-canvas").first.get_attribute("data-time"))
+
+
+def eventually(page, holds):
+    """Wait until it does; the page's policy forbids to wait for an expression of its own."""
+    until = monotonic() + 60
+    while not holds():
+        assert monotonic() < until
+        page.wait_for_timeout(50)
+
+
+def picture(canvas):
+    return np.asarray(Image.open(BytesIO(canvas.screenshot())).convert("RGB"), dtype=int)
+
+
+def test_a_controller_walks_in_both_worlds_on_one_timeline(visit, archive, walker):
+    page = replay(visit, archive, walker)
+    canvases = page.locator(".stage-canvas")
+    assert [each.get_attribute("data-drawn") for each in canvases.all()] == ["webgl", "webgl"]
+    assert [each.split(" 0.")[0] for each in page.locator(".world h2").all_inner_texts()] == [
+        "In the simulator of iteration 0",
+        "In reality",
+    ]
+    assert page.get_by_role("button", name="Play", exact=True).is_visible()  # less motion is asked for
+    before = [picture(each) for each in canvases.all()]
+
+    page.locator("main").press("Shift+ArrowRight")
+    eventually(page, lambda: time_of(page) == 0.2)
+    page.locator("main").press("ArrowLeft")
+    eventually(page, lambda: time_of(page) == 0.18)
+    page.get_by_label("Time", exact=True).fill("1.5")
+
+    assert time_of(page) == 1.5
+    for canvas, first in zip(canvases.all(), before, strict=True):
+        now = picture(canvas)
+        assert len(np.unique(now.reshape(-1, 3), axis=0)) > 100  # shaded bodies, not a flat ground
+        assert (np.abs(now - first).sum(axis=-1) > 60).mean() > 0.005
+
+
+def test_it_plays_at_the_speed_that_is_chosen_and_stands_when_told(visit, archive, walker):
+    page = replay(visit, archive, walker)
+
+    page.get_by_label("Speed", exact=True).select_option("2")
+    page.locator("main").press("Space")
+    eventually(page, lambda: time_of(page) > 0.3)
+    page.get_by_role("button", name="Pause").click()
+
+    stood = time_of(page)
+    page.wait_for_timeout(300)
+    assert time_of(page) == stood
+    assert page.get_by_role("button", name="Play", exact=True).is_visible()
+
+    page.emulate_media(reduced_motion="no-preference")
+    page.reload()
+    page.wait_for_selector(".stage-canvas[data-time]")
+    eventually(page, lambda: time_of(page) > 0.1)
+
+
+def test_the_camera_goes_round_by_keys_and_by_dragging(visit, archive, walker):
+    page = replay(visit, archive, walker)
+    canvas = page.locator(".stage-canvas").first
+    first = picture(canvas)
+
+    for _ in range(4):
+        canvas.press("ArrowLeft")
+    turned = picture(canvas)
+    box = canvas.bounding_box()
+    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 300, box["y"] + 100, steps=4)
+    page.mouse.up()
+    dragged = picture(canvas)
+
+    assert (first != turned).any()
+    assert (turned != dragged).any()
+    assert time_of(page) == 0  # the arrows are the camera's
+
+
+def test_the_cursor_of_the_gait_follows_the_time_and_a_click_moves_it(visit, archive, walker):
+    page = replay(visit, archive, walker)
+    page.wait_for_selector(".gait .main-svg")
+    page.get_by_label("Time", exact=True).fill("1")
+    page.locator(".gait .cursor").wait_for(state="visible")
+    page.locator(".gait figcaption").scroll_into_view_if_needed()
+    at = page.locator(".gait .cursor").bounding_box()["x"]
+    page.get_by_label("Time", exact=True).fill("2")
+    page.locator(".gait figcaption").scroll_into_view_if_needed()
+    then = page.locator(".gait .cursor").bounding_box()
+
+    page.mouse.click(at + 1, then["y"] + then["height"] / 2)
+
+    assert then["x"] > at + 20
+    eventually(page, lambda: abs(time_of(page) - 1) < 0.03)
+
+
+def test_another_controller_or_simulator_is_chosen_and_is_in_the_address(visit, archive, walker):
+    page = replay(visit, archive, walker)
+
+    page.get_by_label("Controller", exact=True).select_option("transfer")
+    page.wait_for_selector("text=In the simulator of iteration 1")
+    page.get_by_label("Iteration", exact=True).select_option("3")
+    page.wait_for_selector("text=In the simulator of iteration 3")
+    page.get_by_label("Simulator", exact=True).select_option("0")
+    page.wait_for_selector("text=In the simulator of iteration 0")
+    page.wait_for_selector(".stage-canvas[data-time]")
+
+    assert page.url.endswith("repetition=0&iteration=3&kind=transfer&simulator=0")
+    page.reload()
+    page.wait_for_selector("text=In the simulator of iteration 0")
+    assert page.get_by_label("Iteration", exact=True).input_value() == "3"
+
+
+def test_what_is_not_there_says_so_and_another_may_be_chosen(visit, archive, walker):
+    visit.forgive("404")
+    page = visit(f"{archive.url}/#/replay?experiment={walker}&repetition=99&iteration=1")
+
+    page.wait_for_selector("text=no repetition 99; there is 0 to 19", timeout=120_000)
+    page.get_by_label("Repetition", exact=True).fill("3")
+    page.get_by_label("Repetition", exact=True).press("Enter")
+
+    page.wait_for_selector(".stage-canvas[data-time]", timeout=120_000)
+
+
+def test_what_is_not_yet_there_may_be_looked_for_again(visit, archive):
+    visit.forgive("409")
+    stopped = archive.get("/experiments", strategy="informative")["items"][0]["id"]
+    done = {each["number"]: each["iterations_done"] for each in archive.get(f"/experiments/{stopped}/repetitions")}
+    number = min(done, key=done.get)
+
+    page = visit(f"{archive.url}/#/replay?experiment={stopped}&repetition={number}&iteration={done[number]}")
+
+    page.wait_for_selector(
+        f"text=Reality has not been asked yet about the transferred controller of iteration {done[number]}"
+    )
+    assert page.get_by_role("button", name="Look again").is_visible()
+
+
+def test_the_page_of_an_experiment_leads_to_its_replays(visit, archive, walker):
+    page = visit(f"{archive.url}/#/experiments/{walker}")
+
+    page.get_by_role("link", name="Replay a controller").click()
+
+    page.wait_for_selector(".stage-canvas[data-time]", timeout=120_000)
+    assert page.get_by_label("Iteration", exact=True).input_value() == "5"  # the last
+
+
+def test_the_direct_baseline_is_seen_in_reality_alone(visit, archive):
+    direct = archive.get("/experiments", strategy="direct")["items"][0]["id"]
+
+    page = replay(visit, archive, direct, query="")
+
+    assert page.locator(".stage-canvas").count() == 1
+    assert page.get_by_text("This controller evolved in reality itself.").is_visible()
+
+
+def test_without_webgl_it_is_seen_from_the_side(visit, archive, walker):
+    page = replay(visit, archive, walker)
+    page.add_init_script(FLAT)
+    page.reload()
+    page.wait_for_selector(".stage-canvas[data-drawn=flat]", timeout=120_000)
+
+    assert len(np.unique(picture(page.locator(".stage-canvas").first).reshape(-1, 3), axis=0)) > 5
+
+
+def test_the_toy_is_stepped_through(visit, archive, function):
+    page = visit(f"{archive.url}/#/toy?experiment={function}")
+    page.wait_for_selector(".toy .main-svg")
+    page.wait_for_selector("text=Iteration 0: after 0 samples")
+
+    page.get_by_label("Iteration", exact=True).fill("2")
+    page.wait_for_selector("text=Iteration 2: after 2 samples")
+    page.locator("main").press("ArrowRight")
+    page.wait_for_selector("text=Iteration 3: after 3 samples")
+    assert page.url.endswith("repetition=0&iteration=3")
+
+    page.get_by_role("button", name="Play").click()
+    page.wait_for_selector("text=Iteration 5: after 5 samples")
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_label("Repetition", exact=True).fill("1")
+    page.get_by_label("Repetition", exact=True).press("Enter")
+    eventually(page, lambda: "repetition=1" in page.url)
+
+
+def seen_by_all(page, name):
+    """Light, dark and on a phone, one after the other."""
+    axe(page)
+    screenshot(page, f"{name}-light")
+    page.emulate_media(color_scheme="dark")
+    axe(page)
+    screenshot(page, f"{name}-dark")
+    page.emulate_media(color_scheme="light")
+    page.set_viewport_size({"width": 400, "height": 900})
+    page.wait_for_timeout(300)
+    fits(page)
+    screenshot(page, f"{name}-phone")
+
+
+def test_a_replay_can_be_seen_by_all(visit, archive, walker):
+    page = replay(visit, archive, walker)
+    page.get_by_label("Time", exact=True).fill("1.2")
+    page.wait_for_selector(".gait .main-svg")
+
+    seen_by_all(page, "replay")
+
+
+def test_the_toy_can_be_seen_by_all(visit, archive, function):
+    page = visit(f"{archive.url}/#/toy?experiment={function}&iteration=4")
+    page.wait_for_selector(".toy .main-svg")
+
+    seen_by_all(page, "toy")
