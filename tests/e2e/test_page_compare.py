@@ -140,6 +140,17 @@ def test_a_reality_that_is_hidden_is_not_taken_for_the_same(api, sqlite_store, v
     visit.forgive("404")
 
 
+def test_of_many_experiments_the_figure_is_drawn_and_no_pair_is_tested(archive, visit):
+    many = [each["id"] for each in archive.get("/experiments", limit=60)["items"]]
+    page = visit(address(archive, *many))
+    expect(page.locator(".chosen li")).to_have_count(60)
+    expect(page.locator(".large .plot .main-svg").first).to_be_visible()
+    expect(page.get_by_text("Pairs are tested for up to 20 experiments; these are 60.")).to_be_visible()
+    page.get_by_role("button", name="Remove all").click()
+    expect(page.get_by_text("Choose experiments above")).to_be_visible()
+    expect(page.locator(".results")).to_be_hidden()
+
+
 def test_it_grows_as_an_experiment_goes_on(api, sqlite_store, visit):
     submitted = experiments.submit_experiment(sqlite_store, toy(name="growing", repetitions=2))
     claims = execution.claim(sqlite_store, "tests", 2)

@@ -8,9 +8,11 @@ import httpx2
 import pytest
 from playwright.sync_api import expect
 
+from schemas.access import Role
 from schemas.events import EventKind
 from schemas.lifecycle import PERMITTED
 from services import execution, experiments
+from services.access import create_token
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import some_log, toy
 
@@ -68,7 +70,29 @@ def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api, sqlite_st
     expect(happened.first).to_contain_text("Completed")
     page.get_by_role("tabpanel").scroll_into_view_if_needed()
     expect(page.get_by_role("tabpanel").locator("tbody .pill.completed")).to_have_count(2)
+    simulators = page.locator(".figure-simulators")
+    simulators.scroll_into_view_if_needed()
+    expect(simulators.locator(".legendtext").get_by_text("Reality", exact=True)).to_be_visible()
     assert page.evaluate("() => window.untouched")
+
+
+def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(api, sqlite_store, visit):
+    submitted = experiments.submit_experiment(sqlite_store, toy(repetitions=2))
+    for claim in execution.claim(sqlite_store, "tests", 2):
+        steps(sqlite_store, claim, some_log())
+    page = visit(address(api, submitted.id))
+    curve = page.locator(".figure-curves")
+    expect(curve.locator(".point")).to_have_count(3)
+    before = curve.locator(".js-line").count()
+    curve.get_by_label("Each repetition").check()
+    expect(curve).to_contain_text("Thin lines: single repetitions")
+    assert curve.locator(".js-line").count() > before
+    curve.get_by_label("Band").select_option("interval")
+    expect(curve).to_contain_text("95 % interval of the mean")
+    simulators = page.locator(".figure-simulators")
+    simulators.scroll_into_view_if_needed()
+    expect(simulators.locator(".legendtext")).to_have_text(["Best simulator of a repetition"])
+    expect(simulators).to_contain_text("Reality is shown once")
 
 
 def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api, sqlite_store, visit):
@@ -212,6 +236,22 @@ def test_its_files_are_saved(archive, ended, visit):
     expect(links).to_have_count(3 * 3 + 4)
     drawn = httpx2.get(f"{archive.url}/{links.first.get_attribute('href')}", timeout=120)
     assert drawn.status_code == 200
+
+
+def test_with_a_token_files_are_saved_and_a_reader_is_told_that_he_may_only_look(api, sqlite_store, visit):
+    submitted = experiments.submit_experiment(sqlite_store, toy(name="guarded"))
+    token = create_token(sqlite_store, Role.READER).secret
+    visit.forgive("403")
+    page = visit(api.url)
+    page.evaluate("(token) => sessionStorage.setItem('gaplab-token', token)", token)
+    page.goto(address(api, submitted.id))
+    with page.expect_download() as saved:
+        page.get_by_role("link", name="Archive of everything").click()
+    assert saved.value.url.startswith("blob:")
+    assert saved.value.path().read_bytes().startswith(b"PK")
+    page.get_by_role("button", name="Pause").click()
+    expect(page.locator(".verbs .said")).to_contain_text("runner")
+    assert experiments.read_experiment(sqlite_store, submitted.id).state == "QUEUED"
 
 
 @pytest.mark.parametrize("dark", [False, True])

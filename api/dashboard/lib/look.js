@@ -7,7 +7,8 @@ const LIGHTER = {
   "0,114,178": "86,172,230", "213,94,0": "255,140,66", "0,158,115": "64,201,160",
   "204,121,167": "230,160,201", "230,159,0": "242,183,64", "86,180,233": "170,220,250",
 };
-const NARROW_PX = 560;
+const PALER = 0.35;
+const NARROW_PX = 480;
 const PANEL_PX = 270;  // of each, where panels stand one above the other
 
 /** The chart as it is drawn in `canvas`. */
@@ -27,6 +28,7 @@ export function dressed({ data, layout: given }, canvas) {
     layout: {
       ...layout,
       ...Object.fromEntries(Object.keys(layout).filter((each) => /^[xy]axis\d*$/.test(each)).map((each) => [each, axis(each)])),
+      ...(layout.coloraxis && isDark() ? { coloraxis: pale(layout.coloraxis) } : {}),
       annotations: (layout.annotations ?? []).map((each) => (each.name === "ink" ? { ...each, arrowcolor: ink } : each)),
       height: Math.max(layout.height ?? 0, least),
       autosize: true,
@@ -44,8 +46,9 @@ function stacked(layout) {
   const found = { ...layout };
   if (layout.coloraxis) {
     const { colorbar } = layout.coloraxis;
-    const across = { ...colorbar, orientation: "h", x: 0, xanchor: "left", y: 1, yanchor: "bottom", len: 1, title: { ...colorbar.title, side: "top" } };
-    Object.assign(found, { coloraxis: { ...layout.coloraxis, colorbar: across }, margin: { ...layout.margin, t: 64 } });
+    const across = { orientation: "h", x: 0, xanchor: "left", y: 1, yanchor: "bottom", len: 1 };
+    const titled = { ...colorbar, ...across, title: { ...colorbar.title, side: "top" } };
+    Object.assign(found, { coloraxis: { ...layout.coloraxis, colorbar: titled }, margin: { ...layout.margin, t: 64 } });
   }
   if (axes.length < 2 || axes.every((each) => same(layout[each].domain, layout[axes[0]].domain))) return found;
   const gap = 0.24 / axes.length;
@@ -82,6 +85,12 @@ function lighter(color) {
   const [red, green, blue, opacity] = parts(color);
   const found = LIGHTER[`${red},${green},${blue}`];
   return found ? `rgba(${found},${Math.min(1, opacity < 1 ? opacity * 1.4 : 1)})` : color;
+}
+
+/** A scale of shades, which may be as dark as the ground, mixed with white. */
+function pale(axis) {
+  const mixed = (color) => `rgb(${parts(color).slice(0, 3).map((each) => Math.round(each + (255 - each) * PALER))})`;
+  return { ...axis, colorscale: axis.colorscale.map(([at, color]) => [at, mixed(color)]) };
 }
 
 function ofInk(color, ink) {

@@ -31,6 +31,7 @@ export function plot(element, kind, query, signal) {
   const caption = h("figcaption");
   const numbers = h("div");
   canvas.append(loading());
+  plotly().catch(() => {});  // while the service computes the figure; what is wrong is said when it is drawn
   element.replaceChildren(h("figure", {}, canvas, caption, numbers));
   let answer = null;
   let drawn = false;

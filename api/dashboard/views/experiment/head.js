@@ -29,7 +29,8 @@ export function head(page) {
     notes.hidden = !experiment.notes;
     refill(state, experiment.state, () => pill(experiment.state));
     bar.value = fraction(experiment.progress);
-    refill(facts, JSON.stringify([experiment.progress, experiment.priority, experiment.max_parallel, experiment.state, minute()]), () => factsOf(experiment));
+    const { progress, priority, max_parallel: most } = experiment;
+    refill(facts, JSON.stringify([progress, priority, most, experiment.state, minute()]), () => factsOf(experiment));
     refill(remarks, JSON.stringify([experiment.warnings, experiment.reasons]), () => remarksOf(experiment));
     asked.update();
   };
@@ -48,7 +49,8 @@ function what({ strategy, spec }) {
   const other = spec.reality?.engine?.name;
   const engines = own && other && own !== other ? `${own}, reality in ${other}` : own;
   const tuned = (spec.tunables ?? []).map((each) => each.name.replaceAll("_", " ")).join(", ");
-  return [spoken(strategy), spec.robot?.name.replaceAll("_", " "), engines, tuned && strategy !== "direct" ? `tunes ${tuned}` : null].filter(Boolean).join(" · ");
+  const tunes = tuned && strategy !== "direct" ? `tunes ${tuned}` : null;
+  return [spoken(strategy), spec.robot?.name.replaceAll("_", " "), engines, tunes].filter(Boolean).join(" · ");
 }
 
 /** Times are told in minutes and hours: what they say is put right each minute. */
@@ -87,8 +89,12 @@ function times({ state, progress, created_at: created, started_at: started, ende
 }
 
 function remarksOf({ warnings, reasons }) {
-  const list = (words, each, kind) => each.length ? h("div", { class: `remark ${kind}` }, h("strong", {}, words), h("ul", {}, ...each.map((one) => h("li", {}, one)))) : null;
-  return [list("Warnings", warnings, "warned"), list("Why repetitions failed", reasons, "broken")].filter(Boolean);
+  const list = (words, each, kind) =>
+    h("div", { class: `remark ${kind}` }, h("strong", {}, words), h("ul", {}, ...each.map((one) => h("li", {}, one))));
+  return [
+    ...(warnings.length ? [list("Warnings", warnings, "warned")] : []),
+    ...(reasons.length ? [list("Why repetitions failed", reasons, "broken")] : []),
+  ];
 }
 
 function links({ id, experiment }) {

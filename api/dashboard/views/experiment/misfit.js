@@ -18,9 +18,10 @@ export function misfit(page) {
       return;
     }
     const names = points[0].tunables.map((each) => each.name);
+    const note = "Mean ± SD over repetitions. ⊣ and ⊢: a share of them is stuck at the lower or the upper bound. Iteration 0 is not tuned.";
     const columns = ["Iteration", `Error on its samples (${unit})`, `Gap of what it evolved (${unit})`, ...names.map(spoken), "n"];
-    place.replaceChildren(h("ul", { class: "said-of-it" }, ...remarks.map((each) => h("li", {}, each))), table("Misfit by iteration", columns, points.map(row)),
-      h("p", { class: "note" }, "Mean ± SD over repetitions. ⊣ and ⊢: a share of them is stuck at the lower or the upper bound. Iteration 0 is not tuned."));
+    place.replaceChildren(h("ul", { class: "said-of-it" }, ...remarks.map((each) => h("li", {}, each))),
+      table("Misfit by iteration", columns, points.map(row)), h("p", { class: "note" }, note));
   });
   return [place];
 }
