@@ -13,7 +13,7 @@ serve: .venv/installed  ## the service on http://127.0.0.1:8000, with its worker
 	$(BIN)/gaplab serve
 
 test: .venv/installed-dev  ## all tests, on SQLite and on a real Postgres
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 lint: .venv/installed-dev  ## style, types, dependencies and the arrows between the layers
 	$(BIN)/ruff check

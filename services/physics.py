@@ -15,8 +15,8 @@ from services.core.errors import EngineInterrupted, EngineUnavailable, LimitReac
 
 T = TypeVar("T")
 
-LONGEST_S = 60.0
-"""One question may take so long; the process that takes longer is ended."""
+LONGEST_S = 120.0
+"""One question may take so long; the process that takes longer is ended. The first one loads all libraries."""
 
 QUEUE_S = 20.0
 """A question waits so long for those before it."""

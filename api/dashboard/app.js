@@ -1,5 +1,6 @@
 /** The page: a bar, and one view at a time, chosen by the address after `#`. */
 
+import { Problem } from "./lib/api.js";
 import { h } from "./lib/dom.js";
 import { failed, loading } from "./lib/states.js";
 import { switchTheme } from "./lib/theme.js";
@@ -47,20 +48,38 @@ async function route() {
   }
   try {
     if (!view) throw new Error(`There is no page ${location.hash.slice(1)} here.`);
-    const { show } = await import(`./views/${view.name}.js`);
+    const { show } = await loaded(view.name);
     if (!signal.aborted) await show(root, view.parameters, signal);
   } catch (error) {
     if (signal.aborted) return;
     root.replaceChildren(failed(error, route));
-    if (AWAY.has(error.status)) againOnce(signal);
+    if (AWAY.has(error.status)) againOnce(error.again ?? route, signal);
   }
   if (!signal.aborted) document.title = `${root.querySelector("h1")?.textContent ?? "gaplab"} · gaplab`;
 }
 
 /** A service that is away is asked again by itself. */
-function againOnce(signal) {
-  const timer = setTimeout(route, AGAIN_MS);
+function againOnce(again, signal) {
+  const timer = setTimeout(again, AGAIN_MS);
   signal.addEventListener("abort", () => clearTimeout(timer));
+}
+
+/** The module of a view. A browser may remember that it could not be had, so once the service is back all begins anew. */
+async function loaded(name) {
+  try {
+    return await import(`./views/${name}.js`);
+  } catch (error) {
+    await fetch("livez").catch(() => { throw new Problem({ detail: "It may be down, or the network is. What it has stored is safe.", again: anew }); });
+    throw error;
+  }
+}
+
+async function anew() {
+  const { signal } = leaving;
+  const isBack = await fetch("livez").then((answer) => answer.ok, () => false);
+  if (signal.aborted) return;
+  if (isBack) location.reload();
+  else againOnce(anew, signal);
 }
 
 document.getElementById("theme").addEventListener("click", switchTheme);

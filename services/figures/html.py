@@ -19,7 +19,7 @@ AXIS = {
     "showline": True,
     "ticks": "outside",
     "tickcolor": INK,
-    "title": {"standoff": 8},
+    "title": {"standoff": 8, "font": {"size": 14}},
 }
 
 PAGE = """<!doctype html>

@@ -8,19 +8,17 @@ import httpx2
 import pytest
 from playwright.sync_api import expect
 
+from schemas.access import Role
 from schemas.events import EventKind
 from schemas.lifecycle import PERMITTED
 from services import execution, experiments
+from services.access import create_token
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import some_log, toy
 
 SLOW_MS = 120_000
+expect.set_options(timeout=SLOW_MS)
 NAME = "simulated_fit"
-
-
-@pytest.fixture(autouse=True)
-def temporary(visit):
-    visit.forgive("422", "40[04]")
 
 
 @pytest.fixture
@@ -55,23 +53,46 @@ def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api, sqlite_st
     page.evaluate("() => { window.untouched = true; }")
     expect(page.get_by_role("heading", level=1)).to_have_text("Growing")
     expect(page.locator(".state-now")).to_contain_text("running")
-    expect(page.locator(".figure-curves .point")).to_have_count(1, timeout=SLOW_MS)
+    expect(page.locator(".figure-curves .point")).to_have_count(1)
 
     for iteration in (1, 2):
         for claim, log in zip(claims, logs, strict=True):
             steps(sqlite_store, claim, islice(log, 5))
-        expect(page.locator(".figure-curves .point")).to_have_count(1 + iteration, timeout=SLOW_MS)
+        expect(page.locator(".figure-curves .point")).to_have_count(1 + iteration)
     happened = page.locator(".events li")
-    expect(happened.first).to_contain_text("Repetition 1, iteration 2: the controller reaches", timeout=SLOW_MS)
+    expect(happened.first).to_contain_text("Repetition 1, iteration 2: the controller reaches")
     expect(page.locator(".facts")).to_contain_text("6 of 8")
 
     for claim, log in zip(claims, logs, strict=True):
         steps(sqlite_store, claim, log)
         assert execution.complete(sqlite_store, claim)
-    expect(page.locator(".state-now")).to_contain_text("completed", timeout=SLOW_MS)
+    expect(page.locator(".state-now")).to_contain_text("completed")
     expect(happened.first).to_contain_text("Completed")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
     expect(page.get_by_role("tabpanel").locator("tbody .pill.completed")).to_have_count(2)
+    simulators = page.locator(".figure-simulators")
+    simulators.scroll_into_view_if_needed()
+    expect(simulators.locator(".legendtext").get_by_text("Reality", exact=True)).to_be_visible()
     assert page.evaluate("() => window.untouched")
+
+
+def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(api, sqlite_store, visit):
+    submitted = experiments.submit_experiment(sqlite_store, toy(repetitions=2))
+    for claim in execution.claim(sqlite_store, "tests", 2):
+        steps(sqlite_store, claim, some_log())
+    page = visit(address(api, submitted.id))
+    curve = page.locator(".figure-curves")
+    expect(curve.locator(".point")).to_have_count(3)
+    before = curve.locator(".js-line").count()
+    curve.get_by_label("Each repetition").check()
+    expect(curve).to_contain_text("Thin lines: single repetitions")
+    assert curve.locator(".js-line").count() > before
+    curve.get_by_label("Band").select_option("interval")
+    expect(curve).to_contain_text("95 % interval of the mean")
+    simulators = page.locator(".figure-simulators")
+    simulators.scroll_into_view_if_needed()
+    expect(simulators.locator(".legendtext")).to_have_text(["Best simulator of a repetition"])
+    expect(simulators).to_contain_text("Reality is shown once")
 
 
 def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api, sqlite_store, visit):
@@ -81,15 +102,15 @@ def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api, sqlite_s
     steps(sqlite_store, claim, islice(log, 3))
     visit.forgive("ERR_", "net::")
     page = visit(address(api, submitted.id))
-    expect(page.locator(".figure-curves .point")).to_have_count(1, timeout=SLOW_MS)
+    expect(page.locator(".figure-curves .point")).to_have_count(1)
     api.kill()
-    expect(page.locator("#connection")).not_to_be_empty(timeout=SLOW_MS)
+    expect(page.locator("#connection")).not_to_be_empty()
     expect(page.locator(".figure-curves .point")).to_have_count(1)
     steps(sqlite_store, claim, log)
     assert execution.complete(sqlite_store, claim)
     api.start()
-    expect(page.locator(".figure-curves .point")).to_have_count(3, timeout=SLOW_MS)
-    expect(page.locator(".state-now")).to_contain_text("completed", timeout=SLOW_MS)
+    expect(page.locator(".figure-curves .point")).to_have_count(3)
+    expect(page.locator(".state-now")).to_contain_text("completed")
     expect(page.locator("#connection")).to_be_empty()
 
 
@@ -161,6 +182,7 @@ def test_what_failed_is_said_with_its_reason_and_attempts(api, sqlite_store, vis
     page = visit(address(api, submitted.id))
     expect(page.locator(".state-now")).to_contain_text("failed")
     expect(page.locator(".remark.broken")).to_contain_text("a foot fell off")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
     page.get_by_role("button", name="Attempts at repetition 0: 1").click()
     attempts = page.get_by_role("region", name="Attempts at repetition 0")
     expect(attempts).to_contain_text("a foot fell off")
@@ -169,8 +191,9 @@ def test_what_failed_is_said_with_its_reason_and_attempts(api, sqlite_store, vis
 def test_there_is_nothing_yet_or_no_such_experiment(api, sqlite_store, visit):
     submitted = experiments.submit_experiment(sqlite_store, toy())
     page = visit(address(api, submitted.id, tab="samples"))
+    expect(page.locator(".figure-curves")).to_contain_text("Nothing to draw yet.")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
     expect(page.get_by_role("tabpanel")).to_contain_text("Nothing was tried in reality yet.")
-    expect(page.locator(".figure-curves")).to_contain_text("Nothing to draw yet.", timeout=SLOW_MS)
     axe(page)
     visit.forgive("404")
     page.goto(f"{api.url}/#/experiments/nowhere")
@@ -215,15 +238,31 @@ def test_its_files_are_saved(archive, ended, visit):
     assert drawn.status_code == 200
 
 
+def test_with_a_token_files_are_saved_and_a_reader_is_told_that_he_may_only_look(api, sqlite_store, visit):
+    submitted = experiments.submit_experiment(sqlite_store, toy(name="guarded"))
+    token = create_token(sqlite_store, Role.READER).secret
+    visit.forgive("403")
+    page = visit(api.url)
+    page.evaluate("(token) => sessionStorage.setItem('gaplab-token', token)", token)
+    page.goto(address(api, submitted.id))
+    with page.expect_download() as saved:
+        page.get_by_role("link", name="Archive of everything").click()
+    assert saved.value.url.startswith("blob:")
+    assert saved.value.path().read_bytes().startswith(b"PK")
+    page.get_by_role("button", name="Pause").click()
+    expect(page.locator(".verbs .said")).to_contain_text("runner")
+    assert experiments.read_experiment(sqlite_store, submitted.id).state == "QUEUED"
+
+
 @pytest.mark.parametrize("dark", [False, True])
 def test_it_is_accessible_and_fits_a_phone(archive, ended, visit, dark):
     shade = "dark" if dark else "light"
     for width in (1280, 375):
         page = visit(address(archive, ended["id"]), dark=dark, width=width)
-        expect(page.locator(".figure-curves .point")).to_have_count(6, timeout=SLOW_MS)
+        expect(page.locator(".figure-curves .point")).to_have_count(6)
         for figure in page.locator(".figures > section").all():
             figure.scroll_into_view_if_needed()
-            expect(figure.locator(".plot .main-svg").first).to_be_visible(timeout=SLOW_MS)
+            expect(figure.locator(".plot .main-svg").first).to_be_visible()
         expect(page.get_by_role("tabpanel").locator("tbody tr")).to_have_count(20)
         axe(page)
         fits(page)

@@ -85,6 +85,11 @@ def test_it_plays_at_the_speed_that_is_chosen_and_stands_when_told(visit, archiv
     assert time_of(page) == stood
     assert page.get_by_role("button", name="Play", exact=True).is_visible()
 
+    page.emulate_media(reduced_motion="no-preference")
+    page.reload()
+    page.wait_for_selector(".stage-canvas[data-time]")
+    eventually(page, lambda: time_of(page) > 0.1)
+
 
 def test_the_camera_goes_round_by_keys_and_by_dragging(visit, archive, walker):
     page = replay(visit, archive, walker)
@@ -149,6 +154,29 @@ def test_what_is_not_there_says_so_and_another_may_be_chosen(visit, archive, wal
     page.get_by_label("Repetition", exact=True).press("Enter")
 
     page.wait_for_selector(".stage-canvas[data-time]", timeout=120_000)
+
+
+def test_what_is_not_yet_there_may_be_looked_for_again(visit, archive):
+    visit.forgive("409")
+    stopped = archive.get("/experiments", strategy="informative")["items"][0]["id"]
+    done = {each["number"]: each["iterations_done"] for each in archive.get(f"/experiments/{stopped}/repetitions")}
+    number = min(done, key=done.get)
+
+    page = visit(f"{archive.url}/#/replay?experiment={stopped}&repetition={number}&iteration={done[number]}")
+
+    page.wait_for_selector(
+        f"text=Reality has not been asked yet about the transferred controller of iteration {done[number]}"
+    )
+    assert page.get_by_role("button", name="Look again").is_visible()
+
+
+def test_the_page_of_an_experiment_leads_to_its_replays(visit, archive, walker):
+    page = visit(f"{archive.url}/#/experiments/{walker}")
+
+    page.get_by_role("link", name="Replay a controller").click()
+
+    page.wait_for_selector(".stage-canvas[data-time]", timeout=120_000)
+    assert page.get_by_label("Iteration", exact=True).input_value() == "5"  # the last
 
 
 def test_the_direct_baseline_is_seen_in_reality_alone(visit, archive):

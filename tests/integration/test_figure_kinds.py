@@ -148,27 +148,27 @@ def log(first: int, *, iterations: int, fitness: float | None = 1.0):
 
 
 @pytest.fixture
-def experiment(sqlite_store: Store) -> str:
+def experiment(store: Store) -> str:
     """Two repetitions of three that have ended, of 20 and 40 rollouts at first, and 30 and 60 with each iteration."""
-    made = experiments.submit_experiment(sqlite_store, toy(repetitions=3)).id
-    for claim in execution.claim(sqlite_store, "test", limit=2):
-        run(sqlite_store, claim, log(claim.number + 1, iterations=2))
+    made = experiments.submit_experiment(store, toy(repetitions=3)).id
+    for claim in execution.claim(store, "test", limit=2):
+        run(store, claim, log(claim.number + 1, iterations=2))
     return made
 
 
-def test_rollouts_are_counted_from_the_start_over_those_that_got_there(sqlite_store: Store, experiment: str):
-    curves = reports.curves(sqlite_store, [experiment])
+def test_rollouts_are_counted_from_the_start_over_those_that_got_there(store: Store, experiment: str):
+    curves = reports.curves(store, [experiment])
 
-    found = abscissa(sqlite_store, curves, "rollouts")
+    found = abscissa(store, curves, "rollouts")
 
     assert found.label == "Rollouts in simulation"
     assert [found.at[experiment, at] for at in range(3)] == [30, 75, 120]
 
 
-def test_time_is_that_of_evaluations_and_of_simulation_as_measured(sqlite_store: Store, experiment: str):
-    curves = reports.curves(sqlite_store, [experiment])
+def test_time_is_that_of_evaluations_and_of_simulation_as_measured(store: Store, experiment: str):
+    curves = reports.curves(store, [experiment])
 
-    simulated, both = (abscissa(sqlite_store, curves, "time", cost_s=each) for each in (0, 3600))
+    simulated, both = (abscissa(store, curves, "time", cost_s=each) for each in (0, 3600))
 
     steps = [3, 8, 13]  # of half a second each
     assert simulated.label == "Time (s)"
@@ -178,10 +178,10 @@ def test_time_is_that_of_evaluations_and_of_simulation_as_measured(sqlite_store:
     assert "at 3600\N{NO-BREAK SPACE}s each and simulation as it was measured" in both.note
 
 
-def test_reality_is_among_the_simulators_only_once_all_of_its_study_have_ended(sqlite_store: Store, experiment: str):
-    running = tunings(sqlite_store, experiment)
-    experiments.cancel_experiment(sqlite_store, experiment)
-    ended = tunings(sqlite_store, experiment)
+def test_reality_is_among_the_simulators_only_once_all_of_its_study_have_ended(store: Store, experiment: str):
+    running = tunings(store, experiment)
+    experiments.cancel_experiment(store, experiment)
+    ended = tunings(store, experiment)
 
     assert running.truth is None
     assert set(ended.truth or {}) == {"static_friction", "dynamic_friction"}

@@ -4,9 +4,9 @@ import { token } from "./token.js";
 
 /** A problem that the service answered with, or that it did not answer (status 0). */
 export class Problem extends Error {
-  constructor({ status = 0, title = "The service does not answer", detail = "", errors = [] }) {
+  constructor({ status = 0, title = "The service does not answer", detail = "", errors = [], again = null }) {
     super(detail || title);
-    Object.assign(this, { status, title, errors });
+    Object.assign(this, { status, title, errors, again });
   }
 }
 

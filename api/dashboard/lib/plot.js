@@ -24,20 +24,23 @@ function plotly() {
 
 /**
  * Draw `/figures/{kind}` into `element`, with its caption and its words for those who do not see it.
- * Returns a function that draws it anew, with another query if one is given.
+ * Returns a function that draws it anew, with another query if one is given; its `drawn` is when it was drawn at first.
  */
 export function plot(element, kind, query, signal) {
   const canvas = h("div", { class: "plot" });
   const caption = h("figcaption");
   const numbers = h("div");
   canvas.append(loading());
+  plotly().catch(() => {});  // while the service computes the figure; what is wrong is said when it is drawn
   element.replaceChildren(h("figure", {}, canvas, caption, numbers));
   let answer = null;
   let drawn = false;
+  let asked = 0;
   const say = (words) => {
     drawn = false;
     globalThis.Plotly?.purge(canvas);
     for (const each of ["role", "aria-label"]) canvas.removeAttribute(each);
+    canvas.style.height = "";
     canvas.replaceChildren(words);
   };
   const draw = async () => {
@@ -52,24 +55,27 @@ export function plot(element, kind, query, signal) {
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", answer.alt);
     const { data, layout } = dressed(answer.figure, canvas);
+    canvas.style.height = layout.height ? `${layout.height}px` : "";  // Plotly takes the place's height when it is resized
     await library.react(canvas, data, layout, { displayModeBar: false, responsive: true });
     drawn = true;
   };
   const refresh = async (changed = query) => {
     query = changed;
+    const mine = ++asked;
     try {
-      answer = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
+      const found = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
+      if (mine !== asked) return;  // another query has overtaken it
+      answer = found;
       caption.textContent = answer.caption;
       numbers.replaceChildren(...(answer.table && !answer.empty ? [counted(answer.table, numbers.querySelector("details")?.open)] : []));
       await draw();
     } catch (error) {
-      if (!signal.aborted && !drawn) say(failed(error, () => refresh()));
+      if (!signal.aborted && !drawn) say(failed(error, () => refresh(), "h3"));
     }
   };
   onTheme(draw, signal);
   signal.addEventListener("abort", () => globalThis.Plotly?.purge(canvas));
-  refresh();
-  return refresh;
+  return Object.assign(refresh, { drawn: refresh() });
 }
 
 function counted({ head, rows }, open) {

@@ -16,7 +16,8 @@ export function progressBar(label) {
   const update = (progress) => {
     bar.value = fraction(progress);
     say(words, `${Math.floor(100 * fraction(progress))} %`);
-    bar.title = `${count(progress.completed)} of ${count(progress.repetitions)} repetitions, ${count(progress.rollouts_done)} rollouts and ${count(progress.rollouts_saved)} saved of ${count(progress.rollouts)}`;
+    const rollouts = `${count(progress.rollouts_done)} rollouts and ${count(progress.rollouts_saved)} saved of ${count(progress.rollouts)}`;
+    bar.title = `${count(progress.completed)} of ${count(progress.repetitions)} repetitions, ${rollouts}`;
   };
   return { element: h("span", { class: "bar-of" }, bar, words), update };
 }

@@ -2,10 +2,13 @@
 
 import { failed, loading } from "./states.js";
 
+const REST = 4;
+
 /**
  * The parts of one view. `add(element, kinds, load)` has `load()` fill the element once it can be seen; `tell(events)`
  * has those loaded anew that show one of these events' kinds, or all of them if there are no events: those in sight at
- * once, the others when they come into sight. No part is loaded twice at a time.
+ * once, the others when they come into sight. No part is loaded twice at a time, and each rests four times as long as it took.
+ * One whose `load()` says true is not complete yet, and loaded again.
  */
 export function sections(signal) {
   const parts = new Map();
@@ -21,12 +24,14 @@ export function sections(signal) {
   async function go(part) {
     if (!part.stale || !part.seen || part.busy || signal.aborted) return;
     Object.assign(part, { busy: true, stale: false });
+    const began = performance.now();
     try {
-      await part.load();
+      part.stale ||= Boolean(await part.load());
       part.filled = true;
     } catch (error) {
-      if (!signal.aborted && !part.filled) part.element.replaceChildren(failed(error, () => again(part)));
+      if (!signal.aborted && !part.filled) part.element.replaceChildren(failed(error, () => again(part), "h3"));
     }
+    if (part.filled) await rest(REST * (performance.now() - began), signal);
     part.busy = false;
     go(part);
   }
@@ -49,3 +54,8 @@ export function sections(signal) {
     },
   };
 }
+
+const rest = (ms, signal) => new Promise((resume) => {
+  const timer = setTimeout(resume, ms);
+  signal.addEventListener("abort", () => { clearTimeout(timer); resume(); }, { once: true });
+});

@@ -14,20 +14,20 @@ export function empty(words, ...action) {
   return h("div", { class: "state empty" }, h("p", {}, words), ...action);
 }
 
-/** It failed, with the service's own words; `again` tries once more. */
-export function failed(error, again) {
+/** It failed, with the service's own words; `again` tries once more. In a part of a view its heading is a lower one. */
+export function failed(error, again, heading = "h1") {
   if (error instanceof Problem && (error.status === 401 || error.status === 403)) return TokenForm(error, again);
-  if (error instanceof Problem && error.status === 0) return away(error, again);
+  if (error instanceof Problem && error.status === 0) return away(error, again, heading);
   const title = error instanceof Problem ? error.title : "It did not work";
   const places = error.errors?.map((each) => h("li", {}, each.pointer ? h("code", {}, each.pointer) : "", " ", each.message)) ?? [];
   return h("div", { class: "state failed", role: "alert" },
-    h("h1", {}, title), h("p", {}, error.message), places.length ? h("ul", {}, ...places) : null,
+    h(heading, {}, title), h("p", {}, error.message), places.length ? h("ul", {}, ...places) : null,
     again ? h("button", { type: "button", onclick: () => again() }, "Try again") : null);
 }
 
 /** The service does not answer: it is asked again by itself, and by a press. */
-function away(error, again) {
-  return h("div", { class: "state away-now", role: "status" }, h("h1", {}, error.title), h("p", {}, error.message),
+function away(error, again, heading) {
+  return h("div", { class: "state away-now", role: "status" }, h(heading, {}, error.title), h("p", {}, error.message),
     h("p", {}, h("span", { class: "spinner", "aria-hidden": "true" }), "Asking again until it does…"),
     again ? h("button", { type: "button", class: "quiet", onclick: () => again() }, "Try now") : null);
 }

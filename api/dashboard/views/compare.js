@@ -43,7 +43,8 @@ export async function show(root, parameters, signal) {
   const changed = async (events) => {
     const news = events.filter(({ data }) => view.choice.experiments.includes(data.experiment));
     if (events.length && !news.length) return;
-    await books.anew(view.choice.experiments.filter((each) => !ENDED.includes(books.get(each)?.state) || news.some(({ data }) => data.experiment === each)));
+    const told = new Set(news.map(({ data }) => data.experiment));
+    await books.anew(view.choice.experiments.filter((each) => told.has(each) || !ENDED.includes(books.get(each)?.state)));
     update([...news, null]);
   };
   follow({ kind: KINDS }, changed, signal);

@@ -42,7 +42,8 @@ class List {
   constructor(signal, unit) {
     Object.assign(this, { signal, unit, open: new Set(), items: [], next: null, wanted: null, turn: 0 });
     const body = h("tbody");
-    this.fill = rows(body, (each) => `${each.value.id} ${each.nested ?? ""}`, (each) => (each.value.experiments ? studyRow(each, this) : experimentRow(each, this)));
+    const make = (each) => (each.value.experiments ? studyRow(each, this) : experimentRow(each, this));
+    this.fill = rows(body, (each) => `${each.value.id} ${each.nested ?? ""}`, make);
     this.table = h("table", { class: "list" }, h("caption", { class: "away" }, "Studies and experiments"), h("thead", {}, h("tr", {}, ...heads())), body);
     this.more = h("button", { type: "button", class: "quiet more", onclick: () => this.lengthen() }, "Show more");
     this.bar = selectionBar(() => this.draw());
@@ -88,7 +89,8 @@ class List {
   }
 
   draw() {
-    const shown = this.items.flatMap((value) => [{ value }, ...(this.open.has(value.id) ? value.experiments.map((each) => ({ value: each, nested: true })) : [])]);
+    const below = (value) => (this.open.has(value.id) ? value.experiments.map((each) => ({ value: each, nested: true })) : []);
+    const shown = this.items.flatMap((value) => [{ value }, ...below(value)]);
     this.fill(shown);
     this.table.hidden = !shown.length;
     this.more.hidden = !this.next;
@@ -96,7 +98,10 @@ class List {
   }
 
   nothing() {
-    if (isFiltered(this.wanted)) return empty("Nothing here is like that.", h("a", { class: "button quiet", href: "#/", onclick: () => dispatchEvent(new HashChangeEvent("hashchange")) }, "Show everything"));
+    if (isFiltered(this.wanted)) {
+      const again = () => dispatchEvent(new HashChangeEvent("hashchange"));  // also where the address is the same already
+      return empty("Nothing here is like that.", h("a", { class: "button quiet", href: "#/", onclick: again }, "Show everything"));
+    }
     return empty("Nothing was submitted yet.", h("a", { class: "button", href: "#/new" }, "Submit a study"));
   }
 }

@@ -100,7 +100,8 @@ class Form {
 
   /** The same key for the same spec: pressed again after no answer came, it is submitted once. */
   keyFor(text) {
-    if (this.keyOf !== text) Object.assign(this, { keyOf: text, key: Array.from(crypto.getRandomValues(new Uint32Array(4)), (each) => each.toString(16)).join("-") });
+    const random = () => Array.from(crypto.getRandomValues(new Uint32Array(4)), (each) => each.toString(16)).join("-");
+    if (this.keyOf !== text) Object.assign(this, { keyOf: text, key: random() });
     return this.key;
   }
 }

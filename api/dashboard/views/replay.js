@@ -56,7 +56,10 @@ async function fill(place, asked, signal) {
     place.replaceChildren(stages.element, timeline.element, differing(replay), steps.element);
     timeline.begin();
   } catch (error) {
-    if (!signal.aborted) place.replaceChildren(failed(error, () => fill(place, asked, signal)));
+    if (signal.aborted) return;
+    const again = () => fill(place, asked, signal);
+    const wait = h("button", { type: "button", class: "quiet", onclick: again }, "Look again");
+    place.replaceChildren(error.status === 409 ? empty(`${error.message[0].toUpperCase()}${error.message.slice(1)}.`, wait) : failed(error, again, "h2"));
   }
 }
 

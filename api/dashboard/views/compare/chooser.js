@@ -49,7 +49,7 @@ export function chooser(view) {
     try {
       const found = await search(view, field.value.trim(), signal);
       options.replaceChildren(...found.map((each, at) => option(each, at, take)));
-      if (!found.length) options.replaceChildren(h("li", { class: "none", role: "option", "aria-disabled": "true", id: "found-none" }, "Nothing has that in its name or id."));
+      if (!found.length) options.replaceChildren(nothing());
       options.hidden = document.activeElement !== field;
       field.setAttribute("aria-expanded", String(!options.hidden));
       activate(-1);
@@ -89,10 +89,15 @@ async function search({ books, choice }, text, signal) {
   experiments.items.forEach(books.keep);
   const left = experiments.items.filter((each) => !choice.experiments.includes(each.id));
   return [
-    ...studies.items.map((each) => ({ name: each.name, what: `study, all ${count(each.experiments.length)} experiments`, of: each, ids: each.experiments.map(({ id }) => id) })),
+    ...studies.items.map((each) => ({
+      name: each.name, what: `study, all ${count(each.experiments.length)} experiments`, of: each, ids: each.experiments.map(({ id }) => id),
+    })),
     ...left.map((each) => ({ name: spoken(each.name), what: books.place(each.id) ?? each.id, of: each, ids: [each.id] })),
   ];
 }
+
+const nothing = () =>
+  h("li", { class: "none", role: "option", "aria-disabled": "true", id: "found-none" }, "Nothing has that in its name or id.");
 
 function option({ name, what, of, ids }, at, take) {
   return h("li", {

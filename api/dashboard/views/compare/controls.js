@@ -7,9 +7,11 @@ import { AXES, BANDS } from "./address.js";
 export function controls(view) {
   const axes = Object.entries(AXES).map(([value, words]) =>
     h("label", {}, h("input", { type: "radio", name: "x", value, onchange: () => view.change({ x: value }) }), words));
-  const cost = h("input", { type: "number", min: 0, step: "any", class: "short", onchange: () => cost.checkValidity() && cost.value !== "" && view.change({ cost_s: Number(cost.value) }) });
+  const spend = () => cost.checkValidity() && cost.value !== "" && view.change({ cost_s: Number(cost.value) });
+  const cost = h("input", { type: "number", min: 0, step: "any", class: "short", onchange: spend });
   const costs = h("label", {}, "each real evaluation costs ", cost, " s");
-  const band = h("select", { onchange: () => view.change({ band: band.value }) }, ...Object.entries(BANDS).map(([value, words]) => h("option", { value }, words)));
+  const bands = Object.entries(BANDS).map(([value, words]) => h("option", { value }, words));
+  const band = h("select", { onchange: () => view.change({ band: band.value }) }, ...bands);
   const each = h("input", { type: "checkbox", onchange: () => view.change({ each: each.checked }) });
   const element = h("div", { class: "controls" },
     h("fieldset", {}, h("legend", {}, "Against"), ...axes, costs),

@@ -51,7 +51,8 @@ export function library(signal) {
     /** Their names by id, as the figure has them: of two that are alike each carries its id. */
     names(ids) {
       const names = ids.map(this.name);
-      return new Map(ids.map((id, at) => [id, names.indexOf(names[at]) === names.lastIndexOf(names[at]) ? names[at] : `${names[at]} (${id.slice(0, 8)})`]));
+      const alone = (name) => names.indexOf(name) === names.lastIndexOf(name);
+      return new Map(ids.map((id, at) => [id, alone(names[at]) ? names[at] : `${names[at]} (${id.slice(0, 8)})`]));
     },
     place: (id) => studies.get(experiments.get(id)?.study) ?? null,
   };

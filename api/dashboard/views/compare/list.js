@@ -23,7 +23,9 @@ export function list(view) {
   };
   const item = (id, at) => {
     const found = books.get(id);
-    const name = found ? h("a", { href: `#/experiments/${id}`, title: books.place(id) }, books.name(id)) : h("span", { class: "failed" }, `There is no experiment ${id}`);
+    const name = found
+      ? h("a", { href: `#/experiments/${id}`, title: books.place(id) }, books.name(id))
+      : h("span", { class: "failed" }, `There is no experiment ${id}`);
     const remove = h("button", { type: "button", class: "link", "aria-label": `Remove ${books.name(id)}`, onclick: () => without(id) }, "✕");
     const place = several(view) && books.place(id) ? h("small", {}, books.place(id)) : null;
     return h("li", {}, h("b", {}, letter(at)), name, place, found ? pill(found.state) : null, remove);

@@ -28,5 +28,5 @@ export function pairs(view, ids, results, open) {
 
 function told(pair, test) {
   const { kind, sign, words } = verdict(pair, test);
-  return h("span", { class: kind, title: probability(pair[test].p_holm) }, `${sign} ${kind === "unknown" ? words : `${words}, ${probability(pair[test].p_holm)}`}`);
+  return h("span", { class: kind }, `${sign} ${words}`, kind === "unknown" ? "" : `, ${probability(pair[test].p_holm)}`);
 }

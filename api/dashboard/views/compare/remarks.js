@@ -25,7 +25,10 @@ export function warnings(found) {
   const robots = groups(found, (each) => text(each.spec.robot));
   const realities = groups(found, reality(found));
   const said = [];
-  if (robots.length > 1) said.push(`⚠ Different robots: ${named(robots, ({ spec }) => spec.robot.name)}. Their fitness does not mean the same, and differences between them say nothing.`);
+  if (robots.length > 1) {
+    const which = named(robots, ({ spec }) => spec.robot.name);
+    said.push(`⚠ Different robots: ${which}. Their fitness does not mean the same, and differences between them say nothing.`);
+  }
   if (realities.length > 1 && realities.some(({ key }) => key.startsWith("hidden"))) {
     said.push("⚠ Some realities are hidden until their experiments have ended: whether all of these have the same cannot be said yet.");
   } else if (realities.length > 1) {
@@ -51,8 +54,10 @@ function groups(found, keyOf) {
 
 /** What tells realities apart: all experiments of a study have one, also where it is hidden. */
 function reality(found) {
-  const known = new Map(found.filter(([, each]) => each.study && !hidden(each)).map(([, each]) => [each.study, text(each.spec.reality)]));
-  return (each) => (hidden(each) ? known.get(each.study) ?? `hidden ${each.study ?? each.id} ${text(each.spec.reality.engine)}` : text(each.spec.reality));
+  const shown = found.map(([, each]) => each).filter((each) => each.study && !hidden(each));
+  const known = new Map(shown.map((each) => [each.study, text(each.spec.reality)]));
+  const unknown = (each) => `hidden ${each.study ?? each.id} ${text(each.spec.reality.engine)}`;
+  return (each) => (hidden(each) ? known.get(each.study) ?? unknown(each) : text(each.spec.reality));
 }
 
 const hidden = ({ spec }) => Object.values(spec.reality.parameters ?? {}).some((each) => each === null) || !spec.reality.parameters;

@@ -8,15 +8,17 @@ import { matrix } from "./matrix.js";
 import { pairs } from "./pairs.js";
 
 const MOST = 20;  // experiments in one table: 190 pairs
-const NOTE = "p after Holm’s correction over all pairs; a pair differs where it is below 0.05, and is not significantly different (n. s.) elsewhere. d is Cohen’s effect size. " +
-  "Values of one repetition at several counts depend on each other, so p over a range is smaller than it should be: it is as in the paper, and safe at a single count only.";
+const NOTE = "p after Holm’s correction over all pairs; a pair differs where it is below 0.05, and is not significantly different " +
+  "(n. s.) elsewhere. d is Cohen’s effect size. Values of one repetition at several counts depend on each other, so p over a " +
+  "range is smaller than it should be: it is as in the paper, and safe at a single count only.";
 
 /** The tests over a range that is chosen, as a matrix, and over the paper's ranges, pair by pair. */
 export function significance(view) {
   const buttons = h("div", { class: "ranges", role: "group", "aria-label": "Range of real-world evaluations" });
   const from = h("input", { type: "number", min: 0, max: 1000, step: 1, class: "short" });
   const to = h("input", { type: "number", min: 0, max: 1000, step: 1, class: "short" });
-  const test = h("select", { onchange: () => view.change({ test: test.value }) }, ...Object.entries(TESTS).map(([value, words]) => h("option", { value }, words)));
+  const tests = Object.entries(TESTS).map(([value, words]) => h("option", { value }, words));
+  const test = h("select", { onchange: () => view.change({ test: test.value }) }, ...tests);
   const typed = () => view.change({ from: whole(from.value), to: whole(to.value) });
   from.addEventListener("change", typed);
   to.addEventListener("change", typed);
@@ -48,14 +50,17 @@ export function significance(view) {
 const lastOf = ({ strategy, spec }) => (strategy === "direct" ? 0 : spec.iterations);
 
 /** The paper's ranges, as far as these experiments go. */
-export const ranges = (last) => [[1, 1], [3, last], [6, last], [1, last]].filter(([from], at, all) => from <= last && (at === 0 || all[at][0] > 1 || last > 1));
+export const ranges = (last) => [[1, 1], [3, last], [6, last], ...(last > 1 ? [[1, last]] : [])].filter(([from]) => from <= last);
 
 /** A range in words. */
 export const spoken = ([from, to]) => (from === to ? `${from}` : `${from}–${to}`);
 
 function button(range, now, view) {
   const pressed = spoken(range) === spoken(now);
-  return h("button", { type: "button", class: "quiet small", "aria-pressed": String(pressed), onclick: () => view.change({ from: range[0], to: range[1] }) }, range[0] === range[1] ? `at ${range[0]}` : spoken(range));
+  const [from, to] = range;
+  const press = () => view.change({ from, to });
+  const words = from === to ? `at ${from}` : spoken(range);
+  return h("button", { type: "button", class: "quiet small", "aria-pressed": String(pressed), onclick: press }, words);
 }
 
 async function fill(place, view, { ids, range, last, anew }, wanted) {
@@ -72,6 +77,6 @@ async function fill(place, view, { ids, range, last, anew }, wanted) {
     const open = place.querySelector("details")?.open ?? false;
     place.replaceChildren(...matrix(view, ids, results.at(-1)), pairs(view, ids, results, open));
   } catch (error) {
-    if (wanted() && !view.signal.aborted) place.replaceChildren(failed(error, () => fill(place, view, { ids, range, last, anew }, wanted)));
+    if (wanted() && !view.signal.aborted) place.replaceChildren(failed(error, () => fill(place, view, { ids, range, last, anew }, wanted), "h3"));
   }
 }

@@ -1,5 +1,6 @@
 /** The figures of an experiment: drawn when they come into sight, and anew as it goes on. */
 
+import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
 import { figureFiles } from "../../lib/downloads.js";
 import { plot } from "../../lib/plot.js";
@@ -7,8 +8,8 @@ import { plot } from "../../lib/plot.js";
 const ENDS = ["completed", "failed", "cancelled", "stopped", "extended"];
 const OTHERS = [
   ["predictions", "Simulation against reality", ["measured", "tuned", ...ENDS]],
-  ["simulators", "Tuned simulators", ["tuned", ...ENDS]],
   ["squared-error", "Squared error", ["tuned", ...ENDS]],
+  ["simulators", "Tuned simulators", ["tuned", ...ENDS]],
 ];
 const BANDS = [["", "as it tells most"], ["interval", "95 % interval"], ["sd", "standard deviation"]];
 
@@ -40,10 +41,16 @@ function card(page, kind, title, kinds, query, options = null, ...files) {
   const draw = async () => {
     saved.replaceChildren(figureFiles(kind, asked(), `gaplab-${page.id}-${kind}`, ...files));
     if (refresh) await refresh(asked());
-    else refresh = plot(place, kind, asked(), page.signal);
+    else await (refresh = plot(place, kind, asked(), page.signal)).drawn;
+    return kind === "predictions" && await isPending(page);
   };
   options?.addEventListener("change", draw);
   page.parts.add(place, kinds, draw);
   return h("section", { class: `card figure-${kind}`, "aria-labelledby": `title-${kind}` },
     h("div", { class: "titled" }, h("h2", { id: `title-${kind}` }, title), options), place, saved);
+}
+
+/** Whether predictions are still computed: they are physics, and go on with each question. */
+async function isPending({ id, signal }) {
+  return (await get(`/experiments/${id}/predictions`, {}, signal)).pending > 0;
 }

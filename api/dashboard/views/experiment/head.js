@@ -5,6 +5,7 @@ import { h, refill } from "../../lib/dom.js";
 import { download } from "../../lib/downloads.js";
 import { age, count, duration, spoken } from "../../lib/format.js";
 import { pill } from "../../lib/pill.js";
+import { fraction } from "../../lib/progress.js";
 import { edit } from "./editing.js";
 import { verbs } from "./verbs.js";
 
@@ -22,25 +23,34 @@ export function head(page) {
   const update = () => {
     const { experiment } = page;
     title.textContent = spoken(experiment.name);
-    document.title = `${title.textContent} · gaplab`;
+    const far = ENDED.includes(experiment.state) ? "" : `${percent(experiment.progress)} · `;
+    document.title = `${far}${title.textContent} · gaplab`;
     notes.textContent = experiment.notes ?? "";
     notes.hidden = !experiment.notes;
     refill(state, experiment.state, () => pill(experiment.state));
     bar.value = fraction(experiment.progress);
-    refill(facts, JSON.stringify([experiment.progress, experiment.priority, experiment.max_parallel, experiment.state, minute()]), () => factsOf(experiment));
+    const { progress, priority, max_parallel: most } = experiment;
+    refill(facts, JSON.stringify([progress, priority, most, experiment.state, minute()]), () => factsOf(experiment));
     refill(remarks, JSON.stringify([experiment.warnings, experiment.reasons]), () => remarksOf(experiment));
     asked.update();
   };
   const pen = h("button", { type: "button", class: "quiet small", onclick: () => edit(page) }, "Edit name and notes");
   update();
   const element = h("header", { class: "experiment-head" }, trail(page),
-    h("div", { class: "titled" }, title, state, pen), notes, bar, facts, remarks, asked.element, links(page));
+    h("div", { class: "titled" }, title, state, pen), h("p", { class: "what" }, what(page.experiment)), notes, bar, facts, remarks, asked.element, links(page));
   return { element, update };
 }
 
-/** How much of the work is behind it, between 0 and 1; of rollouts, which is where the time goes. */
-export function fraction(progress) {
-  return progress.rollouts ? Math.min(1, (progress.rollouts_done + progress.rollouts_saved) / progress.rollouts) : 0;
+const percent = (progress) => `${Math.floor(100 * fraction(progress))} %`;
+
+/** What it is, in a line: strategy, robot, engines, what is tuned. */
+function what({ strategy, spec }) {
+  const own = spec.engine?.name;
+  const other = spec.reality?.engine?.name;
+  const engines = own && other && own !== other ? `${own}, reality in ${other}` : own;
+  const tuned = (spec.tunables ?? []).map((each) => each.name.replaceAll("_", " ")).join(", ");
+  const tunes = tuned && strategy !== "direct" ? `tunes ${tuned}` : null;
+  return [spoken(strategy), spec.robot?.name.replaceAll("_", " "), engines, tunes].filter(Boolean).join(" · ");
 }
 
 /** Times are told in minutes and hours: what they say is put right each minute. */
@@ -59,7 +69,7 @@ function factsOf(experiment) {
   const saved = progress.rollouts_saved ? `, ${count(progress.rollouts_saved)} not needed` : "";
   const broken = progress.rollouts_failed ? `, physics failed in ${count(progress.rollouts_failed)}` : "";
   return [
-    ["Done", `${Math.floor(100 * fraction(progress))} %`],
+    ["Done", percent(progress)],
     ["Repetitions", `${count(progress.completed)} of ${count(progress.repetitions)}${failed}`],
     ["Iterations", `${count(progress.iterations_done)} of ${count(progress.iterations)}`],
     ["Rollouts", `${count(progress.rollouts_done)} of ${count(progress.rollouts)}${saved}${broken}`],
@@ -79,14 +89,18 @@ function times({ state, progress, created_at: created, started_at: started, ende
 }
 
 function remarksOf({ warnings, reasons }) {
-  const list = (words, each, kind) => each.length ? h("div", { class: `remark ${kind}` }, h("strong", {}, words), h("ul", {}, ...each.map((one) => h("li", {}, one)))) : null;
-  return [list("Warnings", warnings, "warned"), list("Why repetitions failed", reasons, "broken")].filter(Boolean);
+  const list = (words, each, kind) =>
+    h("div", { class: `remark ${kind}` }, h("strong", {}, words), h("ul", {}, ...each.map((one) => h("li", {}, one))));
+  return [
+    ...(warnings.length ? [list("Warnings", warnings, "warned")] : []),
+    ...(reasons.length ? [list("Why repetitions failed", reasons, "broken")] : []),
+  ];
 }
 
 function links({ id, experiment }) {
   const toy = experiment.spec.robot?.name === "toy_function";
   return h("p", { class: "links" },
     h("a", { href: `#/compare?experiments=${id}` }, "Compare with others"), " ",
-    toy ? h("a", { href: `#/toy?experiment=${id}` }, "Step through the function") : null, " ",
+    toy ? h("a", { href: `#/toy?experiment=${id}` }, "Step through the function") : h("a", { href: `#/replay?experiment=${id}` }, "Replay a controller"), " ",
     download("Archive of everything (.zip)", `/experiments/${id}/export`, {}, `gaplab-${id}.zip`));
 }

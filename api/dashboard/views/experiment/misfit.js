@@ -2,7 +2,7 @@
 
 import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
-import { number, spoken } from "../../lib/format.js";
+import { spoken } from "../../lib/format.js";
 import { empty } from "../../lib/states.js";
 import { table } from "../../lib/table.js";
 
@@ -18,9 +18,10 @@ export function misfit(page) {
       return;
     }
     const names = points[0].tunables.map((each) => each.name);
+    const note = "Mean ± SD over repetitions. ⊣ and ⊢: a share of them is stuck at the lower or the upper bound. Iteration 0 is not tuned.";
     const columns = ["Iteration", `Error on its samples (${unit})`, `Gap of what it evolved (${unit})`, ...names.map(spoken), "n"];
-    place.replaceChildren(h("ul", { class: "said-of-it" }, ...remarks.map((each) => h("li", {}, each))), table("Misfit by iteration", columns, points.map(row)),
-      h("p", { class: "note" }, "Mean ± SD over repetitions. ⊣ and ⊢: a share of them is stuck at the lower or the upper bound. Iteration 0 is not tuned."));
+    place.replaceChildren(h("ul", { class: "said-of-it" }, ...remarks.map((each) => h("li", {}, each))),
+      table("Misfit by iteration", columns, points.map(row)), h("p", { class: "note" }, note));
   });
   return [place];
 }
@@ -34,4 +35,4 @@ const spread = ({ mean, sd }) => (mean === null ? "–" : `${small(mean)}${sd ==
 
 const bound = (share, sign) => (share ? ` ${sign} ${Math.round(100 * share)} %` : "");
 
-const small = (value) => (value && Math.abs(value) < 0.001 ? value.toExponential(1) : number(value));
+const small = (value) => String(Number(value.toPrecision(3))).replace("-", "−");

@@ -40,5 +40,6 @@ function use({ since, repetitions, provenance: under }) {
     ["Commit", commit], ["Python", under.python], ["Libraries", versions.join(", ")],
     ["Machine", `${under.processor}, ${under.architecture}`], ["System", under.system], ["Version of the spec", under.spec_version],
   ];
-  return framed("Provenance", h("dl", { class: "facts stacked" }, ...facts.map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, String(value))))));
+  const line = ([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, String(value)));
+  return framed("Provenance", h("dl", { class: "facts stacked" }, ...facts.map(line)));
 }

@@ -9,7 +9,9 @@ import { table } from "../../lib/table.js";
 const KINDS = ["transferred", "probed", "extended", "cancelled", "paused", "completed",
   ...["claimed", "completed", "failed", "lost", "handed_back", "paused", "stopped", "cancelled"].map((each) => `repetition_${each}`)];
 
-/** A line for each repetition. */
+const MANY = 50;
+
+/** A line for each repetition, the first of them at first. */
 export function repetitions(page) {
   const place = h("div");
   const attempts = h("div", { role: "status" });
@@ -18,14 +20,22 @@ export function repetitions(page) {
     attempts.replaceChildren(h("h3", {}, `Attempts at repetition ${number}`), attemptsTable(number, found));
     attempts.scrollIntoView({ block: "nearest" });
   };
-  page.parts.add(place, KINDS, async () => {
+  let shown = MANY;
+  const load = async () => {
     const found = await get(`/experiments/${page.id}/repetitions`, {}, page.signal);
     const focused = place.contains(document.activeElement) ? document.activeElement.dataset.repetition : null;
     const columns = ["Repetition", "State", "Iterations", "Rollouts", "Attempts", "Began", "Took", "Why it failed"];
-    place.replaceChildren(table("Repetitions", columns, found.map((each) => row(each, show))));
+    place.replaceChildren(table("Repetitions", columns, found.slice(0, shown).map((each) => row(each, show))));
+    more.hidden = found.length <= shown;
+    more.textContent = `Show more of ${count(found.length)}`;
     if (focused) place.querySelector(`[data-repetition="${focused}"]`)?.focus();
-  });
-  return [place, attempts];
+  };
+  const more = h("button", { type: "button", class: "quiet small", hidden: true, onclick: () => {
+    shown *= 4;
+    load().catch(() => {});
+  } });
+  page.parts.add(place, KINDS, load);
+  return [place, h("p", { class: "pages" }, more), attempts];
 }
 
 function row(each, show) {

@@ -7,14 +7,14 @@ import { empty } from "../../lib/states.js";
 import { table } from "../../lib/table.js";
 
 const MANY = 25;
+const KIND = [["", "samples and probes"], ["sample", "samples, which are learned from"], ["probe", "probes, which are only looked at"]];
 const KINDS = ["measured", "probed"];
 const COLUMNS = ["Repetition", "Iteration", "What for", "Fitness in reality", "Measured by", "When", "Look"];
 
 /** The table, with what it is limited to above and its pages beneath. */
 export function samples(page) {
   const place = h("div");
-  const kind = h("select", {}, ...[["", "samples and probes"], ["sample", "samples, which are learned from"], ["probe", "probes, which are only looked at"]]
-    .map(([value, words]) => h("option", { value }, words)));
+  const kind = h("select", {}, ...KIND.map(([value, words]) => h("option", { value }, words)));
   const repetition = h("input", { type: "number", min: 0, max: 1000000, step: 1, placeholder: "all", class: "short" });
   const cursors = [null];  // of this page and those before it
   let next = null;

@@ -37,7 +37,11 @@ export function verbs(page) {
   };
   const buttons = Object.entries(ASKED).map(([verb, words]) =>
     h("button", { type: "button", class: "quiet", dataset: { verb }, onclick: () => press(verb) }, words));
-  const turn = h("button", { type: "button", class: "quiet", dataset: { verb: "schedule" }, onclick: () => { said.textContent = ""; schedule(page); } }, "Change its turn…");
+  const change = () => {
+    said.textContent = "";
+    schedule(page);
+  };
+  const turn = h("button", { type: "button", class: "quiet", dataset: { verb: "schedule" }, onclick: change }, "Change its turn…");
   const update = () => {
     for (const button of buttons) {
       const why = refusal(button.dataset.verb, page.experiment.state);
@@ -45,7 +49,8 @@ export function verbs(page) {
       button.title = why ?? "";
     }
   };
-  return { element: h("div", { class: "verbs" }, h("div", { role: "group", "aria-label": "Ask of this experiment" }, ...buttons, turn), said), update };
+  const group = h("div", { role: "group", "aria-label": "Ask of this experiment" }, ...buttons, turn);
+  return { element: h("div", { class: "verbs" }, group, said), update };
 }
 
 const ways = { pause: atOnce("pause"), resume: atOnce("resume"), stop, cancel, extend };
@@ -69,7 +74,8 @@ async function tell(page, verb, body = undefined) {
 function stop(page) {
   ask({
     title: "Stop this experiment?",
-    words: "Running repetitions finish their step, then it is completed with what is there. If no repetition has a point of the curve yet, it ends as cancelled.",
+    words: "Running repetitions finish their step, then it is completed with what is there. " +
+      "If no repetition has a point of the curve yet, it ends as cancelled.",
     action: "Stop it", danger: true, act: () => tell(page, "stop"),
   }, page.signal);
 }
@@ -87,7 +93,8 @@ function extend(page) {
   const whole = { type: "number", required: true, step: 1 };
   ask({
     title: "Extend this experiment",
-    words: "Totals, not what is added. What is there stands, and the whole is as if it had been submitted so. With the totals that it has, one that was stopped is brought to its end.",
+    words: "Totals, not what is added. What is there stands, and the whole is as if it had been submitted so. " +
+      "With the totals that it has, one that was stopped is brought to its end.",
     fields: [
       { name: "iterations", label: "Iterations in all", value: iterations, min: iterations, max: 1000, ...whole },
       { name: "repetitions", label: "Repetitions in all", value: repetitions, min: repetitions, max: 10000, ...whole },
@@ -99,12 +106,13 @@ function extend(page) {
 
 function schedule(page) {
   const { priority, max_parallel: most } = page.experiment;
+  const whole = { type: "number", step: 1 };
   ask({
     title: "Change its turn",
     words: "This changes no number, and stops nothing that runs.",
     fields: [
-      { name: "priority", label: "Priority", value: priority, type: "number", min: -10, max: 10, step: 1, required: true, hint: "−10 to 10; the higher is computed first" },
-      { name: "most", label: "Repetitions at once", value: most, type: "number", min: 1, max: 10000, step: 1, hint: "empty: as many as have a core" },
+      { name: "priority", label: "Priority", value: priority, min: -10, max: 10, required: true, hint: "−10 to 10; the higher is computed first", ...whole },
+      { name: "most", label: "Repetitions at once", value: most, min: 1, max: 10000, hint: "empty: as many as have a core", ...whole },
     ],
     action: "Change it",
     act: async (values) => {

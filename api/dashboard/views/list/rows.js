@@ -8,10 +8,14 @@ import { say } from "../../lib/rows.js";
 import { tick } from "./selection.js";
 
 /** The columns, with what a narrow window leaves out. */
-const COLUMNS = [["", "ticks"], ["Name", "name"], ["State", "stands"], ["Progress", "progress"], ["Time left", "left wide"], ["Best fitness", "best"], ["Submitted", "age wide"]];
+const COLUMNS = [
+  ["", "ticks"], ["Name", "name"], ["State", "stands"], ["Progress", "progress"],
+  ["Time left", "left wide"], ["Best fitness", "best"], ["Submitted", "age wide"],
+];
 
 /** The head of the list. */
-export const heads = () => COLUMNS.map(([words, key]) => h("th", { scope: "col", class: key, title: TOLD[key] ?? null }, words || h("span", { class: "away" }, "Select")));
+export const heads = () => COLUMNS.map(([words, key]) =>
+  h("th", { scope: "col", class: key, title: TOLD[key] ?? null }, words || h("span", { class: "away" }, "Select")));
 
 const TOLD = { best: "The best recorded fitness of each repetition so far, on average; of a study, its best experiment’s" };
 

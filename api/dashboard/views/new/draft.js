@@ -23,7 +23,11 @@ export function draftOf(spec, catalogue) {
     tunables: tunablesOf((spec.tunables ?? USUAL_TUNABLES).map((each) => (typeof each === "string" ? { name: each } : each)), catalogue),
     real: plugin(spec.reality?.engine),
     truth: { ...spec.reality?.parameters },
-    budget: { preset: budget.preset ?? "paper", reuse_transfer: budget.reuse_transfer ?? true, ...Object.fromEntries(EVALUATIONS.map((each) => [each, budget[each] ?? ""])) },
+    budget: {
+      preset: budget.preset ?? "paper",
+      reuse_transfer: budget.reuse_transfer ?? true,
+      ...Object.fromEntries(EVALUATIONS.map((each) => [each, budget[each] ?? ""])),
+    },
   };
 }
 

@@ -80,7 +80,8 @@ export function optionFields(plugin, options, pointer, { places, changed }) {
     const hint = schema.description ?? "";
     const choices = schema.enum ? [["", `${spoken(usual)}, as usual`], ...schema.enum.map((each) => [each, spoken(each)])] : null;
     const attributes = choices ? {} : { placeholder: usual, inputmode: "decimal" };
-    return field({ label: spoken(name), hint, value: options[name], set, places, choices, pointer: () => (pointer() === null ? null : `${pointer()}/options/${name}`), ...attributes });
+    const at = () => (pointer() === null ? null : `${pointer()}/options/${name}`);
+    return field({ label: spoken(name), hint, value: options[name], set, places, choices, pointer: at, ...attributes });
   });
   return fields.length ? h("div", { class: "fields" }, ...fields) : null;
 }

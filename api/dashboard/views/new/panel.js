@@ -22,7 +22,10 @@ export function panel() {
     const json = JSON.stringify(spec, null, 2);
     code.json.textContent = json;
     code.curl.textContent = `curl -X POST ${base}studies \\\n  -H 'Content-Type: application/json' \\\n  -d ${quoted(JSON.stringify(spec))}`;
-    code.python.textContent = `import json\n\nfrom gaplab import Client\n\nspec = json.loads(${pythonText(json)})\nwith Client("${base.replace(/\/$/, "")}") as gaplab:\n    study = gaplab.submit(spec)`;
+    code.python.textContent = [
+      "import json", "", "from gaplab import Client", "", `spec = json.loads(${pythonText(json)})`,
+      `with Client("${base.replace(/\/$/, "")}") as gaplab:`, "    study = gaplab.submit(spec)",
+    ].join("\n");
   };
   const estimate = (found) => cost.replaceChildren(...costs(found));
   const refuse = (errors, words) => {
@@ -47,8 +50,9 @@ function costs({ rollouts, seconds, cores, core_seconds: coreSeconds, engines, e
   const idle = supervisors ? null : h("p", { class: "remark" }, "No worker is running now: it will wait until one does (gaplab serve, or python -m workers).");
   const rows = experiments.map((each) => h("tr", {}, h("th", { scope: "row" }, spoken(each.name)),
     h("td", {}, `${count(each.repetitions)} ×`), h("td", {}, count(each.rollouts)), h("td", {}, duration(each.core_seconds))));
+  const heads = ["Experiment", "Repetitions", "Rollouts", "One core"].map((each) => h("th", { scope: "col" }, each));
   const table = h("table", {}, h("caption", { class: "away" }, "Cost of each experiment"),
-    h("thead", {}, h("tr", {}, ...["Experiment", "Repetitions", "Rollouts", "One core"].map((each) => h("th", { scope: "col" }, each)))), h("tbody", {}, ...rows));
+    h("thead", {}, h("tr", {}, ...heads)), h("tbody", {}, ...rows));
   return [big, work, idle, ...paces, h("details", {}, h("summary", {}, "By experiment"), framed("Cost of each experiment", table))].filter(Boolean);
 }
 

@@ -28,7 +28,8 @@ export function extent(form) {
 export function strategies(form) {
   const { draft, places, catalogue } = form;
   const trouble = troubleRoom();
-  const list = h("div", { class: "strategies" }, ...draft.strategies.map((each) => strategy(form, each, catalogue.strategies.find((one) => one.name === each.name))));
+  const list = h("div", { class: "strategies" }, ...draft.strategies.map((each) =>
+    strategy(form, each, catalogue.strategies.find((one) => one.name === each.name))));
   places.add(() => "/strategies", list, trouble);
   const all = (on) => h("button", { type: "button", class: "link", onclick: () => {
     for (const each of draft.strategies) each.on = on;
@@ -53,7 +54,8 @@ function strategy(form, each, plugin) {
   const options = optionFields(plugin, each.options, pointer, form);
   const box = tickField(h("span", {}, spoken(each.name), h("small", {}, plugin.summary)), each.on, (on) => { each.on = on; form.remake(); });
   places.add(pointer, box.querySelector("input"), trouble);
-  const more = options && each.on ? h("details", { open: Object.keys(each.options).length > 0 }, h("summary", {}, "Options"), options, h("p", {}, again, " ", away)) : null;
+  const open = Object.keys(each.options).length > 0;
+  const more = options && each.on ? h("details", { open }, h("summary", {}, "Options"), options, h("p", {}, again, " ", away)) : null;
   return h("div", { class: "strategy" }, box, trouble, more);
 }
 
@@ -85,20 +87,30 @@ function choice(form, label, ref, plugins, pointer, own = null) {
 
 /** What is tuned, between which bounds. */
 export function tunables(form) {
-  const { draft, places, catalogue } = form;
-  const rows = draft.tunables.map((each) => {
-    const plugin = catalogue.tunables.find((one) => one.name === each.name);
-    const at = () => (each.on ? `/tunables/${ticked(draft.tunables).indexOf(each)}` : null);
-    const trouble = troubleRoom();
-    const box = tickField(h("span", {}, spoken(each.name), h("small", {}, plugin.summary)), each.on, (on) => { each.on = on; form.remake(); });
-    places.add(at, box.querySelector("input"), trouble);
-    const bound = (side) => numberField({ label: side === "lower" ? "From" : "To", value: each[side], set: form.set(each, side), places, placeholder: String(plugin.details[side]), pointer: () => (at() === null ? null : `${at()}/${side}`), class: "short", "aria-label": `${spoken(each.name)} ${side === "lower" ? "from" : "to"}` });
-    return h("div", { class: "tunable" }, box, each.on ? h("div", { class: "bounds" }, bound("lower"), bound("upper"), h("span", { class: "note" }, plugin.details.unit === "1" ? "" : plugin.details.unit)) : null, trouble);
-  });
   const trouble = troubleRoom();
-  const list = h("div", {}, ...rows);
-  places.add(() => "/tunables", list, trouble);
+  const list = h("div", {}, ...form.draft.tunables.map((each) => tunable(form, each)));
+  form.places.add(() => "/tunables", list, trouble);
   return part("What is tuned", trouble, list);
+}
+
+function tunable(form, each) {
+  const { draft, places, catalogue } = form;
+  const { summary, details } = catalogue.tunables.find((one) => one.name === each.name);
+  const at = () => (each.on ? `/tunables/${ticked(draft.tunables).indexOf(each)}` : null);
+  const tick = (on) => {
+    each.on = on;
+    form.remake();
+  };
+  const box = tickField(h("span", {}, spoken(each.name), h("small", {}, summary)), each.on, tick);
+  const trouble = troubleRoom();
+  places.add(at, box.querySelector("input"), trouble);
+  const bound = (side, words) => numberField({
+    label: words, "aria-label": `${spoken(each.name)} ${words.toLowerCase()}`, class: "short", placeholder: String(details[side]),
+    value: each[side], set: form.set(each, side), places, pointer: () => (at() === null ? null : `${at()}/${side}`),
+  });
+  const unit = h("span", { class: "note" }, details.unit === "1" ? "" : details.unit);
+  const bounds = each.on ? h("div", { class: "bounds" }, bound("lower", "From"), bound("upper", "To"), unit) : null;
+  return h("div", { class: "tunable" }, box, bounds, trouble);
 }
 
 /** The reality that is asked: its engine and its hidden parameters. */
@@ -113,15 +125,27 @@ export function reality(form) {
     h("div", { class: "fields" }, ...fields));
 }
 
+const SEARCHES = [
+  ["controller_evaluations", "Search for the transferred controller"],
+  ["selection_evaluations", "Search for the next sample"],
+  ["simulator_evaluations", "Search for a simulator"],
+];
+
 /** How much is computed. */
 export function budget(form) {
-  const { draft, places, catalogue } = form;
-  const preset = catalogue.budgets.find((each) => each.name === draft.budget.preset);
-  const evaluations = [["controller_evaluations", "Search for the transferred controller"], ["selection_evaluations", "Search for the next sample"], ["simulator_evaluations", "Search for a simulator"]];
-  const set = (name) => { draft.budget.preset = name; form.remake(); };
+  const { draft: { budget: found }, places, catalogue: { budgets } } = form;
+  const preset = budgets.find((each) => each.name === found.preset);
+  const choices = budgets.map((each) => [each.name, spoken(each.name)]);
+  const set = (name) => {
+    found.preset = name;
+    form.remake();
+  };
+  const numbers = SEARCHES.map(([name, label]) => numberField({
+    label, hint: "evaluations", placeholder: count(preset?.[name]), value: found[name], set: form.set(found, name), places, pointer: `/budget/${name}`,
+  }));
   return part("Budget",
-    field({ label: "Preset", value: draft.budget.preset, set, pointer: "/budget", places, choices: catalogue.budgets.map((each) => [each.name, spoken(each.name)]) }),
-    h("div", { class: "fields" }, ...evaluations.map(([name, label]) => numberField({
-      label, hint: "evaluations", value: draft.budget[name], set: form.set(draft.budget, name), places, placeholder: count(preset?.[name]), pointer: `/budget/${name}` }))),
-    tickField("Simulated fit tries the controller that was just transferred, instead of searching for it again", draft.budget.reuse_transfer, form.set(draft.budget, "reuse_transfer")));
+    field({ label: "Preset", value: found.preset, set, pointer: "/budget", places, choices }),
+    h("div", { class: "fields" }, ...numbers),
+    tickField("Simulated fit tries the controller that was just transferred, instead of searching for it again",
+      found.reuse_transfer, form.set(found, "reuse_transfer")));
 }

@@ -17,7 +17,8 @@ export function edit(page) {
       await page.look();
       ({ tag } = page);
       const { name: theirs, notes: written } = page.study;
-      throw new Problem({ ...error, detail: `Somebody changed it meanwhile: its name is “${theirs}”, its notes are “${written ?? ""}”. Save again to write over that.` });
+      const found = `its name is “${theirs}”, its notes are “${written ?? ""}”`;
+      throw new Problem({ ...error, detail: `Somebody changed it meanwhile: ${found}. Save again to write over that.` });
     }
     await page.look();
   };

@@ -6,7 +6,12 @@ import { h } from "../../lib/dom.js";
 import { count } from "../../lib/format.js";
 import { PERMITTED } from "../experiment/verbs.js";
 
-const VERBS = [["pause", "Pause", "paused"], ["resume", "Resume", "resumed"], ["stop", "Stop…", "stopped"], ["cancel", "Cancel…", "cancelled"], ["extend", "Extend…", "extended"]];
+const CONFLICT = 409;
+
+const VERBS = [
+  ["pause", "Pause", "paused"], ["resume", "Resume", "resumed"], ["stop", "Stop…", "stopped"],
+  ["cancel", "Cancel…", "cancelled"], ["extend", "Extend…", "extended"],
+];
 
 /** The experiments that permit the verb. */
 const willing = (study, verb) => study.experiments.filter((each) => PERMITTED[verb].includes(each.state));
@@ -14,7 +19,10 @@ const willing = (study, verb) => study.experiments.filter((each) => PERMITTED[ve
 /** The buttons, and `update()` for when states are others. A refused one can be reached, and says why. */
 export function verbs(page) {
   const said = h("p", { class: "said", role: "status" });
-  const refusal = (verb, done) => (willing(page.study, verb).length ? "" : `None of its experiments can be ${done} now: only one that is ${PERMITTED[verb].join(", ").toLowerCase()} can.`);
+  const refusal = (verb, done) => {
+    const states = PERMITTED[verb].join(" or ").toLowerCase();
+    return willing(page.study, verb).length ? "" : `None of its experiments can be ${done} now: only one that is ${states} can.`;
+  };
   const press = async (verb, done) => {
     said.textContent = refusal(verb, done);
     if (said.textContent) return;
@@ -52,7 +60,8 @@ const which = (page, verb) => {
 function stop(page) {
   ask({
     title: "Stop this study?",
-    words: `${which(page, "stop")} end: running repetitions finish their step, then each is completed with what is there. One that has no point of its curve yet ends as cancelled.`,
+    words: `${which(page, "stop")} end: running repetitions finish their step, then each is completed with what is there. `
+      + "One that has no point of its curve yet ends as cancelled.",
     action: "Stop it", danger: true, act: () => tell(page, "stop"),
   }, page.signal);
 }
@@ -65,7 +74,22 @@ function cancel(page) {
   }, page.signal);
 }
 
-/** Experiments are extended one by one; the direct baseline has no iterations to add. */
+/** Experiments are extended one by one; the direct baseline has no iterations to add, and one that is large enough is left alone. */
+async function enlarge(some, wanted) {
+  const refused = [];
+  for (const { id, strategy, spec } of some) {
+    const total = (name) => Math.max(spec[name], Number(wanted[name]));
+    const iterations = strategy === "direct" ? {} : { iterations: total("iterations") };
+    try {
+      await post(`/experiments/${id}/extend`, { ...iterations, repetitions: total("repetitions") });
+    } catch (error) {
+      if (error.status !== CONFLICT) throw error;
+      refused.push(error);
+    }
+  }
+  if (refused.length === some.length) throw refused[0];
+}
+
 function extend(page) {
   const some = willing(page.study, "extend");
   const iterations = Math.max(...some.map((each) => each.spec.iterations));
@@ -73,17 +97,15 @@ function extend(page) {
   const whole = { type: "number", required: true, step: 1 };
   ask({
     title: "Extend this study",
-    words: `${which(page, "extend")} become as large as this, in all. What is there stands, and the whole is as if it had been submitted so. One that is larger already stays as it is.`,
+    words: `${which(page, "extend")} become as large as this, in all. What is there stands, and the whole is as if it had been `
+      + "submitted so. One that is larger already stays as it is.",
     fields: [
       { name: "iterations", label: "Iterations in all", value: iterations, min: 1, max: 1000, ...whole },
       { name: "repetitions", label: "Repetitions in all", value: repetitions, min: 1, max: 10000, ...whole },
     ],
     action: "Extend it",
     act: async (values) => {
-      for (const { id, spec } of some) {
-        const larger = (name) => Math.max(spec[name], Number(values[name]));
-        await post(`/experiments/${id}/extend`, { iterations: larger("iterations"), repetitions: larger("repetitions") });
-      }
+      await enlarge(some, values);
       await page.look();
     },
   }, page.signal);
