@@ -1,6 +1,9 @@
 """What the shell offers while an argument is typed; a service that does not answer at once has nothing to offer."""
 
 from collections.abc import Callable, Iterator
+from typing import Any
+
+import httpx2
 
 from api.client import Client, ServiceError, ServiceUnreachable
 
@@ -9,6 +12,13 @@ PATIENCE_S = 1.5
 
 MOST = 50
 KINDS = ("strategies", "robots", "engines", "tunables", "optimizers")
+
+
+class _Hasty(Client):
+    """A client that asks once: who presses a key again asks again."""
+
+    def _patiently(self, method: str, path: str, **request: Any) -> httpx2.Response:  # noqa: ANN401 - as the client's
+        return self._request(method, path, **request)
 
 
 def ids(incomplete: str) -> list[tuple[str, str]]:
@@ -43,7 +53,7 @@ def _newest(client: Client, incomplete: str) -> Iterator[tuple[str, str]]:
 
 def _offered(of: Callable[[Client], Iterator[tuple[str, str]]]) -> list[tuple[str, str]]:
     try:
-        with Client(timeout_s=PATIENCE_S) as client:
+        with _Hasty(timeout_s=PATIENCE_S) as client:
             return list(of(client))
     except (ServiceError, ServiceUnreachable, ValueError):
         return []

@@ -3,7 +3,6 @@
 import json
 import sys
 import threading
-import time
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
@@ -233,17 +232,15 @@ def test_a_notebook_gets_one_display_that_is_replaced(
     def show(html: Any, display_id: bool) -> Any:
         assert display_id
         shown.append(html.data)
+        finish()
         return handle
 
     monkeypatch.setattr("IPython.get_ipython", lambda: SimpleNamespace(kernel=object()))
     monkeypatch.setattr("IPython.display.display", show)
     study = client.submit(BOTH | {"name": "a <b> & c"})
-    worker = threading.Timer(0.3, finish)
-    worker.start()
 
     client.wait(study.id, every_s=0.1)
 
-    worker.join()
     assert len(shown) > 1
     assert "QUEUED" in shown[0]
     assert shown[-1].count("COMPLETED") == 3
@@ -375,10 +372,8 @@ def test_the_service_of_the_environment_is_the_one_that_is_meant(monkeypatch: py
 
     with Client() as client:
         assert client.url == "http://127.0.0.1:7"
-        began = time.monotonic()
         with pytest.raises(ServiceUnreachable, match="no service answers"):
             client.studies()
-        assert time.monotonic() - began < 60  # it is not waited for
 
 
 def test_events_and_lists_are_values_that_json_can_hold(client: Client):
