@@ -43,7 +43,7 @@ __all__ = [
 def main() -> None:
     """Run the command; what goes wrong is a sentence and an exit code, never a traceback."""
     try:
-        app()
+        app(prog_name="gaplab")
     except ServiceError as error:
         _leave(display.problem(error.problem), code_of(error))
     except (ServiceUnreachable, CommandError) as error:

@@ -64,13 +64,13 @@ class Figure:
 class Figures:
     """A part of the client; its methods raise what the client's do."""
 
-    def figure(self: "Client", *ids: str, kind: str = "curves", **options: str | float | bool | None) -> Figure:
+    def figure(self: "Client", *ids: str, of: str = "curves", **options: str | float | bool | None) -> Figure:
         """A figure of experiments and studies.
 
         Args:
             ids: of experiments, or of studies for all of their experiments.
-            kind: what is drawn; `GET /figures/…` of the service's documentation lists them.
-            options: of that kind, like band="sd" or title="…".
+            of: what is drawn, like "curves" or "predictions"; `figure_kinds` lists them.
+            options: of that kind, like band="sd" or title="…"; docs/figures.md says which.
 
         Raises:
             ServiceError: there is no such id; no such kind and no such option show when the figure is looked at.
@@ -83,9 +83,9 @@ class Figures:
         asked: dict[str, Any] = {name: those for name, those in which.items() if those} | options
 
         def draw(format: str) -> bytes:  # noqa: A002 - as the API says
-            return self._get(f"{_FIGURES}{kind}", **asked, format=format).content
+            return self._get(f"{_FIGURES}{of}", **asked, format=format).content
 
-        return Figure(kind, ids, draw)
+        return Figure(of, ids, draw)
 
     def figure_kinds(self: "Client") -> tuple[str, ...]:
         """The kinds of figures that the service draws."""

@@ -32,7 +32,7 @@ def figure(
             msg = f"{file} has no suffix of a figure; there is {', '.join(FORMATS)}"
             raise typer.BadParameter(msg, param_hint="--out")
     with connect(url) as client:
-        drawn = client.figure(*ids, kind=kind, **dict(map(_option, options or [])))
+        drawn = client.figure(*ids, of=kind, **dict(map(_option, options or [])))
         for file in out:
             drawn.content(_format(file))
     files = [drawn.save(file) for file in out]
@@ -49,7 +49,7 @@ def _format(file: Path) -> str:
 
 def _option(text: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
-    if not equals or not name.isidentifier() or name in {"kind", "format", "study", "experiment"}:
+    if not equals or not name.isidentifier() or name in {"of", "format", "study", "experiment"}:
         msg = f"{text!r} sets nothing; write NAME=VALUE, as in band=sd"
         raise typer.BadParameter(msg, param_hint="--set")
     return name, value

@@ -289,7 +289,7 @@ def test_a_figure_of_an_unknown_format_or_kind_or_id_is_a_sentence(client: Clien
     with pytest.raises(ValueError, match="there is no format 'docx' of figures; there is svg, png"):
         client.figure(id).save(tmp_path / "mine.docx")
     with pytest.raises(ServiceError) as unknown:
-        client.figure(id, kind="portrait").content("svg")
+        client.figure(id, of="portrait").content("svg")
     with pytest.raises(ServiceError, match="there is no"):
         client.figure("nope")
 

@@ -265,7 +265,7 @@ def test_where_no_service_answers_nothing_is_offered(monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_the_shell_gets_a_script_and_the_script_gets_commands_and_ids(url: str, study: str, shell: str):
     def ask(**environment: str) -> str:
-        command = [sys.executable, "-c", "import sys; sys.argv[0] = 'gaplab'; from api.cli import main; main()"]
+        command = [sys.executable, "-m", "api.cli"]
         shown = os.environ | {"GAPLAB_URL": url} | environment
         done = subprocess.run(command, env=shown, capture_output=True, text=True, check=False)
         assert "Traceback" not in done.stderr
@@ -278,6 +278,19 @@ def test_the_shell_gets_a_script_and_the_script_gets_commands_and_ids(url: str, 
         shell, {"_TYPER_COMPLETE_ARGS": "gaplab show ", "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
     )
     assert study in ask(_GAPLAB_COMPLETE=f"complete_{shell}", **typed)
+
+
+def test_completion_installs_itself_for_the_shell_that_it_is_asked_from(tmp_path: Path):
+    ask = f"'{sys.executable}' -m api.cli --install-completion; true"  # bash would become the last command itself
+    environment = os.environ | {"HOME": str(tmp_path)}
+
+    done = subprocess.run(["bash", "-c", ask], env=environment, capture_output=True, text=True, check=False)
+
+    assert "bash completion installed" in done.stdout, done.stderr
+    (script,) = (tmp_path / ".bash_completions").iterdir()
+    assert script.name == "gaplab.sh"
+    assert "complete_bash" in script.read_text()
+    assert str(script) in (tmp_path / ".bashrc").read_text()
 
 
 def test_in_a_log_watching_is_lines(gaplab: Gaplab, study: str, finish: Callable[[], None]):
