@@ -3,9 +3,10 @@
 import socket
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import IO
 
 from api.client import Client
@@ -77,13 +78,13 @@ def local_service(folder: str | Path = "results/local", *, plugins: str | Path |
 
 
 def _started(
-    database_url: str, log: IO[bytes], added: dict[str, str] | None = None, *, workers: bool = True
+    database_url: str, log: IO[bytes], added: Mapping[str, str] = MappingProxyType({}), *, workers: bool = True
 ) -> tuple["subprocess.Popen[bytes]", str]:
     """A service's process, and where it will answer."""
     port = _free_port()
     environment = {"GAPLAB_DATABASE_URL": database_url, "GAPLAB_PORT": str(port), "GAPLAB_HOST": "127.0.0.1"}
     module = ("api.cli", "serve") if workers else ("api",)
-    process = start(*module, environment=environment | (added or {}), log=log)
+    process = start(*module, environment=environment | dict(added), log=log)
     return process, f"http://127.0.0.1:{port}"
 
 

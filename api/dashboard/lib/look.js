@@ -21,7 +21,7 @@ export function dressed({ data, layout: given }, canvas) {
   const axis = (each) => ({
     showline: true, linecolor: ink, linewidth: 1, ticks: "outside", ticklen: 4, tickcolor: ink, gridcolor: line, zerolinecolor: line,
     showgrid: layout[each].showgrid ?? each.startsWith("y"), ...layout[each],
-    ...(narrow ? { title: { ...layout[each].title, font: { size: 11 } } } : {}),
+    title: { ...layout[each].title, font: { size: narrow ? 12 : 13 } },
   });
   return {
     data: data.map((each) => worn(each, ink)),
