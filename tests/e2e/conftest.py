@@ -2,8 +2,8 @@
 
 `visit(address, dark=…, width=…)` opens the page in Chromium, and fails the test if the console, a script or a request
 reports an error; `visit.forgive(pattern, …)` names those that a test causes. `archive` is the API alone on a database
-with ended studies, `api` the same on that of `sqlite_store`, which a test fills as workers would, `shared_service` the
-real service with workers.
+with ended studies, `api` the same on the one of `written`, which tests fill as workers would, `shared_service` the real
+service with workers.
 """
 
 import shutil
@@ -12,7 +12,10 @@ from pathlib import Path
 import pytest
 
 from benchmarks.filling import fill
+from schemas.lifecycle import OPEN
 from services.archives import import_archive
+from services.experiments import cancel_experiment, list_experiments
+from services.listing import Which
 from services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import Chromium
@@ -41,13 +44,29 @@ def visit(browser):
     browser.end()
 
 
-@pytest.fixture
-def api(sqlite_url, tmp_path):
-    """The API alone on the database of `sqlite_store`, to which a test writes as workers would."""
-    api = Api(sqlite_url, tmp_path / "api.log").start()
+@pytest.fixture(scope="session")
+def written_file(folder, sqlite_template):
+    """The database of `api`."""
+    return Path(shutil.copy(sqlite_template, folder / "written.db"))
+
+
+@pytest.fixture(scope="session")
+def api(written_file, folder):
+    """The API alone, on a database that tests fill as workers would."""
+    api = Api(f"sqlite:///{written_file}", folder / "written.log").start()
     yield api
-    api.kill()  # an end in order would wait for the page's stream
     api.close()
+
+
+@pytest.fixture
+def written(written_file):
+    """The database of `api`, in which nothing is queued when a test begins."""
+    store = Store(f"sqlite:///{written_file}")
+    yield store
+    for state in OPEN:
+        for each in list_experiments(store, Which(state=state), limit=500, cursor=None).items:
+            cancel_experiment(store, each.id)
+    store.dispose()
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,7 @@ from schemas.events import EventKind
 from schemas.lifecycle import PERMITTED
 from services import execution, experiments
 from services.access import create_token
+from tests.e2e.api_alone import Api
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import some_log, toy
 
@@ -26,6 +27,16 @@ def ended(archive):
     """The address of an experiment that has everything."""
     found = archive.get("/experiments", text=NAME, strategy=NAME, limit=500)["items"]
     return next(each for each in found if each["spec"]["robot"]["name"] == "quadruped")
+
+
+@pytest.fixture
+def guarded(sqlite_url, sqlite_store, tmp_path):
+    """A service with tokens, a reader's, and an experiment."""
+    submitted = experiments.submit_experiment(sqlite_store, toy(name="guarded"))
+    token = create_token(sqlite_store, Role.READER).secret
+    api = Api(sqlite_url, tmp_path / "api.log").start()
+    yield api, token, submitted
+    api.close()
 
 
 def address(api, experiment, **query):
@@ -43,12 +54,12 @@ def markers(page):
     return page.locator(".figure-curves .scatterlayer .point").count()
 
 
-def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api, sqlite_store, visit):
-    submitted = experiments.submit_experiment(sqlite_store, toy(name="growing", repetitions=2, iterations=3))
-    claims = execution.claim(sqlite_store, "tests", 2)
+def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api, written, visit):
+    submitted = experiments.submit_experiment(written, toy(name="growing", repetitions=2, iterations=3))
+    claims = execution.claim(written, "tests", 2)
     logs = [some_log(3, recorded) for recorded in (1.0, 1.5)]
     for claim, log in zip(claims, logs, strict=True):
-        steps(sqlite_store, claim, islice(log, 3))  # number 0
+        steps(written, claim, islice(log, 3))  # number 0
     page = visit(address(api, submitted.id))
     page.evaluate("() => { window.untouched = true; }")
     expect(page.get_by_role("heading", level=1)).to_have_text("Growing")
@@ -57,15 +68,15 @@ def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api, sqlite_st
 
     for iteration in (1, 2):
         for claim, log in zip(claims, logs, strict=True):
-            steps(sqlite_store, claim, islice(log, 5))
+            steps(written, claim, islice(log, 5))
         expect(page.locator(".figure-curves .point")).to_have_count(1 + iteration)
     happened = page.locator(".events li")
     expect(happened.first).to_contain_text("Repetition 1, iteration 2: the controller reaches")
     expect(page.locator(".facts")).to_contain_text("6 of 8")
 
     for claim, log in zip(claims, logs, strict=True):
-        steps(sqlite_store, claim, log)
-        assert execution.complete(sqlite_store, claim)
+        steps(written, claim, log)
+        assert execution.complete(written, claim)
     expect(page.locator(".state-now")).to_contain_text("completed")
     expect(happened.first).to_contain_text("Completed")
     page.get_by_role("tabpanel").scroll_into_view_if_needed()
@@ -76,10 +87,10 @@ def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api, sqlite_st
     assert page.evaluate("() => window.untouched")
 
 
-def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(api, sqlite_store, visit):
-    submitted = experiments.submit_experiment(sqlite_store, toy(repetitions=2))
-    for claim in execution.claim(sqlite_store, "tests", 2):
-        steps(sqlite_store, claim, some_log())
+def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(api, written, visit):
+    submitted = experiments.submit_experiment(written, toy(repetitions=2))
+    for claim in execution.claim(written, "tests", 2):
+        steps(written, claim, some_log())
     page = visit(address(api, submitted.id))
     curve = page.locator(".figure-curves")
     expect(curve.locator(".point")).to_have_count(3)
@@ -95,27 +106,27 @@ def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(a
     expect(simulators).to_contain_text("Reality is shown once")
 
 
-def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api, sqlite_store, visit):
-    submitted = experiments.submit_experiment(sqlite_store, toy(repetitions=1))
-    (claim,) = execution.claim(sqlite_store, "tests", 1)
+def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api, written, visit):
+    submitted = experiments.submit_experiment(written, toy(repetitions=1))
+    (claim,) = execution.claim(written, "tests", 1)
     log = some_log()
-    steps(sqlite_store, claim, islice(log, 3))
+    steps(written, claim, islice(log, 3))
     visit.forgive("ERR_", "net::")
     page = visit(address(api, submitted.id))
     expect(page.locator(".figure-curves .point")).to_have_count(1)
     api.kill()
     expect(page.locator("#connection")).not_to_be_empty()
     expect(page.locator(".figure-curves .point")).to_have_count(1)
-    steps(sqlite_store, claim, log)
-    assert execution.complete(sqlite_store, claim)
+    steps(written, claim, log)
+    assert execution.complete(written, claim)
     api.start()
     expect(page.locator(".figure-curves .point")).to_have_count(3)
     expect(page.locator(".state-now")).to_contain_text("completed")
     expect(page.locator("#connection")).to_be_empty()
 
 
-def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api, sqlite_store, visit):
-    submitted = experiments.submit_experiment(sqlite_store, toy())
+def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api, written, visit):
+    submitted = experiments.submit_experiment(written, toy())
     page = visit(address(api, submitted.id))
     verbs = page.get_by_role("group", name="Ask of this experiment")
     state = page.locator(".state-now")
@@ -143,11 +154,11 @@ def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api, sqlite_store
     expect(verbs.get_by_role("button", name="Pause")).to_have_attribute("aria-disabled", "true")
 
 
-def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api, sqlite_store, visit):
-    submitted = experiments.submit_experiment(sqlite_store, toy(repetitions=1))
-    (claim,) = execution.claim(sqlite_store, "tests", 1)
-    steps(sqlite_store, claim, some_log())
-    assert execution.complete(sqlite_store, claim)
+def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api, written, visit):
+    submitted = experiments.submit_experiment(written, toy(repetitions=1))
+    (claim,) = execution.claim(written, "tests", 1)
+    steps(written, claim, some_log())
+    assert execution.complete(written, claim)
     page = visit(address(api, submitted.id))
     page.get_by_role("button", name="Extend").click()
     page.get_by_label("Repetitions in all").fill("2")
@@ -159,8 +170,8 @@ def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api, sqlit
     expect(page.locator(".state-now")).to_contain_text("completed")
 
 
-def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api, sqlite_store, visit):
-    submitted = experiments.submit_experiment(sqlite_store, toy(name="mine"))
+def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api, written, visit):
+    submitted = experiments.submit_experiment(written, toy(name="mine"))
     visit.forgive("412")
     page = visit(address(api, submitted.id))
     page.get_by_role("button", name="Edit name and notes").click()
@@ -175,10 +186,10 @@ def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api, sqlite
     expect(page.locator(".notes")).to_have_text("On the second robot")
 
 
-def test_what_failed_is_said_with_its_reason_and_attempts(api, sqlite_store, visit):
-    submitted = experiments.submit_experiment(sqlite_store, toy(repetitions=1))
-    (claim,) = execution.claim(sqlite_store, "tests", 1)
-    assert execution.fail(sqlite_store, claim, "a foot fell off")
+def test_what_failed_is_said_with_its_reason_and_attempts(api, written, visit):
+    submitted = experiments.submit_experiment(written, toy(repetitions=1))
+    (claim,) = execution.claim(written, "tests", 1)
+    assert execution.fail(written, claim, "a foot fell off")
     page = visit(address(api, submitted.id))
     expect(page.locator(".state-now")).to_contain_text("failed")
     expect(page.locator(".remark.broken")).to_contain_text("a foot fell off")
@@ -188,8 +199,8 @@ def test_what_failed_is_said_with_its_reason_and_attempts(api, sqlite_store, vis
     expect(attempts).to_contain_text("a foot fell off")
 
 
-def test_there_is_nothing_yet_or_no_such_experiment(api, sqlite_store, visit):
-    submitted = experiments.submit_experiment(sqlite_store, toy())
+def test_there_is_nothing_yet_or_no_such_experiment(api, written, visit):
+    submitted = experiments.submit_experiment(written, toy())
     page = visit(address(api, submitted.id, tab="samples"))
     expect(page.locator(".figure-curves")).to_contain_text("Nothing to draw yet.")
     page.get_by_role("tabpanel").scroll_into_view_if_needed()
@@ -238,11 +249,10 @@ def test_its_files_are_saved(archive, ended, visit):
     assert drawn.status_code == 200
 
 
-def test_with_a_token_files_are_saved_and_a_reader_is_told_that_he_may_only_look(api, sqlite_store, visit):
-    submitted = experiments.submit_experiment(sqlite_store, toy(name="guarded"))
-    token = create_token(sqlite_store, Role.READER).secret
+def test_with_a_token_files_are_saved_and_a_reader_is_told_that_he_may_only_look(guarded, visit):
+    api, token, submitted = guarded
     visit.forgive("403")
-    page = visit(api.url)
+    page = visit(f"{api.url}/assets/dashboard/icon.svg")
     page.evaluate("(token) => sessionStorage.setItem('gaplab-token', token)", token)
     page.goto(address(api, submitted.id))
     with page.expect_download() as saved:
@@ -251,7 +261,7 @@ def test_with_a_token_files_are_saved_and_a_reader_is_told_that_he_may_only_look
     assert saved.value.path().read_bytes().startswith(b"PK")
     page.get_by_role("button", name="Pause").click()
     expect(page.locator(".verbs .said")).to_contain_text("runner")
-    assert experiments.read_experiment(sqlite_store, submitted.id).state == "QUEUED"
+    expect(page.locator(".state-now")).to_contain_text("queued")
 
 
 @pytest.mark.parametrize("dark", [False, True])

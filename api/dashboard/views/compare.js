@@ -33,7 +33,7 @@ export async function show(root, parameters, signal) {
   view.change = async (changes) => {
     view.choice = { ...view.choice, ...changes };
     history.pushState(null, "", address(view.choice));
-    await books.fetch(view.choice.experiments);
+    await books.fetch(view.choice.experiments).catch(() => {});  // it is asked for again when the service is back
     if (!signal.aborted) update();
   };
   await arrive(view);
@@ -43,6 +43,7 @@ export async function show(root, parameters, signal) {
   const changed = async (events) => {
     const news = events.filter(({ data }) => view.choice.experiments.includes(data.experiment));
     if (events.length && !news.length) return;
+    await books.fetch(view.choice.experiments);
     const told = new Set(news.map(({ data }) => data.experiment));
     await books.anew(view.choice.experiments.filter((each) => told.has(each) || !ENDED.includes(books.get(each)?.state)));
     update([...news, null]);

@@ -46,6 +46,7 @@ export function library(signal) {
   return {
     /** An experiment; nothing if there is none of that id. */
     get: (id) => experiments.get(id) ?? null,
+    isMissing: (id) => experiments.has(id) && !experiments.get(id),
     keep, shelve, study, anew, fetch,
     name: (id) => spoken(experiments.get(id)?.name ?? id),
     /** Their names by id, as the figure has them: of two that are alike each carries its id. */

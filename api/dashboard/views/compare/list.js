@@ -25,7 +25,7 @@ export function list(view) {
     const found = books.get(id);
     const name = found
       ? h("a", { href: `#/experiments/${id}`, title: books.place(id) }, books.name(id))
-      : h("span", { class: "failed" }, `There is no experiment ${id}`);
+      : h("span", { class: "failed" }, books.isMissing(id) ? `There is no experiment ${id}` : id);
     const remove = h("button", { type: "button", class: "link", "aria-label": `Remove ${books.name(id)}`, onclick: () => without(id) }, "✕");
     const place = several(view) && books.place(id) ? h("small", {}, books.place(id)) : null;
     return h("li", {}, h("b", {}, letter(at)), name, place, found ? pill(found.state) : null, remove);
@@ -34,7 +34,7 @@ export function list(view) {
     const { experiments } = view.choice;
     element.hidden = !experiments.length;
     all.hidden = experiments.length < 2;
-    const key = JSON.stringify(experiments.map((id) => [id, books.get(id)?.state, books.name(id)]));
+    const key = JSON.stringify(experiments.map((id) => [id, books.get(id)?.state, books.isMissing(id), books.name(id)]));
     refill(chosen, key, () => experiments.map(item));
   };
   return { element, update };
