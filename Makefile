@@ -2,6 +2,7 @@
 
 PYTHON ?= python3.11
 BIN := .venv/bin
+CHROMIUM := $(GAPLAB_CHROMIUM) $(shell which chromium chromium-browser google-chrome google-chrome-stable 2>/dev/null)
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -12,7 +13,7 @@ demo: .venv/installed  ## tune a toy and a quadruped with every strategy, and se
 serve: .venv/installed  ## the service on http://127.0.0.1:8000, with its workers
 	$(BIN)/gaplab serve
 
-test: .venv/installed-dev  ## all tests, on SQLite and on a real Postgres
+test: .venv/browser  ## all tests, on SQLite and on a real Postgres, the page's in a real Chromium
 	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 lint: .venv/installed-dev  ## style, types, dependencies and the arrows between the layers
@@ -43,6 +44,10 @@ clean:  ## remove the environment and what tools cached; results stay
 
 .venv/installed-dev: .venv/installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+.venv/browser: .venv/installed-dev
+	$(if $(strip $(CHROMIUM)),,$(BIN)/playwright install --with-deps chromium-headless-shell)
 	touch $@
 
 .PHONY: help demo serve test lint bench docs soak clean
