@@ -1,6 +1,7 @@
 /** A study, live: how far it is, its curves, its experiments, and what may be asked of it. */
 
 import { get, tagged } from "../lib/api.js";
+import { bandChoice } from "../lib/bands.js";
 import { h } from "../lib/dom.js";
 import { figureFiles } from "../lib/downloads.js";
 import { follow } from "../lib/live.js";
@@ -11,7 +12,6 @@ import { head } from "./study/head.js";
 
 const LOOK_EVERY_MS = 15_000;  // time passes without events too, and what is left of it is shown
 const DRAWN = new Set(["probed", "completed", "failed", "cancelled", "extended", "imported"]);
-const BANDS = [["", "Usual band"], ["interval", "95 % interval"], ["sd", "± 1 SD"]];
 
 /** Fill `root` with the study that `parameters` name, until `signal`. */
 export async function show(root, parameters, signal) {
@@ -47,10 +47,9 @@ function curves({ id, signal, study }) {
     query = { ...query, ...change };
     refresh(query);
   };
-  const band = h("select", { "aria-label": "Band around each curve", onchange: () => draw({ band: band.value }) },
-    ...BANDS.map(([name, words]) => h("option", { value: name }, words)));
+  const band = bandChoice({ onchange: () => draw({ band: band.value }) });
   const each = h("input", { type: "checkbox", onchange: () => draw({ each: each.checked || null }) });
-  const options = h("div", { class: "options" }, band, h("label", {}, each, "Every repetition"));
+  const options = h("p", { class: "options" }, h("label", {}, each, " Each repetition"), h("label", {}, "Band ", band));
   const element = h("section", { class: "card", "aria-labelledby": "curves-of" },
     h("div", { class: "titled" }, h("h2", { id: "curves-of" }, "Curves"), options), place,
     figureFiles("curves", { study: id }, `gaplab-${study.id}-curves`, ["CSV", `/studies/${id}/curves`, { format: "csv" }, `gaplab-${study.id}-curves.csv`]));

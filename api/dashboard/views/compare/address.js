@@ -1,8 +1,9 @@
 /** A comparison as an address, so that it can be shared. */
 
+import { BANDS } from "../../lib/bands.js";
+
 export const AXES = { evaluations: "Real-world evaluations", rollouts: "Rollouts", time: "Time" };
 export const TESTS = { student: "Student’s t, as in the paper", welch: "Welch’s t", mann_whitney: "Mann–Whitney" };
-export const BANDS = { "": "as it tells most", interval: "95 % interval of the mean", sd: "one standard deviation" };
 
 const COST_S = 60;
 

@@ -1,7 +1,8 @@
 /** How the figure is drawn: against what, with which band. */
 
+import { bandChoice } from "../../lib/bands.js";
 import { h } from "../../lib/dom.js";
-import { AXES, BANDS } from "./address.js";
+import { AXES } from "./address.js";
 
 /** The controls; a change is in the address at once. */
 export function controls(view) {
@@ -10,8 +11,7 @@ export function controls(view) {
   const spend = () => cost.checkValidity() && cost.value !== "" && view.change({ cost_s: Number(cost.value) });
   const cost = h("input", { type: "number", min: 0, step: "any", class: "short", onchange: spend });
   const costs = h("label", {}, "each real evaluation costs ", cost, " s");
-  const bands = Object.entries(BANDS).map(([value, words]) => h("option", { value }, words));
-  const band = h("select", { onchange: () => view.change({ band: band.value }) }, ...bands);
+  const band = bandChoice({ onchange: () => view.change({ band: band.value }) });
   const each = h("input", { type: "checkbox", onchange: () => view.change({ each: each.checked }) });
   const element = h("div", { class: "controls" },
     h("fieldset", {}, h("legend", {}, "Against"), ...axes, costs),

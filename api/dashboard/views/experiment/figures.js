@@ -1,6 +1,7 @@
 /** The figures of an experiment: drawn when they come into sight, and anew as it goes on. */
 
 import { get } from "../../lib/api.js";
+import { bandChoice } from "../../lib/bands.js";
 import { h } from "../../lib/dom.js";
 import { figureFiles } from "../../lib/downloads.js";
 import { plot } from "../../lib/plot.js";
@@ -11,7 +12,6 @@ const OTHERS = [
   ["squared-error", "Squared error", ["tuned", ...ENDS]],
   ["simulators", "Tuned simulators", ["tuned", ...ENDS]],
 ];
-const BANDS = [["", "as it tells most"], ["interval", "95 % interval"], ["sd", "standard deviation"]];
 
 /** Whether it is the baseline, which evolves in reality itself: it has no simulators. */
 export const isDirect = (experiment) => experiment.strategy === "direct";
@@ -25,7 +25,7 @@ export function figures(page) {
 
 function curve(page) {
   const each = h("input", { type: "checkbox" });
-  const band = h("select", {}, ...BANDS.map(([value, words]) => h("option", { value }, words)));
+  const band = bandChoice();
   const query = () => ({ experiment: page.id, band: band.value, each: each.checked || null });
   const options = h("p", { class: "options" }, h("label", {}, each, " Each repetition"), h("label", {}, "Band ", band));
   const kinds = ["transferred", "probed", "repetition_completed", ...ENDS];
