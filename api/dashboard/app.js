@@ -2,7 +2,7 @@
 
 import { Problem } from "./lib/api.js";
 import { h } from "./lib/dom.js";
-import { failed, loading } from "./lib/states.js";
+import { empty, failed, loading } from "./lib/states.js";
 import { switchTheme } from "./lib/theme.js";
 
 const VIEWS = [
@@ -47,15 +47,20 @@ async function route() {
     else link.removeAttribute("aria-current");
   }
   try {
-    if (!view) throw new Error(`There is no page ${location.hash.slice(1)} here.`);
-    const { show } = await loaded(view.name);
-    if (!signal.aborted) await show(root, view.parameters, signal);
+    const { show } = view ? await loaded(view.name) : { show: lost };
+    if (!signal.aborted) await show(root, view?.parameters, signal);
   } catch (error) {
     if (signal.aborted) return;
     root.replaceChildren(failed(error, route));
     if (AWAY.has(error.status)) againOnce(error.again ?? route, signal);
   }
   if (!signal.aborted) document.title = `${root.querySelector("h1")?.textContent ?? "gaplab"} · gaplab`;
+}
+
+/** There is no view at this address. */
+function lost(root) {
+  const home = h("a", { class: "button quiet", href: "#/" }, "To the experiments");
+  root.replaceChildren(h("h1", {}, "There is no such page"), empty(`Nothing is shown at ${location.hash}.`, home));
 }
 
 /** A service that is away is asked again by itself. */

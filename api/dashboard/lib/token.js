@@ -15,7 +15,10 @@ export function TokenForm(problem, again) {
     sessionStorage.setItem(KEY, field.value.trim());
     again();
   };
-  return h("form", { class: "state", onsubmit: use },
-    h("h1", {}, "A token, please"), h("p", {}, problem.message), h("label", { for: "token" }, "Token"), field,
+  const words = problem.status === 401
+    ? ["This service lets in whoever has a token. ", h("code", {}, "gaplab token create"), " makes one; it is kept for as long as this tab is open."]
+    : [problem.message];
+  return h("form", { class: "state token", onsubmit: use },
+    h("h1", {}, "A token, please"), h("p", {}, ...words), h("label", { for: "token" }, "Token"), field,
     h("button", { type: "submit" }, "Go on"));
 }
