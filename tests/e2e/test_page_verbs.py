@@ -1,0 +1,102 @@
+"""What may be asked of an experiment on its page: the verbs, its turn, its name, and what a reader may not."""
+
+import pytest
+from playwright.sync_api import expect
+
+from schemas.access import Role
+from services import execution, experiments
+from services.access import create_token
+from tests.e2e.api_alone import Api
+from tests.experiments import run, toy
+
+SLOW_MS = 120_000
+expect.set_options(timeout=SLOW_MS)
+
+
+@pytest.fixture
+def guarded(sqlite_url, sqlite_store, tmp_path):
+    """A service with tokens, a reader's, and an experiment."""
+    submitted = experiments.submit_experiment(sqlite_store, toy(name="guarded"))
+    token = create_token(sqlite_store, Role.READER).secret
+    api = Api(sqlite_url, tmp_path / "api.log").start()
+    yield api, token, submitted
+    api.close()
+
+
+def address(api, experiment):
+    return f"{api.url}/#/experiments/{experiment}"
+
+
+def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api, written, visit):
+    submitted = experiments.submit_experiment(written, toy())
+    page = visit(address(api, submitted.id))
+    verbs = page.get_by_role("group", name="Ask of this experiment")
+    state = page.locator(".state-now")
+    verbs.get_by_role("button", name="Resume").press("Enter")
+    expect(page.locator(".verbs .said")).to_contain_text("queued cannot be resumed, only one that is pausing or paused")
+
+    verbs.get_by_role("button", name="Pause").click()
+    expect(state).to_contain_text("paused")
+    verbs.get_by_role("button", name="Resume").click()
+    expect(state).to_contain_text("queued")
+
+    verbs.get_by_role("button", name="Change its turn").click()
+    page.get_by_label("Priority").fill("7")
+    page.get_by_label("Repetitions at once").fill("2")
+    page.get_by_role("button", name="Change it", exact=True).click()
+    expect(page.locator(".facts")).to_contain_text("at most 2")
+    assert api.get(f"/experiments/{submitted.id}")["priority"] == 7
+
+    verbs.get_by_role("button", name="Cancel").click()
+    page.get_by_role("button", name="Back").click()
+    assert api.get(f"/experiments/{submitted.id}")["state"] == "QUEUED"
+    verbs.get_by_role("button", name="Cancel").press("Enter")
+    page.get_by_role("button", name="Cancel it").press("Enter")
+    expect(state).to_contain_text("cancelled")
+    expect(verbs.get_by_role("button", name="Pause")).to_have_attribute("aria-disabled", "true")
+
+
+def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api, written, visit):
+    submitted = experiments.submit_experiment(written, toy(repetitions=1))
+    (claim,) = execution.claim(written, "tests", 1)
+    run(written, claim)
+    page = visit(address(api, submitted.id))
+    page.get_by_role("button", name="Extend").click()
+    page.get_by_label("Repetitions in all").fill("2")
+    page.get_by_role("button", name="Extend it").click()
+    expect(page.locator(".state-now")).to_contain_text("queued")
+    expect(page.locator(".facts")).to_contain_text("1 of 2")
+    page.get_by_role("button", name="Stop").click()
+    page.get_by_role("button", name="Stop it").click()
+    expect(page.locator(".state-now")).to_contain_text("completed")
+
+
+def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api, written, visit):
+    submitted = experiments.submit_experiment(written, toy(name="mine"))
+    visit.forgive("412")
+    page = visit(address(api, submitted.id))
+    page.get_by_role("button", name="Edit name and notes").click()
+    page.get_by_label("Notes", exact=True).fill("On the second robot")
+    theirs = api.http.patch(f"/experiments/{submitted.id}", json={"name": "theirs"}, headers={"If-Match": "*"})
+    assert theirs.status_code == 200
+    page.get_by_role("button", name="Save").click()
+    expect(page.get_by_role("dialog").get_by_role("alert")).to_contain_text("“theirs”")
+    page.get_by_label("Name", exact=True).fill("<b>ours</b>")
+    page.get_by_role("button", name="Save").click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("<b>ours</b>")
+    expect(page.locator(".notes")).to_have_text("On the second robot")
+
+
+def test_with_a_token_files_are_saved_and_a_reader_is_told_that_he_may_only_look(guarded, visit):
+    api, token, submitted = guarded
+    visit.forgive("403")
+    page = visit(f"{api.url}/assets/dashboard/icon.svg")
+    page.evaluate("(token) => sessionStorage.setItem('gaplab-token', token)", token)
+    page.goto(address(api, submitted.id))
+    with page.expect_download() as saved:
+        page.get_by_role("link", name="Archive of everything").click()
+    assert saved.value.url.startswith("blob:")
+    assert saved.value.path().read_bytes().startswith(b"PK")
+    page.get_by_role("button", name="Pause").click()
+    expect(page.locator(".verbs .said")).to_contain_text("runner")
+    expect(page.locator(".state-now")).to_contain_text("queued")
