@@ -9,8 +9,8 @@ from fastapi.testclient import TestClient
 from api.app import create_app
 from services import execution, experiments
 from services.store.session import Store
+from tests.commands import Gaplab
 from tests.experiments import run, toy
-from tests.integration.test_cli import Gaplab, gaplab, service, url  # noqa: F401 - fixtures
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def test_what_there_is_not_cannot_be_exported(api: TestClient, path: str):
     assert api.get(path).status_code == 404
 
 
-def test_the_command_writes_an_archive_and_reads_it(gaplab: Gaplab, submitted: str, tmp_path):  # noqa: F811
+def test_the_command_writes_an_archive_and_reads_it(gaplab: Gaplab, submitted: str, tmp_path):
     file = tmp_path / "archive.zip"
 
     written = gaplab("export", submitted, "--to", str(file))
@@ -77,7 +77,7 @@ def test_the_command_writes_an_archive_and_reads_it(gaplab: Gaplab, submitted: s
     assert gaplab("show", read.out.strip()).code == 0
 
 
-def test_the_command_overwrites_no_file_and_leaves_no_half(gaplab: Gaplab, submitted: str, tmp_path):  # noqa: F811
+def test_the_command_overwrites_no_file_and_leaves_no_half(gaplab: Gaplab, submitted: str, tmp_path):
     (tmp_path / "precious.zip").write_text("precious")
 
     taken = gaplab("export", submitted, "--to", str(tmp_path / "precious.zip"))
@@ -88,7 +88,7 @@ def test_the_command_overwrites_no_file_and_leaves_no_half(gaplab: Gaplab, submi
     assert (tmp_path / "precious.zip").read_text() == "precious"
 
 
-def test_the_command_says_what_is_wrong_with_an_archive(gaplab: Gaplab, tmp_path):  # noqa: F811
+def test_the_command_says_what_is_wrong_with_an_archive(gaplab: Gaplab, tmp_path):
     (tmp_path / "bad.zip").write_text("no zip")
 
     said = gaplab("import", str(tmp_path / "bad.zip"))
