@@ -25,6 +25,9 @@ from benchmarks.filling import IN_A_STUDY, REPETITIONS, SAMPLES, fill
 from benchmarks.supervisor import postgres
 from services.store.session import Store
 
+UNLIMITED = {f"GAPLAB_MAX_{name}": str(10**6) for name in ("EXPERIMENTS", "EXPERIMENTS_PER_TOKEN")}
+"""What is submitted is never computed here, so that a thousand would soon wait."""
+
 NEXT_TO_NOTHING, A_PAGE = IN_A_STUDY, 50 * IN_A_STUDY
 """Experiments: one study's, and as many as the longest list shows. What comes after these is what storing costs."""
 
@@ -69,6 +72,7 @@ def main() -> None:
     parser.add_argument("--pause", type=float, default=1.0, help="seconds between the requests of a client")
     parser.add_argument("--databases", nargs="+", choices=("sqlite", "postgres"), default=["sqlite", "postgres"])
     options = parser.parse_args()
+    os.environ.update(UNLIMITED)
     print(f"{READERS} readers, {SUBMITTERS} submitters on {os.cpu_count()} cores of {platform.machine()}", flush=True)
     for database in options.databases:
         with TemporaryDirectory() as folder:
