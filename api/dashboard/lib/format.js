@@ -15,6 +15,7 @@ export const count = (value) => (value === null || value === undefined ? "–" :
 /** Seconds as `3 min`, `2 h`, `5 days`, or `7 years`. */
 export function duration(seconds) {
   if (seconds === null || seconds === undefined) return "–";
+  if (seconds > 0 && seconds < 0.5) return "less than 1 s";
   for (const [unit, size, until] of [["s", 1, 90], ["min", 60, 5400], ["h", 3600, 172800]]) {
     if (seconds < until) return `${Math.round(seconds / size)} ${unit}`;
   }

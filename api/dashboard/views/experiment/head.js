@@ -3,10 +3,10 @@
 import { get } from "../../lib/api.js";
 import { h, refill } from "../../lib/dom.js";
 import { download } from "../../lib/downloads.js";
+import { edit } from "../../lib/editing.js";
 import { age, count, duration, spoken } from "../../lib/format.js";
 import { pill } from "../../lib/pill.js";
 import { fraction } from "../../lib/progress.js";
-import { edit } from "./editing.js";
 import { verbs } from "./verbs.js";
 
 const ENDED = ["COMPLETED", "FAILED", "CANCELLED"];
@@ -34,7 +34,8 @@ export function head(page) {
     refill(remarks, JSON.stringify([experiment.warnings, experiment.reasons]), () => remarksOf(experiment));
     asked.update();
   };
-  const pen = h("button", { type: "button", class: "quiet small", onclick: () => edit(page) }, "Edit name and notes");
+  const change = () => edit(page, `/experiments/${page.id}`, () => page.experiment);
+  const pen = h("button", { type: "button", class: "quiet small", onclick: change }, "Edit name and notes");
   update();
   const element = h("header", { class: "experiment-head" }, trail(page),
     h("div", { class: "titled" }, title, state, pen), h("p", { class: "what" }, what(page.experiment)), notes, bar, facts, remarks, asked.element, links(page));

@@ -2,11 +2,11 @@
 
 import { h, refill } from "../../lib/dom.js";
 import { download } from "../../lib/downloads.js";
+import { edit } from "../../lib/editing.js";
 import { age, count, duration, fixed, spoken } from "../../lib/format.js";
 import { pill } from "../../lib/pill.js";
 import { progressBar } from "../../lib/progress.js";
 import { say } from "../../lib/rows.js";
-import { edit } from "./editing.js";
 import { verbs } from "./verbs.js";
 
 /** The head's element, and `update()` for when `page.study` is another. */
@@ -32,7 +32,8 @@ export function head(page) {
     refill(remarks, JSON.stringify(found), () => found.map(remark));
     asked.update();
   };
-  const pen = h("button", { type: "button", class: "quiet small", onclick: () => edit(page) }, "Edit name and notes");
+  const change = () => edit(page, `/studies/${page.id}`, () => page.study);
+  const pen = h("button", { type: "button", class: "quiet small", onclick: change }, "Edit name and notes");
   update();
   const trail = h("nav", { "aria-label": "Place", class: "trail" }, h("a", { href: "#/" }, "Studies"));
   const element = h("header", { class: "experiment-head" }, trail, h("div", { class: "titled" }, title, state, pen),

@@ -1,22 +1,22 @@
 /** Another name or other notes; nobody's change is written over unseen. */
 
-import { patch, Problem } from "../../lib/api.js";
-import { ask } from "../../lib/dialog.js";
+import { patch, Problem } from "./api.js";
+import { ask } from "./dialog.js";
 
 const CHANGED_MEANWHILE = 412;
 
-/** Ask for them, and send them with the tag of what was looked at. */
-export function edit(page) {
-  const { name, notes } = page.experiment;
+/** Ask for them, and send them to `address` with the tag of what was looked at; `shown()` is what the page shows now. */
+export function edit(page, address, shown) {
+  const { name, notes } = shown();
   let tag = page.tag;
   const act = async (values) => {
     try {
-      await patch(`/experiments/${page.id}`, { name: values.name, notes: values.notes || null }, { "If-Match": tag });
+      await patch(address, { name: values.name, notes: values.notes || null }, { "If-Match": tag });
     } catch (error) {
       if (error.status !== CHANGED_MEANWHILE) throw error;
       await page.look();
       tag = page.tag;
-      const { name: theirs, notes: written } = page.experiment;
+      const { name: theirs, notes: written } = shown();
       const detail = `Somebody changed it meanwhile: its name is “${theirs}”, its notes are “${written ?? ""}”. Save again to write over that.`;
       throw new Problem({ status: error.status, title: error.title, detail });
     }
