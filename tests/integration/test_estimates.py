@@ -1,6 +1,8 @@
 """What a study would cost is what it then costs; and asking stores nothing."""
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from math import copysign
 
 import pytest
 from fastapi.testclient import TestClient
@@ -9,6 +11,7 @@ from sqlalchemy import update
 from api.app import create_app
 from schemas.spec import StudySpec
 from services import experiments
+from services.core.types import Probed
 from services.engines import engines
 from services.estimates import estimate
 from services.execution import claim
@@ -123,3 +126,12 @@ def test_the_best_fitness_of_an_experiment_is_the_mean_of_its_repetitions_best(s
     (listed,) = experiments.list_experiments(store).items
     assert listed.best_fitness == experiments.read_experiment(store, made.id).best_fitness
     assert listed.best_fitness == pytest.approx((3.0 + 4.0) / 2)
+
+
+def test_a_best_fitness_of_nothing_has_no_sign_whichever_zero_a_database_takes_for_the_greater(store: Store):
+    made = experiments.submit_experiment(store, toy(repetitions=1))
+    (one,) = claim(store, "me", 1)
+
+    run(store, one, (replace(step, recorded=-0.0) if isinstance(step, Probed) else step for step in some_log()))
+
+    assert copysign(1.0, experiments.read_experiment(store, made.id).best_fitness) == 1.0

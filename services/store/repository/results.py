@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import fsum
 
 from sqlalchemy import case, func, select, tuple_
 from sqlalchemy.orm import Session
@@ -114,8 +115,8 @@ def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, flo
     found: dict[str, list[float]] = {}
     for experiment, best in session.execute(query):
         if best is not None:
-            found.setdefault(experiment, []).append(best)
-    return {experiment: sum(each) / len(each) for experiment, each in found.items()}
+            found.setdefault(experiment, []).append(best + 0.0)  # of 0.0 and -0.0 either may be the maximum
+    return {experiment: fsum(each) / len(each) for experiment, each in found.items()}  # in whatever order they came
 
 
 @dataclass(frozen=True)
