@@ -117,6 +117,11 @@ def screenshot(page, name):
 
 
 def fits(page):
-    """Assert that nothing is wider than the window: no phone scrolls sideways."""
-    wide = page.evaluate("() => document.documentElement.scrollWidth - document.documentElement.clientWidth")
-    assert wide <= 0, f"{wide} px wider than the window"
+    """Assert that nothing is wider than the window, once figures have followed it: no phone scrolls sideways."""
+    for _ in range(100):
+        wide = page.evaluate("() => document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        if wide <= 0:
+            return
+        page.wait_for_timeout(100)
+    msg = f"{wide} px wider than the window"
+    raise AssertionError(msg)
