@@ -1,16 +1,19 @@
-"""Fixtures of tests that ask a service over HTTP: `url` is where it answers, `gaplab` is the command that asks it."""
+"""Fixtures of tests that ask a service over HTTP: `url` is where it answers, `gaplab` is the command that asks it,
+and `finish` computes what was submitted."""
 
 import io
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 from fastapi import FastAPI
 
 from api.app import create_app
 from api.cli import main
+from services import execution
 from services.store.session import Store
 from tests.commands import Gaplab, Said, served
+from tests.experiments import run, some_log
 
 
 @pytest.fixture(scope="module")
@@ -44,3 +47,16 @@ def gaplab(url: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixt
         return Said(int(ended.value.code or 0), printed.out, printed.err)
 
     return command
+
+
+@pytest.fixture
+def finish(sqlite_store: Store) -> Callable[[], None]:
+    """Runs whatever is queued."""
+
+    def work() -> None:
+        while claims := execution.claim(sqlite_store, "test", limit=10):
+            for number, claim in enumerate(claims):
+                iterations = 0 if claim.spec.strategy.name == "direct" else claim.spec.iterations
+                run(sqlite_store, claim, some_log(iterations, recorded=1 + number / 10))
+
+    return work

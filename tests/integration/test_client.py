@@ -18,7 +18,6 @@ from gaplab import Client, ExperimentFailed, ServiceError, ServiceUnreachable
 from schemas.access import Role
 from services import access, execution
 from services.store.session import Store
-from tests.experiments import run, some_log
 
 SMALL = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 3}
 BOTH = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "smoke", "repetitions": 3}
@@ -59,19 +58,6 @@ def network(sqlite_store: Store) -> InProcess:
 def client(network: InProcess) -> Iterator[Client]:
     with Client("http://127.0.0.1:1", transport=network) as found:
         yield found
-
-
-@pytest.fixture
-def finish(sqlite_store: Store) -> Callable[[], None]:
-    """Runs whatever is queued."""
-
-    def work() -> None:
-        while claims := execution.claim(sqlite_store, "test", limit=10):
-            for number, claim in enumerate(claims):
-                iterations = 0 if claim.spec.strategy.name == "direct" else claim.spec.iterations
-                run(sqlite_store, claim, some_log(iterations, recorded=1 + number / 10))
-
-    return work
 
 
 def test_a_curve_is_a_frame_of_its_points_or_of_its_repetitions(client: Client, finish: Callable[[], None]):

@@ -23,7 +23,6 @@ from api.monitor import Look, looks, spark, watch
 from services import execution
 from services.store.session import Store
 from tests.commands import Gaplab
-from tests.experiments import run, some_log
 
 STUDY = {
     "name": "all [of] it",
@@ -48,19 +47,6 @@ def commands(of: Any = None, name: str = "") -> Iterator[tuple[str, Any]]:
 
 
 NAMES = [name for name, _ in commands()]
-
-
-@pytest.fixture
-def finish(sqlite_store: Store) -> Callable[[], None]:
-    """Runs whatever is queued."""
-
-    def work() -> None:
-        while claims := execution.claim(sqlite_store, "test", limit=10):
-            for number, claim in enumerate(claims):
-                iterations = 0 if claim.spec.strategy.name == "direct" else claim.spec.iterations
-                run(sqlite_store, claim, some_log(iterations, recorded=1 + number / 10))
-
-    return work
 
 
 @pytest.fixture
