@@ -74,7 +74,17 @@ export function plot(element, kind, query, signal) {
     }
   };
   onTheme(draw, signal);
-  signal.addEventListener("abort", () => globalThis.Plotly?.purge(canvas));
+  let width = 0;
+  const watch = new ResizeObserver(() => {  // also of a change while it is drawn, which Plotly itself would miss
+    if (canvas.clientWidth === width) return;
+    width = canvas.clientWidth;
+    if (drawn) draw();
+  });
+  watch.observe(canvas);
+  signal.addEventListener("abort", () => {
+    watch.disconnect();
+    globalThis.Plotly?.purge(canvas);
+  });
   return Object.assign(refresh, { drawn: refresh() });
 }
 
