@@ -78,7 +78,7 @@ export function plot(element, kind, query, signal) {
   const watch = new ResizeObserver(() => {  // also of a change while it is drawn, which Plotly itself would miss
     if (canvas.clientWidth === width) return;
     width = canvas.clientWidth;
-    if (drawn) draw();
+    draw();
   });
   watch.observe(canvas);
   signal.addEventListener("abort", () => {
