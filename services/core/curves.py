@@ -31,7 +31,7 @@ def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
     there = values[np.isfinite(values)]
     n = len(there)
     mean = float(there.mean()) if n else None
-    sd = float(there.std(ddof=1)) if n > 1 else None
+    sd = _deviation(there) if n > 1 else None
     lower, upper = _interval(mean, sd, n)
     return CurvePoint(
         evaluations=evaluations,
@@ -42,6 +42,11 @@ def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
         upper=upper,
         values=tuple(float(value) if np.isfinite(value) else None for value in values),
     )
+
+
+def _deviation(values: FloatArray) -> float:
+    """Exactly 0 of equal values, whose mean may be rounded."""
+    return float(values.std(ddof=1)) if np.ptp(values) > 0 else 0.0
 
 
 def _interval(mean: float | None, sd: float | None, n: int) -> tuple[float | None, float | None]:

@@ -40,8 +40,8 @@ def effect_size(first: FloatArray, second: FloatArray) -> float | None:
     """Cohen's d: the difference of the means over the pooled standard deviation; None where that is 0 or unknown."""
     first, second = finite(first), finite(second)
     freedom = len(first) + len(second) - 2
-    if min(len(first), len(second)) < 2:
-        return None
+    if min(len(first), len(second)) < 2 or (np.ptp(first) == 0 and np.ptp(second) == 0):
+        return None  # the variance of equal numbers need not come out as 0
     spread = ((len(first) - 1) * first.var(ddof=1) + (len(second) - 1) * second.var(ddof=1)) / freedom
     return float((first.mean() - second.mean()) / spread**0.5) if spread > 0 else None
 

@@ -43,6 +43,13 @@ def test_cohens_d_is_the_difference_over_the_pooled_deviation():
     assert effect_size(FIRST, SECOND) == pytest.approx(0.25 / (0.15 / 7) ** 0.5)
 
 
+def test_equal_values_have_no_effect_size_though_their_variance_is_rounded():
+    constant = np.full(3, 0.1)
+    assert constant.var(ddof=1) > 0
+
+    assert effect_size(constant, np.full(3, 0.3)) is None
+
+
 @pytest.mark.parametrize(
     ("first", "second"),
     [
