@@ -48,3 +48,11 @@ def test_equal_values_do_not_spread_though_their_mean_is_rounded():
 
     assert point.sd == 0
     assert point.lower == point.upper == point.mean
+
+
+@pytest.mark.parametrize("large", [1e200, 1.7e308])
+def test_values_too_large_to_be_squared_have_no_spread_and_are_no_error(large):
+    (point,) = curve_points(np.array([[large], [-large / 2], [large]]))
+
+    assert (point.sd, point.lower, point.upper) == (None, None, None)
+    assert point.values == (large, -large / 2, large)
