@@ -54,10 +54,11 @@ def digests() -> dict[str, str]:
 def digest_of(file: str) -> str:
     """That of a plug-in's file; of a package, which has more than one, of all that is in its folder."""
     found = digests()
-    folder = file.removesuffix("__init__.py")
-    if folder == file:
+    package, slash, _ = file.partition("/")
+    if not slash:
         return found[file]
-    return sha256(repr(sorted(each for each in found.items() if each[0].startswith(folder))).encode()).hexdigest()[:12]
+    inside = sorted(each for each in found.items() if each[0].startswith(f"{package}/"))
+    return sha256(repr(inside).encode()).hexdigest()[:12]
 
 
 def digest() -> str:

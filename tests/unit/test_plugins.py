@@ -151,6 +151,18 @@ def test_files_of_one_name_in_several_folders_count_both(put: Put, tmp_path: Pat
     assert plugins.digests()["friction.csv"] != before
 
 
+def test_a_package_may_have_its_plug_in_in_any_of_its_files(put: Put):
+    package = put() / "thorough"
+    package.mkdir()
+    (package / "core.py").write_text(CAREFUL)
+    (package / "__init__.py").write_text("from gaplab_plugins.thorough.core import Careful")
+
+    found = strategies()["careful"]
+
+    assert outside.file_of(found) == "thorough/core.py"
+    assert plugins.digest_of("thorough/core.py") == plugins.digest_of("thorough/__init__.py")
+
+
 def test_the_content_of_a_package_is_all_that_is_in_it(put: Put):
     package = put(alone="") / "glide"
     package.mkdir()
