@@ -8,7 +8,7 @@ from schemas.plugin import PluginRef
 from schemas.spec import ExperimentSpec, StudySpec
 from services.admission import check_extent
 from services.engines import engines
-from services.resolution import expected_rollouts, is_direct, resolve_study
+from services.resolution import expected_rollouts, is_direct, resolve_study, spec_of
 from services.settings import Limits
 from services.store.repository import costs, supervisors
 from services.store.session import Store
@@ -53,17 +53,27 @@ def _measured(found: tuple[tuple[dict[str, object], float, int], ...]) -> dict[K
     """Seconds a rollout; of what was computed by two engines only the simulator's counts, which has nearly all."""
     seconds: dict[Key, float] = defaultdict(float)
     rollouts: dict[Key, int] = defaultdict(int)
-    for spec, took, count in found:
-        key = (_text(spec["robot"]), _text(spec["engine"]))
+    for stored, took, count in found:
+        key = _key(spec_of(stored))
         seconds[key] += took
         rollouts[key] += count
     return {key: seconds[key] / count for key, count in rollouts.items() if count and seconds[key]}
 
 
-def _cost(spec: ExperimentSpec, measured: Mapping[Key, float]) -> EngineCost:
+def _key(spec: ExperimentSpec) -> Key:
+    return spec.robot.model_dump_json(), _engine(spec).model_dump_json()
+
+
+def _engine(spec: ExperimentSpec) -> PluginRef:
+    """The engine that computes it."""
     engine = spec.reality.engine if is_direct(spec) else spec.engine
     assert engine is not None  # the spec is resolved
-    known = measured.get((_text(spec.robot), _text(engine)))
+    return engine
+
+
+def _cost(spec: ExperimentSpec, measured: Mapping[Key, float]) -> EngineCost:
+    engine = _engine(spec)
+    known = measured.get(_key(spec))
     usual = engines[engine.name].usual_rollout_s
     return EngineCost(engine=engine.name, seconds_per_rollout=known or usual, measured=known is not None)
 
@@ -80,7 +90,3 @@ def _experiment(spec: ExperimentSpec, cost: EngineCost) -> ExperimentCost:
         rollouts=rollouts,
         core_seconds=rollouts * cost.seconds_per_rollout,
     )
-
-
-def _text(ref: object) -> str:
-    return PluginRef.model_validate(ref).model_dump_json()

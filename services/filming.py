@@ -10,10 +10,9 @@ from services.core.arrays import FloatArray
 from services.core.kinematics import TOUCHING_M, body_poses, clearances_m
 from services.core.robots import robots
 from services.core.robots.base import Robot
-from services.core.tunables import tunables
 from services.core.world import Recording, World
 from services.shapes import feet_of, labels, shapes_of
-from services.simulation import Simulation, engine_of, reality_of
+from services.simulation import Simulation, edits_of, engine_of, reality_of
 
 FRAMES_PER_S = 50
 LONGEST_S = 20.0
@@ -67,7 +66,7 @@ def film(asked: Film) -> bytes:
     times = np.arange(int(min(LONGEST_S, observed[-1]) * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S
     simulation = reality = None
     if asked.parameters is not None:
-        simulate = Simulation(robot, engine_of(spec.engine), [tunables[ref.name]() for ref in spec.tunables])
+        simulate = Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))
         world, seen = simulate.record(genome, np.array(asked.parameters), times)
         simulation = _shown(robot, spec.engine.name if spec.engine else "", world, seen, asked.simulated)
     if asked.known:

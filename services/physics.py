@@ -120,8 +120,8 @@ class Physics:
         self._process = self._pipe = None
 
     def _answer(self, function: Callable[..., T], arguments: tuple[Any, ...]) -> T:
-        pipe = self._started()
         try:
+            pipe = self._started()
             pipe.send((function, arguments))
             if not pipe.poll(self._longest_s):
                 raise TimeoutError
@@ -146,10 +146,11 @@ class Physics:
             self._discard()
         if self._pipe is None:
             context = get_context("spawn")
-            self._pipe, theirs = context.Pipe()
-            self._process = context.Process(target=_serve, args=(theirs,), name="physics", daemon=True)
-            self._process.start()
+            ours, theirs = context.Pipe()
+            process = context.Process(target=_serve, args=(theirs,), name="physics", daemon=True)
+            process.start()  # or raise: then there is none, and the next question starts one
             theirs.close()
+            self._process, self._pipe = process, ours
         return self._pipe
 
 

@@ -37,14 +37,28 @@ def load() -> None:
 
 
 def digests() -> dict[str, str]:
-    """The files of the folders, each with twelve letters that change with its content; none without folders."""
-    found = {}
+    """The files of the folders, each with twelve letters that change with its content; none without folders.
+
+    Files that have a name in common, data beside plug-ins in several folders, have their letters in common as well.
+    """
+    found: dict[str, bytes] = {}
     for folder in outside.folders():
         for path in sorted(folder.rglob("*")):
             parts = path.relative_to(folder).parts
             if path.is_file() and not any(each.startswith(".") or each == "__pycache__" for each in parts):
-                found["/".join(parts)] = sha256(path.read_bytes()).hexdigest()[:12]
-    return found
+                name = "/".join(parts)
+                found[name] = found.get(name, b"") + path.read_bytes()
+    return {name: sha256(content).hexdigest()[:12] for name, content in found.items()}
+
+
+def digest_of(file: str) -> str:
+    """That of a plug-in's file; of a package, which has more than one, of all that is in its folder."""
+    found = digests()
+    package, slash, _ = file.partition("/")
+    if not slash:
+        return found[file]
+    inside = sorted(each for each in found.items() if each[0].startswith(f"{package}/"))
+    return sha256(repr(inside).encode()).hexdigest()[:12]
 
 
 def digest() -> str:

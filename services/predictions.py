@@ -9,10 +9,9 @@ import numpy as np
 from schemas.predictions import Prediction, Predictions
 from schemas.spec import ExperimentSpec
 from services.core.robots import robots
-from services.core.tunables import tunables
 from services.physics import Key, Memory, Physics
 from services.resolution import spec_of, unit
-from services.simulation import Simulation, engine_of
+from services.simulation import Simulation, edits_of, engine_of, refuse_missing
 from services.store.repository import experiments, replays
 from services.store.repository.replays import SampleBetween
 from services.store.session import Store
@@ -48,6 +47,7 @@ def predictions(store: Store, physics: Physics, experiment_id: str, *, seconds: 
 
     Raises:
         NotFound: no such experiment.
+        InvalidSpec: its robot, its engine or a tunable has gone from here.
         EngineUnavailable: its engine is not installed here.
         EngineInterrupted: the physics died.
         LimitReached: others were asking for too long.
@@ -59,6 +59,7 @@ def predictions(store: Store, physics: Physics, experiment_id: str, *, seconds: 
     unknown = [each for each in samples if physics.memory.get(_key(row.id, each)) is None]
     unknown.sort(key=lambda each: (each.iteration, each.repetition))
     if unknown:
+        refuse_missing(spec)
         asked = [Asked(tuple(each.genome), tuple(each.before), tuple(each.after)) for each in unknown[:MOST_ASKED]]
         found = physics.ask(predict, spec.model_dump_json(), asked, seconds)
         for each, pair in zip(unknown, found, strict=False):
@@ -76,7 +77,7 @@ def predict(spec: str, asked: Sequence[Asked], seconds: float) -> list[Pair]:
     """
     read = ExperimentSpec.model_validate_json(spec)
     robot = robots.create(read.robot)
-    simulate = Simulation(robot, engine_of(read.engine), [tunables[ref.name]() for ref in read.tunables])
+    simulate = Simulation(robot, engine_of(read.engine), edits_of(ref.name for ref in read.tunables))
     found: list[Pair] = []
     until = monotonic() + seconds
     for each in asked:

@@ -10,6 +10,7 @@ from services.core.robots import robots
 from services.filming import Film, film
 from services.physics import Key, Physics
 from services.resolution import is_direct, spec_of
+from services.simulation import refuse_missing
 from services.store.models import ExperimentRow
 from services.store.repository import experiments, replays
 from services.store.session import Session, Store
@@ -49,7 +50,7 @@ def replay_json(store: Store, physics: Physics, experiment_id: str, wanted: Want
     Raises:
         NotFound: no such experiment, or it will never have such a repetition or iteration.
         Conflict: reality has not answered yet, or the simulator is not tuned yet.
-        InvalidSpec: a robot without a body.
+        InvalidSpec: a robot without a body, or what it is simulated with has gone from here.
         EngineUnavailable: an engine is not installed here.
         EngineInterrupted: the physics died.
         LimitReached: others were asking for too long.
@@ -62,6 +63,7 @@ def replay_json(store: Store, physics: Physics, experiment_id: str, wanted: Want
     key: Key = ("replay", row.id, wanted.repetition, wanted.iteration, wanted.kind, asked.simulator)
     found: bytes | None = physics.memory.get(key)
     if found is None:
+        refuse_missing(spec, reality=asked.known)
         found = physics.ask(film, asked)
         physics.memory.keep(key, found, len(found))
     return found

@@ -111,9 +111,9 @@ def is_direct(spec: ExperimentSpec) -> bool:
     return spec.strategy.name in strategies and strategies[spec.strategy.name].in_reality
 
 
-def unit(spec: ExperimentSpec) -> str:
-    """The unit of the experiment's fitness."""
-    return robots[spec.robot.name].unit
+def unit(spec: ExperimentSpec | Checked) -> str:
+    """The unit of fitness; "" if the robot's file is gone, so that nobody knows."""
+    return robots[spec.robot.name].unit if spec.robot.name in robots else ""
 
 
 def expected_rollouts(spec: ExperimentSpec) -> int:

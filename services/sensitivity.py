@@ -9,10 +9,9 @@ from datetime import timedelta
 
 from schemas.sensitivity import Checked, Sensitivity, SensitivityRead, SensitivitySpec
 from services.admission import FREELY, Admission, Once, once
-from services.core.robots import robots
 from services.core.sensitivity import Effort
 from services.execution import STALE_AFTER_S
-from services.resolution import resolve_sensitivity
+from services.resolution import resolve_sensitivity, unit
 from services.store.lease import CheckClaim as CheckClaim
 from services.store.models import SensitivityRow
 from services.store.repository import sensitivity
@@ -91,7 +90,7 @@ def _read(row: SensitivityRow) -> SensitivityRead:
         state=row.state,
         spec=spec,
         rollouts=Effort(spec.points, spec.evaluations).rollouts(len(spec.tunables)),
-        unit=robots[spec.robot.name].unit,
+        unit=unit(spec),
         tunables=sensitivity.findings(row),
         warnings=sensitivity.warnings(row),
         reason=row.error,

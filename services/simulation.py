@@ -1,7 +1,7 @@
 """Assembly: robot, world, tunables and engine become a Simulate; a hidden world becomes a Reality."""
 
-from collections.abc import Sequence
-from functools import cache, lru_cache
+from collections.abc import Iterable, Sequence
+from functools import cache, lru_cache, partial
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from schemas.plugin import PluginRef, TunableRef
 from schemas.sensitivity import Checked
 from schemas.spec import ExperimentSpec
 from services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters
+from services.core.errors import gather
 from services.core.loop import Setting
 from services.core.optimizers import optimizers
 from services.core.ports import Simulate
@@ -91,7 +92,7 @@ def setting(spec: ExperimentSpec, repetition: int) -> Setting:
     """
     robot = robots.create(spec.robot)
     strategy = strategies.create(spec.strategy)
-    edits = [tunables[ref.name]() for ref in spec.tunables]
+    edits = edits_of(ref.name for ref in spec.tunables)
     truth, real = reality_of(spec, robot)
     engine = engine_of(spec.engine)
     simulate: Simulate = Simulation(robot, engine, edits)
@@ -116,7 +117,7 @@ def setting(spec: ExperimentSpec, repetition: int) -> Setting:
 def subject(checked: Checked) -> Subject:
     """What a sensitivity check simulates."""
     robot = robots.create(checked.robot)
-    edits = [tunables[ref.name]() for ref in checked.tunables]
+    edits = edits_of(ref.name for ref in checked.tunables)
     return Subject(
         simulate=Simulation(robot, engine_of(checked.engine), edits),
         genomes=robot.space,
@@ -128,9 +129,33 @@ def subject(checked: Checked) -> Subject:
 
 def reality_of(spec: ExperimentSpec, robot: Robot) -> tuple[FloatArray, Simulation]:
     """The hidden parameters of a resolved spec, and the simulation that they belong in."""
-    edits = [tunables[name]() for name in spec.reality.parameters]
+    edits = edits_of(spec.reality.parameters)
     truth = np.array(list(spec.reality.parameters.values()))
     return truth, Simulation(robot, engine_of(spec.reality.engine), edits)
+
+
+def edits_of(names: Iterable[str]) -> list[Tunable]:
+    """The tunables of these names.
+
+    Raises:
+        InvalidSpec: one is not installed here.
+    """
+    return [tunables.create(PluginRef(name=name), "/tunables") for name in names]
+
+
+def refuse_missing(spec: ExperimentSpec, *, reality: bool = False) -> None:
+    """Do nothing if what a stored spec simulates with, and reality if it is asked for, is installed here.
+
+    Raises:
+        InvalidSpec: something is not; a plug-in's file may be gone.
+    """
+    needed = [(engines, spec.engine, "/engine"), (engines, spec.reality.engine if reality else None, "/reality/engine")]
+    names = [*(ref.name for ref in spec.tunables), *(spec.reality.parameters if reality else ())]
+    gather(
+        lambda: robots.check(spec.robot, "/robot"),
+        *(partial(registry.check, ref, pointer) for registry, ref, pointer in needed if ref is not None),
+        lambda: edits_of(names),
+    )
 
 
 def engine_of(ref: PluginRef | None) -> Engine:

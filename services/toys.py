@@ -12,9 +12,8 @@ from services.core.arrays import FloatArray
 from services.core.errors import InvalidSpec, NotFound, Violation
 from services.core.robots import robots
 from services.core.robots.base import Robot
-from services.core.tunables import tunables
 from services.resolution import is_direct, spec_of
-from services.simulation import Simulation, engine_of, reality_of
+from services.simulation import Simulation, edits_of, engine_of, reality_of
 from services.store.models import ExperimentRow
 from services.store.repository import experiments, reads, replays, results
 from services.store.repository.replays import Controlled
@@ -45,7 +44,7 @@ def toys(store: Store, experiment_id: str, repetition: int, iterations: Sequence
 
     Raises:
         NotFound: no such experiment, or it will never have such a repetition or iteration.
-        InvalidSpec: a robot that has a body, or more genes than one.
+        InvalidSpec: a robot that has a body, or more genes than one; or what it is simulated with has gone from here.
     """
     with store.reading() as session:
         found = _stored(session, experiment_id, repetition, iterations)
@@ -102,7 +101,7 @@ def _approximations(found: _Stored, simulators: Sequence[SimulatorRead], genes: 
     """`(simulators, genes)`: the fitness of each gene in each of them."""
     if not simulators:
         return np.empty((0, len(genes)))
-    edits = [tunables[ref.name]() for ref in found.spec.tunables]
+    edits = edits_of(ref.name for ref in found.spec.tunables)
     simulate = Simulation(found.robot, engine_of(found.spec.engine), edits)
     return simulate(genes[:, None], np.array([list(each.parameters.values()) for each in simulators])).T
 

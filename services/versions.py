@@ -2,17 +2,18 @@
 
 import platform
 import subprocess
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, packages_distributions, version
 from pathlib import Path
 
 from schemas.provenance import Provenance
 from services.core.outside import file_of
 from services.engines import engines
 from services.engines.base import Engine
-from services.plugins import digest, digests
+from services.plugins import digest, digest_of, digests
 from services.store.models import SPEC_VERSION
 
 CODE = ("schemas", "services", "workers")
@@ -63,7 +64,7 @@ def _engine(engine: type[Engine]) -> str:
     """What changes when its numbers may."""
     library = f"{engine.library} {_version(engine.library)}" if engine.library else None
     if (file := file_of(engine)) is not None:
-        return f"{file} {digests()[file]}" + (f", {library}" if library else "")
+        return f"{file} {digest_of(file)}" + (f", {library}" if library else "")
     return library or "of gaplab's own"
 
 
@@ -72,7 +73,13 @@ def _version(module: str) -> str:
     for name in DISTRIBUTIONS.get(module, (module,)):
         with suppress(PackageNotFoundError):
             return version(name)
-    return "none"
+    return " ".join(sorted({version(name) for name in _distributions().get(module, ())})) or "none"
+
+
+@cache
+def _distributions() -> Mapping[str, list[str]]:
+    """Those that have each module; their names are often others. Looking takes a quarter of a second."""
+    return packages_distributions()
 
 
 @cache

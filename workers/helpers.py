@@ -1,5 +1,6 @@
 """Processes on idle cores that do parts of one repetition's calls."""
 
+from collections.abc import Sequence
 from functools import cache
 from time import monotonic
 from typing import Any, TypeAlias
@@ -70,8 +71,9 @@ class Helpers:
                 self._meet(answer)
         return self._ready
 
-    def helped(self) -> None:
-        """They were worth asking."""
+    def helped(self, but_for: Sequence[Handle] = ()) -> None:
+        """They were worth asking, but for these: others take their places at the next look."""
+        self._ready = [each for each in self._ready if each not in but_for]
         self._pause_s = LOOK_S
 
     def failed(self) -> None:

@@ -80,7 +80,7 @@ class Pool:
         if spread.lost > spread.gained:
             self._helpers.failed()
         else:
-            self._helpers.helped()
+            self._helpers.helped(but_for=spread.dead)
         return fitnesses
 
     def _here(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:

@@ -9,6 +9,7 @@ from ray.exceptions import RayError, RayTaskError
 
 from schemas.sensitivity import Checked, Sensitivity
 from services import sensitivity
+from services.core.errors import ClusterUnusable
 from services.core.optimizers.steady_state import SteadyState
 from services.core.sensitivity import Effort
 from services.core.sensitivity import check as check_tunables
@@ -16,6 +17,7 @@ from services.execution import STALE_AFTER_S
 from services.sensitivity import CheckClaim
 from services.simulation import subject
 from services.store.session import Store
+from workers.nodes import Versions, check_here
 
 LOOK_S = 0.2
 """Between looks for a check that is queued."""
@@ -24,11 +26,15 @@ log = logging.getLogger("gaplab.supervisor")
 
 
 @ray.remote(num_cpus=0, max_retries=0)
-def check(checked: Checked) -> tuple[Sensitivity, ...]:
+def check(checked: Checked, expected: Versions) -> tuple[Sensitivity, ...]:
     """What each tunable does to fitness.
 
     It reserves no core: it takes seconds, and what it says is wanted before hours of physics, not after them.
+
+    Raises:
+        ClusterUnusable: this node has not the versions that are expected.
     """
+    check_here(expected)
     return check_tunables(subject(checked), SteadyState(), Effort(checked.points, checked.evaluations))
 
 
@@ -39,19 +45,27 @@ class Checks:
         store: the database.
         owner: the supervisor's name in it.
         lease_s: for how long the holder of a check may be silent before it goes to others.
+        versions: that a node must have to run them.
 
     All methods raise StoreUnavailable; nothing is lost by it.
     """
 
-    def __init__(self, store: Store, owner: str, lease_s: float = STALE_AFTER_S) -> None:
+    def __init__(
+        self, store: Store, owner: str, lease_s: float = STALE_AFTER_S, versions: Versions | None = None
+    ) -> None:
         self._store = store
         self._owner = owner
         self._lease_s = lease_s
+        self._versions = versions or {}
         self._run: tuple[CheckClaim, ObjectRef[tuple[Sensitivity, ...]]] | None = None
         self._looked = -LOOK_S
 
     def step(self) -> None:
-        """Store what has ended, and start what is queued."""
+        """Store what has ended, and start what is queued.
+
+        Raises:
+            ClusterUnusable: the node that ran it has other versions; nothing of it is stored.
+        """
         if self._run is not None:
             self._end(*self._run)
         elif monotonic() - self._looked >= LOOK_S:
@@ -73,7 +87,7 @@ class Checks:
 
     def _claim(self) -> None:
         if (claim := sensitivity.claim(self._store, self._owner)) is not None:
-            self._run = claim, check.remote(claim.spec)
+            self._run = claim, check.remote(claim.spec, self._versions)
 
     def _end(self, claim: CheckClaim, result: "ObjectRef[tuple[Sensitivity, ...]]") -> None:
         if not ray.wait([result], timeout=0)[0]:
@@ -81,6 +95,8 @@ class Checks:
         try:
             sensitivity.complete(self._store, claim, ray.get(result))
         except RayTaskError as error:
+            if isinstance(error.cause, ClusterUnusable):
+                raise error.cause from error
             sensitivity.fail(self._store, claim, f"{type(error.cause).__name__}: {error.cause}")
             log.error("sensitivity check %s: failed: %s", claim.id, error.cause)
         except RayError as error:

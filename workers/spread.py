@@ -73,10 +73,12 @@ class Spread:
     Attributes:
         gained: rollouts that others did.
         lost: rollouts that were lent, and had to be done here after all.
+        dead: helpers that answer nothing any more.
     """
 
     def __init__(self, parts: Sequence[Part], here: Simulate, helpers: Sequence[Handle], rollout_s: float) -> None:
         self.gained = self.lost = 0
+        self.dead: list[Handle] = []
         self._parts = parts
         self._here = here
         self._rollout_s = rollout_s
@@ -120,6 +122,7 @@ class Spread:
             self._room.append(loan.helper)
         except RayError:  # its node or its process died
             self._room.clear()
+            self.dead.append(loan.helper)
             self._take_back(loan)
 
     def _take_back(self, loan: Loan) -> None:

@@ -65,7 +65,7 @@ class Supervisor:
         self._checkpoint_s = checkpoint_s
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
         self._runs: list[Run] = []
-        self._checks = Checks(store, self._owner, lease_s)
+        self._checks = Checks(store, self._owner, lease_s, self._versions)
         self._lease_s = lease_s
         self._beat = -lease_s
         self._looked = -WAIT_S

@@ -1,6 +1,7 @@
 """Recorded fitness of many repetitions -> the points of a curve."""
 
 from functools import lru_cache
+from math import isfinite
 
 import numpy as np
 from scipy import stats
@@ -21,8 +22,11 @@ def curve_points(recorded: FloatArray) -> tuple[CurvePoint, ...]:
     return tuple(curve_point(evaluations, column) for evaluations, column in enumerate(recorded.T))
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
     """Mean, sample standard deviation and the 95 % interval of the mean by Student's t, over the finite values.
+
+    A statistic of values so large that it has no number is None, as one of too few values is.
 
     Args:
         evaluations: number of real-world evaluations.
@@ -30,8 +34,8 @@ def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
     """
     there = values[np.isfinite(values)]
     n = len(there)
-    mean = float(there.mean()) if n else None
-    sd = float(there.std(ddof=1)) if n > 1 else None
+    mean = known(there.mean()) if n else None
+    sd = known(_deviation(there)) if n > 1 else None
     lower, upper = _interval(mean, sd, n)
     return CurvePoint(
         evaluations=evaluations,
@@ -44,11 +48,26 @@ def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
     )
 
 
+def _deviation(values: FloatArray) -> float:
+    """Exactly 0 of equal values, whose mean may be rounded."""
+    return float(values.std(ddof=1)) if not equal(values) else 0.0
+
+
 def _interval(mean: float | None, sd: float | None, n: int) -> tuple[float | None, float | None]:
     if mean is None or sd is None:
         return None, None
     half = _quantile(n - 1) * sd / n**0.5
-    return mean - half, mean + half
+    return known(mean - half), known(mean + half)
+
+
+def equal(values: FloatArray) -> bool:
+    """Whether all of the values `(n,)` are the same."""
+    return bool(np.all(values == values[:1]))
+
+
+def known(value: float) -> float | None:
+    """The value; None if it is no finite number."""
+    return float(value) if isfinite(value) else None
 
 
 @lru_cache(maxsize=1024)

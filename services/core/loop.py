@@ -134,14 +134,14 @@ def _draw(setting: Setting) -> Tuned:
 
 
 def _select(setting: Setting, history: History, iteration: int) -> Selected:
+    searched = setting.budget.selection_evaluations * setting.strategy.ensemble if setting.strategy.searches else 0
     if setting.budget.reuse_transfer and setting.strategy.selects_transferred and history.transferred is not None:
-        return Selected(iteration, history.transferred, Cost(saved=setting.budget.selection_evaluations))
+        return Selected(iteration, history.transferred, Cost(saved=searched))
     belief = Belief(setting.genomes, setting.known, history.samples, history.simulators)
     foresight = Foresight(setting.simulate, setting.batch, len(belief.simulators))
     simulate = Counted(foresight)
     search = _search(setting, simulate, foresight, belief.parameters, setting.stream(iteration, "search"))
     genome = setting.strategy.select(belief, search, setting.stream(iteration, "select"))
-    searched = setting.budget.selection_evaluations * setting.strategy.ensemble if setting.strategy.searches else 0
     return Selected(iteration, genome, simulate.count.cost_of(searched))
 
 
@@ -162,17 +162,20 @@ def _search(setting: Setting, simulate: Simulate, ahead: Ahead, parameters: Para
 
 
 def _tune(setting: Setting, history: History, iteration: int) -> Tuned:
-    """New simulators fitted to every sample that was measured; random ones while none was."""
-    ensemble = setting.strategy.ensemble
+    """New simulators fitted to every sample that was measured; random ones while none was.
+
+    The budget counts samples before they are measured: what it had for one that failed is saved.
+    """
+    ensemble, evaluations = setting.strategy.ensemble, setting.budget.simulator_evaluations
+    budget = evaluations * len(history.samples)
     rng = setting.stream(iteration, "tune")
     samples = tuple(each for each in history.samples if np.isfinite(each.fitness))
     if not samples:
-        return Tuned(iteration, draw_simulators(setting.parameters, ensemble, rng))
+        return Tuned(iteration, draw_simulators(setting.parameters, ensemble, rng), Cost(saved=budget))
     optimizer = setting.optimizer.diverse(ensemble) if ensemble > 1 else setting.optimizer
-    evaluations = setting.budget.simulator_evaluations
     misfit = Misfit(setting.simulate, samples, setting.batch)
     found = tune(misfit, setting.parameters, optimizer, evaluations, rng)
-    return Tuned(iteration, found[:ensemble], misfit.count.cost_of(evaluations * len(samples)))
+    return Tuned(iteration, found[:ensemble], misfit.count.cost_of(budget))
 
 
 def _transfer(setting: Setting, history: History, iteration: int) -> Transferred:

@@ -14,6 +14,7 @@ import numpy as np
 
 from schemas.misfit import MisfitPoint, Spread, TunedSpread
 from services.core.arrays import FloatArray
+from services.core.curves import known
 from services.core.types import Space
 
 AT_BOUND = 0.01
@@ -93,10 +94,13 @@ def _spread(values: Sequence[float] | FloatArray) -> dict[str, float | int | Non
     """As `Spread` has it, over the finite values."""
     there = np.asarray(values, dtype=np.float64)
     there = there[np.isfinite(there)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        mean = known(there.mean()) if len(there) else None
+        sd = known((there - there.min()).std(ddof=1)) if len(there) > 1 else None  # exactly 0 if all are equal
     return {
         "n": len(there),
-        "mean": float(there.mean()) if len(there) else None,
-        "sd": float((there - there.min()).std(ddof=1)) if len(there) > 1 else None,  # exactly 0 if all are equal
+        "mean": mean,
+        "sd": sd,
         "least": float(there.min()) if len(there) else None,
         "greatest": float(there.max()) if len(there) else None,
     }

@@ -83,8 +83,10 @@ def _imported(name: str, folder: str) -> ModuleType:
 
 
 def _is_of(module: ModuleType, found: object) -> TypeGuard[type]:
-    """Whether it is a class of this module's own, and not only there for others, as an underscore says."""
-    return isinstance(found, type) and found.__module__ == module.__name__ and not found.__name__.startswith("_")
+    """Whether it is a class of this module or package, and not only there for others, as an underscore says."""
+    if not isinstance(found, type) or found.__name__.startswith("_"):
+        return False
+    return found.__module__ == module.__name__ or found.__module__.startswith(f"{module.__name__}.")
 
 
 def _check(plugin: type) -> None:

@@ -1,7 +1,8 @@
 """The paper's formulas for the worth of a controller as the next sample, and nothing else.
 
 All take the fitness of n controllers in m simulators, `(n, m)`, and give `(n,)`; a nan among a controller's fitnesses
-makes its score nan, which never wins.
+makes its score nan, which never wins. Only a simulator of no weight, whose physics failed on a sample, has no say: an
+ensemble that is kept diverse keeps it, and it may fail on every controller there is.
 """
 
 from collections.abc import Sequence
@@ -22,7 +23,7 @@ def weighted_mean(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
         fitnesses: `(n, m)`.
         weights: `(m,)`, non-negative, summing to 1.
     """
-    return fitnesses @ weights
+    return _weighty(fitnesses, weights) @ weights
 
 
 def weighted_deviation(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
@@ -30,7 +31,7 @@ def weighted_deviation(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
 
     Source: paper, section 2, *Informative*.
     """
-    deviations = fitnesses - weighted_mean(fitnesses, weights)[:, None]
+    deviations = _weighty(fitnesses, weights) - weighted_mean(fitnesses, weights)[:, None]
     return np.sqrt(deviations**2 @ weights)
 
 
@@ -72,3 +73,8 @@ def simulator_weights(squared_errors: FloatArray, floor: float) -> FloatArray:
     weights = 1.0 / np.maximum(squared_errors, floor)
     total = weights.sum()
     return weights / total if total > 0 else np.full(len(weights), 1.0 / len(weights))
+
+
+def _weighty(fitnesses: Fitnesses, weights: FloatArray) -> Fitnesses:
+    """The same where the simulator has a weight, and 0 elsewhere, for nothing takes a nan out of a sum."""
+    return fitnesses if np.all(weights > 0) else np.where(weights > 0, fitnesses, 0.0)

@@ -7,28 +7,32 @@ p is smaller than it should be: it is given because the paper gives it, and is s
 
 from collections.abc import Sequence
 from itertools import combinations
+from math import inf, isfinite
 
 import numpy as np
 from scipy import stats
 
 from schemas.curves import Comparison, Test
 from services.core.arrays import FloatArray
+from services.core.curves import equal, known
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def compare(first: FloatArray, second: FloatArray) -> tuple[Test, Test, Test]:
     """Student's t (the paper's), Welch's t and Mann-Whitney between two groups, two-sided.
 
-    A test is undefined, and its numbers None, where a group has fewer than two values or neither varies.
+    A test is undefined, and its numbers None, where a group has fewer than two values or neither varies, or where the
+    values are too large to be squared.
 
     Args:
         first: `(n,)`, nan counts for nothing.
         second: `(m,)`, likewise.
     """
     first, second = finite(first), finite(second)
-    if min(len(first), len(second)) < 2 or np.ptp(np.concatenate([first, second])) == 0:
+    if min(len(first), len(second)) < 2 or equal(np.concatenate([first, second])):
         undefined = Test(statistic=None, p=None)
         return undefined, undefined, undefined
-    if np.ptp(first) == 0 and np.ptp(second) == 0:
+    if equal(first) and equal(second):
         undefined = Test(statistic=None, p=None)
         return undefined, undefined, _test(stats.mannwhitneyu(first, second))
     student = stats.ttest_ind(first, second)
@@ -36,14 +40,15 @@ def compare(first: FloatArray, second: FloatArray) -> tuple[Test, Test, Test]:
     return _test(student, student.df), _test(welch, welch.df), _test(stats.mannwhitneyu(first, second))
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def effect_size(first: FloatArray, second: FloatArray) -> float | None:
     """Cohen's d: the difference of the means over the pooled standard deviation; None where that is 0 or unknown."""
     first, second = finite(first), finite(second)
     freedom = len(first) + len(second) - 2
-    if min(len(first), len(second)) < 2:
-        return None
+    if min(len(first), len(second)) < 2 or (equal(first) and equal(second)):
+        return None  # the variance of equal numbers need not come out as 0
     spread = ((len(first) - 1) * first.var(ddof=1) + (len(second) - 1) * second.var(ddof=1)) / freedom
-    return float((first.mean() - second.mean()) / spread**0.5) if spread > 0 else None
+    return known((first.mean() - second.mean()) / spread**0.5) if 0 < spread < inf else None
 
 
 def holm(p_values: Sequence[float | None]) -> tuple[float | None, ...]:
@@ -106,10 +111,13 @@ def finite(values: FloatArray) -> FloatArray:
     return values[np.isfinite(values)]
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _difference(first: FloatArray, second: FloatArray) -> float | None:
-    return float(first.mean() - second.mean()) if len(first) and len(second) else None
+    return known(first.mean() - second.mean()) if len(first) and len(second) else None
 
 
 def _test(result: object, freedom: float | None = None) -> Test:
-    statistic, p = float(result.statistic), float(result.pvalue)  # type: ignore[attr-defined] # scipy has no stubs
+    statistic, p = known(result.statistic), known(result.pvalue)  # type: ignore[attr-defined] # scipy has no stubs
+    if statistic is None or p is None or not (freedom is None or isfinite(freedom)):
+        return Test(statistic=None, p=None)
     return Test(statistic=statistic, p=p, degrees_of_freedom=None if freedom is None else float(freedom))

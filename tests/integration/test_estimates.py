@@ -9,6 +9,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy import update
 
 from api.app import create_app
+from schemas.plugin import PluginRef
 from schemas.spec import StudySpec
 from services import experiments
 from services.core.types import Probed
@@ -76,6 +77,24 @@ def test_the_direct_baseline_is_computed_by_the_engine_of_reality(sqlite_store: 
 
     assert [each.engine for each in found.experiments] == ["pybullet", "mujoco"]
     assert {each.engine for each in found.engines} == {"pybullet", "mujoco"}
+
+
+def test_what_the_direct_baseline_took_is_a_measurement_of_the_engine_of_reality(sqlite_store: Store):
+    spec = StudySpec.model_validate(
+        {"strategies": ["direct"], "engine": "mujoco", "reality": {"engine": "pybullet"}, "budget": "smoke"}
+    )
+    experiments.submit_study(sqlite_store, spec)
+    claim(sqlite_store, "me", 1)
+    with sqlite_store.transaction() as session:
+        session.execute(update(RepetitionRow).values(seconds=30.0, rollouts_done=600))
+
+    direct = estimate(sqlite_store, spec)
+    other = estimate(sqlite_store, spec.model_copy(update={"strategies": (PluginRef(name="random"),)}))
+
+    assert [(each.engine, each.seconds_per_rollout, each.measured) for each in direct.engines] == [
+        ("pybullet", 0.05, True)
+    ]
+    assert [(each.engine, each.measured) for each in other.engines] == [("mujoco", False)]
 
 
 def test_few_at_once_take_as_long_as_few_cores(sqlite_store: Store):

@@ -55,6 +55,18 @@ def test_a_process_that_was_killed_is_replaced(physics):
     assert physics.ask(os.getpid) not in {killed, os.getpid()}
 
 
+def test_a_process_that_could_not_be_started_is_started_by_the_next_question(physics, monkeypatch):
+    def out_of_memory(_):
+        raise OSError(12, "Cannot allocate memory")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("multiprocessing.context.SpawnProcess.start", out_of_memory)
+        with pytest.raises(EngineInterrupted):
+            physics.ask(os.getpid)
+
+    assert physics.ask(os.getpid) not in {None, os.getpid()}
+
+
 def test_physics_that_kills_its_process_is_an_error_and_no_more(physics):
     first = physics.ask(os.getpid)
 

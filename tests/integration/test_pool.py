@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+import ray
 
 from schemas.spec import ExperimentSpec
 from services.resolution import resolve_experiment
@@ -70,11 +71,16 @@ def test_rollouts_are_spread_if_there_are_several(alone, pool, spreads):
     assert spreads
 
 
-def test_it_asks_for_as_many_rollouts_at_a_time_as_keep_the_cores_busy(alone, pool):
+def until(pool, alone, batch):
+    """Ask until so many rollouts are what keeps the cores busy."""
     deadline = time.monotonic() + 60
-    while pool.batch() != 3:  # this process, and two idle cores
+    while pool.batch() != batch:
         assert time.monotonic() < deadline
         pool(*asked(alone, 3, 1))
+
+
+def test_it_asks_for_as_many_rollouts_at_a_time_as_keep_the_cores_busy(alone, pool):
+    until(pool, alone, 3)  # this process, and two idle cores
 
 
 def test_a_long_call_gets_help_that_came_after_it_began(alone, spreads):
@@ -99,6 +105,21 @@ def test_a_helper_that_dies_or_dawdles_costs_time_and_no_result(alone, pool, spr
     np.testing.assert_array_equal(got, expected)
     assert spreads[-1].lost
     assert pool.batch() == 1  # it is not asked again
+
+
+def test_one_of_several_helpers_that_dies_is_asked_no_more(alone, pool):
+    question = asked(alone, 1, 2)
+    until(pool, alone, 3)
+    live, dead = pool._helpers.ready(*question)
+    ray.kill(dead)
+
+    spread = Spread([question] * 6, alone.simulate, [live, dead], rollout_s=10.0)
+    spread.run()
+    pool._helpers.helped(but_for=spread.dead)
+
+    assert set(spread.dead) == {dead}
+    assert dead not in pool._helpers.ready(*question)
+    assert live in pool._helpers.ready(*question)
 
 
 @pytest.mark.parametrize(

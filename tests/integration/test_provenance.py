@@ -1,6 +1,7 @@
 """Under what an experiment is computed, and that it does not go on under something else unless asked to."""
 
 import subprocess
+from importlib.metadata import version
 
 import pytest
 from fastapi.testclient import TestClient
@@ -56,6 +57,11 @@ def test_it_names_the_library_and_the_version_of_every_engine():
     assert "none" not in {*HERE.engines["mujoco"].split(), *HERE.engines["physx"].split()}
     assert versions.versions()["mujoco"] != "none"
     assert HERE.libraries.keys() >= {"numpy", "scipy", "cma"}
+
+
+def test_a_library_may_come_in_a_distribution_of_another_name():
+    assert versions._version("attr") == version("attrs")
+    assert versions._version("no_such_library") == "none"
 
 
 def test_it_knows_the_commit_and_whether_the_code_was_changed_since(tmp_path, monkeypatch):

@@ -82,7 +82,7 @@ class Ray:
         self.looks = 0
         self.lost = False
 
-    def remote(self, spec):
+    def remote(self, spec, expected):
         self.looks = 2
         return spec
 

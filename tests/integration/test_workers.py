@@ -13,7 +13,7 @@ from schemas.lifecycle import State
 from schemas.sensitivity import SensitivitySpec, Verdict
 from schemas.spec import ExperimentSpec
 from services import execution, experiments, sensitivity
-from services.core.errors import StoreUnavailable
+from services.core.errors import ClusterUnusable, StoreUnavailable
 from services.core.loop import repetition
 from services.core.optimizers.steady_state import SteadyState
 from services.core.sensitivity import Effort, check
@@ -256,7 +256,7 @@ def test_a_sensitivity_check_runs_beside_repetitions_and_tells_the_same_as_in_on
 
 def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store, monkeypatch):
     @ray.remote(num_cpus=0, max_retries=0)
-    def raising(spec):
+    def raising(spec, expected):
         msg = "the check is broken"
         raise ZeroDivisionError(msg)
 
@@ -282,7 +282,7 @@ def killed_once(spec, mark):
 
 
 def test_a_sensitivity_check_whose_worker_is_killed_runs_again(sqlite_store, monkeypatch, tmp_path):
-    monkeypatch.setattr(checking.check, "remote", lambda spec: killed_once.remote(spec, str(tmp_path / "killed")))
+    monkeypatch.setattr(checking.check, "remote", lambda spec, _: killed_once.remote(spec, str(tmp_path / "killed")))
     check_id = experiments.submit_experiment(sqlite_store, toy()).sensitivity
 
     found = checked(sqlite_store, check_id, Supervisor(sqlite_store, lambda: 2))
@@ -315,5 +315,15 @@ def test_a_check_that_was_taken_over_is_dropped(sqlite_store):
     sensitivity.claim(sqlite_store, "second")
     checks.heartbeat()
     checks.step()
+
+    assert sensitivity.read(sqlite_store, check_id).state is State.RUNNING
+
+
+def test_a_check_on_a_node_with_other_versions_is_not_stored(sqlite_store):
+    check_id = sensitivity.submit(sqlite_store, SensitivitySpec(robot="toy_function")).id
+    supervisor = Supervisor(sqlite_store, lambda: 2, {"gaplab": "0.0.1"})
+
+    with pytest.raises(ClusterUnusable, match=r"the supervisor has gaplab 0\.0\.1"):
+        checked(sqlite_store, check_id, supervisor)
 
     assert sensitivity.read(sqlite_store, check_id).state is State.RUNNING

@@ -41,3 +41,18 @@ def test_a_curve_may_fall():
     means = [each.mean for each in curve_points(np.array([[1.0, 0.5], [1.0, 0.7]]))]
 
     assert means[1] < means[0]
+
+
+def test_equal_values_do_not_spread_though_their_mean_is_rounded():
+    (point,) = curve_points(np.full((3, 1), 0.1))
+
+    assert point.sd == 0
+    assert point.lower == point.upper == point.mean
+
+
+@pytest.mark.parametrize("large", [1e200, 1.7e308])
+def test_values_too_large_to_be_squared_have_no_spread_and_are_no_error(large):
+    (point,) = curve_points(np.array([[large], [-large / 2], [large]]))
+
+    assert (point.sd, point.lower, point.upper) == (None, None, None)
+    assert point.values == (large, -large / 2, large)

@@ -7,6 +7,8 @@ import pytest
 
 from services.core.loop import History, next_step, recorded_fitness, repetition
 from services.core.strategies import strategies
+from services.core.strategies.base import EnsembleOptions
+from services.core.strategies.informative import Informative
 from services.core.types import Budget, Measured, Probed, Sample, Selected, Transferred, Tuned
 from tests.fakes import CountedReality, Recorder, flat, paraboloid, small_setting
 
@@ -90,6 +92,27 @@ def test_budgets_are_honoured_to_the_rollout_and_reported_in_the_steps(strategy,
     assert sum(cost.rollouts + cost.saved for cost in costs) == expected
     assert sum(cost.rollouts for cost in costs) == simulate.rollouts <= expected
     assert all(cost.saved >= 0 for cost in costs)
+
+
+@pytest.mark.parametrize("failed", [{2}, {1, 2}, {1, 2, 3}])
+def test_what_a_failed_measurement_does_not_take_of_the_budget_is_saved(failed):
+    reality = CountedReality(lambda genome: float("nan") if reality.asked // 2 in failed else float(genome.sum()))
+
+    steps = list(repetition(small_setting("random", reality=reality)))
+
+    costs = [step.cost for step in steps if hasattr(step, "cost")]
+    assert sum(cost.rollouts + cost.saved for cost in costs) == 160 + 300
+
+
+def test_a_strategy_that_transfers_the_best_of_many_simulators_saves_the_budget_of_all():
+    class Fittest(Informative):
+        selects_transferred = True
+
+    strategy = Fittest(EnsembleOptions(simulators=4))
+
+    steps = list(repetition(replace(small_setting(), strategy=strategy)))
+
+    assert {step.cost.saved for step in steps if isinstance(step, Selected)} == {30 * 4}
 
 
 def test_a_budget_that_the_population_does_not_divide_is_honoured_too():

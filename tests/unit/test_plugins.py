@@ -140,6 +140,42 @@ def test_what_is_in_the_folder_has_a_hash_and_files_that_python_keeps_have_none(
     assert plugins.digest() != digest
 
 
+def test_files_of_one_name_in_several_folders_count_both(put: Put, tmp_path: Path):
+    for folder in ("mine", "yours"):
+        put(folder)
+        (tmp_path / folder / "friction.csv").write_text("1.0")
+    before = plugins.digests()["friction.csv"]
+
+    (tmp_path / "mine" / "friction.csv").write_text("0.5")
+
+    assert plugins.digests()["friction.csv"] != before
+
+
+def test_a_package_may_have_its_plug_in_in_any_of_its_files(put: Put):
+    package = put() / "thorough"
+    package.mkdir()
+    (package / "core.py").write_text(CAREFUL)
+    (package / "__init__.py").write_text("from gaplab_plugins.thorough.core import Careful")
+
+    found = strategies()["careful"]
+
+    assert outside.file_of(found) == "thorough/core.py"
+    assert plugins.digest_of("thorough/core.py") == plugins.digest_of("thorough/__init__.py")
+
+
+def test_the_content_of_a_package_is_all_that_is_in_it(put: Put):
+    package = put(alone="") / "glide"
+    package.mkdir()
+    (package / "__init__.py").write_text(GLIDE)
+    (package / "law.py").write_text("SPEED = 1.0")
+    before, alone = plugins.digest_of("glide/__init__.py"), plugins.digest_of("alone.py")
+
+    (package / "law.py").write_text("SPEED = 2.0")
+
+    assert plugins.digest_of("glide/__init__.py") != before
+    assert plugins.digest_of("alone.py") == alone == plugins.digests()["alone.py"]
+
+
 def test_without_folders_there_is_nothing_to_tell():
     assert plugins.digests() == {}
     assert plugins.digest() == "none"

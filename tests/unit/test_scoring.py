@@ -68,6 +68,14 @@ def test_a_failed_simulator_weighs_nothing_and_if_all_fail_they_weigh_alike():
     np.testing.assert_allclose(simulator_weights(np.array([np.inf, np.inf]), floor=0.01), [0.5, 0.5])
 
 
+def test_a_simulator_that_failed_on_a_sample_cannot_rule_controllers_out():
+    weights = simulator_weights(np.array([0.1, 0.1, np.inf]), floor=1e-9)
+    fitnesses = np.array([[1.0, 3.0, np.nan], [2.0, 2.0, 5.0]])
+
+    np.testing.assert_allclose(weighted_mean(fitnesses, weights), [2.0, 2.0])
+    np.testing.assert_allclose(weighted_deviation(fitnesses, weights), [1.0, 0.0])
+
+
 def test_a_failed_rollout_makes_the_score_nan():
     failed = np.array([[1.0, np.nan]])
 

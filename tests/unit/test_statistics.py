@@ -43,6 +43,22 @@ def test_cohens_d_is_the_difference_over_the_pooled_deviation():
     assert effect_size(FIRST, SECOND) == pytest.approx(0.25 / (0.15 / 7) ** 0.5)
 
 
+def test_equal_values_have_no_effect_size_though_their_variance_is_rounded():
+    constant = np.full(3, 0.1)
+    assert constant.var(ddof=1) > 0
+
+    assert effect_size(constant, np.full(3, 0.3)) is None
+
+
+@pytest.mark.parametrize("values", [[1e200, -1e200, 1e200], [1e308, 1e308, -1e308], [0.0, 1e-200, 0.0]])
+def test_what_cannot_be_squared_has_no_test_and_is_no_error(values):
+    (found,) = compare_all({"large": np.array(values)[:, None], "constant": np.zeros((3, 1))}, frozenset(), 0, 0)
+
+    assert found.student.p is None or 0 <= found.student.p <= 1
+    assert found.mann_whitney.p is not None
+    assert found.effect_size is None
+
+
 @pytest.mark.parametrize(
     ("first", "second"),
     [

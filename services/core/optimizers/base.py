@@ -99,7 +99,7 @@ def maximise(
 ) -> Population:
     """The population after exactly `evaluations` fitness evaluations, ranked; nan never wins.
 
-    A genome that the search has evaluated before counts, but is not evaluated again.
+    A genome that the search has evaluated before counts, but is not evaluated again, unless it was hopeless then.
 
     Args:
         optimizer: that searches.

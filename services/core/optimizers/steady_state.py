@@ -61,7 +61,7 @@ class SteadyState(Optimizer):
     """Steady-state evolution: a newcomer is evaluated and added, then the replacement rule drops a member.
 
     The first population is drawn uniformly and told whole. Mutation is Gaussian; periodic genes wrap, others clip; at
-    least one gene mutates, so no evaluation is spent on a copy.
+    least one gene mutates, so that a newcomer is a copy only where that gene clips at its bound.
     """
 
     name = "steady_state"

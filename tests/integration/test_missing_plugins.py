@@ -1,0 +1,60 @@
+"""Experiments whose plug-ins are gone: what is stored is shown, and what cannot be computed is said in a sentence."""
+
+from copy import deepcopy
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from services import experiments
+from services.core.errors import InvalidSpec
+from services.execution import claim
+from services.resolution import spec_of
+from services.simulation import setting
+from services.store.models import ExperimentRow
+from services.store.session import Store
+from tests.experiments import run, toy
+
+
+def experiment_without(store: Store, kind: str) -> str:
+    """The id of one that is computed, and whose plug-in of this kind is not installed any more."""
+    made = experiments.submit_experiment(store, toy(repetitions=1))
+    (one,) = claim(store, "me", 1)
+    run(store, one)
+    with store.transaction() as session:
+        row = session.get_one(ExperimentRow, made.id)
+        spec = deepcopy(row.spec)
+        (spec["tunables"][0] if kind == "tunables" else spec[kind])["name"] = "gone"
+        row.spec = spec
+    return made.id
+
+
+@pytest.mark.parametrize("kind", ["robot", "engine", "tunables", "optimizer"])
+@pytest.mark.parametrize("path", ["", "/curve", "/misfit", "/simulators"])
+def test_what_is_stored_is_shown(sqlite_store: Store, kind: str, path: str):
+    id_ = experiment_without(sqlite_store, kind)
+
+    assert TestClient(create_app(sqlite_store)).get(f"/experiments/{id_}{path}").status_code == 200
+
+
+@pytest.mark.parametrize("kind", ["robot", "engine", "tunables"])
+@pytest.mark.parametrize(
+    "path", ["/experiments/{}/predictions", "/figures/predictions?experiment={}", "/figures/toy?experiment={}"]
+)
+def test_what_cannot_be_computed_any_more_says_why(sqlite_store: Store, kind: str, path: str):
+    id_ = experiment_without(sqlite_store, kind)
+
+    answer = TestClient(create_app(sqlite_store)).get(path.format(id_))
+
+    assert answer.status_code == 422
+    assert "called 'gone'" in answer.text
+
+
+@pytest.mark.parametrize("kind", ["robot", "engine", "tunables", "optimizer", "strategy"])
+def test_a_repetition_of_it_fails_with_a_sentence(sqlite_store: Store, kind: str):
+    id_ = experiment_without(sqlite_store, kind)
+    with sqlite_store.reading() as session:
+        spec = spec_of(session.get_one(ExperimentRow, id_).spec)
+
+    with pytest.raises(InvalidSpec, match="called 'gone'"):
+        setting(spec, 0)
