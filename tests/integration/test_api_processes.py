@@ -123,7 +123,9 @@ def test_a_port_that_is_taken_is_a_sentence(tmp_path: Path):
     assert re.fullmatch(rf"gaplab: cannot serve on 127\.0\.0\.1:{port}: address already in use\n", said)
 
 
-@pytest.mark.parametrize(("host", "port"), [("no-such-host.invalid", 9999), ("127.0.0.1", 99999), ("::1::", 1)])
+@pytest.mark.parametrize(
+    ("host", "port"), [("no-such-host.invalid", 9999), ("127.0.0.1", 99999), ("127.0.0.1", -1), ("::1::", 1)]
+)
 def test_an_address_that_is_none_is_a_sentence(host: str, port: int):
     with pytest.raises(CommandError, match=f"^cannot serve on {host}:{port}: [^\n]+$"):
         listen(host, port)
