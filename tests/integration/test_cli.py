@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from api.client import Client, ServiceError, ServiceUnreachable
+from api.commands import reading
 from api.exits import Exit
 from services import execution, sensitivity
 from services.core.optimizers.steady_state import SteadyState
@@ -57,6 +58,22 @@ def test_a_spec_with_several_strategies_or_none_is_a_study(gaplab: Gaplab):
 
     assert "toy function (7)" in listed
     assert "information? (5)" in listed
+
+
+def test_an_experiment_of_no_study_is_listed_whatever_many_of_studies_are_newer(
+    gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(reading, "PAGE", 4)
+    older, alone = submitted(gaplab), submitted(gaplab)
+    studies = [submitted(gaplab, str(EXAMPLES / "toy.json")) for _ in range(2)]
+
+    three = json.loads(gaplab("list", "--limit", "3", "--json").out)
+    one = json.loads(gaplab("list", "--limit", "1", "--json").out)
+    all_ = json.loads(gaplab("list", "--json").out)
+
+    assert [each["id"] for each in three] == [*reversed(studies), alone]
+    assert [each["id"] for each in one] == studies[1:]
+    assert [each["id"] for each in all_] == [*reversed(studies), alone, older]
 
 
 def test_a_spec_comes_from_standard_input_too(gaplab: Gaplab):
