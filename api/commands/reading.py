@@ -81,7 +81,7 @@ def curve(
             if path:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(client.figure(*ids).content(format))
-                typer.echo(f"Wrote {path}.", err=as_json)
+                typer.echo(f"Wrote {path}.", err=as_json or csv)
         if not (as_json or csv or svg or html):
             found = client.curves(ids)
             display.console().print(display.curves(found), *display.baselines(found))

@@ -123,11 +123,13 @@ def test_curves_are_a_table_values_or_drawings(gaplab: Gaplab, sqlite_store: Sto
 
     table, values = gaplab("curve", id), gaplab("curve", id, "--csv")
     drawn = gaplab("curve", id, "--svg", str(svg), "--html", str(html))
+    both = gaplab("curve", id, "--csv", "--svg", str(svg))
 
     assert re.search(r"^ *2 +\d+\.\d\d±\d+\.\d\d", table.out, re.MULTILINE)
     assert "evolved in reality itself" in table.out
     assert values.out.startswith("experiment,name,strategy,repetition,evaluations,fitness\n")
     assert drawn.code == 0
+    assert both == (0, values.out, f"Wrote {svg}.\n")
     assert ET.fromstring(svg.read_text()).tag.endswith("svg")
     assert html.read_text().startswith("<!doctype html>")
 
