@@ -50,6 +50,16 @@ def test_submit_prints_the_id_that_show_and_list_know(gaplab: Gaplab):
     assert id in listed.out
 
 
+def test_an_edit_that_is_none_is_a_sentence(gaplab: Gaplab):
+    id = submitted(gaplab)  # noqa: A001
+
+    nothing, nameless = gaplab("edit", id), gaplab("edit", id, "--name", "")
+
+    assert (nothing.code, nameless.code) == (Exit.INVALID, Exit.INVALID)
+    assert nothing.err == "gaplab: give a name, notes, or both\n"
+    assert nameless.err == "gaplab: --name: String should have at least 1 character\n"
+
+
 def test_a_spec_with_several_strategies_or_none_is_a_study(gaplab: Gaplab):
     submitted(gaplab, str(EXAMPLES / "toy.json"))
     submitted(gaplab, str(EXAMPLES / "weights.json"))
