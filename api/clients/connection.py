@@ -31,7 +31,7 @@ class Connection:
 
     Args:
         url: of the service; left out: GAPLAB_URL, or this machine.
-        token: to show; left out: GAPLAB_TOKEN, or none.
+        token: to show; left out: GAPLAB_TOKEN, or none; "" for none.
         timeout_s: for which an answer is waited.
         transport: instead of the network, for tests.
 
@@ -47,7 +47,7 @@ class Connection:
         transport: httpx2.BaseTransport | None = None,
     ) -> None:
         self.url = url = Settings.from_environment().url if url is None else url
-        shown = token or os.environ.get("GAPLAB_TOKEN")
+        shown = os.environ.get("GAPLAB_TOKEN") if token is None else token
         headers = {"Authorization": f"Bearer {shown}"} if shown else {}
         try:
             here = httpx2.URL(url).host in LOOPBACK

@@ -17,6 +17,7 @@ from api import service
 from api.client import Client
 from api.exits import CommandError
 from api.launch import end, start
+from api.own import own_service
 from api.server import listen, refuse_strangers
 from api.service import Keeper, environment_of, migrate
 from schemas.access import Role
@@ -209,3 +210,15 @@ def test_children_read_the_same_settings():
         "GAPLAB_HOST": "0.0.0.0",
         "GAPLAB_PORT": "99",
     }
+
+
+def test_the_token_of_another_service_is_not_shown_to_one_of_ones_own(
+    sqlite_url: str, sqlite_store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("GAPLAB_TOKEN", f"gaplab_elsewhere_{'0' * 64}")
+    with own_service(sqlite_url, tmp_path / "log", workers=False) as client:
+        found = client.studies()
+
+    monkeypatch.setenv("GAPLAB_TOKEN", create_token(sqlite_store, Role.READER).secret)
+    with own_service(sqlite_url, tmp_path / "log", workers=False) as client:
+        assert client.studies() == found
