@@ -295,6 +295,24 @@ def test_a_file_that_cannot_be_read_is_a_sentence(gaplab: Gaplab, file: str):
     assert said.err.count("\n") == 1
 
 
+def test_a_file_that_is_there_already_is_a_sentence(
+    gaplab: Gaplab, sqlite_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
+    file = tmp_path / "there.db"
+    file.touch()
+
+    said = gaplab("backup", str(file))
+
+    assert (said.code, said.err) == (Exit.FILE, f"gaplab: {file}: a file of this name is there already\n")
+
+
+def test_a_token_that_is_none_is_an_id_that_is_none(gaplab: Gaplab, sqlite_url: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
+
+    assert gaplab("token", "revoke", "nobody").code == Exit.NOT_FOUND
+
+
 def test_wrong_use_of_the_command_ends_with_2_and_help_tells_the_codes(gaplab: Gaplab):
     assert gaplab("submit").code == Exit.USAGE
     assert gaplab("list", "--limit", "0").code == Exit.USAGE
