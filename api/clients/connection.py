@@ -49,17 +49,17 @@ class Connection:
         self.url = url = Settings.from_environment().url if url is None else url
         shown = os.environ.get("GAPLAB_TOKEN") if token is None else token
         headers = {"Authorization": f"Bearer {shown}"} if shown else {}
+        if shown and not (shown.isascii() and shown.isprintable()):
+            msg = "the token has characters that no token of this service has"
+            raise ServiceUnreachable(msg)
         try:
             here = httpx2.URL(url).host in LOOPBACK
             self._http = httpx2.Client(
                 base_url=url, headers=headers, timeout=timeout_s, transport=transport, trust_env=not here
             )
-        except httpx2.InvalidURL as error:
+        except (httpx2.InvalidURL, UnicodeEncodeError) as error:
             msg = f"{url!r} is no address of a service: {error}"
             raise ServiceUnreachable(msg) from error
-        except UnicodeEncodeError:
-            msg = "the token has characters that no token of this service has"
-            raise ServiceUnreachable(msg) from None
 
     def __enter__(self) -> Self:
         return self

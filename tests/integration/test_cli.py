@@ -307,6 +307,18 @@ def test_a_file_that_is_there_already_is_a_sentence(
     assert (said.code, said.err) == (Exit.FILE, f"gaplab: {file}: a file of this name is there already\n")
 
 
+@pytest.mark.parametrize("id_", ["", " ", "..", "a/b", "é", "\udcff"])
+def test_an_id_that_can_be_none_is_not_found(gaplab: Gaplab, id_: str):
+    assert gaplab("show", id_).code == Exit.NOT_FOUND
+
+
+@pytest.mark.parametrize("token", ["a\nb", "é", "\udcff"])
+def test_a_token_that_cannot_be_one_is_said_at_once(gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch, token: str):
+    monkeypatch.setenv("GAPLAB_TOKEN", token)
+
+    assert "the token has characters" in gaplab("list").err
+
+
 def test_a_token_that_is_none_is_an_id_that_is_none(gaplab: Gaplab, sqlite_url: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
 
