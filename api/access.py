@@ -87,10 +87,18 @@ def _refuse_other_sites(request: Request) -> None:
         Forbidden: it was meant for something else.
     """
     host = request.headers.get("host", "")
-    if not is_loopback(urlsplit(f"//{host}").hostname or ""):
+    if not is_loopback(_without_port(host)):
         msg = f"without tokens only 127.0.0.1, [::1] and localhost are served here, not {host[:100]!r}"
         raise Forbidden(msg)
     origin = request.headers.get("origin")
-    if origin is not None and urlsplit(origin).netloc != host:
+    if origin is not None and origin.partition("://")[2] != host:
         msg = f"without tokens no page of another site may ask here, and {origin[:100]!r} is one"
         raise Forbidden(msg)
+
+
+def _without_port(host: str) -> str:
+    """The name in a `Host`; empty where it is no host at all."""
+    try:
+        return urlsplit(f"//{host}").hostname or ""
+    except ValueError:
+        return ""

@@ -21,7 +21,7 @@ from api.commands import (
 )
 from api.commands.base import app
 from api.exits import CommandError, Exit, code_of
-from services.core.errors import GaplabError
+from services.core.errors import GaplabError, NotFound
 
 __all__ = [
     "app",
@@ -48,10 +48,12 @@ def main() -> None:
         _leave(display.problem(error.problem), code_of(error))
     except (ServiceUnreachable, CommandError) as error:
         _leave([str(error)], code_of(error))
+    except NotFound as error:
+        _leave([str(error)], Exit.NOT_FOUND)
     except (GaplabError, ValueError) as error:
         _leave([str(error)], Exit.FAILED)
     except OSError as error:
-        _leave([str(error)], Exit.FILE)
+        _leave([f"{error.filename}: {error.strerror}" if error.filename else str(error)], Exit.FILE)
 
 
 def _leave(lines: list[str], code: Exit) -> None:

@@ -45,7 +45,7 @@ class Client(LifeCycle, Waiting, Frames, Figures, History, Archives, Connection)
 
     Args:
         url: of the service; left out: GAPLAB_URL, or this machine.
-        token: to show; left out: GAPLAB_TOKEN, or none.
+        token: to show; left out: GAPLAB_TOKEN, or none; "" for none.
         timeout_s: for which an answer is waited.
         transport: instead of the network, for tests.
 

@@ -1,11 +1,12 @@
 """What the shell offers while an argument is typed; a service that does not answer at once has nothing to offer."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import httpx2
 
 from api.client import Client, ServiceError, ServiceUnreachable
+from schemas.records import ExperimentRead, StudyRead
 
 PATIENCE_S = 1.5
 """A shell that waits longer for an offer seems to hang."""
@@ -24,6 +25,11 @@ class _Hasty(Client):
 def ids(incomplete: str) -> list[tuple[str, str]]:
     """The newest studies and experiments, each with its name and state."""
     return _offered(lambda client: _newest(client, incomplete))
+
+
+def experiments(incomplete: str) -> list[tuple[str, str]]:
+    """The newest experiments, each with its name and state."""
+    return _offered(lambda client: _named(client.experiments(limit=MOST).items, incomplete))
 
 
 def kinds(incomplete: str) -> list[str]:
@@ -45,10 +51,14 @@ def plugins(incomplete: str) -> list[tuple[str, str]]:
 
 
 def _newest(client: Client, incomplete: str) -> Iterator[tuple[str, str]]:
-    for page in (client.studies(limit=MOST), client.experiments(limit=MOST)):
-        for each in page.items:
-            if each.id.startswith(incomplete):
-                yield each.id, f"{each.name} ({each.state})"
+    yield from _named(client.studies(limit=MOST).items, incomplete)
+    yield from _named(client.experiments(limit=MOST).items, incomplete)
+
+
+def _named(found: Iterable[ExperimentRead | StudyRead], incomplete: str) -> Iterator[tuple[str, str]]:
+    for each in found:
+        if each.id.startswith(incomplete):
+            yield each.id, f"{each.name} ({each.state})"
 
 
 def _offered(of: Callable[[Client], Iterator[tuple[str, str]]]) -> list[tuple[str, str]]:

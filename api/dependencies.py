@@ -2,6 +2,7 @@
 
 import logging
 import re
+from dataclasses import replace
 from typing import Annotated, TypeVar
 
 from fastapi import Depends, Header, Request, Response
@@ -60,14 +61,20 @@ def _physics(request: Request) -> Physics:
     return physics
 
 
-def _admission(request: Request, key: IdempotencyKey = None) -> Admission:
-    """Who submits, within which limits, and under which key."""
-    return Admission(_caller(request).token, request.app.state.limits, key)
+def _limited(request: Request) -> Admission:
+    """Who submits, and within which limits."""
+    return Admission(_caller(request).token, request.app.state.limits)
+
+
+def _admission(admitted: Annotated[Admission, Depends(_limited)], key: IdempotencyKey = None) -> Admission:
+    """The same, and under which key."""
+    return replace(admitted, key=key)
 
 
 StoreDep = Annotated[Store, Depends(_store)]
 CallerDep = Annotated[Caller, Depends(_caller)]
 PhysicsDep = Annotated[Physics, Depends(_physics)]
+LimitedDep = Annotated[Admission, Depends(_limited)]
 AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]
 

@@ -72,7 +72,7 @@ class Feed:
     @contextmanager
     def _counted(self) -> Iterator[None]:
         self._open += 1
-        if self._reader is None and not self._closed:
+        if not self._closed and (self._reader is None or self._reader.done()):
             self._reader = asyncio.get_running_loop().create_task(self._read())
             self._reader.add_done_callback(self._give_up)
         try:
@@ -110,7 +110,7 @@ class Feed:
                 await asyncio.sleep(RETRY_S)
 
     def _give_up(self, reader: "asyncio.Task[None]") -> None:
-        """A reader that failed ends all streams: whoever resumes his gets a new one."""
+        """A reader that failed ends all streams that wait: whoever resumes his gets a new one."""
         if not reader.cancelled() and (error := reader.exception()) is not None:
             log.error("event streams end: their reader failed", exc_info=error)
             self._tell()

@@ -12,7 +12,10 @@ from typing import IO
 from api.client import Client
 from api.exits import CommandError, Exit
 from api.launch import end, start
+from services.access import authenticate
+from services.core.errors import Unauthenticated
 from services.plugins import VARIABLE
+from services.store.session import Store
 
 START_WITHIN_S = 120.0
 
@@ -32,8 +35,8 @@ def own_service(database_url: str, log: Path, *, workers: bool = True) -> Iterat
     with log.open("ab") as output:
         process, url = _started(database_url, output, workers=workers)
         try:
-            with Client(url) as client:
-                _wait_until_ready(client, process, log)
+            _wait_until_ready(url, process, log)
+            with Client(url, token=_token(database_url)) as client:
                 yield client
         finally:
             end(process)
@@ -42,8 +45,8 @@ def own_service(database_url: str, log: Path, *, workers: bool = True) -> Iterat
 class LocalService(Client):
     """A client of a service that `local_service` started; closing it ends the service."""
 
-    def __init__(self, url: str, process: "subprocess.Popen[bytes]") -> None:
-        super().__init__(url)
+    def __init__(self, url: str, process: "subprocess.Popen[bytes]", token: str | None) -> None:
+        super().__init__(url, token=token)
         self._process = process
 
     def close(self) -> None:
@@ -65,16 +68,16 @@ def local_service(folder: str | Path = "results/local", *, plugins: str | Path |
     home = Path(folder).absolute()
     home.mkdir(parents=True, exist_ok=True)
     log = home / "service.log"
+    database_url = f"sqlite:///{home / 'gaplab.db'}"
     added = {} if plugins is None else {VARIABLE: str(Path(plugins).absolute())}
     with log.open("ab") as output:
-        process, url = _started(f"sqlite:///{home / 'gaplab.db'}", output, added)
-    service = LocalService(url, process)
+        process, url = _started(database_url, output, added)
     try:
-        _wait_until_ready(service, process, log)
+        _wait_until_ready(url, process, log)
+        return LocalService(url, process, _token(database_url))
     except BaseException:
-        service.close()
+        end(process)
         raise
-    return service
 
 
 def _started(
@@ -88,13 +91,26 @@ def _started(
     return process, f"http://127.0.0.1:{port}"
 
 
-def _wait_until_ready(client: Client, process: "subprocess.Popen[bytes]", log: Path) -> None:
+def _wait_until_ready(url: str, process: "subprocess.Popen[bytes]", log: Path) -> None:
     deadline = time.monotonic() + START_WITHIN_S
-    while not client.ready():
-        if process.poll() is not None or time.monotonic() > deadline:
-            msg = f"the service does not start: {_last_line(log)} ({log} says more)"
-            raise CommandError(msg, Exit.FAILED)
-        time.sleep(0.2)
+    with Client(url, token="") as client:
+        while not client.ready():
+            if process.poll() is not None or time.monotonic() > deadline:
+                msg = f"the service does not start: {_last_line(log)} ({log} says more)"
+                raise CommandError(msg, Exit.FAILED)
+            time.sleep(0.2)
+
+
+def _token(database_url: str) -> str | None:
+    """None, for GAPLAB_TOKEN, where the database knows tokens; else "", for that one would admit nobody there."""
+    store = Store(database_url)
+    try:
+        authenticate(store, None, required=False)
+    except Unauthenticated:
+        return None
+    finally:
+        store.dispose()
+    return ""
 
 
 def _free_port() -> int:

@@ -23,8 +23,8 @@ def listen(host: str, port: int) -> socket.socket:
     Raises:
         CommandError: it cannot be had; most often because a service has it already.
     """
-    if port >= 2**16:
-        msg = f"cannot serve on {host}:{port}: ports end at {2**16 - 1}"
+    if not 0 <= port < 2**16:
+        msg = f"cannot serve on {host}:{port}: ports go from 0 to {2**16 - 1}"
         raise CommandError(msg, Exit.FAILED)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:

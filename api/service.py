@@ -13,7 +13,7 @@ from api.launch import end, start
 from api.server import end_in_order, listen, refuse_strangers, serve_api
 from services import logs, plugins
 from services.core.errors import StoreUnavailable
-from services.settings import Settings
+from services.settings import Settings, address
 
 log = logging.getLogger("gaplab.service")
 
@@ -49,8 +49,8 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
     listener = listen(settings.host, settings.port)
     migrate(settings.database_url)
     refuse_strangers(settings)
-    address = f"http://{settings.host}:{settings.port}"
-    log.info("gaplab serves on %s (/docs lists what it answers to; Ctrl-C ends it)", address)
+    found_at = address(settings.host, settings.port)
+    log.info("gaplab serves on %s (/docs lists what it answers to; Ctrl-C ends it)", found_at)
     keeper = Keeper(environment_of(settings)) if workers else None
     try:
         if keeper:

@@ -13,7 +13,9 @@ from typing import Any, TextIO
 
 HIDDEN = "…"
 
-_NAME = r"[\w-]*(?:token|password|passwd|secret|api_?key)[\w-]*"
+_NAME = r"(?<![\w-])(?=[\w-]*(?:token|password|passwd|secret|api_?key))[\w-]*+"
+"""Looked for once in each word, and the word then taken whole: an address of a request may be one very long word."""
+
 _SECRETS = (
     (re.compile(r"(?i)(authorization\W{1,6})(?:(?:bearer|basic|token)\s+)?[^\s'\",;)}\]]+"), rf"\1{HIDDEN}"),
     (re.compile(r"(?i)\b(bearer|basic)\s+[\w.~+/=-]{6,}"), rf"\1 {HIDDEN}"),

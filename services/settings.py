@@ -36,15 +36,15 @@ class Settings:
             ValueError: a number that is none, with the name of its variable.
         """
         get = os.environ.get
-        host, port = get("GAPLAB_HOST", cls.host), _number("GAPLAB_PORT", cls.port)
+        host, port = get("GAPLAB_HOST") or cls.host, _number("GAPLAB_PORT", None) or cls.port
         return cls(
-            database_url=get("GAPLAB_DATABASE_URL", cls.database_url),
+            database_url=get("GAPLAB_DATABASE_URL") or cls.database_url,
             ray_address=get("GAPLAB_RAY_ADDRESS") or None,
             workers=_number("GAPLAB_WORKERS", None),
             lease_s=_number("GAPLAB_LEASE_S", None) or cls.lease_s,
             host=host,
-            port=port or cls.port,
-            url=get("GAPLAB_URL", f"http://{host}:{port}"),
+            port=port,
+            url=get("GAPLAB_URL") or address(host, port),
             token=get("GAPLAB_TOKEN") or None,
         )
 
@@ -89,6 +89,11 @@ class Limits:
         return cls(**{name: _number(variable_of(name), None) or getattr(defaults, name) for name in names})
 
 
+def address(host: str, port: int) -> str:
+    """Where what binds these is found."""
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+
+
 def variable_of(limit: str) -> str:
     """The variable of the environment that sets the limit."""
     return f"GAPLAB_MAX_{limit.upper()}"
@@ -98,7 +103,7 @@ def _number(variable: str, default: int | None) -> int | None:
     text = os.environ.get(variable)
     if not text:
         return default
-    if not text.isdigit() or int(text) < 1:
+    if not text.isdecimal() or int(text) < 1:
         msg = f"{variable} is {text!r}; it must be a whole number of at least 1"
         raise ValueError(msg)
     return int(text)

@@ -31,7 +31,7 @@ class Connection:
 
     Args:
         url: of the service; left out: GAPLAB_URL, or this machine.
-        token: to show; left out: GAPLAB_TOKEN, or none.
+        token: to show; left out: GAPLAB_TOKEN, or none; "" for none.
         timeout_s: for which an answer is waited.
         transport: instead of the network, for tests.
 
@@ -47,19 +47,19 @@ class Connection:
         transport: httpx2.BaseTransport | None = None,
     ) -> None:
         self.url = url = Settings.from_environment().url if url is None else url
-        shown = token or os.environ.get("GAPLAB_TOKEN")
+        shown = os.environ.get("GAPLAB_TOKEN") if token is None else token
         headers = {"Authorization": f"Bearer {shown}"} if shown else {}
+        if shown and not (shown.isascii() and shown.isprintable()):
+            msg = "the token has characters that no token of this service has"
+            raise ServiceUnreachable(msg)
         try:
             here = httpx2.URL(url).host in LOOPBACK
             self._http = httpx2.Client(
                 base_url=url, headers=headers, timeout=timeout_s, transport=transport, trust_env=not here
             )
-        except httpx2.InvalidURL as error:
+        except (httpx2.InvalidURL, UnicodeEncodeError) as error:
             msg = f"{url!r} is no address of a service: {error}"
             raise ServiceUnreachable(msg) from error
-        except UnicodeEncodeError:
-            msg = "the token has characters that no token of this service has"
-            raise ServiceUnreachable(msg) from None
 
     def __enter__(self) -> Self:
         return self
@@ -120,7 +120,7 @@ class Connection:
     def _reached(self) -> Iterator[None]:
         try:
             yield
-        except (httpx2.TransportError, httpx2.InvalidURL) as error:
+        except (httpx2.RequestError, httpx2.InvalidURL) as error:
             msg = f"no service answers at {self.url} ({type(error).__name__}); start one with `gaplab serve`"
             raise ServiceUnreachable(msg) from error
 

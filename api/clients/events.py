@@ -32,35 +32,46 @@ def follow(
         ServiceUnreachable: it was away for too long, or what answers is no gaplab of this version.
     """
     parameters = {name: value for name, value in filters.items() if value is not None}
-    last, heard_at = None, time.monotonic()
+    last: int | None = None
+    away_since: float | None = None
     while True:
         try:
             for each in _stream(http, parameters, last):
-                last, heard_at = each.number, time.monotonic()
-                yield each
-        except (ServiceError, httpx2.TransportError) as error:
-            if is_for_good(error) or time.monotonic() - heard_at > patience_s:
+                away_since = None
+                if each is not None:
+                    last = each.number
+                    yield each
+        except (ServiceError, httpx2.RequestError) as error:
+            now = time.monotonic()
+            away_since = now if away_since is None else away_since
+            if is_for_good(error) or now - away_since > patience_s:
                 raise _named(error, http) from error
         time.sleep(RETRY_S)
 
 
-def _stream(http: httpx2.Client, parameters: Mapping[str, Any], last: int | None) -> Iterator[EventRead]:
+def _stream(http: httpx2.Client, parameters: Mapping[str, Any], last: int | None) -> Iterator[EventRead | None]:
+    """Each event; None for whatever else says that the service is there, which may be all for days."""
     headers = {"Accept": "text/event-stream"} | ({} if last is None else {"Last-Event-ID": str(last)})
     with http.stream("GET", "/events", params=parameters, headers=headers, timeout=SILENCE_S) as answer:
         if not answer.is_success:
             answer.read()
             raise ServiceError(problem_of(answer))
+        if not answer.headers.get("content-type", "").startswith("text/event-stream"):
+            raise _foreign(http)
+        yield None
         for line in answer.iter_lines():  # the service sends each event's data as one line
-            if line.startswith("data:"):
-                yield _read(line.removeprefix("data:"), http)
+            yield _read(line.removeprefix("data:"), http) if line.startswith("data:") else None
 
 
 def _read(data: str, http: httpx2.Client) -> EventRead:
     try:
         return EventRead.model_validate_json(data)
     except ValidationError as error:
-        msg = f"what answers at {http.base_url} is no gaplab of this version"
-        raise ServiceUnreachable(msg) from error
+        raise _foreign(http) from error
+
+
+def _foreign(http: httpx2.Client) -> ServiceUnreachable:
+    return ServiceUnreachable(f"what answers at {http.base_url} is no gaplab of this version")
 
 
 def _named(error: Exception, http: httpx2.Client) -> Exception:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 def part(id: str) -> str:  # noqa: A002 - as the API says
     """The id as one part of an address, whatever it is; servers decode a slash before they look for parts."""
-    return quote(id.replace("/", "%2F"), safe="").replace(".", "%2E") or "%20"
+    return quote(id.replace("/", "%2F"), safe="", errors="replace").replace(".", "%2E") or "%20"
 
 
 class LifeCycle:

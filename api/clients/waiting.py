@@ -40,8 +40,8 @@ class Waiting:
                 if is_for_good(error) or time.monotonic() - heard_at > patience_s:
                     raise
                 continue
-            heard_at = time.monotonic()
             yield current
+            heard_at = time.monotonic()
 
     def wait(
         self: "Client",

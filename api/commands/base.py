@@ -20,6 +20,9 @@ app = typer.Typer(
 )
 
 Id = Annotated[str, typer.Argument(metavar="ID", help="of a study or an experiment", autocompletion=completion.ids)]
+ExperimentId = Annotated[
+    str, typer.Argument(metavar="ID", help="of an experiment", autocompletion=completion.experiments)
+]
 Ids = Annotated[
     list[str], typer.Argument(metavar="ID...", help="of studies or experiments", autocompletion=completion.ids)
 ]

@@ -1,11 +1,14 @@
 """Change names and notes."""
 
+from collections.abc import Mapping
 from typing import Annotated
 
 import typer
+from pydantic import ValidationError
 
 from api.commands.base import AsJson, Id, Url, app, connect
 from api.document import document
+from api.exits import CommandError, Exit
 from schemas.editing import Edit
 
 
@@ -22,8 +25,21 @@ def edit(
     if notes is not None:
         changes["notes"] = notes or None
     with connect(url) as client:
-        edited = client.edit(id, Edit.model_validate(changes))
+        edited = client.edit(id, _checked(changes))
     if as_json:
         document(edited)
         return
     typer.echo(f"{edited.id}: {edited.name}" + (f" ({edited.notes})" if edited.notes else ""))
+
+
+def _checked(changes: Mapping[str, str | None]) -> Edit:
+    try:
+        return Edit.model_validate(changes)
+    except ValidationError as error:
+        wrong = (_sentence(each["loc"], each["msg"]) for each in error.errors())
+        raise CommandError("; ".join(wrong), Exit.INVALID) from error
+
+
+def _sentence(place: tuple[int | str, ...], message: str) -> str:
+    said = message.removeprefix("Value error, ")
+    return f"--{place[0]}: {said}" if place else said

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from api import completion, display
-from api.commands.base import AsJson, Id, Url, app, connect
+from api.commands.base import AsJson, ExperimentId, Url, app, connect
 from api.document import document
 from schemas.events import EventKind, EventRead
 from schemas.provenance import ProvenanceRead
@@ -38,7 +38,11 @@ def events(
 
 
 @app.command("accept-versions")
-def accept_versions(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A002 - as the API says
+def accept_versions(
+    id: ExperimentId,  # noqa: A002 - as the API says
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
     """Let an experiment go on under other engine versions than it was begun with."""
     with connect(url) as client:
         found = client.accept_versions(id)

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from api.commands.base import AsJson, Id, Url, app, connect
+from api.commands.base import AsJson, ExperimentId, Id, Url, app, connect
 from api.document import document
 from schemas.records import ExperimentRead, StudyRead
 
@@ -41,7 +41,7 @@ def cancel(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A
 
 @app.command()
 def extend(
-    id: Id,  # noqa: A002 - as the API says
+    id: ExperimentId,  # noqa: A002 - as the API says
     iterations: Annotated[int | None, Total] = None,
     repetitions: Annotated[int | None, Total] = None,
     as_json: AsJson = False,

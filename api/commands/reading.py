@@ -1,5 +1,7 @@
 """Look at what there is."""
 
+from collections.abc import Iterator
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import Annotated
 
@@ -19,6 +21,9 @@ from schemas.plugin import Catalogue
 from schemas.records import ExperimentRead, StudyRead
 from services.core.errors import unknown_name
 
+PAGE = 100
+"""Experiments that are asked for at once."""
+
 
 @app.command("list")
 def list_(
@@ -29,11 +34,7 @@ def list_(
 ) -> None:
     """List the newest studies, and the experiments that belong to none."""
     with connect(url) as client:
-        found: list[ExperimentRead | StudyRead] = list(client.experiments(limit=limit).items)
-        if not experiments:
-            alone = [each for each in found if isinstance(each, ExperimentRead) and each.study is None]
-            found = [*client.studies(limit=limit).items, *alone]
-    newest = sorted(found, key=lambda each: each.created_at, reverse=True)[:limit]
+        newest = client.experiments(limit=limit).items if experiments else _newest(client, limit)
     if as_json:
         document(newest)
         return
@@ -80,7 +81,7 @@ def curve(
             if path:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(client.figure(*ids).content(format))
-                typer.echo(f"Wrote {path}.", err=as_json)
+                typer.echo(f"Wrote {path}.", err=as_json or csv)
         if not (as_json or csv or svg or html):
             found = client.curves(ids)
             display.console().print(display.curves(found), *display.baselines(found))
@@ -126,6 +127,24 @@ def catalogue(
         document(found)
     else:
         display.console().print(*display.catalogue(found))
+
+
+def _newest(client: Client, limit: int) -> list[ExperimentRead | StudyRead]:
+    """Studies, and the experiments of no study that are as new; however many of studies lie between those."""
+    studies = client.studies(limit=limit).items
+    full = len(studies) == limit
+    as_new = takewhile(lambda each: not full or each.created_at >= studies[-1].created_at, _experiments(client))
+    alone = islice((each for each in as_new if each.study is None), limit)
+    return sorted([*studies, *alone], key=lambda each: each.created_at, reverse=True)[:limit]
+
+
+def _experiments(client: Client) -> Iterator[ExperimentRead]:
+    """All of them, the newest first, page after page."""
+    page = client.experiments(limit=PAGE)
+    yield from page.items
+    while page.next is not None:
+        page = client.experiments(limit=PAGE, cursor=page.next)
+        yield from page.items
 
 
 def _print_plugin(found: Catalogue, name: str, *, as_json: bool) -> None:

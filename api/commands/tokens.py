@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 from rich.box import SIMPLE_HEAD
+from rich.markup import escape
 from rich.table import Table
 
 from api import display
@@ -53,7 +54,7 @@ def list_(as_json: AsJson = False) -> None:
     table = Table("id", "name", "role", "made", "last used", "revoked", box=SIMPLE_HEAD)
     for each in found:
         moments = map(_minute, (each.created_at, each.last_used_at, each.revoked_at))
-        table.add_row(each.id, each.name.replace("[", r"\["), each.role.value, *moments)
+        table.add_row(each.id, escape(each.name), each.role.value, *moments)
     display.console().print(table if found else "No tokens yet; `gaplab token create` makes one.")
 
 
@@ -82,4 +83,4 @@ def _store() -> Iterator[Store]:
 
 
 def _minute(moment: datetime | None) -> str:
-    return moment.strftime("%Y-%m-%d %H:%M") if moment else ""
+    return moment.astimezone().strftime("%Y-%m-%d %H:%M") if moment else ""

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Body
 
 from api import examples
-from api.dependencies import AdmissionDep, Id, StoreDep
+from api.dependencies import Id, LimitedDep, StoreDep
 from api.problems import documented
 from schemas.lifecycle import State, Verb
 from schemas.records import ExperimentRead, StudyRead
@@ -80,27 +80,27 @@ def cancel_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 
     status_code=202,
     tags=["experiments"],
     summary="Extend an experiment",
-    responses={202: _experiment(State.QUEUED, "It is queued again"), **documented(404, 409, 413, 422, 429)},
+    responses={202: _experiment(State.QUEUED, "It is queued again"), **documented(404, 409, 413, 415, 422, 429)},
 )
 def extend_experiment(
     id: Id,  # noqa: A002 - the address says {id}
     extension: Annotated[ExtensionSpec, Body(openapi_examples=_EXTENSIONS)],
     store: StoreDep,
-    admission: AdmissionDep,
+    admitted: LimitedDep,
 ) -> ExperimentRead:
     """Add iterations or repetitions to a completed experiment: totals, not what is added.
 
     What is there stands, and the whole equals an experiment that was submitted with these totals. With the totals that
     it has, one that was stopped is brought to its end.
     """
-    return life_cycle.extend_experiment(store, id, extension, admission)
+    return life_cycle.extend_experiment(store, id, extension, admitted)
 
 
 @router.patch(
     "/experiments/{id}/schedule",
     tags=["experiments"],
     summary="Change an experiment's turn",
-    responses={200: _experiment(State.QUEUED, "With its new schedule"), **documented(404, 413, 422)},
+    responses={200: _experiment(State.QUEUED, "With its new schedule"), **documented(404, 413, 415, 422)},
 )
 def schedule_experiment(
     id: Id,  # noqa: A002 - the address says {id}

@@ -182,7 +182,16 @@ def test_no_token_is_in_logs_answers_or_problems_whatever_happens(
     assert not any(secret in each.text + str(each.headers) for each in said)
 
 
-@pytest.mark.parametrize("headers", [{"host": "evil.example"}, {"origin": "http://evil.example"}, {"origin": "null"}])
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"host": "evil.example"},
+        {"origin": "http://evil.example"},
+        {"origin": "null"},
+        {"host": "["},
+        {"origin": "http://["},
+    ],
+)
 def test_without_tokens_no_page_of_another_site_is_served(sqlite_store: Store, headers: dict[str, str]):
     api = TestClient(create_app(sqlite_store, Settings()), base_url="http://127.0.0.1:8000")
 

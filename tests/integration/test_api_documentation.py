@@ -215,6 +215,29 @@ def test_every_error_is_documented_as_a_problem(document: dict[str, Any]):
     assert "HTTPValidationError" not in str(document)
 
 
+def test_what_takes_json_says_what_it_answers_to_anything_else(document: dict[str, Any]):
+    bodies = {
+        operation["operationId"]: operation["responses"]
+        for operations in document["paths"].values()
+        for operation in operations.values()
+        if "application/json" in operation.get("requestBody", {}).get("content", {})
+    }
+
+    assert {"extend_experiment", "schedule_experiment", "submit_study"} <= set(bodies)
+    assert [name for name, answers in bodies.items() if "415" not in answers] == []
+
+
+def test_a_key_is_offered_where_it_is_heeded(document: dict[str, Any]):
+    keyed = {
+        operation["operationId"]
+        for operations in document["paths"].values()
+        for operation in operations.values()
+        if "Idempotency-Key" in {each["name"] for each in operation.get("parameters", ())}
+    }
+
+    assert keyed == {"submit_experiment", "submit_study", "submit_sensitivity"}
+
+
 def test_real_answers_fit_their_documented_schema(document: dict[str, Any], sqlite_store: Store):
     api = TestClient(create_app(sqlite_store))
     made = api.post("/studies", json={"robot": "toy_function", "budget": "smoke"}).json()

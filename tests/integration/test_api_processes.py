@@ -17,6 +17,7 @@ from api import service
 from api.client import Client
 from api.exits import CommandError
 from api.launch import end, start
+from api.own import own_service
 from api.server import listen, refuse_strangers
 from api.service import Keeper, environment_of, migrate
 from schemas.access import Role
@@ -123,7 +124,9 @@ def test_a_port_that_is_taken_is_a_sentence(tmp_path: Path):
     assert re.fullmatch(rf"gaplab: cannot serve on 127\.0\.0\.1:{port}: address already in use\n", said)
 
 
-@pytest.mark.parametrize(("host", "port"), [("no-such-host.invalid", 9999), ("127.0.0.1", 99999), ("::1::", 1)])
+@pytest.mark.parametrize(
+    ("host", "port"), [("no-such-host.invalid", 9999), ("127.0.0.1", 99999), ("127.0.0.1", -1), ("::1::", 1)]
+)
 def test_an_address_that_is_none_is_a_sentence(host: str, port: int):
     with pytest.raises(CommandError, match=f"^cannot serve on {host}:{port}: [^\n]+$"):
         listen(host, port)
@@ -207,3 +210,15 @@ def test_children_read_the_same_settings():
         "GAPLAB_HOST": "0.0.0.0",
         "GAPLAB_PORT": "99",
     }
+
+
+def test_the_token_of_another_service_is_not_shown_to_one_of_ones_own(
+    sqlite_url: str, sqlite_store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("GAPLAB_TOKEN", f"gaplab_elsewhere_{'0' * 64}")
+    with own_service(sqlite_url, tmp_path / "log", workers=False) as client:
+        found = client.studies()
+
+    monkeypatch.setenv("GAPLAB_TOKEN", create_token(sqlite_store, Role.READER).secret)
+    with own_service(sqlite_url, tmp_path / "log", workers=False) as client:
+        assert client.studies() == found

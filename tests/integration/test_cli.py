@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from api.client import Client, ServiceError, ServiceUnreachable
+from api.commands import reading
 from api.exits import Exit
 from services import execution, sensitivity
 from services.core.optimizers.steady_state import SteadyState
@@ -49,6 +50,16 @@ def test_submit_prints_the_id_that_show_and_list_know(gaplab: Gaplab):
     assert id in listed.out
 
 
+def test_an_edit_that_is_none_is_a_sentence(gaplab: Gaplab):
+    id = submitted(gaplab)  # noqa: A001
+
+    nothing, nameless = gaplab("edit", id), gaplab("edit", id, "--name", "")
+
+    assert (nothing.code, nameless.code) == (Exit.INVALID, Exit.INVALID)
+    assert nothing.err == "gaplab: give a name, notes, or both\n"
+    assert nameless.err == "gaplab: --name: String should have at least 1 character\n"
+
+
 def test_a_spec_with_several_strategies_or_none_is_a_study(gaplab: Gaplab):
     submitted(gaplab, str(EXAMPLES / "toy.json"))
     submitted(gaplab, str(EXAMPLES / "weights.json"))
@@ -57,6 +68,22 @@ def test_a_spec_with_several_strategies_or_none_is_a_study(gaplab: Gaplab):
 
     assert "toy function (7)" in listed
     assert "information? (5)" in listed
+
+
+def test_an_experiment_of_no_study_is_listed_whatever_many_of_studies_are_newer(
+    gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(reading, "PAGE", 4)
+    older, alone = submitted(gaplab), submitted(gaplab)
+    studies = [submitted(gaplab, str(EXAMPLES / "toy.json")) for _ in range(2)]
+
+    three = json.loads(gaplab("list", "--limit", "3", "--json").out)
+    one = json.loads(gaplab("list", "--limit", "1", "--json").out)
+    all_ = json.loads(gaplab("list", "--json").out)
+
+    assert [each["id"] for each in three] == [*reversed(studies), alone]
+    assert [each["id"] for each in one] == studies[1:]
+    assert [each["id"] for each in all_] == [*reversed(studies), alone, older]
 
 
 def test_a_spec_comes_from_standard_input_too(gaplab: Gaplab):
@@ -106,11 +133,13 @@ def test_curves_are_a_table_values_or_drawings(gaplab: Gaplab, sqlite_store: Sto
 
     table, values = gaplab("curve", id), gaplab("curve", id, "--csv")
     drawn = gaplab("curve", id, "--svg", str(svg), "--html", str(html))
+    both = gaplab("curve", id, "--csv", "--svg", str(svg))
 
     assert re.search(r"^ *2 +\d+\.\d\d±\d+\.\d\d", table.out, re.MULTILINE)
     assert "evolved in reality itself" in table.out
     assert values.out.startswith("experiment,name,strategy,repetition,evaluations,fitness\n")
     assert drawn.code == 0
+    assert both == (0, values.out, f"Wrote {svg}.\n")
     assert ET.fromstring(svg.read_text()).tag.endswith("svg")
     assert html.read_text().startswith("<!doctype html>")
 
@@ -264,6 +293,36 @@ def test_a_file_that_cannot_be_read_is_a_sentence(gaplab: Gaplab, file: str):
 
     assert said.code == Exit.FILE
     assert said.err.count("\n") == 1
+
+
+def test_a_file_that_is_there_already_is_a_sentence(
+    gaplab: Gaplab, sqlite_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
+    file = tmp_path / "there.db"
+    file.touch()
+
+    said = gaplab("backup", str(file))
+
+    assert (said.code, said.err) == (Exit.FILE, f"gaplab: {file}: a file of this name is there already\n")
+
+
+@pytest.mark.parametrize("id_", ["", " ", "..", "a/b", "é", "\udcff"])
+def test_an_id_that_can_be_none_is_not_found(gaplab: Gaplab, id_: str):
+    assert gaplab("show", id_).code == Exit.NOT_FOUND
+
+
+@pytest.mark.parametrize("token", ["a\nb", "é", "\udcff"])
+def test_a_token_that_cannot_be_one_is_said_at_once(gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch, token: str):
+    monkeypatch.setenv("GAPLAB_TOKEN", token)
+
+    assert "the token has characters" in gaplab("list").err
+
+
+def test_a_token_that_is_none_is_an_id_that_is_none(gaplab: Gaplab, sqlite_url: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
+
+    assert gaplab("token", "revoke", "nobody").code == Exit.NOT_FOUND
 
 
 def test_wrong_use_of_the_command_ends_with_2_and_help_tells_the_codes(gaplab: Gaplab):

@@ -3,8 +3,10 @@
 import json
 import sys
 import threading
+import time
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,8 +16,10 @@ from fastapi.testclient import TestClient
 
 from api.app import create_app
 from api.clients import connection, frames
+from api.clients import events as stream
 from gaplab import Client, ExperimentFailed, ServiceError, ServiceUnreachable
 from schemas.access import Role
+from schemas.events import EventKind, EventRead
 from services import access, execution
 from services.store.session import Store
 
@@ -369,3 +373,44 @@ def test_events_and_lists_are_values_that_json_can_hold(client: Client):
 
     assert kinds.count("submitted") == 2
     assert json.dumps([each.model_dump(mode="json") for each in client.studies().items])
+
+
+def test_what_cannot_be_unpacked_is_no_answer(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(connection, "PAUSES_S", ())
+    network = httpx2.MockTransport(lambda _: httpx2.Response(200, headers={"Content-Encoding": "gzip"}, content=b"no"))
+
+    with Client("http://gaplab.example", transport=network) as client:
+        with pytest.raises(ServiceUnreachable, match="no service answers"):
+            client.catalogue()
+        with pytest.raises(ServiceUnreachable, match="no service answers"):
+            next(client.events(patience_s=-1))
+
+
+def test_events_of_what_is_no_gaplab_are_not_waited_for():
+    network = httpx2.MockTransport(lambda _: httpx2.Response(200, html="<p>hello</p>"))
+
+    with (
+        Client("http://gaplab.example", transport=network) as client,
+        pytest.raises(ServiceUnreachable, match="is no gaplab of this version"),
+    ):
+        next(client.events())
+
+
+def test_a_stream_that_had_nothing_to_tell_for_long_is_resumed_when_it_breaks(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(stream, "RETRY_S", 0.01)
+    event = EventRead(number=7, kind=EventKind.STARTED, experiment="e", body={}, at=datetime.now(UTC))
+
+    def quiet() -> Iterator[bytes]:
+        for _ in range(3):
+            time.sleep(0.1)
+            yield b": still here\n\n"
+        msg = "it broke"
+        raise httpx2.ReadError(msg)
+
+    bodies = [quiet(), f"data: {event.model_dump_json()}\n\n".encode()]
+    network = httpx2.MockTransport(
+        lambda _: httpx2.Response(200, headers={"Content-Type": "text/event-stream"}, content=bodies.pop(0))
+    )
+
+    with Client("http://gaplab.example", transport=network) as client:
+        assert next(client.events(patience_s=0.15)) == event

@@ -235,6 +235,8 @@ def test_ids_and_plug_ins_are_completed(url: str, study: str, monkeypatch: pytes
 
     assert dict(completion.ids(study[:3]))[study] == "all [of] it (QUEUED)"
     assert len(completion.ids("")) == 3  # the study and its two experiments
+    assert study not in dict(completion.experiments(""))
+    assert len(completion.experiments("")) == 2
     assert [name for name, _ in completion.plugins("simulated_fit_and")] == [
         "simulated_fit_and_informative",
         "simulated_fit_and_unique",

@@ -1,5 +1,6 @@
 """Events: what is told, in which order, and that a reader who resumes misses nothing."""
 
+import asyncio
 import json
 import random
 import threading
@@ -19,7 +20,7 @@ from api.app import create_app
 from api.client import Client, ServiceError
 from api.feed import Feed
 from api.server import Server, listen
-from schemas.events import EventKind, EventRead
+from schemas.events import EventKind, EventPage, EventRead
 from schemas.lifecycle import Verb
 from schemas.schedule import ExtensionSpec
 from services import archives, events, execution, experiments, life_cycle, provenance, sensitivity
@@ -364,6 +365,34 @@ def test_all_streams_together_ask_the_database_once_a_look(sqlite_store, monkeyp
 
     assert looks <= seconds / feeding.EVERY_S + 2  # eight streams that each ask would be eight times as many
     assert second == [2] * 8
+
+
+def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(sqlite_store, monkeypatch):
+    experiments.submit_experiment(sqlite_store, toy())
+    page, failing = events.page, [False]
+
+    def fail_once(*asked: object, **named: object) -> EventPage:
+        if failing.pop():
+            msg = "a mistake of ours"
+            raise ValueError(msg)
+        return page(*asked, **named)
+
+    async def follow() -> list[int]:
+        feed = Feed(sqlite_store, every_s=0.01)
+        stalled, resumed = feed.follow(0, Which()), feed.follow(0, Which())
+        first = await anext(stalled)
+        failing.append(True)
+        monkeypatch.setattr(feeding.events, "page", fail_once)
+        while failing == [False, True]:
+            await asyncio.sleep(0.01)
+        await asyncio.sleep(0.05)
+        monkeypatch.setattr(feeding.events, "page", page)
+        second = await asyncio.wait_for(anext(resumed), DEADLINE_S)
+        await stalled.aclose()
+        await resumed.aclose()
+        return [first.number, second.number]
+
+    assert asyncio.run(follow()) == [1, 1]
 
 
 def test_a_stream_whose_reader_failed_is_resumed_by_the_client(sqlite_store, monkeypatch):

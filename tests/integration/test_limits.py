@@ -13,7 +13,7 @@ from schemas.access import Role
 from services import execution
 from services.access import create_token
 from services.core.errors import LimitReached
-from services.settings import Limits, variable_of
+from services.settings import Limits, Settings, variable_of
 from services.store.session import Store
 from tests.experiments import run
 
@@ -143,6 +143,31 @@ def test_limits_come_from_the_environment(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("GAPLAB_MAX_STREAMS", "many")
     with pytest.raises(ValueError, match="GAPLAB_MAX_STREAMS is 'many'"):
         Limits.from_environment()
+
+
+def test_what_is_set_to_nothing_is_not_set(monkeypatch: pytest.MonkeyPatch):
+    for each in ("DATABASE_URL", "RAY_ADDRESS", "WORKERS", "LEASE_S", "HOST", "PORT", "URL", "TOKEN"):
+        monkeypatch.setenv(f"GAPLAB_{each}", "")
+
+    assert Settings.from_environment() == Settings()
+
+
+@pytest.mark.parametrize(
+    ("host", "url"), [("::1", "http://[::1]:9000"), ("127.0.0.2", "http://127.0.0.2:9000"), ("x", "http://x:9000")]
+)
+def test_the_service_is_looked_for_where_it_binds(monkeypatch: pytest.MonkeyPatch, host: str, url: str):
+    monkeypatch.delenv("GAPLAB_URL", raising=False)
+    monkeypatch.setenv("GAPLAB_HOST", host)
+    monkeypatch.setenv("GAPLAB_PORT", "9000")
+
+    assert Settings.from_environment().url == url
+
+
+def test_a_number_that_is_none_is_said_with_its_variable(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("GAPLAB_PORT", "8²")
+
+    with pytest.raises(ValueError, match="GAPLAB_PORT is '8²'"):
+        Settings.from_environment()
 
 
 def test_every_limit_is_documented_with_its_default():
