@@ -184,7 +184,7 @@ def test_a_deadlock_is_tried_again(postgres_store):
         done = list(pool.map(lock_both, orders))
 
     assert done == orders
-    assert len(attempts) == 3
+    assert len(attempts) >= 3
 
 
 def test_the_store_recovers_from_lost_connections(postgres_store):
