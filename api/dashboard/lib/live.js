@@ -13,6 +13,7 @@ const MANY = 1000;
  */
 export function follow(query, refresh, signal) {
   let some = [];
+  let all = false;  // whatever happens until it was asked for anew: what is missing is not told by events alone
   let due = false;
   let timer = null;
   let busy = false;
@@ -20,8 +21,9 @@ export function follow(query, refresh, signal) {
   const run = async () => {
     timer = null;
     if (signal.aborted || busy || document.hidden) return;
-    const taken = some.length > MANY ? [] : some;
+    const taken = all || some.length > MANY ? [] : some;
     some = [];
+    all = false;
     busy = true;
     due = false;
     try {
@@ -29,7 +31,8 @@ export function follow(query, refresh, signal) {
     } catch (error) {
       if (signal.aborted) return;
       console.warn(error.message);
-      some = taken.length ? [...taken, ...some] : [];
+      some = [...taken, ...some];
+      all ||= !taken.length;
       due = true;
     }
     busy = false;
@@ -47,7 +50,7 @@ export function follow(query, refresh, signal) {
     if (signal.aborted) return;
     announce(is);
     if (is && away) {
-      some = [];
+      all = true;
       soon();
     }
     away = !is;

@@ -1,0 +1,40 @@
+"""Answers that come late, twice, or not at all: what the page shows is of what was asked last, and all of it."""
+
+QUIET = "#/toy"  # a view that asks for nothing
+FOLLOWED = """
+async () => {
+  const { follow } = await import("/assets/dashboard/lib/live.js");
+  const streams = [];
+  globalThis.fetch = async () => new Response(new ReadableStream({ start: (stream) => streams.push(stream) }));
+  const told = [];
+  const refresh = async (events) => {
+    told.push(events.map((each) => each.data.number));
+    if (told.length === 1) throw new Error("not yet");
+  };
+  const until = async (holds) => { while (!holds()) await new Promise((resume) => setTimeout(resume, 20)); };
+  const text = (number) => `id: ${number}\\ndata: {"number": ${number}}\\n\\n`;
+  const send = (number) => streams.at(-1).enqueue(new TextEncoder().encode(text(number)));
+  const leaving = new AbortController();
+  follow({ after: 0 }, refresh, leaving.signal);
+  await until(() => streams.length === 1);
+  streams[0].close();
+  await until(() => streams.length === 2);
+  send(1);
+  await until(() => told.length === 1);
+  send(2);
+  await until(() => told.length === 2);
+  send(3);
+  await until(() => told.length === 3);
+  leaving.abort();
+  return told;
+}
+"""
+
+
+def test_after_a_break_everything_is_asked_for_anew_until_it_is_there_also_if_something_happens_meanwhile(
+    visit, archive
+):
+    page = visit(f"{archive.url}/{QUIET}")
+    page.get_by_role("heading", level=1).wait_for()
+
+    assert page.evaluate(FOLLOWED) == [[], [], [3]]
