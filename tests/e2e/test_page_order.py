@@ -1,5 +1,7 @@
 """Answers that come late, twice, or not at all: what the page shows is of what was asked last, and all of it."""
 
+import pytest
+
 QUIET = "#/toy"  # a view that asks for nothing
 FOLLOWED = """
 async () => {
@@ -38,3 +40,10 @@ def test_after_a_break_everything_is_asked_for_anew_until_it_is_there_also_if_so
     page.get_by_role("heading", level=1).wait_for()
 
     assert page.evaluate(FOLLOWED) == [[], [], [3]]
+
+
+@pytest.mark.parametrize("view", ["experiments/%", "experiments/..%2F..", "studies/%E0%A4%A"])
+def test_an_address_that_cannot_be_an_id_is_no_page(visit, archive, view):
+    page = visit(f"{archive.url}/#/{view}")
+
+    page.get_by_role("heading", name="There is no such page").wait_for()
