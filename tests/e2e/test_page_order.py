@@ -47,3 +47,32 @@ def test_an_address_that_cannot_be_an_id_is_no_page(visit, archive, view):
     page = visit(f"{archive.url}/#/{view}")
 
     page.get_by_role("heading", name="There is no such page").wait_for()
+
+
+def test_what_was_typed_just_before_one_left_does_not_change_the_address_of_another_view(visit, archive):
+    page = visit(archive.url)
+    page.locator("tr.study").first.wait_for()
+
+    page.get_by_label("Search by name or id").fill("mujoco")
+    page.evaluate(f"() => {{ location.hash = '{QUIET}'; }}")
+    page.get_by_role("heading", name="The toy function").wait_for()
+    page.wait_for_timeout(500)
+
+    assert page.url.endswith(QUIET)
+
+
+def test_more_of_a_list_that_another_has_replaced_is_not_added_to_it(visit, archive):
+    page = visit(f"{archive.url}/#/?show=experiments")
+    page.locator("tr.experiment").nth(19).wait_for()
+    late = []
+    page.route("**/experiments?*cursor=*", lambda route: late.append(route))
+
+    page.get_by_role("button", name="Show more").click()
+    page.get_by_label("State").select_option("CANCELLED")
+    page.locator("tr.experiment").nth(1).wait_for(state="detached")
+    (asked,) = late
+    with page.expect_response("**/experiments?*cursor=*"):
+        asked.continue_()
+    page.wait_for_timeout(200)
+
+    assert page.locator("tr.experiment").count() == 1

@@ -21,6 +21,7 @@ export async function show(root, parameters, signal) {
   const strategies = catalogue.strategies.map((each) => each.name);
   const place = h("div");
   const changed = async (wanted) => {
+    if (signal.aborted) return;  // what was typed just before one left would change the address of another view
     history.replaceState(null, "", addressOf(wanted));
     const focused = place.querySelector(":focus")?.textContent;
     if (list.wanted?.show !== wanted.show) {
@@ -71,10 +72,12 @@ class List {
 
   /** What follows. */
   async lengthen() {
-    const { show: kind, ...which } = this.wanted;
+    const asked = this.wanted;
+    const { show: kind, ...which } = asked;
     this.more.disabled = true;
     try {
       const page = await get(`/${kind}`, { ...which, limit: AT_ONCE * 2, cursor: this.next }, this.signal);
+      if (asked !== this.wanted) return;  // another list has taken its place
       this.items.push(...page.items);
       this.next = page.next;
       this.draw();
