@@ -76,3 +76,21 @@ def test_more_of_a_list_that_another_has_replaced_is_not_added_to_it(visit, arch
     page.wait_for_timeout(200)
 
     assert page.locator("tr.experiment").count() == 1
+
+
+def test_earlier_events_and_the_next_page_of_samples_come_once_however_fast_one_presses(visit, archive):
+    found = archive.get("/experiments", text="simulated_fit", strategy="simulated_fit", limit=500)["items"]
+    ended = next(each["id"] for each in found if each["spec"]["robot"]["name"] == "quadruped")
+    page = visit(f"{archive.url}/#/experiments/{ended}?tab=samples")
+    more, events = page.get_by_role("button", name="Earlier"), page.locator(".events li")
+    page.get_by_text("Page 1", exact=True).wait_for()
+    events.first.wait_for()
+
+    if more.is_visible():
+        more.evaluate("(button) => { button.click(); button.click(); }")
+        page.wait_for_load_state("networkidle")
+    numbers = events.evaluate_all("(all) => all.map((each) => each.dataset.number)")
+    page.get_by_role("button", name="After").evaluate("(button) => { button.click(); button.click(); }")
+
+    page.get_by_text("Page 2", exact=True).wait_for()
+    assert len(set(numbers)) == len(numbers)
