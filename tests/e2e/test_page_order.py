@@ -1,5 +1,7 @@
 """Answers that come late, twice, or not at all: what the page shows is of what was asked last, and all of it."""
 
+import json
+
 import pytest
 
 QUIET = "#/toy"  # a view that asks for nothing
@@ -94,3 +96,24 @@ def test_earlier_events_and_the_next_page_of_samples_come_once_however_fast_one_
 
     page.get_by_text("Page 2", exact=True).wait_for()
     assert len(set(numbers)) == len(numbers)
+
+
+def test_a_number_is_submitted_as_it_was_typed_or_not_at_all(visit, archive):
+    visit.forgive("422")
+    page = visit(f"{archive.url}/#/new")
+    page.locator(".panel .big").wait_for()
+    seed = 2**64 - 1
+
+    page.get_by_label("Seed").fill(str(seed))
+    with page.expect_response("**/studies/estimate") as answered:
+        page.get_by_label("Repetitions at once").fill("1e999")
+
+    page.locator(".trouble", has_text="integer").or_(page.locator(".trouble", has_text="whole number")).wait_for()
+    sent = json.loads(answered.value.request.post_data)
+    assert (sent["seed"], sent["max_parallel"]) == (seed, "1e999")
+    spec = {"robot": "toy_function", "strategy": "random", "budget": "smoke", "seed": seed}
+    made = archive.http.post("/experiments", json=spec).json()["id"]
+    page.goto(f"{archive.url}/#/experiments/{made}?tab=spec")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
+    page.get_by_text(f'"seed": {seed}').wait_for()
+    archive.http.post(f"/experiments/{made}/cancel")

@@ -1,5 +1,6 @@
 /** The service: what is asked of it, what it answers, and what happens there. */
 
+import { read, written } from "./json.js";
 import { token } from "./token.js";
 
 /** A problem that the service answered with, or that it did not answer (status 0). */
@@ -17,7 +18,7 @@ export const get = async (path, query = {}, signal = undefined) =>
 /** The JSON at `path`, and the tag that a change of it names. */
 export async function tagged(path, signal = undefined) {
   const answer = await request(path, { signal });
-  return { value: await answer.json(), tag: answer.headers.get("ETag") };
+  return { value: read(await answer.text()), tag: answer.headers.get("ETag") };
 }
 
 /** The file at `path`. */
@@ -37,7 +38,7 @@ export function search(query) {
 }
 
 async function send(method, path, body, headers) {
-  const json = body === undefined ? {} : { body: JSON.stringify(body) };
+  const json = body === undefined ? {} : { body: written(body) };
   const answer = await request(path, { method, headers: { "Content-Type": "application/json", ...headers }, ...json });
   return answer.json();
 }
