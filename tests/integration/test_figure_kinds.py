@@ -135,6 +135,13 @@ def test_squared_errors_that_are_all_zero_or_failed_are_drawn_as_they_are():
     assert failed.empty
 
 
+def test_the_band_of_squared_errors_is_told_of_only_where_there_is_one():
+    alone, several = squared_error_figure({1: {0: 1.0}}), squared_error_figure({1: {0: 1.0, 1: 2.0}, 2: {0: 1.0}})
+
+    assert alone.caption.endswith("Median over 1\N{NO-BREAK SPACE}repetition.")
+    assert "band: from the first to the third quartile." in several.caption
+
+
 def log(first: int, *, iterations: int, fitness: float | None = 1.0):
     """Every phase of iteration k takes 10 rollouts times what it begins with; the last may have no fitness."""
     for iteration in range(iterations + 1):
