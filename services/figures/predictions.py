@@ -78,7 +78,7 @@ def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], pending:
     parts += [
         f"{name}: root-mean-square error {number(_error(pairs), 2)}{shown}." for name, pairs in drawn.items() if pairs
     ]
-    left_out = max(len(items) - len(pairs) for pairs in drawn.values())
+    left_out = sum(None in (each.fitness, each.simulated_before, each.simulated_after) for each in items)
     parts += [f"{counted([left_out], 'sample')} left out: a measurement or the physics failed."] if left_out else []
     parts += [f"{counted([pending], 'sample')} still being computed."] if pending else []
     return " ".join(parts)

@@ -14,7 +14,7 @@ from services.figures.squared_error import squared_error_figure
 from services.store.session import Store
 from services.tuned import tunings
 from tests.experiments import run, toy
-from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, tuned
+from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, prediction, tuned
 
 
 def marks(figure: Figure, panel: int = 0) -> dict[str, Mark]:
@@ -140,6 +140,12 @@ def test_the_band_of_squared_errors_is_told_of_only_where_there_is_one():
 
     assert alone.caption.endswith("Median over 1\N{NO-BREAK SPACE}repetition.")
     assert "band: from the first to the third quartile." in several.caption
+
+
+def test_every_sample_that_misses_one_of_its_points_is_counted_as_left_out():
+    figure = predictions_figure([prediction(None, 0.3, 0.3), prediction(0.3, None, 0.3, 1)])
+
+    assert "2\N{NO-BREAK SPACE}samples left out" in figure.caption
 
 
 def log(first: int, *, iterations: int, fitness: float | None = 1.0):
