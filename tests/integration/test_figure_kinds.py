@@ -178,6 +178,18 @@ def test_rollouts_are_counted_from_the_start_over_those_that_got_there(store: St
     assert [found.at[experiment, at] for at in range(3)] == [30, 75, 120]
 
 
+def test_the_baseline_which_is_drawn_across_has_no_say_in_the_units_of_the_axis(store: Store, experiment: str):
+    direct = experiments.submit_experiment(store, toy(strategy="direct", repetitions=1)).id
+    (claim,) = (each for each in execution.claim(store, "test", limit=2) if each.experiment_id == direct)
+    genome = frozen([0.5])
+    steps = TunedStep(0, ()), Transferred(0, genome, 1.0, Cost(10_000_000)), Probed(0, 1.0, 1.0)
+    run(store, claim, iter(steps))
+
+    found = abscissa(store, reports.curves(store, [experiment, direct]), "rollouts")
+
+    assert found.label == "Rollouts in simulation"
+
+
 def test_time_is_that_of_evaluations_and_of_simulation_as_measured(store: Store, experiment: str):
     curves = reports.curves(store, [experiment])
 
