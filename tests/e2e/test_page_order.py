@@ -117,3 +117,18 @@ def test_a_number_is_submitted_as_it_was_typed_or_not_at_all(visit, archive):
     page.get_by_role("tabpanel").scroll_into_view_if_needed()
     page.get_by_text(f'"seed": {seed}').wait_for()
     archive.http.post(f"/experiments/{made}/cancel")
+
+
+def test_a_figure_that_the_service_did_not_answer_with_is_asked_for_again_and_none_stands_for_another(visit, archive):
+    visit.forgive("ERR_FAILED")
+    made = archive.http.post("/experiments", json={"robot": "toy_function", "strategy": "random", "budget": "smoke"})
+    page = visit(f"{archive.url}/#/toy?experiment={made.json()['id']}")
+    page.get_by_text("Nothing to draw yet.").wait_for()
+
+    page.route("**/figures/toy*", lambda route: route.abort())
+    page.get_by_label("Iteration", exact=True).press("ArrowRight")
+    page.get_by_role("heading", name="The service does not answer").wait_for()
+    page.unroute("**/figures/toy*")
+
+    page.get_by_text("Nothing to draw yet.").wait_for()
+    archive.http.post(f"/experiments/{made.json()['id']}/cancel")

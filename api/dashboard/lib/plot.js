@@ -35,6 +35,7 @@ export function plot(element, kind, query, signal) {
   element.replaceChildren(h("figure", {}, canvas, caption, numbers));
   let answer = null;
   let drawn = false;
+  let shown = null;  // the query of what is drawn
   let asked = 0;
   const say = (words) => {
     drawn = false;
@@ -62,15 +63,18 @@ export function plot(element, kind, query, signal) {
   const refresh = async (changed = query) => {
     query = changed;
     const mine = ++asked;
+    const wanted = JSON.stringify(query);
     try {
       const found = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
       if (mine !== asked) return;  // another query has overtaken it
       answer = found;
+      shown = wanted;
       caption.textContent = answer.caption;
       numbers.replaceChildren(...(answer.table && !answer.empty ? [counted(answer.table, numbers.querySelector("details")?.open)] : []));
       await draw();
     } catch (error) {
-      if (!signal.aborted && !drawn) say(failed(error, () => refresh(), "h3"));
+      if (signal.aborted || mine !== asked) return;
+      if (!drawn || shown !== wanted) say(failed(error, () => refresh(), "h3"));
     }
   };
   onTheme(draw, signal);
