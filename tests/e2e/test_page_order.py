@@ -132,3 +132,16 @@ def test_a_figure_that_the_service_did_not_answer_with_is_asked_for_again_and_no
 
     page.get_by_text("Nothing to draw yet.").wait_for()
     archive.http.post(f"/experiments/{made.json()['id']}/cancel")
+
+
+def test_a_list_that_did_not_come_is_not_said_to_be_empty(visit, archive):
+    visit.forgive("ERR_FAILED", "The service does not answer", "It may be down")
+    page = visit(f"{archive.url}/#/?show=experiments")
+    page.locator("tr.experiment").nth(19).wait_for()
+
+    page.route("**/experiments?*", lambda route: route.abort())
+    with page.expect_event("requestfailed"):
+        page.get_by_label("State").select_option("CANCELLED")
+    page.locator("tr.experiment input").first.check()
+
+    assert page.get_by_text("Nothing here is like that").count() == 0

@@ -55,17 +55,17 @@ class List {
 
   /** Another list than before. */
   async ask(wanted) {
-    Object.assign(this, { wanted, items: [], next: null });
-    await this.refresh(AT_ONCE);
+    Object.assign(this, { wanted, next: null });
+    await this.refresh(AT_ONCE, []);
   }
 
   /** The same list anew, as long as it is. */
-  async refresh(limit = Math.min(MOST, Math.max(AT_ONCE, this.items.length))) {
+  async refresh(limit = Math.min(MOST, Math.max(AT_ONCE, this.items.length)), former = null) {
     const turn = ++this.turn;
     const { show: kind, ...which } = this.wanted;
     const page = await get(`/${kind}`, { ...which, limit }, this.signal);
     if (turn !== this.turn || this.signal.aborted) return;
-    const rest = this.items.length > limit ? this.items.slice(limit) : [];
+    const rest = (former ?? this.items).slice(limit);
     Object.assign(this, { items: [...page.items, ...rest], next: rest.length ? this.next : page.next });
     this.draw();
   }
