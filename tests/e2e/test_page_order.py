@@ -1,6 +1,7 @@
 """Answers that come late, twice, or not at all: what the page shows is of what was asked last, and all of it."""
 
 import json
+import re
 
 import pytest
 
@@ -132,6 +133,17 @@ def test_a_figure_that_the_service_did_not_answer_with_is_asked_for_again_and_no
 
     page.get_by_text("Nothing to draw yet.").wait_for()
     archive.http.post(f"/experiments/{made.json()['id']}/cancel")
+
+
+def test_a_stream_that_is_refused_is_not_a_service_that_is_away(visit, archive):
+    visit.forgive("429")
+    page = visit(f"{archive.url}/{QUIET}")
+    refusal = {"status": 429, "title": "Too many", "detail": "20 streams are open."}
+    page.route(re.compile("/events(\\?|$)"), lambda route: route.fulfill(status=429, json=refusal))
+
+    page.evaluate("() => { location.hash = '#/'; }")
+
+    page.get_by_text("What happens is not seen here: 20 streams are open; trying again…").wait_for()
 
 
 def test_a_list_that_did_not_come_is_not_said_to_be_empty(visit, archive):

@@ -59,11 +59,13 @@ async function request(path, options) {
 
 /**
  * Server-sent events after `query.after`, or from now on, for as long as `signal` lasts: `handler({ kind, id, data })` for each of them, and
- * `connected(true | false)` as the stream comes and goes. It is taken up again where it broke off, without a hole.
+ * `connected(true | false, why)` as the stream comes and goes, with why the service refused it. It is taken up again where it broke off,
+ * without a hole.
  */
 export async function events(query, handler, connected, signal) {
   let last = null;
   while (!signal.aborted) {
+    let why = "";
     try {
       last ??= query.after ?? (await get("/events/page", { limit: 1 }, signal)).latest;
       const headers = { Accept: "text/event-stream", "Last-Event-ID": last };
@@ -76,8 +78,9 @@ export async function events(query, handler, connected, signal) {
     } catch (error) {
       if (signal.aborted) return;
       if (error.status === 401 || error.status === 403) throw error;
+      if (error.status < 500 && error.status > 0) why = error.message;
     }
-    connected(false);
+    connected(false, why);
     await new Promise((resume) => setTimeout(resume, 1500));
   }
 }

@@ -46,9 +46,9 @@ export function follow(query, refresh, signal) {
     if (some.length <= MANY) some.push(event);
     soon();
   };
-  const connected = (is) => {
+  const connected = (is, why = "") => {
     if (signal.aborted) return;
-    announce(is);
+    announce(is, why);
     if (is && away) {
       all = true;
       soon();
@@ -63,9 +63,9 @@ export function follow(query, refresh, signal) {
   events(query, happened, connected, signal).catch(() => {});
 }
 
-/** Say in the bar whether the service is there. */
-export function announce(isThere) {
+/** Say in the bar whether the service is there, or why what happens is not told. */
+export function announce(isThere, why = "") {
   const place = document.getElementById("connection");
-  const words = isThere ? "" : "The service is away; trying again…";
+  const words = isThere ? "" : `${why ? `What happens is not seen here: ${why.replace(/\.$/, "")}` : "The service is away"}; trying again…`;
   if (place.textContent !== words) place.textContent = words;
 }
