@@ -1,8 +1,7 @@
 """What simulators said of a controller, against what reality said."""
 
 from collections.abc import Sequence
-from math import sqrt
-from statistics import fmean
+from math import dist, sqrt
 
 from schemas.predictions import Prediction
 from services.figures.marks import Axis, Diagonal, Figure, Panel, Points, Table
@@ -85,7 +84,8 @@ def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], pending:
 
 
 def _error(pairs: Sequence[Pair]) -> float:
-    return sqrt(fmean((simulated - real) ** 2 for _, simulated, real in pairs))
+    _, simulated, real = zip(*pairs, strict=True)
+    return dist(simulated, real) / sqrt(len(pairs))  # without squares, which physics that explodes has no numbers for
 
 
 def _alt(drawn: dict[str, list[Pair]]) -> str:

@@ -1,5 +1,7 @@
 """What is in the figures of one experiment: simulators, predictions, squared error, and curves against their cost."""
 
+from warnings import catch_warnings
+
 import pytest
 
 from services import execution, experiments, reports
@@ -7,6 +9,7 @@ from services.core.arrays import frozen
 from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred
 from services.core.types import Tuned as TunedStep
 from services.efforts import abscissa
+from services.figures.files import render_file
 from services.figures.marks import Diagonal, Figure, Level, Line, Mark, Points
 from services.figures.predictions import AFTER, BEFORE, predictions_figure
 from services.figures.simulators import MOST, REALITY, simulators_figure
@@ -146,6 +149,17 @@ def test_every_sample_that_misses_one_of_its_points_is_counted_as_left_out():
     figure = predictions_figure([prediction(None, 0.3, 0.3), prediction(0.3, None, 0.3, 1)])
 
     assert "2\N{NO-BREAK SPACE}samples left out" in figure.caption
+
+
+def test_what_exploding_physics_says_is_drawn_too():
+    predicted = predictions_figure([prediction(1e200, 1.0, 1.0)])
+    tuning = squared_error_figure({1: {0: 1e-300}, 2: {0: 1e300}})
+
+    assert "root-mean-square error 1e+200" in predicted.caption
+    assert render_file(predicted, "svg")
+    # matplotlib looks for ticks beyond the greatest number
+    with catch_warnings(action="ignore", category=RuntimeWarning):
+        assert render_file(tuning, "svg")
 
 
 def log(first: int, *, iterations: int, fitness: float | None = 1.0):
