@@ -157,3 +157,19 @@ def test_a_list_that_did_not_come_is_not_said_to_be_empty(visit, archive):
     page.locator("tr.experiment input").first.check()
 
     assert page.get_by_text("Nothing here is like that").count() == 0
+
+
+def test_a_part_that_could_not_be_had_for_a_while_is_not_left_as_it_was(visit, archive):
+    visit.forgive("500", "console: ")
+    made = archive.http.post("/experiments", json={"robot": "toy_function", "strategy": "random", "budget": "smoke"})
+    page = visit(f"{archive.url}/#/experiments/{made.json()['id']}?tab=repetitions")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
+    page.locator("tbody .pill.queued").first.wait_for()
+
+    page.route("**/repetitions", lambda route: route.fulfill(status=500, json={"status": 500, "title": "Busy"}))
+    archive.http.post(f"/experiments/{made.json()['id']}/cancel")
+    page.locator(".state-now .pill.cancelled").wait_for()
+    page.wait_for_timeout(3000)
+    page.unroute("**/repetitions")
+
+    page.locator("tbody .pill.cancelled").first.wait_for()
