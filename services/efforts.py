@@ -38,12 +38,12 @@ def abscissa(store: Store, curves: Sequence[Curve], cost: Cost, *, cost_s: float
 
     Args:
         store: that has the experiments.
-        curves: of them.
+        curves: of them; the direct baseline is drawn across, and has no place on the axis.
         cost: rollouts until then, or time: of simulation, and of the real-world evaluations.
         cost_s: seconds that one real-world evaluation takes.
     """
     with store.reading() as session:
-        found = _efforts(results.efforts(session, [each.experiment for each in curves]))
+        found = _efforts(results.efforts(session, [each.experiment for each in curves if not each.direct]))
     if cost == "rollouts":
         return _of_rollouts({key: effort.rollouts for key, effort in found.items()})
     measured = any(effort.seconds for effort in found.values())

@@ -11,8 +11,8 @@ const VIEWS = [
   [/^\/compare$/, "compare", []],
   [/^\/replay$/, "replay", []],
   [/^\/toy$/, "toy", []],
-  [/^\/studies\/([^/]+)$/, "study", ["id"]],
-  [/^\/experiments\/([^/]+)$/, "experiment", ["id"]],
+  [/^\/studies\/([\w-]+)$/, "study", ["id"]],
+  [/^\/experiments\/([\w-]+)$/, "experiment", ["id"]],
 ];
 
 const AWAY = new Set([0, 502, 503, 504]);
@@ -27,7 +27,7 @@ function wanted() {
     const found = pattern.exec(path);
     if (!found) continue;
     const parameters = new URLSearchParams(query);
-    keys.forEach((key, at) => parameters.set(key, decodeURIComponent(found[at + 1])));
+    keys.forEach((key, at) => parameters.set(key, found[at + 1]));
     return { name, parameters };
   }
   return null;

@@ -146,6 +146,7 @@ def _curves(store: Store, query: CurvesDrawing) -> Figure:
     studies = [experiments.read_study(store, each) for each in query.study]
     curves = [curve for each in studies for curve in reports.study_curves(store, each.id)]
     curves += reports.curves(store, query.experiment) if query.experiment else ()
+    curves = list({each.experiment: each for each in curves}.values())  # one that is asked for twice is one line
     title = query.title if query.title is not None else ", ".join(each.name for each in studies)
     against = None if query.x == "evaluations" else abscissa(store, curves, query.x, cost_s=query.cost_s)
     return curves_figure(curves, title=title, band=query.band, against=against, each=query.each)

@@ -134,6 +134,10 @@ def _level(one: _Placed, position: int) -> Level:
     return Level(one.name, mean, Style(INK, style_of(position + 1).dash, "circle"), *_ends(point, "sd"))
 
 
+def _has_band(point: CurvePoint) -> bool:
+    return point.sd is not None
+
+
 def _ends(point: CurvePoint, band: Band) -> tuple[float | None, float | None]:
     if band == "interval":
         return point.lower, point.upper
@@ -162,7 +166,8 @@ def _caption(
 ) -> str:
     """What a caption must say: n, the bands, the thin lines, the axis, the baseline."""
     counts = [point.n for one in lines for _, _, point in one.points]
-    parts = [f"Mean over {counted(counts, 'repetition')}; bands: {band}."] if counts else []
+    bands = f"; bands: {band}" if any(_has_band(point) for one in lines for _, _, point in one.points) else ""
+    parts = [f"Mean over {counted(counts, 'repetition')}{bands}."] if counts else []
     parts += ["Thin lines: single repetitions."] if counts and each else []
     parts += [against.note] if against else []
     parts += [f"{one.name}: evolved in reality itself, {_level_in_words(one)}." for one in levels]

@@ -1,8 +1,7 @@
 """What simulators said of a controller, against what reality said."""
 
 from collections.abc import Sequence
-from math import sqrt
-from statistics import fmean
+from math import dist, sqrt
 
 from schemas.predictions import Prediction
 from services.figures.marks import Axis, Diagonal, Figure, Panel, Points, Table
@@ -78,14 +77,15 @@ def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], pending:
     parts += [
         f"{name}: root-mean-square error {number(_error(pairs), 2)}{shown}." for name, pairs in drawn.items() if pairs
     ]
-    left_out = max(len(items) - len(pairs) for pairs in drawn.values())
+    left_out = sum(None in (each.fitness, each.simulated_before, each.simulated_after) for each in items)
     parts += [f"{counted([left_out], 'sample')} left out: a measurement or the physics failed."] if left_out else []
     parts += [f"{counted([pending], 'sample')} still being computed."] if pending else []
     return " ".join(parts)
 
 
 def _error(pairs: Sequence[Pair]) -> float:
-    return sqrt(fmean((simulated - real) ** 2 for _, simulated, real in pairs))
+    _, simulated, real = zip(*pairs, strict=True)
+    return dist(simulated, real) / sqrt(len(pairs))  # without squares, which physics that explodes has no numbers for
 
 
 def _alt(drawn: dict[str, list[Pair]]) -> str:

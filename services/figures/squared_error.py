@@ -103,10 +103,11 @@ def _caption(errors: Mapping[int, Errors], there: Mapping[int, Sequence[float]],
     if not there:
         return ""
     counts = [len(found) for found in there.values()]
+    band = "; band: from the first to the third quartile" if max(counts) > 1 else ""
     failed = sum(value is None for found in errors.values() for value in found.values())
     parts = [
         "Sum over the samples so far of the squared difference between fitness in simulation and in reality.",
-        f"Median over {counted(counts, 'repetition')}; band: from the first to the third quartile.",
+        f"Median over {counted(counts, 'repetition')}{band}.",
     ]
     parts += ["Thin lines: single repetitions."] if each else []
     parts += [f"{counted([failed], 'value')} left out, for the physics failed."] if failed else []

@@ -56,7 +56,9 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def power(value: float) -> str:
-    """A value of a logarithmic axis: `0.01`, `10`, `10⁻⁶`."""
+    """A value of a logarithmic axis: `0.01`, `10`, `10⁻⁶`; nothing for a tick beyond all numbers."""
+    if not isfinite(value):
+        return ""
     if 1e-3 <= value < 1e4:
         return f"{value:g}"
     mantissa, exponent = f"{value:.0e}".split("e")

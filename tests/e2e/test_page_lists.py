@@ -235,3 +235,11 @@ def test_a_service_with_tokens_asks_for_one_and_a_reader_may_look_and_estimate(
         page.get_by_text("The token does not permit this").wait_for()
     finally:
         api.close()
+
+
+def test_the_line_for_curl_is_one_that_every_shell_takes(visit, archive, published):
+    page = visit(f"{archive.url}/#/studies/{published['id']}")
+
+    call = page.locator(".calls code").first.text_content()
+
+    assert call == f"curl '{archive.url}/studies/{published['id']}/curves?format=csv'"

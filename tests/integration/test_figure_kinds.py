@@ -1,5 +1,7 @@
 """What is in the figures of one experiment: simulators, predictions, squared error, and curves against their cost."""
 
+from warnings import catch_warnings
+
 import pytest
 
 from services import execution, experiments, reports
@@ -7,6 +9,7 @@ from services.core.arrays import frozen
 from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred
 from services.core.types import Tuned as TunedStep
 from services.efforts import abscissa
+from services.figures.files import render_file
 from services.figures.marks import Diagonal, Figure, Level, Line, Mark, Points
 from services.figures.predictions import AFTER, BEFORE, predictions_figure
 from services.figures.simulators import MOST, REALITY, simulators_figure
@@ -14,7 +17,7 @@ from services.figures.squared_error import squared_error_figure
 from services.store.session import Store
 from services.tuned import tunings
 from tests.experiments import run, toy
-from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, tuned
+from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, prediction, tuned
 
 
 def marks(figure: Figure, panel: int = 0) -> dict[str, Mark]:
@@ -135,6 +138,30 @@ def test_squared_errors_that_are_all_zero_or_failed_are_drawn_as_they_are():
     assert failed.empty
 
 
+def test_the_band_of_squared_errors_is_told_of_only_where_there_is_one():
+    alone, several = squared_error_figure({1: {0: 1.0}}), squared_error_figure({1: {0: 1.0, 1: 2.0}, 2: {0: 1.0}})
+
+    assert alone.caption.endswith("Median over 1\N{NO-BREAK SPACE}repetition.")
+    assert "band: from the first to the third quartile." in several.caption
+
+
+def test_every_sample_that_misses_one_of_its_points_is_counted_as_left_out():
+    figure = predictions_figure([prediction(None, 0.3, 0.3), prediction(0.3, None, 0.3, 1)])
+
+    assert "2\N{NO-BREAK SPACE}samples left out" in figure.caption
+
+
+def test_what_exploding_physics_says_is_drawn_too():
+    predicted = predictions_figure([prediction(1e200, 1.0, 1.0)])
+    tuning = squared_error_figure({1: {0: 1e-300}, 2: {0: 1e300}})
+
+    assert "root-mean-square error 1e+200" in predicted.caption
+    assert render_file(predicted, "svg")
+    # matplotlib looks for ticks beyond the greatest number
+    with catch_warnings(action="ignore", category=RuntimeWarning):
+        assert render_file(tuning, "svg")
+
+
 def log(first: int, *, iterations: int, fitness: float | None = 1.0):
     """Every phase of iteration k takes 10 rollouts times what it begins with; the last may have no fitness."""
     for iteration in range(iterations + 1):
@@ -163,6 +190,18 @@ def test_rollouts_are_counted_from_the_start_over_those_that_got_there(store: St
 
     assert found.label == "Rollouts in simulation"
     assert [found.at[experiment, at] for at in range(3)] == [30, 75, 120]
+
+
+def test_the_baseline_which_is_drawn_across_has_no_say_in_the_units_of_the_axis(store: Store, experiment: str):
+    direct = experiments.submit_experiment(store, toy(strategy="direct", repetitions=1)).id
+    (claim,) = (each for each in execution.claim(store, "test", limit=2) if each.experiment_id == direct)
+    genome = frozen([0.5])
+    steps = TunedStep(0, ()), Transferred(0, genome, 1.0, Cost(10_000_000)), Probed(0, 1.0, 1.0)
+    run(store, claim, iter(steps))
+
+    found = abscissa(store, reports.curves(store, [experiment, direct]), "rollouts")
+
+    assert found.label == "Rollouts in simulation"
 
 
 def test_time_is_that_of_evaluations_and_of_simulation_as_measured(store: Store, experiment: str):

@@ -90,6 +90,12 @@ def test_curves_are_drawn_against_rollouts_and_time_and_with_each_repetition(api
     assert len(each["figure"]["data"]) == len(plain["figure"]["data"]) + 1
 
 
+def test_an_experiment_that_is_asked_for_twice_is_drawn_once(api: TestClient, experiment: str):
+    drawn = api.get("/figures/curves", params={"experiment": [experiment, experiment], "format": "json"}).json()
+
+    assert len(drawn["table"]["rows"]) == 1
+
+
 def test_a_study_gives_the_title_unless_it_is_given_and_a_file_its_width(api: TestClient, experiment: str):
     study = api.get(f"/experiments/{experiment}").json()["study"]
 

@@ -65,7 +65,7 @@ def test_points_that_no_repetition_has_reached_are_left_out_and_one_repetition_h
 
     (line,) = lines(figure)
     assert (line.y, line.lower, line.upper) == ((1.0,), (None,), (None,))
-    assert "Mean over 1\N{NO-BREAK SPACE}repetition;" in figure.caption
+    assert figure.caption == "Mean over 1\N{NO-BREAK SPACE}repetition."
 
 
 def test_each_repetition_has_a_thin_line_behind_the_mean_if_asked_for():

@@ -1,5 +1,6 @@
 /** The service: what is asked of it, what it answers, and what happens there. */
 
+import { read, written } from "./json.js";
 import { token } from "./token.js";
 
 /** A problem that the service answered with, or that it did not answer (status 0). */
@@ -17,7 +18,7 @@ export const get = async (path, query = {}, signal = undefined) =>
 /** The JSON at `path`, and the tag that a change of it names. */
 export async function tagged(path, signal = undefined) {
   const answer = await request(path, { signal });
-  return { value: await answer.json(), tag: answer.headers.get("ETag") };
+  return { value: read(await answer.text()), tag: answer.headers.get("ETag") };
 }
 
 /** The file at `path`. */
@@ -37,7 +38,7 @@ export function search(query) {
 }
 
 async function send(method, path, body, headers) {
-  const json = body === undefined ? {} : { body: JSON.stringify(body) };
+  const json = body === undefined ? {} : { body: written(body) };
   const answer = await request(path, { method, headers: { "Content-Type": "application/json", ...headers }, ...json });
   return answer.json();
 }
@@ -58,11 +59,13 @@ async function request(path, options) {
 
 /**
  * Server-sent events after `query.after`, or from now on, for as long as `signal` lasts: `handler({ kind, id, data })` for each of them, and
- * `connected(true | false)` as the stream comes and goes. It is taken up again where it broke off, without a hole.
+ * `connected(true | false, why)` as the stream comes and goes, with why the service refused it. It is taken up again where it broke off,
+ * without a hole.
  */
 export async function events(query, handler, connected, signal) {
   let last = null;
   while (!signal.aborted) {
+    let why = "";
     try {
       last ??= query.after ?? (await get("/events/page", { limit: 1 }, signal)).latest;
       const headers = { Accept: "text/event-stream", "Last-Event-ID": last };
@@ -75,8 +78,9 @@ export async function events(query, handler, connected, signal) {
     } catch (error) {
       if (signal.aborted) return;
       if (error.status === 401 || error.status === 403) throw error;
+      if (error.status < 500 && error.status > 0) why = error.message;
     }
-    connected(false);
+    connected(false, why);
     await new Promise((resume) => setTimeout(resume, 1500));
   }
 }

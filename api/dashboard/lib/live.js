@@ -13,6 +13,7 @@ const MANY = 1000;
  */
 export function follow(query, refresh, signal) {
   let some = [];
+  let all = false;  // whatever happens until it was asked for anew: what is missing is not told by events alone
   let due = false;
   let timer = null;
   let busy = false;
@@ -20,8 +21,9 @@ export function follow(query, refresh, signal) {
   const run = async () => {
     timer = null;
     if (signal.aborted || busy || document.hidden) return;
-    const taken = some.length > MANY ? [] : some;
+    const taken = all || some.length > MANY ? [] : some;
     some = [];
+    all = false;
     busy = true;
     due = false;
     try {
@@ -29,7 +31,8 @@ export function follow(query, refresh, signal) {
     } catch (error) {
       if (signal.aborted) return;
       console.warn(error.message);
-      some = taken.length ? [...taken, ...some] : [];
+      some = [...taken, ...some];
+      all ||= !taken.length;
       due = true;
     }
     busy = false;
@@ -43,11 +46,11 @@ export function follow(query, refresh, signal) {
     if (some.length <= MANY) some.push(event);
     soon();
   };
-  const connected = (is) => {
+  const connected = (is, why = "") => {
     if (signal.aborted) return;
-    announce(is);
+    announce(is, why);
     if (is && away) {
-      some = [];
+      all = true;
       soon();
     }
     away = !is;
@@ -60,9 +63,9 @@ export function follow(query, refresh, signal) {
   events(query, happened, connected, signal).catch(() => {});
 }
 
-/** Say in the bar whether the service is there. */
-export function announce(isThere) {
+/** Say in the bar whether the service is there, or why what happens is not told. */
+export function announce(isThere, why = "") {
   const place = document.getElementById("connection");
-  const words = isThere ? "" : "The service is away; trying again…";
+  const words = isThere ? "" : `${why ? `What happens is not seen here: ${why.replace(/\.$/, "")}` : "The service is away"}; trying again…`;
   if (place.textContent !== words) place.textContent = words;
 }

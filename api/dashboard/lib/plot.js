@@ -24,7 +24,8 @@ function plotly() {
 
 /**
  * Draw `/figures/{kind}` into `element`, with its caption and its words for those who do not see it.
- * Returns a function that draws it anew, with another query if one is given; its `drawn` is when it was drawn at first.
+ * Returns a function that draws it anew, with another query if one is given, and says whether it is as of now; its `drawn` is when it was
+ * drawn at first.
  */
 export function plot(element, kind, query, signal) {
   const canvas = h("div", { class: "plot" });
@@ -35,6 +36,7 @@ export function plot(element, kind, query, signal) {
   element.replaceChildren(h("figure", {}, canvas, caption, numbers));
   let answer = null;
   let drawn = false;
+  let shown = null;  // the query of what is drawn
   let asked = 0;
   const say = (words) => {
     drawn = false;
@@ -62,15 +64,21 @@ export function plot(element, kind, query, signal) {
   const refresh = async (changed = query) => {
     query = changed;
     const mine = ++asked;
+    const wanted = JSON.stringify(query);
     try {
       const found = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
-      if (mine !== asked) return;  // another query has overtaken it
+      if (mine !== asked) return true;  // another query has overtaken it
       answer = found;
+      shown = wanted;
       caption.textContent = answer.caption;
       numbers.replaceChildren(...(answer.table && !answer.empty ? [counted(answer.table, numbers.querySelector("details")?.open)] : []));
       await draw();
+      return true;
     } catch (error) {
-      if (!signal.aborted && !drawn) say(failed(error, () => refresh(), "h3"));
+      if (signal.aborted || mine !== asked) return true;
+      if (drawn && shown === wanted) return false;  // it stays as it was
+      say(failed(error, () => refresh(), "h3"));
+      return true;
     }
   };
   onTheme(draw, signal);

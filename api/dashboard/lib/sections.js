@@ -3,12 +3,13 @@
 import { failed, loading } from "./states.js";
 
 const REST = 4;
+const AGAIN_MS = 1000;
 
 /**
  * The parts of one view. `add(element, kinds, load)` has `load()` fill the element once it can be seen; `tell(events)`
  * has those loaded anew that show one of these events' kinds, or all of them if there are no events: those in sight at
  * once, the others when they come into sight. No part is loaded twice at a time, and each rests four times as long as it took.
- * One whose `load()` says true is not complete yet, and loaded again.
+ * One whose `load()` says true is not complete yet, and loaded again; so is one that was filled and could not be filled anew.
  */
 export function sections(signal) {
   const parts = new Map();
@@ -29,9 +30,10 @@ export function sections(signal) {
       part.stale ||= Boolean(await part.load());
       part.filled = true;
     } catch (error) {
+      part.stale ||= part.filled;
       if (!signal.aborted && !part.filled) part.element.replaceChildren(failed(error, () => again(part), "h3"));
     }
-    if (part.filled) await rest(REST * (performance.now() - began), signal);
+    if (part.filled) await rest(Math.max(REST * (performance.now() - began), part.stale ? AGAIN_MS : 0), signal);
     part.busy = false;
     go(part);
   }

@@ -4,6 +4,8 @@ import { TokenForm } from "./token.js";
 import { Problem } from "./api.js";
 import { h } from "./dom.js";
 
+const AGAIN_MS = 2000;
+
 /** Something is on its way. */
 export function loading(words = "Loading…") {
   return h("p", { class: "state loading", role: "status" }, h("span", { class: "spinner", "aria-hidden": "true" }), words);
@@ -27,7 +29,9 @@ export function failed(error, again, heading = "h1") {
 
 /** The service does not answer: it is asked again by itself, and by a press. */
 function away(error, again, heading) {
-  return h("div", { class: "state away-now", role: "status" }, h(heading, {}, error.title), h("p", {}, error.message),
+  const element = h("div", { class: "state away-now", role: "status" }, h(heading, {}, error.title), h("p", {}, error.message),
     h("p", {}, h("span", { class: "spinner", "aria-hidden": "true" }), "Asking again until it does…"),
     again ? h("button", { type: "button", class: "quiet", onclick: () => again() }, "Try now") : null);
+  if (again && heading !== "h1") setTimeout(() => { if (element.isConnected) again(); }, AGAIN_MS);  // a whole view is asked again by what shows it
+  return element;
 }

@@ -21,6 +21,7 @@ export async function show(root, parameters, signal) {
   const strategies = catalogue.strategies.map((each) => each.name);
   const place = h("div");
   const changed = async (wanted) => {
+    if (signal.aborted) return;  // what was typed just before one left would change the address of another view
     history.replaceState(null, "", addressOf(wanted));
     const focused = place.querySelector(":focus")?.textContent;
     if (list.wanted?.show !== wanted.show) {
@@ -54,27 +55,29 @@ class List {
 
   /** Another list than before. */
   async ask(wanted) {
-    Object.assign(this, { wanted, items: [], next: null });
-    await this.refresh(AT_ONCE);
+    Object.assign(this, { wanted, next: null });
+    await this.refresh(AT_ONCE, []);
   }
 
   /** The same list anew, as long as it is. */
-  async refresh(limit = Math.min(MOST, Math.max(AT_ONCE, this.items.length))) {
+  async refresh(limit = Math.min(MOST, Math.max(AT_ONCE, this.items.length)), former = null) {
     const turn = ++this.turn;
     const { show: kind, ...which } = this.wanted;
     const page = await get(`/${kind}`, { ...which, limit }, this.signal);
     if (turn !== this.turn || this.signal.aborted) return;
-    const rest = this.items.length > limit ? this.items.slice(limit) : [];
+    const rest = (former ?? this.items).slice(limit);
     Object.assign(this, { items: [...page.items, ...rest], next: rest.length ? this.next : page.next });
     this.draw();
   }
 
   /** What follows. */
   async lengthen() {
-    const { show: kind, ...which } = this.wanted;
+    const asked = this.wanted;
+    const { show: kind, ...which } = asked;
     this.more.disabled = true;
     try {
       const page = await get(`/${kind}`, { ...which, limit: AT_ONCE * 2, cursor: this.next }, this.signal);
+      if (asked !== this.wanted) return;  // another list has taken its place
       this.items.push(...page.items);
       this.next = page.next;
       this.draw();

@@ -2,6 +2,7 @@
 
 import { get, post } from "../lib/api.js";
 import { h } from "../lib/dom.js";
+import { written } from "../lib/json.js";
 import { draftOf, specOf } from "./new/draft.js";
 import { Places } from "./new/fields.js";
 import { panel } from "./new/panel.js";
@@ -88,7 +89,7 @@ class Form {
     const spec = specOf(this.draft);
     this.panel.busy(true);
     try {
-      const study = await post("/studies", spec, { "Idempotency-Key": this.keyFor(JSON.stringify(spec)) });
+      const study = await post("/studies", spec, { "Idempotency-Key": this.keyFor(written(spec)) });
       location.hash = `#/studies/${study.id}`;
     } catch (error) {
       if (this.signal.aborted) return;

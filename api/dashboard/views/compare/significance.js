@@ -27,6 +27,7 @@ export function significance(view) {
     h("div", { class: "titled" }, h("h2", { id: "differ" }, "Which differ"), h("p", { class: "options" }, h("label", {}, "Test ", test))),
     h("div", { class: "controls" }, buttons, h("label", {}, "from ", from), h("label", {}, "to ", to)), place, h("p", { class: "note" }, NOTE));
   let key = null;
+  let turn = 0;
   const update = (events) => {
     const ids = view.choice.experiments.filter((each) => view.books.get(each));
     element.hidden = ids.length < 2;
@@ -41,7 +42,8 @@ export function significance(view) {
     if (key === now && !events.length) return;
     const anew = key !== now;
     key = now;
-    fill(place, view, { ids, range, last, anew }, () => key === now);
+    const mine = ++turn;
+    fill(place, view, { ids, range, last, anew }, () => mine === turn);
   };
   return { element, update };
 }

@@ -19,10 +19,15 @@ export function feed(page) {
   const about = (query) => get("/events/page", { experiment: page.id, limit: PAGE, ...query }, page.signal);
   const past = history(about, page.latest);
   let newest = page.latest;
+  let going = null;
 
-  const earlier = async () => {
+  const lengthen = async () => {
     list.append(...(await past.some(AT_ONCE)).map(entry));
     more.hidden = past.over();
+  };
+  const earlier = () => {  // pressed twice, once
+    going ??= lengthen().finally(() => { going = null; });
+    return going;
   };
   const later = async () => {
     for (let full = true; full;) {

@@ -40,9 +40,8 @@ function card(page, kind, title, kinds, query, options = null, ...files) {
   let refresh = null;
   const draw = async () => {
     saved.replaceChildren(figureFiles(kind, asked(), `gaplab-${page.id}-${kind}`, ...files));
-    if (refresh) await refresh(asked());
-    else await (refresh = plot(place, kind, asked(), page.signal)).drawn;
-    return kind === "predictions" && await isPending(page);
+    const isNew = await (refresh ? refresh(asked()) : (refresh = plot(place, kind, asked(), page.signal)).drawn);
+    return !isNew || (kind === "predictions" && await isPending(page));
   };
   options?.addEventListener("change", draw);
   page.parts.add(place, kinds, draw);

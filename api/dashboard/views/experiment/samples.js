@@ -16,11 +16,15 @@ export function samples(page) {
   const place = h("div");
   const kind = h("select", {}, ...KIND.map(([value, words]) => h("option", { value }, words)));
   const repetition = h("input", { type: "number", min: 0, max: 1000000, step: 1, placeholder: "all", class: "short" });
-  const cursors = [null];  // of this page and those before it
+  let cursors = [null];  // of this page and those before it
   let next = null;
+  let asked = 0;
+  let turning = false;
   const load = async () => {
     const query = { limit: MANY, cursor: cursors.at(-1), kind: kind.value, repetition: repetition.value };
+    const mine = ++asked;
     const found = await get(`/experiments/${page.id}/samples`, query, page.signal);
+    if (mine !== asked) return;  // another page has overtaken it
     next = found.next;
     const rows = found.items.map((each) => row(page, each));
     place.replaceChildren(rows.length ? table("Real-world evaluations", COLUMNS, rows) : empty("Nothing was tried in reality yet."));
@@ -28,14 +32,28 @@ export function samples(page) {
     on.disabled = !next;
     where.textContent = `Page ${cursors.length}`;
   };
-  const turn = (change) => {
-    change();
-    load().catch((error) => { where.textContent = error.message; });
+  const say = (error) => { where.textContent = error.message; };
+  const turn = async (to) => {
+    if (turning) return;
+    const before = cursors;
+    turning = true;
+    cursors = to;
+    try {
+      await load();
+    } catch (error) {
+      if (cursors === to) cursors = before;
+      say(error);
+    }
+    turning = false;
   };
-  const back = h("button", { type: "button", class: "quiet small", disabled: true, onclick: () => turn(() => cursors.pop()) }, "Before");
-  const on = h("button", { type: "button", class: "quiet small", disabled: true, onclick: () => turn(() => cursors.push(next)) }, "After");
+  const limit = () => {
+    cursors = [null];
+    load().catch(say);
+  };
+  const back = h("button", { type: "button", class: "quiet small", disabled: true, onclick: () => turn(cursors.slice(0, -1)) }, "Before");
+  const on = h("button", { type: "button", class: "quiet small", disabled: true, onclick: () => turn([...cursors, next]) }, "After");
   const where = h("span", { role: "status" });
-  const limited = h("p", { class: "options", onchange: () => turn(() => cursors.splice(1)) },
+  const limited = h("p", { class: "options", onchange: limit },
     h("label", {}, "Show ", kind), h("label", {}, "Repetition ", repetition));
   page.parts.add(place, KINDS, load);
   return [limited, place, h("p", { class: "pages" }, back, where, on)];

@@ -2,11 +2,12 @@
 
 import { copyButton } from "../../lib/copy.js";
 import { h } from "../../lib/dom.js";
+import { written } from "../../lib/json.js";
 import { framed } from "../../lib/table.js";
 
 /** The spec as JSON; reality's parameters are null in it until the experiment has ended. */
 export function spec(page) {
-  const text = () => JSON.stringify(page.experiment.spec, null, 2);
+  const text = () => written(page.experiment.spec, 2);
   const code = h("code");
   const place = framed("Spec as JSON", h("pre", {}, code));
   page.parts.add(place, ["extended", "completed", "failed", "cancelled"], async () => {

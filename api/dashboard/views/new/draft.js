@@ -1,5 +1,7 @@
 /** What the form holds, and the spec that it makes of it: only what was said, for what is left out is the service's own. */
 
+import { numberOf } from "../../lib/json.js";
+
 const COUNTS = ["iterations", "repetitions", "direct_repetitions", "seed", "priority", "max_parallel"];
 const EVALUATIONS = ["controller_evaluations", "selection_evaluations", "simulator_evaluations"];
 const USUAL_TUNABLES = ["static_friction", "dynamic_friction", "restitution"];
@@ -75,8 +77,7 @@ const mapped = (object, way) => Object.fromEntries(Object.entries(object).map(([
 /** A number where one was typed; else what was typed, which the service says something about. */
 function given(value) {
   if (typeof value !== "string" || !value.trim()) return typeof value === "string" ? "" : value;
-  const found = Number(value.replace("−", "-"));
-  return Number.isNaN(found) ? value.trim() : found;
+  return numberOf(value.trim().replace("−", "-")) ?? value.trim();
 }
 
 /** The object without what says nothing. */

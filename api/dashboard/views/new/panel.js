@@ -3,6 +3,7 @@
 import { copyButton } from "../../lib/copy.js";
 import { h } from "../../lib/dom.js";
 import { count, duration, spoken } from "../../lib/format.js";
+import { written } from "../../lib/json.js";
 import { framed } from "../../lib/table.js";
 import { tabs } from "../../lib/tabs.js";
 
@@ -19,9 +20,9 @@ export function panel() {
   const element = h("aside", { class: "panel card", "aria-label": "Cost and spec" }, h("h2", {}, "What it costs"), cost, trouble, button, forms);
   const show = (spec) => {
     const base = new URL(".", location.href).href;
-    const json = JSON.stringify(spec, null, 2);
+    const json = written(spec, 2);
     code.json.textContent = json;
-    code.curl.textContent = `curl -X POST ${base}studies \\\n  -H 'Content-Type: application/json' \\\n  -d ${quoted(JSON.stringify(spec))}`;
+    code.curl.textContent = `curl -X POST ${base}studies \\\n  -H 'Content-Type: application/json' \\\n  -d ${quoted(written(spec))}`;
     code.python.textContent = [
       "import json", "", "from gaplab import Client", "", `spec = json.loads(${pythonText(json)})`,
       `with Client("${base.replace(/\/$/, "")}") as gaplab:`, "    study = gaplab.submit(spec)",

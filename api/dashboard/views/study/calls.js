@@ -8,7 +8,7 @@ import { framed } from "../../lib/table.js";
 export function lines({ id }) {
   const base = new URL(".", location.href).href.replace(/\/$/, "");
   return h("details", { class: "calls" }, h("summary", {}, "From a terminal or a program"),
-    call("curl", `curl ${base}/studies/${id}/curves?format=csv`),
+    call("curl", `curl '${base}/studies/${id}/curves?format=csv'`),
     call("Command", `GAPLAB_URL=${base} gaplab show ${id}`),
     call("Python", `from gaplab import Client\n\nwith Client("${base}") as gaplab:\n    curves = gaplab.curves(["${id}"])`));
 }

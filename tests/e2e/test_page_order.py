@@ -1,0 +1,175 @@
+"""Answers that come late, twice, or not at all: what the page shows is of what was asked last, and all of it."""
+
+import json
+import re
+
+import pytest
+
+QUIET = "#/toy"  # a view that asks for nothing
+FOLLOWED = """
+async () => {
+  const { follow } = await import("/assets/dashboard/lib/live.js");
+  const streams = [];
+  globalThis.fetch = async () => new Response(new ReadableStream({ start: (stream) => streams.push(stream) }));
+  const told = [];
+  const refresh = async (events) => {
+    told.push(events.map((each) => each.data.number));
+    if (told.length === 1) throw new Error("not yet");
+  };
+  const until = async (holds) => { while (!holds()) await new Promise((resume) => setTimeout(resume, 20)); };
+  const text = (number) => `id: ${number}\\ndata: {"number": ${number}}\\n\\n`;
+  const send = (number) => streams.at(-1).enqueue(new TextEncoder().encode(text(number)));
+  const leaving = new AbortController();
+  follow({ after: 0 }, refresh, leaving.signal);
+  await until(() => streams.length === 1);
+  streams[0].close();
+  await until(() => streams.length === 2);
+  send(1);
+  await until(() => told.length === 1);
+  send(2);
+  await until(() => told.length === 2);
+  send(3);
+  await until(() => told.length === 3);
+  leaving.abort();
+  return told;
+}
+"""
+
+
+def test_after_a_break_everything_is_asked_for_anew_until_it_is_there_also_if_something_happens_meanwhile(
+    visit, archive
+):
+    page = visit(f"{archive.url}/{QUIET}")
+    page.get_by_role("heading", level=1).wait_for()
+
+    assert page.evaluate(FOLLOWED) == [[], [], [3]]
+
+
+@pytest.mark.parametrize("view", ["experiments/%", "experiments/..%2F..", "studies/%E0%A4%A"])
+def test_an_address_that_cannot_be_an_id_is_no_page(visit, archive, view):
+    page = visit(f"{archive.url}/#/{view}")
+
+    page.get_by_role("heading", name="There is no such page").wait_for()
+
+
+def test_what_was_typed_just_before_one_left_does_not_change_the_address_of_another_view(visit, archive):
+    page = visit(archive.url)
+    page.locator("tr.study").first.wait_for()
+
+    page.get_by_label("Search by name or id").fill("mujoco")
+    page.evaluate(f"() => {{ location.hash = '{QUIET}'; }}")
+    page.get_by_role("heading", name="The toy function").wait_for()
+    page.wait_for_timeout(500)
+
+    assert page.url.endswith(QUIET)
+
+
+def test_more_of_a_list_that_another_has_replaced_is_not_added_to_it(visit, archive):
+    page = visit(f"{archive.url}/#/?show=experiments")
+    page.locator("tr.experiment").nth(19).wait_for()
+    late = []
+    page.route("**/experiments?*cursor=*", lambda route: late.append(route))
+
+    page.get_by_role("button", name="Show more").click()
+    page.get_by_label("State").select_option("CANCELLED")
+    page.locator("tr.experiment").nth(1).wait_for(state="detached")
+    (asked,) = late
+    with page.expect_response("**/experiments?*cursor=*"):
+        asked.continue_()
+    page.wait_for_timeout(200)
+
+    assert page.locator("tr.experiment").count() == 1
+
+
+def test_earlier_events_and_the_next_page_of_samples_come_once_however_fast_one_presses(visit, archive):
+    found = archive.get("/experiments", text="simulated_fit", strategy="simulated_fit", limit=500)["items"]
+    ended = next(each["id"] for each in found if each["spec"]["robot"]["name"] == "quadruped")
+    page = visit(f"{archive.url}/#/experiments/{ended}?tab=samples")
+    more, events = page.get_by_role("button", name="Earlier"), page.locator(".events li")
+    page.get_by_text("Page 1", exact=True).wait_for()
+    events.first.wait_for()
+
+    if more.is_visible():
+        more.evaluate("(button) => { button.click(); button.click(); }")
+        page.wait_for_load_state("networkidle")
+    numbers = events.evaluate_all("(all) => all.map((each) => each.dataset.number)")
+    page.get_by_role("button", name="After").evaluate("(button) => { button.click(); button.click(); }")
+
+    page.get_by_text("Page 2", exact=True).wait_for()
+    assert len(set(numbers)) == len(numbers)
+
+
+def test_a_number_is_submitted_as_it_was_typed_or_not_at_all(visit, archive):
+    visit.forgive("422")
+    page = visit(f"{archive.url}/#/new")
+    page.locator(".panel .big").wait_for()
+    seed = 2**64 - 1
+
+    page.get_by_label("Seed").fill(str(seed))
+    with page.expect_response("**/studies/estimate") as answered:
+        page.get_by_label("Repetitions at once").fill("1e999")
+
+    page.locator(".trouble", has_text="integer").or_(page.locator(".trouble", has_text="whole number")).wait_for()
+    sent = json.loads(answered.value.request.post_data)
+    assert (sent["seed"], sent["max_parallel"]) == (seed, "1e999")
+    spec = {"robot": "toy_function", "strategy": "random", "budget": "smoke", "seed": seed}
+    made = archive.http.post("/experiments", json=spec).json()["id"]
+    page.goto(f"{archive.url}/#/experiments/{made}?tab=spec")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
+    page.get_by_text(f'"seed": {seed}').wait_for()
+    archive.http.post(f"/experiments/{made}/cancel")
+
+
+def test_a_figure_that_the_service_did_not_answer_with_is_asked_for_again_and_none_stands_for_another(visit, archive):
+    visit.forgive("ERR_FAILED")
+    made = archive.http.post("/experiments", json={"robot": "toy_function", "strategy": "random", "budget": "smoke"})
+    page = visit(f"{archive.url}/#/toy?experiment={made.json()['id']}")
+    page.get_by_text("Nothing to draw yet.").wait_for()
+
+    page.route("**/figures/toy*", lambda route: route.abort())
+    page.get_by_label("Iteration", exact=True).press("ArrowRight")
+    page.get_by_role("heading", name="The service does not answer").wait_for()
+    page.unroute("**/figures/toy*")
+
+    page.get_by_text("Nothing to draw yet.").wait_for()
+    archive.http.post(f"/experiments/{made.json()['id']}/cancel")
+
+
+def test_a_stream_that_is_refused_is_not_a_service_that_is_away(visit, archive):
+    visit.forgive("429")
+    page = visit(f"{archive.url}/{QUIET}")
+    refusal = {"status": 429, "title": "Too many", "detail": "20 streams are open."}
+    page.route(re.compile("/events(\\?|$)"), lambda route: route.fulfill(status=429, json=refusal))
+
+    page.evaluate("() => { location.hash = '#/'; }")
+
+    page.get_by_text("What happens is not seen here: 20 streams are open; trying again…").wait_for()
+
+
+def test_a_list_that_did_not_come_is_not_said_to_be_empty(visit, archive):
+    visit.forgive("ERR_FAILED", "The service does not answer", "It may be down")
+    page = visit(f"{archive.url}/#/?show=experiments")
+    page.locator("tr.experiment").nth(19).wait_for()
+
+    page.route("**/experiments?*", lambda route: route.abort())
+    with page.expect_event("requestfailed"):
+        page.get_by_label("State").select_option("CANCELLED")
+    page.locator("tr.experiment input").first.check()
+
+    assert page.get_by_text("Nothing here is like that").count() == 0
+
+
+def test_a_part_that_could_not_be_had_for_a_while_is_not_left_as_it_was(visit, archive):
+    visit.forgive("500", "console: ")
+    made = archive.http.post("/experiments", json={"robot": "toy_function", "strategy": "random", "budget": "smoke"})
+    page = visit(f"{archive.url}/#/experiments/{made.json()['id']}?tab=repetitions")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
+    page.locator("tbody .pill.queued").first.wait_for()
+
+    page.route("**/repetitions", lambda route: route.fulfill(status=500, json={"status": 500, "title": "Busy"}))
+    archive.http.post(f"/experiments/{made.json()['id']}/cancel")
+    page.locator(".state-now .pill.cancelled").wait_for()
+    page.wait_for_timeout(3000)
+    page.unroute("**/repetitions")
+
+    page.locator("tbody .pill.cancelled").first.wait_for()
