@@ -123,5 +123,8 @@ def fits(page):
         if wide <= 0:
             return
         page.wait_for_timeout(100)
-    msg = f"{wide} px wider than the window"
+    beyond = page.evaluate("""() => [...document.querySelectorAll("body *")]
+        .filter((each) => each.getBoundingClientRect().right > document.documentElement.clientWidth + 1)
+        .slice(0, 8).map((each) => `${each.tagName}.${each.getAttribute("class") ?? ""}`)""")
+    msg = f"{wide} px wider than the window: {', '.join(beyond)}"
     raise AssertionError(msg)

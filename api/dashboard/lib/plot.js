@@ -45,7 +45,7 @@ export function plot(element, kind, query, signal) {
     canvas.style.height = "";
     canvas.replaceChildren(words);
   };
-  const draw = async () => {
+  const paint = async () => {
     if (!answer || signal.aborted) return;
     if (answer.empty) {
       say(empty("Nothing to draw yet."));
@@ -57,9 +57,15 @@ export function plot(element, kind, query, signal) {
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", answer.alt);
     const { data, layout } = dressed(answer.figure, canvas);
-    canvas.style.height = layout.height ? `${layout.height}px` : "";  // Plotly takes the place's height when it is resized
-    await library.react(canvas, data, layout, { displayModeBar: false, responsive: true });
+    canvas.style.height = layout.height ? `${layout.height}px` : "";
+    await library.react(canvas, data, layout, { displayModeBar: false });
     drawn = true;
+  };
+  let painting = Promise.resolve();
+  /** One after the other: of two at once Plotly may keep the size of the one that began first. */
+  const draw = () => {
+    painting = painting.catch(() => {}).then(paint);
+    return painting;
   };
   const refresh = async (changed = query) => {
     query = changed;
@@ -83,10 +89,10 @@ export function plot(element, kind, query, signal) {
   };
   onTheme(draw, signal);
   let width = 0;
-  const watch = new ResizeObserver(() => {  // also of a change while it is drawn, which Plotly itself would miss
+  const watch = new ResizeObserver(() => {  // also of a change while it is drawn, which Plotly's own watch misses
     if (canvas.clientWidth === width) return;
     width = canvas.clientWidth;
-    draw();
+    draw().catch(() => {});
   });
   watch.observe(canvas);
   signal.addEventListener("abort", () => {
