@@ -155,6 +155,13 @@ def test_an_archive_may_arrive_twice_at_once(store, other, unpacked_here, monkey
     assert sorted(len(each.renamed) for each in both) == [0, 1]
 
 
+def test_the_best_of_repetitions_whose_sum_is_no_number_is_one(store):
+    greatest = 1.7e308
+    id_ = finished(store, list(some_log(recorded=greatest)))
+
+    assert experiments.read_experiment(store, id_).best_fitness == pytest.approx(greatest)
+
+
 def test_a_study_goes_there_with_all_that_is_its_own(store, other):
     study = experiments.submit_study(
         store,
