@@ -132,7 +132,8 @@ def _checked_spec(row: Row) -> Row:
     left_out = [name for name in _RESOLVED if row["spec"].get(name) is None]
     unknown = [name for name in (*truth, *(each.name for each in spec.tunables)) if name not in tunables]
     unknown += [spec.robot.name] if spec.robot.name not in robots else []
-    if left_out or unknown or spec.reality.engine is None or spec.strategy.name != row["strategy"]:
+    twice = len({each.name for each in spec.tunables}) < len(spec.tunables)
+    if left_out or unknown or twice or spec.reality.engine is None or spec.strategy.name != row["strategy"]:
         msg = f"{place} is not resolved, or names what is not installed here: {', '.join([*left_out, *unknown])[:200]}"
         raise InvalidArchive(msg)
     if row["iterations"] not in _iterations(spec):

@@ -226,6 +226,7 @@ def without(part):
         ({"spec": in_spec(robot={"name": "/etc/passwd"})}, "not resolved"),
         ({"spec": in_spec(strategy={"name": "random"})}, "not resolved"),
         ({"spec": in_spec(tunables=[{"name": "static_friction"}])}, "does not fit its experiment"),
+        ({"spec": in_spec(tunables=[{"name": "static_friction"}] * 2)}, "not resolved"),
         (
             {"spec": in_spec(reality={"engine": {"name": "analytic"}, "parameters": {"static_friction": "x"}})},
             "no spec",
