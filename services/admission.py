@@ -108,8 +108,8 @@ def check_extent(specs: Sequence[ExperimentSpec], limits: Limits | None) -> None
         raise InvalidSpec(violations)
 
 
-def check_load(session: Session, specs: Sequence[ExperimentSpec], admitted: Admission) -> None:
-    """Do nothing if there is room for these; within the transaction that inserts them.
+def check_load(session: Session, specs: Sequence[ExperimentSpec], admitted: Admission, *, done: int = 0) -> None:
+    """Do nothing if there is room for these, in the transaction that inserts them; `done` of their rollouts are over.
 
     Raises:
         LimitReached: there is none; the message names the limit.
@@ -119,7 +119,7 @@ def check_load(session: Session, specs: Sequence[ExperimentSpec], admitted: Admi
     admission.one_at_a_time(session)
     under_way = admission.load(session)
     own = under_way.get(admitted.token, Load(0, 0))
-    rollouts = sum(expected_rollouts(each) * (each.repetitions or 0) for each in specs)
+    rollouts = max(0, sum(expected_rollouts(each) * (each.repetitions or 0) for each in specs) - done)
     _check("experiments_per_token", own.experiments, len(specs), limits)
     _check("rollouts_per_token", own.rollouts, rollouts, limits)
     _check("experiments", sum(each.experiments for each in under_way.values()), len(specs), limits)

@@ -16,6 +16,7 @@ from services.experiments import extent_of
 from services.resolution import is_direct
 from services.store.repository import reads, verbs
 from services.store.repository.experiments import Extent
+from services.store.repository.progress import tallies
 from services.store.session import Session, Store
 
 
@@ -57,7 +58,8 @@ def extend_experiment(
         def larger(spec: ExperimentSpec) -> tuple[ExperimentSpec, Extent]:
             found = _larger(spec, extension)
             check_extent([found], admitted.limits)
-            check_load(session, [found], admitted)
+            there = tallies(session, [experiment_id])[experiment_id]
+            check_load(session, [found], admitted, done=there.rollouts_done + there.rollouts_saved)
             return found, extent_of(found)
 
         return reads.read_experiments(session, [verbs.extend(session, experiment_id, larger)])[0]

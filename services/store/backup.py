@@ -36,18 +36,32 @@ def backup(url: str, file: Path) -> int:
         msg = f"there is no database at {source or 'no place'}, so there is nothing to copy"
         raise StoreUnavailable(msg)
     if file.exists():
-        raise FileExistsError(None, "a file of this name is there already", str(file))
+        raise _taken(file)
     part = file.with_name(f"{file.name}.part")
     os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
     try:
         with troubles.named(), engine.connect() as connection:
             _copy(connection.connection.driver_connection, part)
-        part.rename(file)
+        _name(part, file)
     finally:
         engine.dispose()
         part.unlink(missing_ok=True)
     _sync(file.parent)
     return file.stat().st_size
+
+
+def _name(part: Path, file: Path) -> None:
+    """Give the copy its name, but not in place of what has got that name meanwhile."""
+    try:
+        os.link(part, file)
+    except FileExistsError as error:
+        raise _taken(file) from error
+    except OSError:  # no file has two names there
+        part.rename(file)
+
+
+def _taken(file: Path) -> FileExistsError:
+    return FileExistsError(None, "a file of this name is there already", str(file))
 
 
 def _copy(source: sqlite3.Connection | None, part: Path) -> None:

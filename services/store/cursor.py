@@ -35,7 +35,7 @@ def decode(cursor: str, columns: Sequence[Column], bound_to: str = "") -> Tuple:
             message = "this cursor is of a list with other filters or another order; leave it out to start anew"
             raise InvalidSpec([Violation("cursor", cursor, message)])
         return tuple_(*(_part(part, column) for part, column in zip(parts, columns, strict=True)))
-    except (ValueError, TypeError, OverflowError) as error:
+    except (ValueError, TypeError, OverflowError, RecursionError) as error:
         message = "this is no cursor that the service gave out; leave it out to start anew"
         raise InvalidSpec([Violation("cursor", cursor, message)]) from error
 

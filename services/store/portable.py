@@ -83,7 +83,7 @@ class Column:
         required: a row without it cannot be stored: it has no default.
         nullable: it may be null.
         longest: characters of a text; None for any number of them.
-        least, greatest: of whole numbers.
+        least, greatest: of whole numbers; half of what a database has room for, since some of them go on to count.
         choices: the only permitted texts, if there are such.
     """
 
@@ -93,7 +93,7 @@ class Column:
     nullable: bool = False
     longest: int | None = None
     least: int = 0
-    greatest: int = 2**31 - 1
+    greatest: int = 2**30
     choices: tuple[str, ...] = ()
 
 
@@ -138,7 +138,7 @@ def _column(table: str, column: TableColumn[Any]) -> Column:
     kind = _kind(table, column)
     choices = tuple(getattr(column.type, "enums", ()))
     longest = column.type.length if isinstance(column.type, String) and not choices else None
-    greatest = MOST if isinstance(column.type, BigInteger) else 2**31 - 1
+    greatest = MOST if isinstance(column.type, BigInteger) else Column.greatest
     least = -greatest if (table, column.name) in SIGNED else 0
     return Column(column.name, kind, required, bool(column.nullable), longest, least, greatest, choices)
 

@@ -65,18 +65,18 @@ class Store:
         Raises:
             StoreUnavailable: the database cannot be used now.
         """
-        for attempt in range(1, _TRIES):
-            try:
-                with self._writer.begin() as session:
-                    return work(session)
-            except DBAPIError as error:
-                if not troubles.is_clash(error):
-                    with self._named():
+        with self._named():
+            for attempt in range(1, _TRIES):
+                try:
+                    with self._writer.begin() as session:
+                        return work(session)
+                except DBAPIError as error:
+                    if not troubles.is_clash(error):
                         raise
-            self.retries += 1
-            time.sleep(0.01 * 2**attempt)
-        with self.transaction() as session:
-            return work(session)
+                self.retries += 1
+                time.sleep(0.01 * 2**attempt)
+            with self._writer.begin() as session:
+                return work(session)
 
     def check(self) -> None:
         """Do nothing if the database is there and its schema is the one this version needs.

@@ -1,7 +1,9 @@
 """Out of one database and into another: the same to the last bit, whatever the databases and the numbers."""
 
 import json
+import time
 import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from io import BytesIO
 from math import copysign, inf, nan
@@ -25,6 +27,7 @@ from services.core.types import Cost, Measured, Probed, Sample, Selected, Simula
 from services.misfit import misfit
 from services.store.models import Base, ExperimentRow, RepetitionRow, SimulatorRow
 from services.store.portable import EXPORTED
+from services.store.repository import archives as repository
 from services.store.repository.attempts import attempts_of
 from tests.experiments import AWKWARD, run, some_log, toy
 
@@ -135,6 +138,28 @@ def test_whatever_numbers_and_names_go_there_and_back(store, other, unpacked_her
 
     assert exported(export_experiment(other, submitted)) == archive
     assert repr(shown(other, submitted)) == repr(shown(store, submitted))
+
+
+def test_an_archive_may_arrive_twice_at_once(store, other, unpacked_here, monkeypatch):
+    archive, free = exported(export_experiment(store, finished(store))), repository.free
+
+    def slowly(*arguments):
+        found = free(*arguments)
+        time.sleep(0.2)
+        return found
+
+    monkeypatch.setattr(repository, "free", slowly)
+    with ThreadPoolExecutor(2) as pool:
+        both = list(pool.map(lambda _: import_archive(other, BytesIO(archive)), range(2)))
+
+    assert sorted(len(each.renamed) for each in both) == [0, 1]
+
+
+def test_the_best_of_repetitions_whose_sum_is_no_number_is_one(store):
+    greatest = 1.7e308
+    id_ = finished(store, list(some_log(recorded=greatest)))
+
+    assert experiments.read_experiment(store, id_).best_fitness == pytest.approx(greatest)
 
 
 def test_a_study_goes_there_with_all_that_is_its_own(store, other):

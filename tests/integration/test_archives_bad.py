@@ -187,6 +187,13 @@ def in_spec(**changes):
     return lambda spec: spec | changes
 
 
+PARTS = ("name", "iterations", "repetitions", "robot", "engine", "tunables", "optimizer", "budget", "seed")
+
+
+def without(part):
+    return lambda spec: {name: value for name, value in spec.items() if name != part}
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -205,6 +212,9 @@ def in_spec(**changes):
         ({"position": 2**31}, "no whole number"),
         ({"rollouts": 2**48 + 1}, "no whole number"),
         ({"iterations": 1}, "does not fit its experiment"),
+        ({"iterations": 10**9}, "does not fit its experiment"),
+        ({"edits": 2**31 - 1}, "no whole number"),
+        *(({"spec": without(each)}, f"not resolved, or names what is not installed here: {each}") for each in PARTS),
         ({"created_at": "yesterday"}, "created_at"),
         ({"created_at": "2012-11-05T09:00:00"}, "time zone"),
         ({"created_at": "0001-01-01T00:00:00+14:00"}, "created_at"),
@@ -216,6 +226,7 @@ def in_spec(**changes):
         ({"spec": in_spec(robot={"name": "/etc/passwd"})}, "not resolved"),
         ({"spec": in_spec(strategy={"name": "random"})}, "not resolved"),
         ({"spec": in_spec(tunables=[{"name": "static_friction"}])}, "does not fit its experiment"),
+        ({"spec": in_spec(tunables=[{"name": "static_friction"}] * 2)}, "not resolved"),
         (
             {"spec": in_spec(reality={"engine": {"name": "analytic"}, "parameters": {"static_friction": "x"}})},
             "no spec",
@@ -279,11 +290,23 @@ def test_a_row_without_an_end(sqlite_store, good, monkeypatch, unpacked_here):
         ("repetition", lambda rows: rows[:1], "contradict"),
         ("repetition", lambda rows: set_in(rows, 0, steps=12), "no log of 12 steps"),
         ("repetition", lambda rows: set_in(rows, 0, error="x\0"), "NUL"),
+        ("repetition", lambda rows: set_in(rows, 0, iterations_done=0), "no log"),
+        ("repetition", lambda rows: set_in(rows, 0, epoch=0), "more attempts than leases"),
+        ("repetition", lambda rows: set_in(rows, 0, epoch=2**31 - 1), "no whole number"),
         ("repetition", lambda rows: [*rows, set_in(rows[:1], 0, number=0)[0]], "contradict"),
     ],
 )
 def test_results_that_cannot_be(store, good, table, change, said, unpacked_here):
     refused(store, packed(with_table(good, table, change)), said)
+
+
+@pytest.mark.parametrize("left", [[], [0], [1]])
+def test_an_experiment_without_some_of_its_repetitions(store, good, left, unpacked_here):
+    members = with_table(good, "repetition", lambda rows: [rows[each] for each in left])
+    for table in ("iteration", "measurement", "simulator", "attempt"):
+        members = with_table(members, table, lambda rows: [each for each in rows if each["repetition"] in left])
+
+    refused(store, packed(members), f"has {len(left)} of its 2 repetitions")
 
 
 @pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1" * 100, bytes(1000)])

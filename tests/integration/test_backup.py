@@ -12,6 +12,7 @@ from services import execution, experiments, reports
 from services.core.errors import StoreUnavailable, Unsupported
 from services.core.loop import repetition
 from services.simulation import setting
+from services.store import backup as backing_up
 from services.store.backup import backup
 from services.store.session import Store
 from tests.experiments import toy
@@ -130,3 +131,18 @@ def test_the_command_copies_the_database_of_the_environment(sqlite_url, tmp_path
     assert end.value.code == code
     said = capsys.readouterr()
     assert str(file) in (said.out if code == 0 else said.err)
+
+
+def test_a_file_that_appears_meanwhile_is_not_written_over(sqlite_url, tmp_path, monkeypatch):
+    copied = backing_up._copy
+
+    def slowly(source, part):
+        copied(source, part)
+        (tmp_path / "copy.db").write_text("mine")
+
+    monkeypatch.setattr(backing_up, "_copy", slowly)
+
+    with pytest.raises(FileExistsError, match="there already"):
+        backing_up.backup(sqlite_url, tmp_path / "copy.db")
+
+    assert [each.read_text() for each in tmp_path.iterdir()] == ["mine"]

@@ -184,6 +184,21 @@ def test_cancelling_forgets_checkpoints(store):
     assert checkpoints_left(store) == 0
 
 
+@pytest.mark.parametrize("hopeless", [True, False])
+def test_a_repetition_that_fails_leaves_no_checkpoints(store, hopeless):
+    experiments.submit_experiment(store, toy(repetitions=1))
+    (claim,) = execution.claim(store, "me", 1)
+    execution.record_all(store, [(claim, [part(0, 0)])])
+
+    for _ in range(MAX_LOSSES if hopeless else 0):
+        assert checkpoints_left(store) == 1
+        execution.release(store, claim, "killed")
+        (claim,) = execution.claim(store, "me", 1) or (claim,)
+    assert execution.fail(store, claim, "no") is not hopeless
+
+    assert checkpoints_left(store) == 0
+
+
 def test_a_claim_that_timed_out_is_handed_back_and_those_that_are_known_stay(store):
     submitted = experiments.submit_experiment(store, toy())
     (known,) = execution.claim(store, "me", 1)

@@ -26,8 +26,11 @@ from schemas.schedule import ExtensionSpec
 from services import archives, events, execution, experiments, life_cycle, provenance, sensitivity
 from services.core.errors import NotFound
 from services.events import Which
+from services.resolution import resolve_experiment
 from services.store.repository.events import note, write
+from services.store.repository.experiments import insert_experiment
 from services.store.repository.leases import MAX_LOSSES
+from services.store.repository.sensitivity import queue_for
 from services.store.session import Store
 from services.versions import provenance as own
 from tests.experiments import run, some_log, toy
@@ -134,13 +137,29 @@ def test_every_kind_of_event_is_told_and_none_shows_where_reality_is(store):
 
 
 def test_an_experiment_submitted_after_its_check_is_told_of_it_at_once(store):
-    experiments.submit_experiment(store, toy())
+    before = experiments.submit_experiment(store, toy()).id
     check = sensitivity.claim(store, "me")
     sensitivity.complete(store, check, [])
 
     later = experiments.submit_experiment(store, toy()).id
 
-    assert kinds(store, Which(experiment=later)) == ["submitted", "sensitivity_ended"]
+    for each in (before, later):
+        assert kinds(store, Which(experiment=each)) == ["submitted", "sensitivity_ended"]
+
+
+def test_an_experiment_submitted_while_its_check_ends_is_told_of_it(store):
+    experiments.submit_experiment(store, toy())
+    check, spec = sensitivity.claim(store, "me"), resolve_experiment(toy())
+
+    with ThreadPoolExecutor(1) as pool:
+        with store.transaction() as session:
+            row = insert_experiment(session, spec, experiments.extent_of(spec))
+            queue_for(session, [row])
+            ending = pool.submit(sensitivity.complete, store, check, [])
+            time.sleep(0.3)  # it waits for what is locked here
+        assert ending.result(timeout=30)
+
+    assert kinds(store, Which(experiment=row.id)) == ["submitted", "sensitivity_ended"]
 
 
 def test_a_step_that_is_delivered_twice_is_told_once(store):

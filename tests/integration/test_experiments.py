@@ -152,7 +152,9 @@ def test_a_list_is_filtered_by_study_state_and_strategy(store):
     assert found(strategy="no\0such") == found(study="no-such") == set()
 
 
-@pytest.mark.parametrize("cursor", ["", "x", "ü", "W10", "WzEsMiwzXQ", "WyIyMDI2LTAxLTAxIiwgMSwgMV0", "W" * 100_000])
+@pytest.mark.parametrize(
+    "cursor", ["", "x", "ü", "W10", "WzEsMiwzXQ", "WyIyMDI2LTAxLTAxIiwgMSwgMV0", "W" * 100_000, "W1tb" * 497]
+)
 @pytest.mark.parametrize("listed", ["experiments", "studies", "samples", "simulators"])
 def test_a_cursor_that_no_page_gave_is_refused(store, listed, cursor):
     experiment = experiments.submit_experiment(store, toy()).id

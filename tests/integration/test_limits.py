@@ -10,7 +10,7 @@ from fastapi.testclient import TestClient
 from api.app import create_app
 from api.limits import Streams
 from schemas.access import Role
-from services import execution
+from services import execution, experiments
 from services.access import create_token
 from services.core.errors import LimitReached
 from services.settings import Limits, Settings, variable_of
@@ -82,6 +82,22 @@ def test_what_is_extended_stays_within_the_limits_too(sqlite_store: Store):
     assert variable_of("repetitions") in refused.json()["detail"]
     assert full.status_code == 429
     assert extended.status_code == 202
+
+
+def test_what_is_extended_counts_with_the_rollouts_that_it_has_left(sqlite_store: Store):
+    made = served(sqlite_store).post("/experiments", json=TOY | {"repetitions": 3}).json()
+    for claim in execution.claim(sqlite_store, "me", 9):
+        run(sqlite_store, claim)
+    progress = experiments.read_experiment(sqlite_store, made["id"]).progress
+    each, done = progress.rollouts // 3, progress.rollouts_done + progress.rollouts_saved
+    left = 4 * each - done
+
+    def extended(rollouts: int) -> int:
+        path = f"/experiments/{made['id']}/extend"
+        return served(sqlite_store, rollouts=rollouts).post(path, json={"repetitions": 4}).status_code
+
+    assert done > 0
+    assert (extended(left - 1), extended(left)) == (429, 202)
 
 
 def test_one_token_cannot_take_the_room_of_another(store: Store):

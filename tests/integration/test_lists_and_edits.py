@@ -7,6 +7,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api.app import create_app
+from schemas.lifecycle import State
 from services import execution
 from services.store.session import Store
 
@@ -89,15 +90,20 @@ def test_studies_are_filtered_by_state_strategy_and_text(store: Store, api: Test
     api.post(f"/experiments/{called_off['experiments'][0]['id']}/cancel")
     api.post(f"/experiments/{mixed['experiments'][0]['id']}/cancel")
     study("waiting", "simulated_fit")
+    paused, partly = study("paused", "random", "known_fit"), study("partly paused", "random", "known_fit")
+    api.post(f"/studies/{paused['id']}/pause")
+    api.post(f"/experiments/{paused['experiments'][0]['id']}/cancel")
+    api.post(f"/experiments/{partly['experiments'][0]['id']}/pause")
 
     def found(**which: str) -> set[str]:
         return {each["name"] for each in walk(api, "/studies", **which)}
 
-    assert found(strategy="random") == {"off", "mixed"}
+    assert found(strategy="random") == {"off", "mixed", "paused", "partly paused"}
     assert found(strategy="random", text="MIX") == {"mixed"}
-    for state in ("QUEUED", "RUNNING", "COMPLETED", "FAILED", "CANCELLED"):
+    for state in State:
         assert found(state=state) == {each["name"] for each in walk(api, "/studies") if each["state"] == state}
-    assert found(state="RUNNING") == {"mixed"}
+    assert found(state="RUNNING") == {"mixed", "partly paused"}
+    assert found(state="PAUSED") == {"paused"}
     assert found(state="CANCELLED") == {"off"}
 
 

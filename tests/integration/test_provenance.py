@@ -1,7 +1,9 @@
 """Under what an experiment is computed, and that it does not go on under something else unless asked to."""
 
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
+from time import sleep
 
 import pytest
 from fastapi.testclient import TestClient
@@ -14,6 +16,7 @@ from services import events, execution, experiments, provenance, versions
 from services.core.errors import Conflict, StoreUnavailable
 from services.events import Which
 from services.store.models import SPEC_VERSION
+from services.store.repository import leases
 from tests.experiments import run, same, some_log, toy
 
 HERE = versions.provenance()
@@ -49,6 +52,20 @@ def test_it_is_recorded_with_the_first_claim(store):
     found = provenance.read(store, id_)
     assert [(each.repetitions, each.provenance) for each in found.uses] == [(2, HERE)]
     assert found.computed_with == f"analytic (of gaplab's own), {HERE.architecture}, spec {SPEC_VERSION}"
+
+
+def test_of_two_that_begin_it_at_once_one_is_bound_and_the_other_leaves_it_alone(store):
+    id_ = experiments.submit_experiment(store, toy(repetitions=2)).id
+
+    with ThreadPoolExecutor(1) as pool:
+        with store.transaction() as session:
+            first = leases.claim(session, "me", 1, HERE)
+            second = pool.submit(execution.claim, store, "you", 1, OTHERS["engine"])
+            sleep(0.3)  # the other one waits for what is locked here
+        assert second.result(timeout=30) == ()
+
+    assert len(first) == 1
+    assert [each.provenance for each in provenance.read(store, id_).uses] == [HERE]
 
 
 def test_it_names_the_library_and_the_version_of_every_engine():

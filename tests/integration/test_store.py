@@ -202,6 +202,20 @@ def test_a_connection_lost_in_the_midst_is_unavailability(postgres_store):
         session.execute(text("SELECT pg_terminate_backend(pg_backend_pid())"))
 
 
+@pytest.mark.parametrize("use", [experiments.list_studies, lambda store: execution.claim(store, "me", 1)])
+def test_to_have_no_connection_free_is_unavailability(sqlite_store, monkeypatch, use):
+    pool = sqlite_store._engine.pool
+    monkeypatch.setattr(pool, "_timeout", 0.01)
+    taken = [sqlite_store._engine.connect() for _ in range(pool.size() + pool._max_overflow)]
+
+    with pytest.raises(StoreUnavailable, match="all connections"):
+        use(sqlite_store)
+
+    assert sqlite_store.errors == 1
+    for each in taken:
+        each.close()
+
+
 def test_an_unreachable_database_is_unavailable_and_recovers_by_itself(tmp_path):
     folder = tmp_path / "not-yet"
     url = f"sqlite:///{folder / 'gaplab.db'}"

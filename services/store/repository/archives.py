@@ -6,7 +6,7 @@ from enum import Enum
 from itertools import islice
 from typing import Any
 
-from sqlalchemy import ColumnElement, Select, Table, insert, select
+from sqlalchemy import ColumnElement, Select, Table, insert, select, text
 from sqlalchemy.exc import DataError, IntegrityError
 from sqlalchemy.orm import Session
 
@@ -25,6 +25,7 @@ Refused = (IntegrityError, DataError)
 """What a database says to rows that contradict each other, or that have no place in it."""
 
 _AT_ONCE = 1_000
+_LOCK = 0x67617069  # among the advisory locks of a Postgres database
 _REPETITIONS = table_of("repetition")
 _REPLACED = {EXPERIMENT: _REPETITIONS.c.experiment_id, REPETITION: _REPETITIONS.c.number}
 
@@ -59,7 +60,12 @@ def rows(
 
 
 def free(session: Session, model: type[StudyRow | ExperimentRow], wanted: Iterable[str]) -> dict[str, str]:
-    """The id under which each is stored here: its own, or a new one if that is taken."""
+    """The id under which each is stored here: its own, or a new one if that is taken.
+
+    No other import looks until this one's transaction ends: of two of the same archive, one would be refused.
+    """
+    if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write ever overlap
+        session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
     ids = list(wanted)
     taken = set(session.scalars(select(model.id).where(model.id.in_(ids))))
     return {each: new_id() if each in taken else each for each in ids}

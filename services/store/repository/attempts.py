@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import insert, select, update
+from sqlalchemy import func, insert, select, update
 from sqlalchemy.orm import Session
 
 from schemas.events import EventKind
@@ -46,6 +46,14 @@ def end(session: Session, repetitions: Sequence[int], ending: Ending, reason: st
         why = each.error if failed else reason
         kind = EventKind.REPETITION_FAILED if failed else _TOLD[ending]
         note(session, kind, each.experiment_id, each.number, **({"reason": why} if why else {}))
+
+
+def latest(session: Session, experiment: str) -> dict[int, int]:
+    """The number of the latest attempt at each repetition of an experiment that has had one."""
+    row, repetition = AttemptRow, RepetitionRow
+    of_it = select(row.repetition_id, func.max(row.epoch)).join(repetition, repetition.id == row.repetition_id)
+    found = of_it.where(repetition.experiment_id == experiment).group_by(row.repetition_id)
+    return dict(session.execute(found).all())
 
 
 def attempts_of(session: Session, experiment: str, number: int) -> tuple[AttemptRead, ...]:

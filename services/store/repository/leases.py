@@ -99,6 +99,7 @@ def fail(session: Session, claim: Claim, reason: str) -> bool:
     values = {"state": State.FAILED, "error": plain(reason), "ended_at": now()}
     ended = session.scalars(update(row).where(mine(claim)).values(values).returning(row.id)).all()
     attempts.end(session, ended, Ending.FAILED, plain(reason))
+    checkpoints.forget(session, ended)
     settle(session, [claim.experiment_id])
     return bool(ended)
 
@@ -150,7 +151,7 @@ def _give_back(session: Session, which: ColumnElement[bool], experiments: Sequen
     row = RepetitionRow
     hopeless = row.losses + 1 >= MAX_LOSSES
     failed = f"lost {MAX_LOSSES} times without a step in between; the last time {reason}"
-    moved = session.scalars(
+    moved = session.execute(
         update(row)
         .where(which)
         .values(
@@ -160,9 +161,10 @@ def _give_back(session: Session, which: ColumnElement[bool], experiments: Sequen
             losses=row.losses + 1,
             owner=None,
         )
-        .returning(row.id)
+        .returning(row.id, row.state)
     ).all()
-    attempts.end(session, moved, Ending.LOST, reason)
+    attempts.end(session, [id_ for id_, _ in moved], Ending.LOST, reason)
+    checkpoints.forget(session, [id_ for id_, state in moved if state is State.FAILED])
     settle(session, experiments)
     return len(moved)
 

@@ -14,7 +14,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Select, String, or_, select, tuple_, type_coerce
 from sqlalchemy.orm import Session
 
-from schemas.lifecycle import State
+from schemas.lifecycle import OPEN, State
 from services.store.cursor import Column, decode, encode
 from services.store.models import ExperimentRow, StudyRow
 from services.store.repository.leases import plain
@@ -126,13 +126,20 @@ def _has(condition: ColumnElement[bool]) -> ColumnElement[bool]:
 
 def _study_is(state: State) -> list[ColumnElement[bool]]:
     """That the experiments taken together are in the state, as `reads.state_of` says for one study."""
-    open_ = _has(ExperimentRow.state.in_([each for each in State if not each.ended]))
+    open_ = _has(ExperimentRow.state.in_(OPEN))
+    if state is State.RUNNING:
+        return [open_, *(~_all_left_are(each) for each in OPEN if each is not State.RUNNING)]
     if not state.ended:
-        queued = ~_has(ExperimentRow.state != State.QUEUED)
-        return [open_, queued if state is State.QUEUED else ~queued]
+        return [open_, _all_left_are(state)]
     ends = (State.COMPLETED, State.FAILED, State.CANCELLED)
     return [
         ~open_,
         _has(ExperimentRow.state == state),
         *(~_has(ExperimentRow.state == each) for each in ends[: ends.index(state)]),
     ]
+
+
+def _all_left_are(state: State) -> ColumnElement[bool]:
+    """That those which have not ended, or if they are to be QUEUED all of them, are in that state."""
+    others = State if state is State.QUEUED else OPEN
+    return ~_has(ExperimentRow.state.in_([each for each in others if each is not state]))

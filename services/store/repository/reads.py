@@ -129,7 +129,7 @@ def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: Mappi
         edits=row.edits,
         state=state_of([each.state for each in experiments]),
         experiments=tuple(experiments),
-        progress=sum((progress[each.id] for each in experiments), Tally()).progress(),
+        progress=sum((progress.get(each.id, Tally()) for each in experiments), Tally()).progress(),
         created_at=row.created_at,
     )
 

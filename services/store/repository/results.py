@@ -116,7 +116,15 @@ def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, flo
     for experiment, best in session.execute(query):
         if best is not None:
             found.setdefault(experiment, []).append(best + 0.0)  # of 0.0 and -0.0 either may be the maximum
-    return {experiment: fsum(each) / len(each) for experiment, each in found.items()}  # in whatever order they came
+    return {experiment: _mean(each) for experiment, each in found.items()}
+
+
+def _mean(values: Sequence[float]) -> float:
+    """The same in whatever order they come, and though their sum may be no number any more."""
+    try:
+        return fsum(values) / len(values)
+    except OverflowError:
+        return fsum(each / len(values) for each in values)
 
 
 @dataclass(frozen=True)

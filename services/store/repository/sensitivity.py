@@ -47,7 +47,10 @@ def id_of(spec: Checked) -> str:
 
 
 def queue(session: Session, spec: Checked) -> SensitivityRow:
-    """The check of this, QUEUED if there was none or it had FAILED."""
+    """The check of this, QUEUED if there was none or it had FAILED; it does not end before the session's transaction.
+
+    Else whoever ends it would not see, and not tell, the experiments that are submitted with it.
+    """
     row, id_ = SensitivityRow, id_of(spec)
     insert = _INSERT[session.get_bind().dialect.name]
     moment = session.execute(select(now())).scalar_one()
@@ -55,7 +58,7 @@ def queue(session: Session, spec: Checked) -> SensitivityRow:
     session.execute(insert(row).values(values).on_conflict_do_nothing(index_elements=[row.id]))
     again = {"state": State.QUEUED, "losses": 0, "error": None, "ended_at": None}
     session.execute(update(row).where(row.id == id_, row.state == State.FAILED).values(again))
-    return get(session, id_)
+    return session.get_one(row, id_, populate_existing=True, with_for_update={"read": True})
 
 
 def queue_for(session: Session, experiments: Iterable[ExperimentRow]) -> None:
@@ -67,7 +70,7 @@ def queue_for(session: Session, experiments: Iterable[ExperimentRow]) -> None:
             row.sensitivity_id = check.id
         session.flush()
         if check.state.ended:
-            _tell(session, check.id)
+            _tell(session, check, [row.id for row in tuning])
 
 
 def get(session: Session, id_: str) -> SensitivityRow:
@@ -188,14 +191,13 @@ def _move(session: Session, which: ColumnElement[bool], **values: Any) -> int:  
     moved = session.execute(update(row).where(which).values(values).returning(row.id, row.state)).all()
     for id_, state in moved:
         if state.ended:
-            _tell(session, id_)
+            of_it = select(ExperimentRow.id).where(ExperimentRow.sensitivity_id == id_).order_by(ExperimentRow.id)
+            _tell(session, get(session, id_), session.scalars(of_it))
     return len(moved)
 
 
-def _tell(session: Session, id_: str) -> None:
-    """Every experiment whose check this is that the check has ended, and what it found."""
-    check = get(session, id_)
-    told = {"sensitivity": id_, "state": check.state.value, "warnings": list(warnings(check))}
-    of_it = select(ExperimentRow.id).where(ExperimentRow.sensitivity_id == id_).order_by(ExperimentRow.id)
-    for experiment in session.scalars(of_it):
+def _tell(session: Session, check: SensitivityRow, experiments: Iterable[str]) -> None:
+    """These experiments that their check has ended, and what it found."""
+    told = {"sensitivity": check.id, "state": check.state.value, "warnings": list(warnings(check))}
+    for experiment in experiments:
         note(session, EventKind.SENSITIVITY_ENDED, experiment, **told)

@@ -93,9 +93,12 @@ def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, 
 
 
 def is_whole(session: Session, repetition: RepetitionRow) -> bool:
-    """Whether the rows of the repetition tell of as many steps as it counts, in their order and without holes."""
+    """Whether the rows of the repetition tell of as many steps and iterations as it counts, in order, without holes."""
     (log,) = logs(session, [repetition.id]).values()
-    return [mapping.position(each) for each in log] == list(range(repetition.steps))
+    done = sum(isinstance(each, Probed) for each in log)
+    return done == repetition.iterations_done and [mapping.position(each) for each in log] == list(
+        range(repetition.steps)
+    )
 
 
 def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, tuple[int, int]]:

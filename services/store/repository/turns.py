@@ -23,7 +23,7 @@ def next_repetitions(session: Session, limit: int, permitted: ColumnElement[bool
     if not experiments:
         return ()
     lock(session, experiments)
-    turns = _turns(session, experiments, limit)
+    turns = _turns(session, experiments, limit, permitted)
     waiting = {each: iter(_queued(session, each, turns.count(each))) for each in set(turns)}
     return tuple(next(waiting[each]) for each in turns)
 
@@ -50,8 +50,11 @@ def ahead(session: Session, experiments: Sequence[str], permitted: ColumnElement
     )
 
 
-def _turns(session: Session, experiments: Sequence[str], limit: int) -> list[str]:
-    """The experiment whose turn it is, again and again; each has one more running after its turn."""
+def _turns(session: Session, experiments: Sequence[str], limit: int, permitted: ColumnElement[bool]) -> list[str]:
+    """The experiment whose turn it is, again and again; each has one more running after its turn.
+
+    Only now, when they are locked, is it sure which are claimable and permitted: another may have claimed first.
+    """
     row = RepetitionRow
     queued = (
         select(row.experiment_id, func.count().label("queued"))
@@ -62,7 +65,7 @@ def _turns(session: Session, experiments: Sequence[str], limit: int) -> list[str
     found = session.execute(
         select(_ROW.id, _ROW.precedence, _ROW.running, _ROW.max_parallel, queued.c.queued)
         .join(queued, queued.c.experiment_id == _ROW.id)
-        .where(_ROW.claimable.is_(True))
+        .where(_ROW.claimable.is_(True), permitted)
         .order_by(_ROW.created_at, _ROW.position, _ROW.id)
     ).all()
     heap = [
