@@ -37,6 +37,7 @@ def main() -> None:
         console.print(f"measuring {name} ...")
         for row in measure():
             table.add_row(*_cells(row))
+            console.print("  " + ", ".join(filter(None, _cells(row))), style="dim", highlight=False)
     console.print(table)
 
 

@@ -10,10 +10,12 @@ from benchmarks.measure import Row, ratio
 from benchmarks.physics import SWITCHING, genomes, simulation
 from schemas.spec import ExperimentSpec
 from services.core.loop import repetition
+from services.execution import Claim, TimedStep
 from services.resolution import resolve_experiment
 from services.settings import Settings
 from services.simulation import setting
 from workers import repetition as task
+from workers.checkpoints import CHECKPOINT_S
 from workers.cluster import cluster
 
 SPEC = ExperimentSpec.model_validate(
@@ -52,8 +54,9 @@ def alone() -> int:
 
 def spread() -> int:
     """The steps of the repetition, as the service runs it."""
-    stream = task.run.remote(resolve_experiment(SPEC), 0, (), {})
-    return sum(len(ray.get(batch)) for batch in stream)
+    claim = Claim(repetition_id=0, epoch=0, experiment_id="none", number=0, spec=resolve_experiment(SPEC))
+    stream = task.run.remote(claim, {}, CHECKPOINT_S)
+    return sum(isinstance(each, TimedStep) for batch in stream for each in ray.get(batch))
 
 
 def bare(processes: int) -> Callable[[], int]:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 import ray
 
+from benchmarks import pool as benchmark
 from schemas.spec import ExperimentSpec
+from services.core.loop import repetition
 from services.resolution import resolve_experiment
 from services.settings import Settings
 from services.simulation import setting
@@ -134,3 +136,12 @@ def test_one_of_several_helpers_that_dies_is_asked_no_more(alone, pool):
 )
 def test_a_call_is_dealt_in_large_parts_first_and_small_ones_in_the_end(rows, cores, least, parts):
     assert sizes(rows, cores, least) == parts
+
+
+def test_the_benchmark_runs_a_repetition_as_the_service_does(monkeypatch):
+    budget = {"controller_evaluations": 2, "selection_evaluations": 2, "simulator_evaluations": 2}
+    tiny = {"strategy": "random", "robot": "toy_function", "iterations": 2, "repetitions": 1, "budget": budget}
+    spec = ExperimentSpec.model_validate(tiny)
+    monkeypatch.setattr(benchmark, "SPEC", spec)
+
+    assert benchmark.spread() == sum(1 for _ in repetition(setting(resolve_experiment(spec), 0)))
