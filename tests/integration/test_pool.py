@@ -139,9 +139,9 @@ def test_a_call_is_dealt_in_large_parts_first_and_small_ones_in_the_end(rows, co
 
 
 def test_the_benchmark_runs_a_repetition_as_the_service_does(monkeypatch):
-    budget = {"controller_evaluations": 2, "selection_evaluations": 2, "simulator_evaluations": 2}
-    tiny = {"strategy": "random", "robot": "toy_function", "iterations": 2, "repetitions": 1, "budget": budget}
-    spec = ExperimentSpec.model_validate(tiny)
+    spec = ExperimentSpec.model_validate(
+        {"strategy": "random", "robot": "toy_function", "iterations": 2, "repetitions": 1, "budget": "smoke"}
+    )
     monkeypatch.setattr(benchmark, "SPEC", spec)
 
     assert benchmark.spread() == sum(1 for _ in repetition(setting(resolve_experiment(spec), 0)))
