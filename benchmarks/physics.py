@@ -89,7 +89,7 @@ def rows(rounds: int) -> list[Row]:
             milliseconds["switching"],
             ratio(measured["switching"], measured["bare"]),
             "bare",
-            "≥ 0.80",
+            "≥ 0.85",
         ),
         Row(
             "engine, static = dynamic friction",
