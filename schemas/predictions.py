@@ -18,10 +18,13 @@ class Prediction(Frozen):
 class Predictions(Frozen):
     """The predictions of an experiment, by repetition and iteration, as far as they are computed.
 
-    Computing goes on with each question: ask again while some are pending.
+    Computing goes on with each question: ask again while some are pending. Those that are left out never are.
     """
 
     experiment: str
     unit: str
     items: tuple[Prediction, ...]
     pending: int = Field(description="samples that are not computed yet")
+    left_out: int = Field(
+        default=0, description="samples of the last repetitions, for which there is no room: they are never computed"
+    )

@@ -30,7 +30,8 @@ class BudgetSpec(Frozen):
     reuse_transfer: bool = Field(
         default=True,
         strict=True,
-        description="`simulated_fit` tries the controller that was just transferred, instead of searching for it again",
+        description="`simulated_fit` tries the controller that was just transferred, instead of searching again: "
+        "the best of `controller_evaluations`, where other strategies select from `selection_evaluations`",
     )
 
     @model_validator(mode="before")

@@ -1,4 +1,8 @@
-"""The named budgets: how much of the paper's computation an experiment spends."""
+"""The named budgets: how much of the paper's computation an experiment spends.
+
+Where a transfer has more evaluations than a selection, *simulated fit* selects from a larger search than other
+strategies do, unless `reuse_transfer` is off: docs/decisions/no-wasted-rollout.md.
+"""
 
 from dataclasses import dataclass
 

@@ -25,6 +25,12 @@ MOST_ASKED = 2_000
 WEIGHT = 300
 """Bytes of memory that a prediction takes, about."""
 
+MOST_KEPT = 20_000
+"""Samples of one experiment, so that those of eight have room in memory at once; else one would push out the other.
+
+The paper's experiments have 400. Of more, those of the first repetitions, which are as good as any others.
+"""
+
 Fitness = float | None
 Pair = tuple[Fitness, Fitness]
 """Before and after."""
@@ -43,7 +49,7 @@ def predictions(store: Store, physics: Physics, experiment_id: str, *, seconds: 
     """The predictions of every sample that simulators were tuned on.
 
     What is not known yet is computed for so many seconds, in the order of iterations over all repetitions; the rest is
-    counted as pending, and computed when it is asked for again.
+    counted as pending, and computed when it is asked for again. What there is no room for is left out.
 
     Raises:
         NotFound: no such experiment.
@@ -54,17 +60,19 @@ def predictions(store: Store, physics: Physics, experiment_id: str, *, seconds: 
     """
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
-        samples = replays.samples_between(session, experiment_id)
+        every = replays.samples_between(session, experiment_id)
+    samples = every[:MOST_KEPT]
     spec = spec_of(row.spec)
     unknown = [each for each in samples if physics.memory.get(_key(row.id, each)) is None]
     unknown.sort(key=lambda each: (each.iteration, each.repetition))
     if unknown:
         refuse_missing(spec)
         asked = [Asked(tuple(each.genome), tuple(each.before), tuple(each.after)) for each in unknown[:MOST_ASKED]]
-        found = physics.ask(predict, spec.model_dump_json(), asked, seconds)
-        for each, pair in zip(unknown, found, strict=False):
+        pairs = physics.ask(predict, spec.model_dump_json(), asked, seconds)
+        for each, pair in zip(unknown, pairs, strict=False):
             physics.memory.keep(_key(row.id, each), pair, WEIGHT)
-    return _read(row.id, unit(spec), samples, physics.memory)
+    found = _read(row.id, unit(spec), samples, physics.memory)
+    return found.model_copy(update={"left_out": len(every) - len(samples)})
 
 
 def predict(spec: str, asked: Sequence[Asked], seconds: float) -> list[Pair]:

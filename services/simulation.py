@@ -37,10 +37,14 @@ class Simulation:
         self._world = lru_cache(maxsize=WORLDS_KEPT)(self._edited)
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
-        """`(n, g)` genomes × `(m, p)` parameters -> `(n, m)` fitnesses; nan where the physics failed."""
+        """`(n, g)` genomes × `(m, p)` parameters -> `(n, m)` fitnesses; nan where the physics failed.
+
+        A fitness that is infinite is no physics either, whatever a robot makes of it.
+        """
         worlds = [self._world(tuple(row)) for row in parameters.tolist()]
         motions = [self._robot.motion(genome) for genome in genomes]
-        return self._robot.fitness(self._engine.rollouts(worlds, motions))
+        fitnesses = self._robot.fitness(self._engine.rollouts(worlds, motions))
+        return np.where(np.isfinite(fitnesses), fitnesses, np.nan)
 
     def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:
         """The rollout of one genome in one simulator, looked at at these times besides, and the world it was in."""

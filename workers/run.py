@@ -21,7 +21,7 @@ class Run:
         begun: the task does not wait for a core any more.
         ended: the task is over; nothing more will be received.
         failed: why its code raised.
-        lost: why its worker is gone.
+        lost: why its worker is gone, or what it delivered has no place in its log: another is to go on from there.
     """
 
     claim: Claim

@@ -15,7 +15,7 @@ from time import monotonic
 import ray
 
 from services import execution, supervisors
-from services.core.errors import StoreUnavailable
+from services.core.errors import Conflict, StoreUnavailable
 from services.execution import Claim
 from services.store.session import Store
 from workers import repetition
@@ -159,16 +159,31 @@ class Supervisor:
         filled = [run for run in self._runs if run.received]
         if not filled:
             return
-        held = execution.record_all(self._store, [(run.claim, run.received) for run in filled])
+        try:
+            held = execution.record_all(self._store, [(run.claim, run.received) for run in filled])
+        except Conflict:
+            held = self._record_each(filled)
         for run in filled:
             run.received = []
         self._drop_all_but([*held, *(run.claim for run in self._runs if run not in filled)])
+
+    def _record_each(self, runs: list[Run]) -> tuple[Claim, ...]:
+        """Store what each has delivered by itself; one whose log refuses it is given up, and nobody else with it."""
+        held: list[Claim] = []
+        for run in runs:
+            try:
+                held += execution.record_all(self._store, [(run.claim, run.received)])
+            except Conflict as error:
+                run.cancel()
+                run.received, run.lost = [], f"what it delivered could not be stored: {error}"
+                held.append(run.claim)
+        return tuple(held)
 
     def _end(self) -> None:
         over = [each for each in self._runs if each.over]
         if not over:
             return
-        execution.complete_all(self._store, [run.claim for run in over if run.ended])
+        self._complete([run for run in over if run.ended and run.lost is None])
         for run in over:
             if run.failed is not None:
                 execution.fail(self._store, run.claim, run.failed)
@@ -180,6 +195,16 @@ class Supervisor:
                 log.info("completed", extra=run.place)
             self._runs.remove(run)
         self._looked = -WAIT_S  # cores are free: look for work at once
+
+    def _complete(self, runs: list[Run]) -> None:
+        try:
+            execution.complete_all(self._store, [run.claim for run in runs])
+        except Conflict:
+            for run in runs:
+                try:
+                    execution.complete(self._store, run.claim)
+                except Conflict as error:
+                    run.lost = f"it ended too early: {error}"
 
     def _drop_all_but(self, held: list[Claim] | tuple[Claim, ...]) -> None:
         """Stop the runs whose claim holds no more: cancelled, paused, stopped, given back, or taken over."""

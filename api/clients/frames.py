@@ -97,7 +97,8 @@ class Frames:
     def predictions(self: "Client", id: str, *, every_s: float = 0.5, timeout_s: float = 600.0) -> "pandas.DataFrame":  # noqa: A002
         """What simulators said of each sample of an experiment before and after it was measured, and what reality said.
 
-        The service computes it when it is asked for the first time, and is waited for.
+        The service computes it when it is asked for the first time, and is waited for. Of very many samples it has
+        those of the first repetitions.
 
         Args:
             id: of the experiment.

@@ -110,12 +110,13 @@ def draw_simulators(store: StoreDep, query: Annotated[SimulatorsDrawing, Query()
     responses=responses() | documented(404, 422, 429),
 )
 def draw_predictions(store: StoreDep, physics: PhysicsDep, query: Annotated[ExperimentDrawing, Query()]) -> Response:
-    """The fitness of every sample of an experiment in simulation, before and after tuning on it, against reality.
+    """The fitness of the samples of an experiment in simulation, before and after tuning on it, against reality.
 
     About two seconds are computed for each question; ask again while some samples are pending, as its caption says.
     """
     found = predictions(store, physics, query.experiment)
-    figure = predictions_figure(found.items, unit=found.unit, pending=found.pending, title=_title(store, query))
+    counts = {"pending": found.pending, "left_out": found.left_out}
+    figure = predictions_figure(found.items, unit=found.unit, **counts, title=_title(store, query))
     return answer(_explained(store, query, figure), query)
 
 

@@ -129,17 +129,30 @@ def _checked_spec(row: Row) -> Row:
     except (ValidationError, KeyError, TypeError, AttributeError) as error:
         msg = f"{place} is no spec"
         raise InvalidArchive(msg) from error
-    left_out = [name for name in _RESOLVED if row["spec"].get(name) is None]
+    left_out = [*(name for name in _RESOLVED if row["spec"].get(name) is None), *_left_out(spec)]
     unknown = [name for name in (*truth, *(each.name for each in spec.tunables)) if name not in tunables]
     unknown += [spec.robot.name] if spec.robot.name not in robots else []
     twice = len({each.name for each in spec.tunables}) < len(spec.tunables)
-    if left_out or unknown or twice or spec.reality.engine is None or spec.strategy.name != row["strategy"]:
+    if left_out or unknown or twice or spec.strategy.name != row["strategy"]:
         msg = f"{place} is not resolved, or names what is not installed here: {', '.join([*left_out, *unknown])[:200]}"
         raise InvalidArchive(msg)
     if row["iterations"] not in _iterations(spec):
         msg = f"{place} does not fit its experiment, which says that a repetition has {row['iterations']:,} iterations"
         raise InvalidArchive(msg)
     return _whole(spec, truth, row["spec"])
+
+
+def _left_out(spec: ExperimentSpec) -> list[str]:
+    """What has nothing to do with what is installed here, and what no resolved spec lacks: nobody may go on without."""
+    return [
+        *(f"budget/{name}" for name, value in spec.budget if value is None),
+        *(
+            f"bounds of {each.name}"
+            for each in spec.tunables
+            if each.lower is None or each.upper is None or each.lower >= each.upper
+        ),
+        *(["reality/engine"] if spec.reality.engine is None else []),
+    ]
 
 
 def _iterations(spec: ExperimentSpec) -> set[int]:

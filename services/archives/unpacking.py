@@ -8,6 +8,7 @@ import resource
 import sys
 from contextlib import suppress
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 MOST: dict[int, int] = {
@@ -16,7 +17,7 @@ MOST: dict[int, int] = {
     resource.RLIMIT_CPU: 300,
     resource.RLIMIT_CORE: 0,
 }
-"""Bytes of memory, bytes of a file that is written, seconds, and bytes of what a crash leaves behind."""
+"""Bytes of memory, bytes of all files that are written, seconds, and bytes of what a crash leaves behind."""
 
 _AT_ONCE = 500
 
@@ -27,12 +28,19 @@ def main(paths: list[str]) -> int:
     Nothing is said about what is wrong: it would come from the file.
     """
     for limit, most in MOST.items():
-        with suppress(ValueError, OSError):  # the system does not know this limit, or has a lower one already
-            resource.setrlimit(limit, (most, most))
+        _restrict(limit, most)
+    left = MOST[resource.RLIMIT_FSIZE]
     for number, (source, target) in enumerate(zip(paths[::2], paths[1::2], strict=True), 1):
         if not convert(source, target):
             return number
+        left -= Path(target).stat().st_size
+        _restrict(resource.RLIMIT_FSIZE, left)  # which the system holds against each file by itself
     return 0
+
+
+def _restrict(limit: int, most: int) -> None:
+    with suppress(ValueError, OSError):  # the system does not know this limit, or has a lower one already
+        resource.setrlimit(limit, (most, most))
 
 
 def convert(source: str, target: str) -> bool:

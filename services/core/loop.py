@@ -13,6 +13,7 @@ from numpy.random import Generator
 
 from services.core.arrays import Genome, Parameters
 from services.core.counted import Counted
+from services.core.errors import PluginBroken
 from services.core.foresight import Foresight
 from services.core.optimizers.base import Ahead, Optimizer, maximise
 from services.core.ports import Reality, Simulate
@@ -146,7 +147,16 @@ def _select(setting: Setting, history: History, iteration: int) -> Selected:
 
 
 def _search(setting: Setting, simulate: Simulate, ahead: Ahead, parameters: Parameters, rng: Generator) -> Search:
+    """The search of one selection, whose budget is for a single one; there is none for who says not to search."""
+    name, left = setting.strategy.name, int(setting.strategy.searches)
+
     def search(score: Score) -> Genome:
+        nonlocal left
+        if not left:
+            wrong = "searches twice in one selection" if setting.strategy.searches else "says that it does not search"
+            msg = f"strategy {name!r} {wrong}, so that no budget is left for this search"
+            raise PluginBroken(msg)
+        left -= 1
         found = maximise(
             setting.optimizer,
             setting.genomes,

@@ -120,7 +120,8 @@ class Budget:
     """Fitness evaluations of each search; the paper's numbers are the defaults. Source: sections 2 and 3.
 
     Attributes:
-        reuse_transfer: a strategy that would search for what the transfer has just found tries that one in reality.
+        reuse_transfer: a strategy that would search for what the transfer has just found tries that one in reality;
+            so it selects from a search of `controller_evaluations`, others from one of `selection_evaluations`.
     """
 
     controller_evaluations: int = 10_000

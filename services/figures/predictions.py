@@ -14,13 +14,16 @@ Pair = tuple[Prediction, float, float]
 """A prediction, and what it says: fitness in simulation and in reality."""
 
 
-def predictions_figure(items: Sequence[Prediction], *, unit: str = "", pending: int = 0, title: str = "") -> Figure:
+def predictions_figure(
+    items: Sequence[Prediction], *, unit: str = "", pending: int = 0, left_out: int = 0, title: str = ""
+) -> Figure:
     """The fitness of each sample in simulation against its fitness in reality, with the diagonal on which they agree.
 
     Args:
         items: the samples.
         unit: of fitness.
         pending: how many more there are, which are not computed yet.
+        left_out: how many more there are, of later repetitions, which never will be.
         title: above the figure.
     """
     before = [(each, each.simulated_before) for each in items]
@@ -43,7 +46,7 @@ def predictions_figure(items: Sequence[Prediction], *, unit: str = "", pending: 
         name="predictions",
         title=printable(title),
         panels=(panel,),
-        caption=_caption(items, drawn, pending, unit),
+        caption=_caption(items, drawn, unit, pending, left_out),
         alt=_alt(drawn),
         table=_table(items),
         nothing="no results yet" if not pending else "being computed",
@@ -65,7 +68,7 @@ def _points(name: str, pairs: Sequence[Pair], style: Style, *, hollow: bool) -> 
     )
 
 
-def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], pending: int, unit: str) -> str:
+def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], unit: str, pending: int, left_out: int) -> str:
     if not items:
         return ""
     repetitions = len({each.repetition for each in items})
@@ -77,8 +80,9 @@ def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], pending:
     parts += [
         f"{name}: root-mean-square error {number(_error(pairs), 2)}{shown}." for name, pairs in drawn.items() if pairs
     ]
-    left_out = sum(None in (each.fitness, each.simulated_before, each.simulated_after) for each in items)
-    parts += [f"{counted([left_out], 'sample')} left out: a measurement or the physics failed."] if left_out else []
+    failed = sum(None in (each.fitness, each.simulated_before, each.simulated_after) for each in items)
+    parts += [f"{counted([failed], 'sample')} left out: a measurement or the physics failed."] if failed else []
+    parts += [f"{counted([left_out], 'sample')} of later repetitions left out: they are too many."] if left_out else []
     parts += [f"{counted([pending], 'sample')} still being computed."] if pending else []
     return " ".join(parts)
 

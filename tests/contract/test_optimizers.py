@@ -114,6 +114,13 @@ class TestEveryOptimizer:
         assert np.isfinite(found.fitness[0])
         assert found.fitness[0] <= -0.05
 
+    @pytest.mark.parametrize("endless", [np.inf, -np.inf])
+    def test_what_is_infinite_never_wins(self, name, endless):
+        found = search(name, Hill(lambda fitness: np.where(fitness > -0.05, endless, fitness)), 500)
+
+        assert np.isfinite(found.fitness[0])
+        assert found.fitness[0] <= -0.05
+
     def test_goes_on_where_everything_fails(self, name):
         found = search(name, Hill(lambda fitness: np.full_like(fitness, np.nan)))
 

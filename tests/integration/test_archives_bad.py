@@ -2,9 +2,12 @@
 
 import json
 import shutil
+import subprocess
+import sys
 import zipfile
 from hashlib import sha256
 from io import BytesIO
+from pathlib import Path
 
 import pyarrow as arrow
 import pyarrow.parquet
@@ -187,6 +190,7 @@ def in_spec(**changes):
     return lambda spec: spec | changes
 
 
+BOUNDED = {"name": "static_friction", "lower": 0.0, "upper": 1.0}
 PARTS = ("name", "iterations", "repetitions", "robot", "engine", "tunables", "optimizer", "budget", "seed")
 
 
@@ -225,8 +229,13 @@ def without(part):
         ({"spec": in_spec(repetitions=None)}, "not resolved"),
         ({"spec": in_spec(robot={"name": "/etc/passwd"})}, "not resolved"),
         ({"spec": in_spec(strategy={"name": "random"})}, "not resolved"),
-        ({"spec": in_spec(tunables=[{"name": "static_friction"}])}, "does not fit its experiment"),
-        ({"spec": in_spec(tunables=[{"name": "static_friction"}] * 2)}, "not resolved"),
+        ({"spec": in_spec(tunables=[BOUNDED])}, "does not fit its experiment"),
+        ({"spec": in_spec(tunables=[BOUNDED] * 2)}, "not resolved"),
+        ({"spec": in_spec(tunables=[{"name": "static_friction"}])}, "bounds of static_friction"),
+        ({"spec": in_spec(tunables=[BOUNDED | {"lower": 1.0}])}, "bounds of static_friction"),
+        ({"spec": in_spec(budget={})}, "budget/controller_evaluations"),
+        ({"spec": in_spec(budget="smoke")}, "budget/simulator_evaluations"),
+        ({"spec": in_spec(reality={"parameters": {}})}, "reality/engine"),
         (
             {"spec": in_spec(reality={"engine": {"name": "analytic"}, "parameters": {"static_friction": "x"}})},
             "no spec",
@@ -320,6 +329,29 @@ def test_a_reader_of_parquet_that_is_killed(sqlite_store, good, monkeypatch, tmp
     monkeypatch.setattr(opening, "_UNPACKING", suicide)
 
     refused(sqlite_store, packed(good), "a member is no Parquet")
+
+
+WITH_ROOM_FOR = """
+import resource, sys
+sys.path.append(sys.argv[1])
+import unpacking
+unpacking.MOST[resource.RLIMIT_FSIZE] = int(sys.argv[2])
+sys.exit(unpacking.main(sys.argv[3:]))
+"""
+
+
+@pytest.mark.parametrize(("room", "ended"), [(0, 1), (1, 2), (2, 3), (3, 0)])
+def test_what_is_written_of_all_tables_together_is_limited(good, tmp_path, room, ended):
+    table, paths = tmp_path / "simulator.parquet", [str(tmp_path / name) for name in ("first", "second", "third")]
+    table.write_bytes(good["simulator.parquet"])
+    assert unpacking.convert(str(table), str(tmp_path / "alone"))
+    size = (tmp_path / "alone").stat().st_size
+
+    folder = str(Path(unpacking.__file__).parent)
+    tables = [path for target in paths for path in (str(table), target)]
+    command = [sys.executable, "-I", "-c", WITH_ROOM_FOR, folder, str(room * size), *tables]
+
+    assert subprocess.run(command, check=False).returncode == ended
 
 
 def test_a_small_file_of_parquet_that_becomes_a_large_row(sqlite_store, good):

@@ -81,7 +81,7 @@ def test_simulators_of_nothing_do_not_tell_where_reality_is():
 
 
 def test_predictions_are_drawn_before_and_after_with_the_line_of_agreement():
-    figure = predictions_figure(PREDICTIONS, unit="m/s", pending=2)
+    figure = predictions_figure(PREDICTIONS, unit="m/s", pending=2, left_out=3)
 
     found = marks(figure)
     (panel,) = figure.panels
@@ -95,6 +95,7 @@ def test_predictions_are_drawn_before_and_after_with_the_line_of_agreement():
     assert "Before tuning on it: root-mean-square error 0.5 m/s." in told
     assert "After tuning on it: root-mean-square error 0.082 m/s." in told
     assert "2 samples left out: a measurement or the physics failed." in told
+    assert "3 samples of later repetitions left out: they are too many." in told
     assert "2 samples still being computed." in told
 
 

@@ -244,6 +244,19 @@ def test_predictions_take_a_while_and_are_pending_meanwhile(sqlite_store, app):
     assert second.items[1].simulated_before == second.items[1].simulated_after  # the same simulator
 
 
+def test_samples_for_which_there_is_no_room_are_left_out_and_not_waited_for(sqlite_store, app, api, monkeypatch):
+    experiment, _, claim = walked(sqlite_store)
+    execution.record(sqlite_store, claim, Tuned(2, (Simulator(frozen(BEST)),)))
+    monkeypatch.setattr("services.predictions.MOST_KEPT", 1)
+
+    found = api.get(f"/experiments/{experiment}/predictions").json()
+    figure = api.get(f"/figures/predictions?experiment={experiment}&format=json").json()
+
+    assert [each["iteration"] for each in found["items"]] == [1]
+    assert (found["pending"], found["left_out"]) == (0, 1)
+    assert "of later repetitions left out" in figure["caption"]
+
+
 def test_samples_that_nothing_is_tuned_on_yet_have_no_prediction(sqlite_store, api):
     experiment, _, _ = walked(sqlite_store)
 

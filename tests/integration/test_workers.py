@@ -9,7 +9,7 @@ from threading import Event
 import pytest
 import ray
 
-from schemas.lifecycle import State
+from schemas.lifecycle import Ending, State
 from schemas.sensitivity import SensitivitySpec, Verdict
 from schemas.spec import ExperimentSpec
 from services import execution, experiments, sensitivity
@@ -123,6 +123,50 @@ def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others
     assert states == [State.COMPLETED, State.FAILED, State.COMPLETED]
     assert (read.state, read.progress.failed) == (State.COMPLETED, 1)
     assert read.reasons == ("ZeroDivisionError: the second one is broken",)
+
+
+def delivering(left_out, attempts):
+    """A task whose repetition 1 leaves out some of what it has done in its first attempts."""
+
+    @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
+    def task_(claim, expected, checkpoint_s):
+        delivered = list(recorded(setting(claim.spec, claim.number), claim.log, ()))
+        if claim.number == 1 and claim.epoch <= attempts:
+            del delivered[left_out]
+        yield tuple(delivered)
+
+    return task_
+
+
+@pytest.mark.parametrize(
+    ("left_out", "reason"),
+    [
+        (slice(0, 1), "could not be stored: step 1 of repetition 1 cannot be recorded: the log has 0 steps"),
+        (slice(-2, None), "it ended too early: repetition 1"),
+    ],
+)
+def test_a_repetition_that_its_log_refuses_is_queued_again_alone(sqlite_store, monkeypatch, left_out, reason):
+    monkeypatch.setattr(task, "run", delivering(left_out, attempts=1))
+    experiment = experiments.submit_experiment(sqlite_store, toy()).id
+
+    run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
+
+    first, second = experiments.list_attempts(sqlite_store, experiment, 1)
+    assert (first.ending, second.ending) == (Ending.LOST, Ending.COMPLETED)
+    assert reason in first.reason
+    assert [each.attempts for each in experiments.list_repetitions(sqlite_store, experiment)] == [1, 2, 1]
+    assert stored(sqlite_store, experiment) == expected(toy())
+
+
+def test_a_repetition_that_its_log_refuses_again_and_again_is_failed_alone(sqlite_store, monkeypatch):
+    monkeypatch.setattr(task, "run", delivering(slice(0, 1), attempts=99))
+    experiment = experiments.submit_experiment(sqlite_store, toy()).id
+
+    run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
+
+    repetitions = experiments.list_repetitions(sqlite_store, experiment)
+    assert [each.state for each in repetitions] == [State.COMPLETED, State.FAILED, State.COMPLETED]
+    assert "cannot be recorded" in repetitions[1].error
 
 
 def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_twice(sqlite_store, monkeypatch):

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from services.core.errors import PluginBroken
 from services.core.loop import History, next_step, recorded_fitness, repetition
 from services.core.strategies import strategies
-from services.core.strategies.base import EnsembleOptions
+from services.core.strategies.base import EnsembleOptions, Strategy
 from services.core.strategies.informative import Informative
 from services.core.types import Budget, Measured, Probed, Sample, Selected, Transferred, Tuned
 from tests.fakes import CountedReality, Recorder, flat, paraboloid, small_setting
@@ -113,6 +114,26 @@ def test_a_strategy_that_transfers_the_best_of_many_simulators_saves_the_budget_
     steps = list(repetition(replace(small_setting(), strategy=strategy)))
 
     assert {step.cost.saved for step in steps if isinstance(step, Selected)} == {30 * 4}
+
+
+@pytest.mark.parametrize(
+    ("said", "wrong"), [(True, "'eager' searches twice"), (False, "'eager' says that it does not search")]
+)
+def test_a_search_for_which_there_is_no_budget_is_refused(said, wrong):
+    class Eager(Strategy):
+        name = "eager"
+        searches = said
+
+        def select(self, belief, search, rng):
+            search(lambda genomes, fitnesses: fitnesses[:, 0])
+            return search(lambda genomes, fitnesses: -fitnesses[:, 0])
+
+    simulate, of_a_transfer, of_a_search = Recorder(), 40, 30
+
+    with pytest.raises(PluginBroken, match=wrong):
+        list(repetition(replace(small_setting(simulate=simulate), strategy=Eager())))
+
+    assert simulate.rollouts <= of_a_transfer + of_a_search * said
 
 
 def test_a_budget_that_the_population_does_not_divide_is_honoured_too():

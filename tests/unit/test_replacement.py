@@ -13,11 +13,12 @@ from services.core.optimizers.replacement import least_fit, less_fit_of_most_sim
 from services.core.types import Space
 
 SPACE = Space.box([0.0, 0.0], [1.0, 10.0])
+PHASE = Space.box([-1.0, 0.0], [3.0, 10.0], [True, False])
 
 
-def population(seed, size=9):
+def population(seed, size=9, space=SPACE):
     rng = np.random.default_rng(seed)
-    return Population(SPACE, SPACE.draw(size, rng), rng.normal(size=size))
+    return Population(space, space.draw(size, rng), rng.normal(size=size))
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -32,19 +33,30 @@ def test_the_least_fit_leaves_as_in_pymoo(seed):
 
 
 def brute_force(members):
-    """Every pair, one by one, in units of the space's extent."""
+    """Every pair, one by one, in units of the space's extent; a phase also with a turn more and a turn less."""
     pairs = [(i, j) for i in range(members.size) for j in range(i)]
-    scaled = members.genomes / SPACE.extent
-    nearest = min(pairs, key=lambda pair: float(np.linalg.norm(scaled[pair[0]] - scaled[pair[1]])))
+    scaled = members.genomes / members.space.extent
+    turns = [turn * members.space.periodic for turn in (-1, 0, 1)]
+
+    def distance(pair):
+        return min(float(np.linalg.norm(scaled[pair[0]] - scaled[pair[1]] + turn)) for turn in turns)
+
+    nearest = min(pairs, key=distance)
     return min(nearest, key=lambda index: (members.fitness[index], index))
 
 
 @settings(max_examples=200, deadline=None)
-@given(st.integers(0, 10**6), st.integers(2, 12))
-def test_the_less_fit_of_the_most_similar_pair_leaves_as_in_a_brute_force(seed, size):
-    members = population(seed, size)
+@given(st.integers(0, 10**6), st.integers(2, 12), st.sampled_from([SPACE, PHASE]))
+def test_the_less_fit_of_the_most_similar_pair_leaves_as_in_a_brute_force(seed, size, space):
+    members = population(seed, size, space)
 
     assert less_fit_of_most_similar(members) == brute_force(members)
+
+
+def test_phases_on_both_sides_of_a_turn_are_near():
+    members = Population(PHASE, np.array([[-0.99, 5], [1.0, 5], [1.5, 5], [2.99, 5]]), np.array([1.0, 2, 0, 3]))
+
+    assert less_fit_of_most_similar(members) == 0
 
 
 def test_the_fittest_never_leaves_a_diverse_population_even_if_all_are_near_it():

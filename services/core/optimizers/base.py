@@ -14,7 +14,7 @@ from services.core.registry import Plugin
 from services.core.types import Space
 
 Evaluate: TypeAlias = Callable[[Genomes, FloatArray], FloatArray]
-"""`(n, g)` genomes, `(n,)` bounds -> `(n,)`: the fitness of each, maximised; nan where it has none.
+"""`(n, g)` genomes, `(n,)` bounds -> `(n,)`: the fitness of each, maximised; not finite where it has none.
 
 A fitness below its bound need not be exact: any number below the bound will do.
 """
@@ -97,7 +97,7 @@ def maximise(
     rng: Generator,
     ahead: Ahead | None = None,
 ) -> Population:
-    """The population after exactly `evaluations` fitness evaluations, ranked; nan never wins.
+    """The population after exactly `evaluations` fitness evaluations, ranked; what is not finite never wins.
 
     A genome that the search has evaluated before counts, but is not evaluated again, unless it was hopeless then.
 
@@ -117,7 +117,7 @@ def maximise(
         if ahead is not None and bounds.max() > -np.inf:
             ahead.expect(_following(optimizer, state, deepcopy(rng), min(ahead.room(), evaluations) - len(genomes)))
         fitness = remembered(genomes, bounds)
-        state = optimizer.tell(state, genomes, np.where(np.isnan(fitness), -np.inf, fitness))
+        state = optimizer.tell(state, genomes, np.where(np.isfinite(fitness), fitness, -np.inf))
         evaluations -= len(genomes)
     return state.ranked()
 

@@ -43,11 +43,15 @@ def least_fit(population: Population) -> int:
 def most_similar(population: Population) -> tuple[int, int]:
     """The pair whose genomes are most similar, the older first.
 
-    Similar means near in Euclidean distance, with each coordinate in units of its extent.
+    Similar means near in Euclidean distance, with each coordinate in units of its extent, and the shorter way around in
+    those that wrap.
     """
     scaled = population.genomes / population.space.extent
     squares = np.einsum("ij,ij->i", scaled, scaled)
     distances = squares[:, None] + squares[None, :] - 2.0 * (scaled @ scaled.T)
+    for phase in scaled.T[population.space.periodic]:
+        apart = np.abs(phase[:, None] - phase)
+        distances += np.minimum(apart, 1.0 - apart) ** 2 - apart**2
     np.fill_diagonal(distances, np.inf)
     first, second = divmod(int(np.argmin(distances)), len(scaled))
     return min(first, second), max(first, second)

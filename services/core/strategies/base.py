@@ -17,10 +17,14 @@ Score: TypeAlias = Callable[[Genomes, Fitnesses], FloatArray]
 
 
 class Search(Protocol):
-    """A search over controllers, with the budget of a selection."""
+    """A search over controllers, with the whole budget of a selection: there is one for each, and no second."""
 
     def __call__(self, score: Score) -> Genome:
-        """The genome `(g,)` with the highest score that was found."""
+        """The genome `(g,)` with the highest score that was found.
+
+        Raises:
+            PluginBroken: the selection has searched before, or the strategy says that it does not search.
+        """
         ...
 
 
@@ -28,7 +32,7 @@ class Strategy(Plugin):
     """Selects the samples: the controllers whose evaluation in reality guides simulator tuning.
 
     Attributes:
-        searches: its selection spends a search's budget.
+        searches: its selection spends a search's budget, on one search.
         selects_transferred: its search is the transfer's: for the fittest controller in the best simulator.
         in_reality: the experiment is the direct baseline, which evolves in reality and takes no samples.
     """

@@ -110,8 +110,7 @@ def _numbered(session: Session, some: Sequence[Row]) -> list[Row]:
     row = RepetitionRow
     owners = {each[EXPERIMENT] for each in some}
     found = session.execute(select(row.experiment_id, row.number, row.id).where(row.experiment_id.in_(owners)))
-    ids: dict[tuple[Any, Any], int | None] = {(experiment, number): id_ for experiment, number, id_ in found}
-    ids[None, None] = None
+    ids = {(experiment, number): id_ for experiment, number, id_ in found}
     return [
         {key: value for key, value in each.items() if key not in _REPLACED}
         | {"repetition_id": ids[each[EXPERIMENT], each[REPETITION]]}
@@ -128,9 +127,8 @@ def _query(name: str, owner: str) -> Select[Any]:
     key = [each for each in table.primary_key.columns if each.name != "repetition_id"]
     if not numbered:
         return query.order_by(*([table.c.number] if table is _REPETITIONS else key))
-    outer = bool(table.c.repetition_id.nullable)
-    query = query.join(_REPETITIONS, _REPETITIONS.c.id == table.c.repetition_id, isouter=outer)
-    return query.order_by(*([] if outer else [_REPETITIONS.c.number]), *key)
+    query = query.join(_REPETITIONS, _REPETITIONS.c.id == table.c.repetition_id)
+    return query.order_by(_REPETITIONS.c.number, *key)
 
 
 def _belongs(table: Table, owner: str) -> ColumnElement[bool]:

@@ -34,7 +34,11 @@ class Extent:
 
 
 def new_id() -> str:
-    """A short random name, without letters that look alike; a trillion of them, so that two never meet."""
+    """A short random name, without letters that look alike.
+
+    There are 31 to the tenth of them, 8e14: among a million, the next one is taken with a probability of 1e-9. Then the
+    database refuses it, as an IntegrityError, and nothing of what it was for is stored.
+    """
     return "".join(choice(_LETTERS) for _ in range(10))
 
 

@@ -1,0 +1,39 @@
+"""What a robot says of a trajectory, and what is made of it."""
+
+import numpy as np
+import pytest
+
+from services.core.counted import Counted
+from services.core.robots.toy_function import ToyFunction
+from services.engines.analytic import Analytic
+from services.simulation import HiddenReality, Simulation
+
+
+class Endless(ToyFunction):
+    """A robot whose fitness is no number on the right of its space."""
+
+    name = "endless"
+
+    def __init__(self, worth):
+        super().__init__()
+        self.worth = worth
+
+    def fitness(self, trajectory):
+        travelled = super().fitness(trajectory)
+        return np.where(travelled > 0.3, self.worth, travelled)
+
+
+@pytest.mark.parametrize("worth", [np.inf, -np.inf, np.nan])
+def test_a_fitness_that_is_not_finite_is_physics_that_failed_in_simulation_and_in_reality(worth):
+    whole, broken = (Simulation(robot, Analytic(), ()) for robot in (ToyFunction(), Endless(worth)))
+    genomes, parameters = np.linspace(0.0, 1.0, 50)[:, None], np.empty((1, 0))
+    counted = Counted(broken)
+
+    fitnesses, expected = counted(genomes, parameters), whole(genomes, parameters)
+
+    failed = expected > 0.3
+    assert failed.any()
+    assert not failed.all()
+    np.testing.assert_array_equal(fitnesses, np.where(failed, np.nan, expected))
+    assert counted.count.cost_of(50).failures == failed.sum()
+    assert np.isnan(HiddenReality(broken, np.empty(0))(genomes[failed[:, 0]][0]))
