@@ -112,6 +112,24 @@ def test_simulators_are_a_frame_with_a_column_for_each_tunable(client: Client, f
     assert set(client.simulators(experiment.id, iteration=0)["iteration"]) == {0}
 
 
+def test_curves_are_asked_for_in_parts_that_the_service_takes_and_come_in_order(
+    client: Client, finish: Callable[[], None], network: InProcess, monkeypatch: pytest.MonkeyPatch
+):
+    study = client.submit(BOTH)
+    finish()
+    whole = client.curves_csv([study.id])
+    first, second = (each.id for each in study.experiments)
+    many = [first] * 70 + [second] * 70
+    network.asked.clear()
+
+    curves = client.curves_of(many)
+
+    assert network.asked == ["GET /curves"] * 2
+    assert [each.experiment for each in curves] == many
+    monkeypatch.setattr("api.client.MOST_CURVES", 1)
+    assert client.curves_csv([study.id]) == whole
+
+
 def predictions(pending: int) -> httpx2.Response:
     """An answer of the service, with `pending` of two samples not computed yet."""
     items = [
