@@ -146,3 +146,21 @@ def test_a_file_that_appears_meanwhile_is_not_written_over(sqlite_url, tmp_path,
         backing_up.backup(sqlite_url, tmp_path / "copy.db")
 
     assert [each.read_text() for each in tmp_path.iterdir()] == ["mine"]
+
+
+def test_what_a_copy_left_that_was_killed_is_in_no_ones_way(sqlite_url, tmp_path, monkeypatch):
+    class Killed(BaseException):
+        """Stands for a death after which nothing is tidied up."""
+
+    def die(*_):
+        raise Killed
+
+    with monkeypatch.context() as patch, pytest.raises(Killed):
+        patch.setattr(backing_up, "_copy", die)
+        patch.setattr("pathlib.Path.unlink", lambda *_, **__: None)
+        backup(sqlite_url, tmp_path / "copy.db")
+    left = list(tmp_path.iterdir())
+
+    assert backup(sqlite_url, tmp_path / "copy.db") == (tmp_path / "copy.db").stat().st_size
+    assert len(left) == 1
+    assert {*tmp_path.iterdir()} == {*left, tmp_path / "copy.db"}
