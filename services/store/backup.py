@@ -1,5 +1,6 @@
 """A consistent copy of a database that is in use."""
 
+import shlex
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -9,7 +10,8 @@ from services.store import troubles
 from services.store.engine import open_engine
 from services.store.files import appearing
 
-PG_DUMP = 'pg_dump --format=custom --file={file} "$GAPLAB_DATABASE_URL"'
+PG_DUMP = 'pg_dump --format=custom --file={file} "postgresql:${{GAPLAB_DATABASE_URL#*:}}"'
+"""Before its first colon the URL may name a driver, as in postgresql+psycopg://, of which that tool knows nothing."""
 
 
 def backup(url: str, file: Path) -> int:
@@ -29,7 +31,7 @@ def backup(url: str, file: Path) -> int:
     """
     engine = open_engine(url)
     if engine.name != "sqlite":
-        msg = f"a Postgres database is copied by Postgres' own tool: {PG_DUMP.format(file=file)}"
+        msg = f"a Postgres database is copied by Postgres' own tool: {PG_DUMP.format(file=shlex.quote(str(file)))}"
         raise Unsupported(msg)
     source = engine.url.database
     if source is None or not Path(source).is_file():
