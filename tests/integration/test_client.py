@@ -14,10 +14,11 @@ import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
+import gaplab
 from api.app import create_app
 from api.clients import connection, frames
 from api.clients import events as stream
-from gaplab import Client, ExperimentFailed, ServiceError, ServiceUnreachable
+from gaplab import Client, ExperimentFailed, ExtraMissing, ServiceError, ServiceUnreachable
 from schemas.access import Role
 from schemas.events import EventKind, EventRead
 from services import access, execution
@@ -174,9 +175,16 @@ def test_without_pandas_the_message_is_the_line_that_installs_it(client: Client,
     id = client.submit(SMALL).id  # noqa: A001
     monkeypatch.setitem(sys.modules, "pandas", None)
 
-    with pytest.raises(ImportError, match=r"pip install 'gaplab\[notebook\]'"):
+    with pytest.raises(ExtraMissing, match=r"pip install 'gaplab\[notebook\]'"):
         client.curve(id)
     assert client.curves([id])
+
+
+def test_programs_import_what_the_client_raises_from_where_it_is():
+    raised = {"CommandError", "ExperimentFailed", "ExtraMissing", "ServiceError", "ServiceUnreachable"}
+
+    assert raised < set(gaplab.__all__)
+    assert [getattr(gaplab, name).__name__ for name in gaplab.__all__] == gaplab.__all__
 
 
 def test_waiting_gives_what_it_ended_as(client: Client, finish: Callable[[], None]):
