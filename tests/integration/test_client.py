@@ -395,9 +395,10 @@ def test_the_service_of_the_environment_is_the_one_that_is_meant(monkeypatch: py
 def test_events_and_lists_are_values_that_json_can_hold(client: Client):
     study = client.submit(BOTH)
 
-    kinds = [each.kind for each in client.events(follow=False, study=study.id)]
+    kinds = [each.kind for each in client.events(follow=False, study=study.id, after=None)]
 
     assert kinds.count("submitted") == 2
+    assert [each.number for each in client.events(follow=False, after=1)] == [2]
     assert json.dumps([each.model_dump(mode="json") for each in client.studies().items])
 
 
@@ -420,6 +421,17 @@ def test_events_of_what_is_no_gaplab_are_not_waited_for():
         pytest.raises(ServiceUnreachable, match="is no gaplab of this version"),
     ):
         next(client.events())
+
+
+@pytest.mark.parametrize("answer", ["{}", "[]", "null", '{"paths": null}', "<p>hello</p>"])
+def test_kinds_of_figures_of_what_is_no_gaplab_are_a_sentence(answer: str):
+    network = httpx2.MockTransport(lambda _: httpx2.Response(200, text=answer))
+
+    with (
+        Client("http://gaplab.example", transport=network) as client,
+        pytest.raises(ServiceUnreachable, match="is no gaplab of this version"),
+    ):
+        client.figure_kinds()
 
 
 def test_a_stream_that_had_nothing_to_tell_for_long_is_resumed_when_it_breaks(monkeypatch: pytest.MonkeyPatch):
