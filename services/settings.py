@@ -63,7 +63,7 @@ class Limits:
         experiments: that have not ended, of all.
         rollouts_per_token: budgeted and not yet done, of experiments that have not ended.
         rollouts: the same, of all.
-        streams_per_token: of events, open at once at one API process.
+        streams_per_token: of events, open at once at one API process; a request that waits for events is one.
         streams: the same, of all.
     """
 
