@@ -3,11 +3,12 @@
 import os
 from importlib.metadata import version
 
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
 from fastapi.middleware.gzip import GZipMiddleware
 
 from api import documentation, problems
 from api.access import Access
+from api.dependencies import refuse_doubles
 from api.feed import Feed
 from api.limits import BodyLimit, Streams
 from api.metrics import Measured, Metrics
@@ -109,7 +110,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     app.add_middleware(Measured, metrics=app.state.metrics)
     problems.install(app)
     for module in MODULES:
-        app.include_router(module.router)
+        app.include_router(module.router, dependencies=[Depends(refuse_doubles)])
     figures.install(app)
     dashboard.install(app)
     documentation.install(app)

@@ -23,7 +23,15 @@ TEXTS = ("text/", "application/javascript", "application/json", "image/svg+xml")
 
 
 class Assets(StaticFiles):
-    """Static files with an ETag, that are sent compressed to whoever takes that; an address with `?v=` is for good."""
+    """Static files with an ETag, that are sent compressed to whoever takes that; an address with `?v=` is for good.
+
+    They are sent whole: a server may do so whatever `Range` says, and then none is wrong.
+    """
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        asked = [(name, value) for name, value in scope.get("headers", ()) if name != b"range"]
+        await super().__call__(scope | {"headers": asked}, receive, send)
 
     def file_response(
         self,
@@ -36,7 +44,8 @@ class Assets(StaticFiles):
         asked = Headers(scope=scope)
         plain = FileResponse(full_path, status_code=status_code, stat_result=stat_result)
         for_good = b"v=" in scope["query_string"]
-        told = {"Cache-Control": FOR_GOOD if for_good else AGAIN, "Vary": "Accept-Encoding"}
+        kept = FOR_GOOD if for_good else AGAIN
+        told = {"Cache-Control": kept, "Vary": "Accept-Encoding", "Accept-Ranges": "none"}
         plain.headers.update(told)
         if self.is_not_modified(plain.headers, asked):
             return NotModifiedResponse(plain.headers)

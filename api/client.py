@@ -9,7 +9,7 @@ Programs import it from `gaplab`.
 """
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import httpx2
@@ -38,6 +38,9 @@ Spec = ExperimentSpec | StudySpec | Mapping[str, Any]
 
 NOT_CHECKED = {"name", "strategy", "strategies", "direct_repetitions", "priority", "max_parallel"}
 """What a spec has beside the settings that a sensitivity check takes."""
+
+MOST_CURVES = 100
+"""Of one request: as many as the service gives at a time, in an address that is not too long for anybody."""
 
 
 class Client(LifeCycle, Waiting, Frames, Figures, History, Archives, Connection):
@@ -117,12 +120,15 @@ class Client(LifeCycle, Waiting, Frames, Figures, History, Archives, Connection)
         return self.curves_of(self._experiments_of(ids))
 
     def curves_of(self, experiments: Sequence[str]) -> tuple[Curve, ...]:
-        """The same of ids that are known to be of experiments: one request."""
-        return self._read(tuple[Curve, ...], self._get("/curves", experiment=list(experiments)))
+        """The same of ids that are known to be of experiments: one request for each hundred."""
+        answers = [self._get("/curves", experiment=some) for some in _by_hundreds(experiments)]
+        return tuple(curve for answer in answers for curve in self._read(tuple[Curve, ...], answer))
 
     def curves_csv(self, ids: Sequence[str]) -> str:
         """The same as CSV."""
-        return self._get("/curves", experiment=self._experiments_of(ids), format="csv").text
+        parts = _by_hundreds(self._experiments_of(ids))
+        first, *others = [self._get("/curves", experiment=some, format="csv").text for some in parts]
+        return first + "".join(each.partition("\n")[2] for each in others)  # the heads of columns stand once
 
     def compare(self, experiments: Sequence[str], first: int, last: int) -> tuple[Comparison, ...]:
         """Every pair of experiments, at the counts of real-world evaluations from `first` to `last`, pooled."""
@@ -136,6 +142,12 @@ class Client(LifeCycle, Waiting, Frames, Figures, History, Archives, Connection)
     def _experiments_of(self, ids: Sequence[str]) -> list[str]:
         found = [self.find(each) for each in ids]
         return [one.id for each in found for one in (each.experiments if isinstance(each, StudyRead) else (each,))]
+
+
+def _by_hundreds(experiments: Sequence[str]) -> Iterator[list[str]]:
+    """The ids in parts that one request can ask for; none at all are a part, for the service to refuse."""
+    for start in range(0, len(experiments) or 1, MOST_CURVES):
+        yield list(experiments[start : start + MOST_CURVES])
 
 
 def _body(spec: BaseModel | Mapping[str, Any]) -> dict[str, Any]:

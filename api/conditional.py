@@ -28,12 +28,13 @@ _TAG = re.compile(r'(?:W/)?"(\d{1,9})\.[0-9a-f]+"')
 
 
 def tagged(request: Request, shown: BaseModel, edits: int = 0) -> Response:
-    """What is shown, with its tag; nothing but the tag if the client has it already."""
+    """What is shown, with its tag; only the tag if the reader has it already, or says `*`: whatever there is."""
     content = shown.model_dump(mode="json")
     answer = JSONResponse(content)
     tag = f'"{edits}.{sha256(answer.body).hexdigest()[:16]}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
-    if tag in _listed(request.headers.get("if-none-match", "")):
+    known = _listed(request.headers.get("if-none-match", "")) if request.method == "GET" else []
+    if tag in known or known == ["*"]:
         return Response(status_code=304, headers=headers)
     answer.headers.update(headers)
     return answer

@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from shlex import quote
 
 from rich.console import Console
 from rich.markup import escape
@@ -45,11 +46,12 @@ def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
     try:
         database, log = _database(folder), folder / "service.log"
         with _interruptible(), own_service(database, log) as client:
-            console.print(f"Service: {client.url}, database {database}, log {log}", highlight=False)
+            _say(f"Service: {client.url}, database {database}, log {log}", console)
             for name, spec in specs.items():
                 _run_study(name, spec, client, folder, console)
     except KeyboardInterrupt:
-        msg = f"interrupted; all that was measured is kept, and `gaplab demo --folder {folder}` goes on with it"
+        again = f"gaplab demo --folder {quote(str(folder))}"
+        msg = f"interrupted; all that was measured is kept, and `{again}` goes on with it"
         raise CommandError(msg, Exit.INTERRUPTED) from None
     (folder / "demo.json").unlink()
     _say_where(folder, console, time.monotonic() - began)
@@ -88,17 +90,22 @@ def _show(name: str, study: StudyRead, client: Client, folder: Path, console: Co
         console.print(escape(line))
     for kind in ("html", "svg"):
         client.figure(study.id).save(folder / f"{name}.{kind}")
-    console.print(f"Figure: {escape(str(folder / name))}.html and .svg")
+    _say(f"Figure: {folder / name}.html and .svg", console)
 
 
 def _say_where(folder: Path, console: Console, seconds: float) -> None:
     minutes, rest = divmod(round(seconds), 60)
-    console.print(f"\nDone in {minutes} min {rest} s; the service has ended. Everything is in {folder}/: look at")
+    _say(f"\nDone in {minutes} min {rest} s; the service has ended. Everything is in {folder}/: look at", console)
     for name in STUDIES:
-        console.print(f"  {escape(str(folder / name))}.html", style="bold")
-    console.print("Start the service on the same database, and ask it anything:")
-    console.print(f"  GAPLAB_DATABASE_URL={_database(folder)} gaplab serve", style="bold")
-    console.print("  gaplab list; gaplab curve ID; http://127.0.0.1:8000/docs", style="bold")
+        _say(f"  {folder / name}.html", console, style="bold")
+    _say("Start the service on the same database, and ask it anything:", console)
+    _say(f"  GAPLAB_DATABASE_URL={quote(_database(folder))} gaplab serve", console, style="bold")
+    _say("  gaplab list; gaplab curve ID; http://127.0.0.1:8000/docs", console, style="bold")
+
+
+def _say(line: str, console: Console, style: str = "none") -> None:
+    """A line as it is, to be copied: names of folders may look like markup, and are not broken."""
+    console.print(line, style=style, markup=False, emoji=False, highlight=False, soft_wrap=True)
 
 
 @contextmanager

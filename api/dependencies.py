@@ -9,11 +9,12 @@ from fastapi import Depends, Header, Request, Response
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from starlette.datastructures import URLPath
 
+from api.violations import given_twice
 from schemas.access import Role
 from schemas.base import Frozen
 from services.access import Caller, demand
 from services.admission import Admission, Once
-from services.core.errors import NotFound
+from services.core.errors import InvalidSpec, NotFound
 from services.physics import Physics
 from services.store.session import Store
 
@@ -79,8 +80,18 @@ AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]
 
 
+async def refuse_doubles(request: Request) -> None:
+    """Of a query parameter that takes one value and is given several, none is chosen.
+
+    Raises:
+        InvalidSpec: there are such.
+    """
+    if doubles := given_twice(request):
+        raise InvalidSpec(doubles)
+
+
 class Parameters(BaseModel):
-    """Query parameters; a misspelt one is an error, not ignored."""
+    """Query parameters; a misspelt one is an error, not ignored, and so is one that is given twice."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

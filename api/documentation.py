@@ -5,9 +5,9 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.openapi.docs import get_redoc_html, get_swagger_ui_html
 from fastapi.responses import HTMLResponse
-from fastapi.staticfiles import StaticFiles
 
 from api.access import OPEN
+from api.assets import Assets
 from api.pages import page
 from api.problems import documented
 from schemas.problems import Problem
@@ -17,7 +17,7 @@ ASSETS = "/assets/docs"
 
 def install(app: FastAPI) -> None:
     """Serve /docs and /redoc, and describe problems in /openapi.json."""
-    app.mount(ASSETS, StaticFiles(packages=[("fastapi_offline", "static")]), name="docs_assets")
+    app.mount(ASSETS, Assets(packages=[("fastapi_offline", "static")]), name="docs_assets")
     app.add_api_route("/docs", _docs, include_in_schema=False)
     app.add_api_route("/redoc", _redoc, include_in_schema=False)
     _describe_problems(app)

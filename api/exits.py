@@ -27,7 +27,7 @@ MEANINGS = {
     Exit.UNREACHABLE: "no service answers",
     Exit.NOT_FOUND: "no such id",
     Exit.INVALID: "invalid spec or request",
-    Exit.CONFLICT: "its state forbids it",
+    Exit.CONFLICT: "its state, or all that is under way, forbids it now",
     Exit.FILE: "a file cannot be read or written, or is not JSON",
     Exit.DENIED: "the token does not permit it, or there is none",
     Exit.INTERRUPTED: "interrupted",
@@ -42,7 +42,10 @@ BY_STATUS = {
     409: Exit.CONFLICT,
     412: Exit.CONFLICT,
     413: Exit.INVALID,
+    415: Exit.INVALID,
     422: Exit.INVALID,
+    428: Exit.INVALID,
+    429: Exit.CONFLICT,
 }
 
 

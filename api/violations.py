@@ -12,6 +12,7 @@ from fastapi import Request
 from pydantic import BaseModel
 
 from schemas.problems import SpecError
+from services.core.errors import Violation
 
 MOST_ERRORS = 50
 """Errors that one answer carries; nobody reads more, and a hostile body could cause thousands."""
@@ -128,7 +129,7 @@ def _nearest(value: object, permitted: tuple[str, ...] | str | None) -> str | No
 
 def _unknown_field(place: str, path: Sequence[str | int], value: object, request: Request) -> SpecError:
     name = _text(path[-1])
-    fields = _fields(request, path[:-1]) if place == "body" else _parameters(request)
+    fields = _fields(request, path[:-1]) if place == "body" else tuple(_parameters(request))
     nearest = _nearest(name, fields)
     hint = f" (did you mean {nearest!r}?)" if nearest else ""
     kind = "field" if place == "body" else "parameter"
@@ -158,12 +159,22 @@ def _models(annotation: object) -> list[type[BaseModel]]:
     return []
 
 
-def _parameters(request: Request) -> tuple[str, ...]:
-    """The query parameters that the endpoint takes."""
-    dependant = request.scope["route"].dependant
-    queries = (field.field_info.annotation for field in dependant.query_params)
-    return tuple(name for each in queries for model in _models(each) for name in _wire_names(model))
+def given_twice(request: Request) -> list[Violation]:
+    """The query parameters of which the endpoint takes one value, and the request has several."""
+    given = {name: request.query_params.getlist(name) for name, several in _parameters(request).items() if not several}
+    return [
+        Violation(name, values, f"it is given {len(values)} times, and takes one value", "one value")
+        for name, values in given.items()
+        if len(values) > 1
+    ]
 
 
-def _wire_names(model: type[BaseModel]) -> list[str]:
-    return [field.alias or name for name, field in model.model_fields.items()]
+def _parameters(request: Request) -> dict[str, bool]:
+    """The query parameters that the endpoint takes, and whether each takes several values."""
+    queries = (field.field_info.annotation for field in request.scope["route"].dependant.query_params)
+    models = [model for each in queries for model in _models(each)]
+    return {
+        field.alias or name: get_origin(field.annotation) is list
+        for model in models
+        for name, field in model.model_fields.items()
+    }

@@ -88,7 +88,7 @@ def plugins() -> Iterator[str]:
 def python() -> Iterator[str]:
     """Every method of the client."""
     yield "`from gaplab import Client`. Methods raise `ServiceError`, which carries the service's `problem`, and"
-    yield "`ServiceUnreachable`.\n"
+    yield "`ServiceUnreachable`; a few `ExperimentFailed` or `ExtraMissing`. All are imported from `gaplab`.\n"
     yield f"## Client{_signature(Client.__init__)}\n\n{_docstring(Client)}\n"
     methods = inspect.getmembers(Client, lambda each: inspect.isfunction(each) and not each.__name__.startswith("_"))
     for name, method in methods:

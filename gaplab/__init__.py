@@ -16,21 +16,34 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from api.client import Client as Client
     from api.client import ExperimentFailed as ExperimentFailed
+    from api.client import ExtraMissing as ExtraMissing
     from api.client import ServiceError as ServiceError
     from api.client import ServiceUnreachable as ServiceUnreachable
     from api.clients.figures import Figure as Figure
+    from api.exits import CommandError as CommandError
     from api.own import local_service as local_service
 
 _HOMES = {
     "Client": "api.client",
+    "CommandError": "api.exits",
     "ExperimentFailed": "api.client",
+    "ExtraMissing": "api.client",
     "Figure": "api.clients.figures",
     "ServiceError": "api.client",
     "ServiceUnreachable": "api.client",
     "local_service": "api.own",
 }
 
-__all__ = ["Client", "ExperimentFailed", "Figure", "ServiceError", "ServiceUnreachable", "local_service"]
+__all__ = [
+    "Client",
+    "CommandError",
+    "ExperimentFailed",
+    "ExtraMissing",
+    "Figure",
+    "ServiceError",
+    "ServiceUnreachable",
+    "local_service",
+]
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever it is

@@ -11,7 +11,7 @@ class Settings:
     Attributes:
         database_url: SQLAlchemy URL. `GAPLAB_DATABASE_URL`; `sqlite:///gaplab.db` in the working directory.
         ray_address: of an existing cluster; None starts Ray on this machine. `GAPLAB_RAY_ADDRESS`.
-        workers: repetitions that run at once; None is one for each core that Ray has. `GAPLAB_WORKERS`.
+        workers: cores of gaplab's own Ray, or repetitions at once on a cluster; None is all cores. `GAPLAB_WORKERS`.
         lease_s: seconds for which a supervisor may be silent before its work goes to others. `GAPLAB_LEASE_S`; 30.
         host: that the API binds. `GAPLAB_HOST`; loopback.
         port: that the API binds. `GAPLAB_PORT`; 8000.
@@ -63,7 +63,7 @@ class Limits:
         experiments: that have not ended, of all.
         rollouts_per_token: budgeted and not yet done, of experiments that have not ended.
         rollouts: the same, of all.
-        streams_per_token: of events, open at once at one API process.
+        streams_per_token: of events, open at once at one API process; a request that waits for events is one.
         streams: the same, of all.
     """
 

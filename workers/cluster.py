@@ -49,7 +49,8 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
     A Ray of our own listens on loopback only, has no dashboard, and ends with this process, even if it is killed.
 
     Args:
-        settings: `ray_address` names an existing cluster; `workers` limits the cores.
+        settings: `ray_address` names an existing cluster; `workers` limits the cores of a Ray of our own, and how many
+            repetitions run at once on a cluster.
 
     Raises:
         ClusterUnusable: it cannot be joined, a node has other versions than this process, or a Ray of our own would

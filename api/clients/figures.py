@@ -5,6 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pydantic import BaseModel
+
 from schemas.records import ExperimentRead, StudyRead
 
 if TYPE_CHECKING:
@@ -13,6 +15,12 @@ if TYPE_CHECKING:
 _FIGURES = "/figures/"
 
 FORMATS = ("svg", "png", "pdf", "html", "json")
+
+
+class _Described(BaseModel):
+    """Of what a service says of itself, the addresses."""
+
+    paths: dict[str, Any]
 
 
 class Figure:
@@ -89,5 +97,5 @@ class Figures:
 
     def figure_kinds(self: "Client") -> tuple[str, ...]:
         """The kinds of figures that the service draws."""
-        paths = self._get("/openapi.json").json()["paths"]
+        paths = self._read(_Described, self._get("/openapi.json")).paths
         return tuple(path.removeprefix(_FIGURES) for path in paths if path.startswith(_FIGURES))

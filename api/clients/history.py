@@ -29,7 +29,7 @@ class History:
         if follow:
             yield from follow_events(self._http, filters, patience_s=patience_s)
             return
-        while (page := self._read(EventPage, self._get("/events/page", **filters))).last > filters.get("after", -1):
+        while (page := self._read(EventPage, self._get("/events/page", **filters))).items:
             yield from page.items
             filters["after"] = page.last
 

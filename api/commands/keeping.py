@@ -9,6 +9,7 @@ from api.commands.base import AsJson, Id, Url, app, connect
 from api.document import document
 from services.settings import Settings
 from services.store.backup import backup as copy
+from services.store.files import appearing
 
 
 @app.command()
@@ -21,16 +22,10 @@ def export(
     url: Url = None,
 ) -> None:
     """Write everything of a study or an experiment into one archive of JSON and Parquet."""
-    file = to or Path(f"gaplab-{id}.zip")
     with connect(url) as client:
-        try:
-            with file.open("xb") as target:
-                client.export(id, target)
-        except FileExistsError:
-            raise
-        except BaseException:
-            file.unlink(missing_ok=True)
-            raise
+        file = to or Path(f"gaplab-{client.find(id).id}.zip")  # an id that there is: not any path that was typed
+        with appearing(file) as part, part.open("wb") as target:
+            client.export(id, target)
     if as_json:
         document({"file": str(file), "bytes": file.stat().st_size})
         return

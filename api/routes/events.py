@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Iterator
+from contextlib import suppress
 from typing import Annotated
 
 from anyio.to_thread import run_sync
@@ -48,9 +49,16 @@ def _feed(request: Request) -> Feed:
     return feed
 
 
-def _room(request: Request, caller: CallerDep) -> Iterator[None]:
-    """Room for one more stream, for as long as it is open."""
+def _streams(request: Request) -> Streams:
     streams: Streams = request.app.state.streams
+    return streams
+
+
+StreamsDep = Annotated[Streams, Depends(_streams)]
+
+
+def _room(streams: StreamsDep, caller: CallerDep) -> Iterator[None]:
+    """Room for one more stream, for as long as it is open."""
     with streams.open(caller.token):
         yield
 
@@ -93,21 +101,26 @@ async def stream_events(
 @router.get(
     "/page",
     summary="List events",
-    responses={200: examples.shown(event_examples.EVENTS, "In their order"), **documented(404, 422)},
+    responses={200: examples.shown(event_examples.EVENTS, "In their order"), **documented(404, 422, 429)},
 )
 async def list_events(
-    store: StoreDep, asked: Annotated[EventPaging, Query()], feed: Annotated[Feed, Depends(_feed)]
+    store: StoreDep,
+    asked: Annotated[EventPaging, Query()],
+    feed: Annotated[Feed, Depends(_feed)],
+    streams: StreamsDep,
+    caller: CallerDep,
 ) -> EventPage:
-    """Events after a number, in their order; pass `last` as `after` for what follows, with `wait_s` to wait for it."""
+    """Events after a number, in their order; pass `last` as `after` for what follows, with `wait_s` to wait for it.
+
+    Who waits has a stream open until he is answered.
+    """
     which = asked.which()
     await run_sync(lambda: events.check(store, which))
     found = await run_sync(lambda: events.page(store, asked.after, which, limit=asked.limit))
     if found.items or not asked.wait_s:
         return found
-    try:
+    with streams.open(caller.token), suppress(TimeoutError):
         async with asyncio.timeout(asked.wait_s):
             async for _ in feed.follow(found.last, which):
                 break
-    except TimeoutError:
-        pass
     return await run_sync(lambda: events.page(store, found.last, which, limit=asked.limit))

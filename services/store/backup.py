@@ -1,15 +1,17 @@
 """A consistent copy of a database that is in use."""
 
-import os
+import shlex
 import sqlite3
-from contextlib import closing, suppress
+from contextlib import closing
 from pathlib import Path
 
 from services.core.errors import StoreUnavailable, Unsupported
 from services.store import troubles
 from services.store.engine import open_engine
+from services.store.files import appearing
 
-PG_DUMP = 'pg_dump --format=custom --file={file} "$GAPLAB_DATABASE_URL"'
+PG_DUMP = 'pg_dump --format=custom --file={file} "postgresql:${{GAPLAB_DATABASE_URL#*:}}"'
+"""Before its first colon the URL may name a driver, as in postgresql+psycopg://, of which that tool knows nothing."""
 
 
 def backup(url: str, file: Path) -> int:
@@ -29,39 +31,18 @@ def backup(url: str, file: Path) -> int:
     """
     engine = open_engine(url)
     if engine.name != "sqlite":
-        msg = f"a Postgres database is copied by Postgres' own tool: {PG_DUMP.format(file=file)}"
+        msg = f"a Postgres database is copied by Postgres' own tool: {PG_DUMP.format(file=shlex.quote(str(file)))}"
         raise Unsupported(msg)
     source = engine.url.database
     if source is None or not Path(source).is_file():
         msg = f"there is no database at {source or 'no place'}, so there is nothing to copy"
         raise StoreUnavailable(msg)
-    if file.exists():
-        raise _taken(file)
-    part = file.with_name(f"{file.name}.part")
-    os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
     try:
-        with troubles.named(), engine.connect() as connection:
+        with appearing(file, 0o600) as part, troubles.named(), engine.connect() as connection:
             _copy(connection.connection.driver_connection, part)
-        _name(part, file)
     finally:
         engine.dispose()
-        part.unlink(missing_ok=True)
-    _sync(file.parent)
     return file.stat().st_size
-
-
-def _name(part: Path, file: Path) -> None:
-    """Give the copy its name, but not in place of what has got that name meanwhile."""
-    try:
-        os.link(part, file)
-    except FileExistsError as error:
-        raise _taken(file) from error
-    except OSError:  # no file has two names there
-        part.rename(file)
-
-
-def _taken(file: Path) -> FileExistsError:
-    return FileExistsError(None, "a file of this name is there already", str(file))
 
 
 def _copy(source: sqlite3.Connection | None, part: Path) -> None:
@@ -77,12 +58,3 @@ def _copy(source: sqlite3.Connection | None, part: Path) -> None:
     if found != "ok":
         msg = f"the copy is corrupt, and so is the database: {found}"
         raise StoreUnavailable(msg)
-    _sync(part)
-
-
-def _sync(place: Path) -> None:
-    """Wait until it is on the disk; not every kind of folder can be waited for."""
-    descriptor = os.open(place, os.O_RDONLY)
-    with suppress(OSError):
-        os.fsync(descriptor)
-    os.close(descriptor)

@@ -51,7 +51,7 @@ def left_running(folder: Path) -> list[str]:
 
 
 def test_a_demo_killed_outright_leaves_nothing_running_and_goes_on_when_run_again(tmp_path: Path, specs: Path):
-    folder = tmp_path / "demo"
+    folder = tmp_path / "my [bold] demo :house:"
     first = demo(folder, specs)
     deadline = time.monotonic() + 60
     while not (folder / "demo.json").exists():
@@ -72,7 +72,9 @@ def test_a_demo_killed_outright_leaves_nothing_running_and_goes_on_when_run_agai
     assert "toy: 12 of 12 repetitions" in said
     assert "evolved in reality itself" in said
     assert "real-world evaluation" in said
+    assert f"  GAPLAB_DATABASE_URL='sqlite:///{folder}/gaplab.db' gaplab serve" in said.splitlines()
     for name in ("toy", "quadruped"):
+        assert f"  {folder / name}.html" in said.splitlines()
         assert (folder / f"{name}.html").read_text().startswith("<!doctype html>")
         assert "<svg" in (folder / f"{name}.svg").read_text()
     assert not (folder / "demo.json").exists()

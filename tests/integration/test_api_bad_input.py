@@ -275,6 +275,12 @@ def test_an_unknown_address_and_a_wrong_method_are_problems_too(api: TestClient)
         ("/comparisons?experiment=a&experiment=b&from=-1", "from"),
         ("/figures/curves?study=a&format=bmp", "format"),
         ("/figures/curves", ""),
+        ("/studies?state=RUNNING&state=QUEUED", "state"),
+        ("/experiments?limit=3&limit=3", "limit"),
+        ("/figures/gait?experiment=a&experiment=b", "experiment"),
+        ("/comparisons?experiment=a&experiment=b&from=1&from=2", "from"),
+        ("/experiments/a/samples?kind=sample&kind=probe", "kind"),
+        ("/events/page?after=1&after=2", "after"),
     ],
 )
 def test_a_wrong_query_is_refused_with_the_parameters_name(api: TestClient, path: str, name: str):

@@ -7,6 +7,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api.app import create_app
+from api.client import Client
 from services import execution, experiments
 from services.store.session import Store
 from tests.commands import Gaplab
@@ -86,6 +87,31 @@ def test_the_command_overwrites_no_file_and_leaves_no_half(gaplab: Gaplab, submi
     assert (taken.code, unknown.code) == (7, 4)
     assert [each.name for each in tmp_path.iterdir()] == ["precious.zip"]
     assert (tmp_path / "precious.zip").read_text() == "precious"
+
+
+def test_an_archive_that_is_being_written_has_not_its_name_yet(
+    gaplab: Gaplab, submitted: str, tmp_path, monkeypatch: pytest.MonkeyPatch
+):
+    meanwhile, export = [], Client.export
+
+    def watched(self, id_, file):
+        export(self, id_, file)
+        meanwhile.extend(each.name for each in tmp_path.iterdir())
+
+    monkeypatch.setattr(Client, "export", watched)
+    written = gaplab("export", submitted, "--to", str(tmp_path / "archive.zip"))
+
+    assert written.code == 0, written.err
+    assert len(meanwhile) == 1
+    assert meanwhile != ["archive.zip"]
+    assert [each.name for each in tmp_path.iterdir()] == ["archive.zip"]
+
+
+def test_what_is_no_id_is_no_place_for_an_archive(gaplab: Gaplab, tmp_path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+
+    assert gaplab("export", "../x").code == 4
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_command_says_what_is_wrong_with_an_archive(gaplab: Gaplab, tmp_path):

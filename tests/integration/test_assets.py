@@ -58,6 +58,16 @@ def test_a_module_is_script_also_where_it_is_compressed(api: TestClient):
         assert answer.text == (FILES / path).read_text()
 
 
+@pytest.mark.parametrize("path", ["/assets/dashboard/app.js", "/assets/docs/favicon.png"])
+@pytest.mark.parametrize("part", ["bytes=0-3", "bytes=99999999-", "bytes=nonsense", "parsecs=1-2"])
+def test_a_file_is_sent_whole_whatever_part_of_it_is_asked_for(api: TestClient, path: str, part: str):
+    whole = api.get(path, headers={"accept-encoding": "identity"})
+    answer = api.get(path, headers={"accept-encoding": "identity", "range": part})
+
+    assert (answer.status_code, answer.content) == (200, whole.content)
+    assert answer.headers["accept-ranges"] == "none"
+
+
 def test_nothing_outside_the_folder_is_served(api: TestClient):
     for path in ("/assets/dashboard/../app.py", "/assets/dashboard/%2e%2e/app.py", "/assets/dashboard/no.js"):
         assert api.get(path).status_code == 404

@@ -1,6 +1,7 @@
 """A copy of a database that is in use: it is whole, it is of one moment, and it goes on computing."""
 
 import sqlite3
+import subprocess
 import sys
 from threading import Event, Thread
 
@@ -117,6 +118,18 @@ def test_of_postgres_it_says_what_copies_one(tmp_path):
     assert "secret" not in str(refusal.value)
 
 
+@pytest.mark.parametrize("scheme", ["postgresql", "postgresql+psycopg"])
+def test_the_line_that_copies_a_postgres_has_a_url_that_its_tool_knows(tmp_path, monkeypatch, scheme):
+    monkeypatch.setenv("GAPLAB_DATABASE_URL", f"{scheme}://me:a:b@127.0.0.1/gaplab")
+    with pytest.raises(Unsupported) as refusal:
+        backup("postgresql+psycopg://me:secret@127.0.0.1/gaplab", tmp_path / "my copy")
+
+    line = str(refusal.value)[str(refusal.value).index("pg_dump") :].replace("pg_dump", "printf '%s\\n'", 1)
+    said = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=True).stdout.splitlines()
+
+    assert said[1:] == [f"--file={tmp_path / 'my copy'}", "postgresql://me:a:b@127.0.0.1/gaplab"]
+
+
 @pytest.mark.parametrize(("existing", "code"), [(False, 0), (True, 7)])
 def test_the_command_copies_the_database_of_the_environment(sqlite_url, tmp_path, monkeypatch, capsys, existing, code):
     file = tmp_path / "copy.db"
@@ -146,3 +159,22 @@ def test_a_file_that_appears_meanwhile_is_not_written_over(sqlite_url, tmp_path,
         backing_up.backup(sqlite_url, tmp_path / "copy.db")
 
     assert [each.read_text() for each in tmp_path.iterdir()] == ["mine"]
+
+
+def test_what_a_copy_left_that_was_killed_is_in_no_ones_way(sqlite_url, tmp_path, monkeypatch):
+    class Killed(BaseException):
+        """Stands for a death after which nothing is tidied up."""
+
+    def die(*_):
+        raise Killed
+
+    with monkeypatch.context() as patch:
+        patch.setattr(backing_up, "_copy", die)
+        patch.setattr("pathlib.Path.unlink", lambda *_, **__: None)
+        with pytest.raises(Killed):
+            backup(sqlite_url, tmp_path / "copy.db")
+    left = list(tmp_path.iterdir())
+
+    assert backup(sqlite_url, tmp_path / "copy.db") == (tmp_path / "copy.db").stat().st_size
+    assert len(left) == 1
+    assert {*tmp_path.iterdir()} == {*left, tmp_path / "copy.db"}

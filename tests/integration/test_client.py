@@ -14,10 +14,11 @@ import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
+import gaplab
 from api.app import create_app
 from api.clients import connection, frames
 from api.clients import events as stream
-from gaplab import Client, ExperimentFailed, ServiceError, ServiceUnreachable
+from gaplab import Client, ExperimentFailed, ExtraMissing, ServiceError, ServiceUnreachable
 from schemas.access import Role
 from schemas.events import EventKind, EventRead
 from services import access, execution
@@ -112,6 +113,24 @@ def test_simulators_are_a_frame_with_a_column_for_each_tunable(client: Client, f
     assert set(client.simulators(experiment.id, iteration=0)["iteration"]) == {0}
 
 
+def test_curves_are_asked_for_in_parts_that_the_service_takes_and_come_in_order(
+    client: Client, finish: Callable[[], None], network: InProcess, monkeypatch: pytest.MonkeyPatch
+):
+    study = client.submit(BOTH)
+    finish()
+    whole = client.curves_csv([study.id])
+    first, second = (each.id for each in study.experiments)
+    many = [first] * 70 + [second] * 70
+    network.asked.clear()
+
+    curves = client.curves_of(many)
+
+    assert network.asked == ["GET /curves"] * 2
+    assert [each.experiment for each in curves] == many
+    monkeypatch.setattr("api.client.MOST_CURVES", 1)
+    assert client.curves_csv([study.id]) == whole
+
+
 def predictions(pending: int) -> httpx2.Response:
     """An answer of the service, with `pending` of two samples not computed yet."""
     items = [
@@ -156,9 +175,16 @@ def test_without_pandas_the_message_is_the_line_that_installs_it(client: Client,
     id = client.submit(SMALL).id  # noqa: A001
     monkeypatch.setitem(sys.modules, "pandas", None)
 
-    with pytest.raises(ImportError, match=r"pip install 'gaplab\[notebook\]'"):
+    with pytest.raises(ExtraMissing, match=r"pip install 'gaplab\[notebook\]'"):
         client.curve(id)
     assert client.curves([id])
+
+
+def test_programs_import_what_the_client_raises_from_where_it_is():
+    raised = {"CommandError", "ExperimentFailed", "ExtraMissing", "ServiceError", "ServiceUnreachable"}
+
+    assert raised < set(gaplab.__all__)
+    assert [getattr(gaplab, name).__name__ for name in gaplab.__all__] == gaplab.__all__
 
 
 def test_waiting_gives_what_it_ended_as(client: Client, finish: Callable[[], None]):
@@ -369,9 +395,10 @@ def test_the_service_of_the_environment_is_the_one_that_is_meant(monkeypatch: py
 def test_events_and_lists_are_values_that_json_can_hold(client: Client):
     study = client.submit(BOTH)
 
-    kinds = [each.kind for each in client.events(follow=False, study=study.id)]
+    kinds = [each.kind for each in client.events(follow=False, study=study.id, after=None)]
 
     assert kinds.count("submitted") == 2
+    assert [each.number for each in client.events(follow=False, after=1)] == [2]
     assert json.dumps([each.model_dump(mode="json") for each in client.studies().items])
 
 
@@ -394,6 +421,17 @@ def test_events_of_what_is_no_gaplab_are_not_waited_for():
         pytest.raises(ServiceUnreachable, match="is no gaplab of this version"),
     ):
         next(client.events())
+
+
+@pytest.mark.parametrize("answer", ["{}", "[]", "null", '{"paths": null}', "<p>hello</p>"])
+def test_kinds_of_figures_of_what_is_no_gaplab_are_a_sentence(answer: str):
+    network = httpx2.MockTransport(lambda _: httpx2.Response(200, text=answer))
+
+    with (
+        Client("http://gaplab.example", transport=network) as client,
+        pytest.raises(ServiceUnreachable, match="is no gaplab of this version"),
+    ):
+        client.figure_kinds()
 
 
 def test_a_stream_that_had_nothing_to_tell_for_long_is_resumed_when_it_breaks(monkeypatch: pytest.MonkeyPatch):

@@ -15,10 +15,10 @@ import pytest
 import typer
 from rich.console import Console
 
-from api import completion
+from api import completion, problems
 from api.cli import app
 from api.client import Client, ServiceError, ServiceUnreachable
-from api.exits import MEANINGS, Exit
+from api.exits import BY_STATUS, MEANINGS, Exit
 from api.monitor import Look, looks, spark, watch
 from services import execution
 from services.store.session import Store
@@ -172,6 +172,13 @@ def test_help_explains_every_exit_code(gaplab: Gaplab):
     assert [int(line.split()[0]) for line in said.splitlines()] == [each.value for each in Exit]
     assert "watch" in gaplab("help").out
     assert gaplab("help", "nonsense").code == Exit.USAGE
+
+
+def test_whatever_is_wrong_with_a_request_ends_as_that_and_not_as_a_failure_of_the_service():
+    statuses = {status for status, *_ in [*problems.KINDS.values(), *problems.FRAMEWORK.values()] if status < 500}
+
+    assert statuses - {405} <= set(BY_STATUS)  # the command knows which methods there are
+    assert (BY_STATUS[415], BY_STATUS[428], BY_STATUS[429]) == (Exit.INVALID, Exit.INVALID, Exit.CONFLICT)
 
 
 def test_a_figure_is_drawn_into_as_many_files_as_one_names(

@@ -152,6 +152,22 @@ def test_streams_are_limited_for_a_token_and_in_all_and_a_closed_one_makes_room(
         pass
 
 
+def test_who_waits_for_events_has_a_stream_open_and_who_does_not_wait_has_none(sqlite_store: Store):
+    app = create_app(sqlite_store, limits=replace(Limits(), streams_per_token=1))
+    api = TestClient(app)
+    wait = {"wait_s": 0.05}
+
+    with app.state.streams.open(None):
+        refused = api.get("/events/page", params=wait)
+        at_once = api.get("/events/page")
+    room = api.get("/events/page", params=wait), api.get("/events/page", params=wait)
+
+    assert refused.status_code == 429
+    assert "GAPLAB_MAX_STREAMS_PER_TOKEN" in refused.json()["detail"]
+    assert refused.headers["retry-after"]
+    assert [at_once.status_code, *(each.status_code for each in room)] == [200, 200, 200]
+
+
 def test_limits_come_from_the_environment(monkeypatch: pytest.MonkeyPatch):
     assert Limits.from_environment() == Limits()
     monkeypatch.setenv("GAPLAB_MAX_ROLLOUTS_PER_TOKEN", "7")

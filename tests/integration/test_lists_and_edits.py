@@ -182,6 +182,17 @@ def test_progress_outdates_what_was_seen_but_refuses_no_edit(store: Store, api: 
     assert edited.status_code == 200
 
 
+def test_whatever_there_is_is_not_sent_and_what_is_changed_is_shown(lite: TestClient):
+    address, tag = submitted(lite, "experiments")
+    whatever = {"If-None-Match": "*"}
+
+    read = lite.get(address, headers=whatever)
+    edited = lite.patch(address, json={"name": "x"}, headers=whatever | {"If-Match": tag})
+
+    assert (read.status_code, read.content, read.headers["etag"]) == (304, b"", tag)
+    assert (edited.status_code, edited.json()["name"]) == (200, "x")
+
+
 def test_the_catalogue_is_sent_once(lite: TestClient):
     tag = lite.get("/catalogue").headers["etag"]
 
