@@ -7,7 +7,7 @@ from typing import Literal
 from schemas.curves import Curve, CurvePoint
 from services.figures.marks import Axis, Figure, Level, Line, Mark, Panel, Table
 from services.figures.style import INK, Style, style_of
-from services.figures.words import counted, number, printable, told_apart, with_unit
+from services.figures.words import counted, heading, number, told_apart, with_unit
 
 Band = Literal["interval", "sd"]
 
@@ -78,7 +78,7 @@ def curves_figure(
     y = Axis(with_unit("Fitness in reality", {one.unit for one in curves}), _limits(marks))
     return Figure(
         name="curves",
-        title=printable(title),
+        title=heading(title),
         panels=(Panel(tuple(marks), x, y),),
         caption=_caption(lines, levels, BANDS[band], against, each=each),
         alt=_alt(lines, levels, x, y),

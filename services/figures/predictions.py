@@ -6,7 +6,7 @@ from math import dist, sqrt
 from schemas.predictions import Prediction
 from services.figures.marks import Axis, Diagonal, Figure, Panel, Points, Table
 from services.figures.style import INK, Style, style_of
-from services.figures.words import counted, limits, number, printable, with_unit
+from services.figures.words import counted, heading, limits, number, printable, with_unit
 
 BEFORE, AFTER = "Before tuning on it", "After tuning on it"
 
@@ -41,7 +41,7 @@ def predictions_figure(items: Sequence[Prediction], *, unit: str = "", pending: 
     )
     return Figure(
         name="predictions",
-        title=printable(title),
+        title=heading(title),
         panels=(panel,),
         caption=_caption(items, drawn, pending, unit),
         alt=_alt(drawn),

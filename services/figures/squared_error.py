@@ -5,7 +5,7 @@ from statistics import median, quantiles
 
 from services.figures.marks import Axis, Figure, Line, Number, Panel, Table
 from services.figures.style import style_of
-from services.figures.words import counted, limits, number, printable
+from services.figures.words import counted, heading, limits, number, printable
 
 WIDE = 30.0
 """Medians that differ by this factor are drawn on a logarithmic axis."""
@@ -39,7 +39,7 @@ def squared_error_figure(
     )
     return Figure(
         name="squared-error",
-        title=printable(title),
+        title=heading(title),
         panels=(panel,),
         caption=_caption(errors, there, each=each),
         alt=_alt(line),
