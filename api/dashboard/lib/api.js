@@ -1,6 +1,7 @@
 /** The service: what is asked of it, what it answers, and what happens there. */
 
 import { read, written } from "./json.js";
+import { inSight, whileInSight } from "./sight.js";
 import { token } from "./token.js";
 
 /** A problem that the service answered with, or that it did not answer (status 0). */
@@ -60,16 +61,20 @@ async function request(path, options) {
 /**
  * Server-sent events after `query.after`, or from now on, for as long as `signal` lasts: `handler({ kind, id, data })` for each of them, and
  * `connected(true | false, why)` as the stream comes and goes, with why the service refused it. It is taken up again where it broke off,
- * without a hole.
+ * without a hole. A page that is out of sight lets go of it without a word, until it is in sight again.
  */
 export async function events(query, handler, connected, signal) {
   let last = null;
   while (!signal.aborted) {
     let why = "";
+    let seen = null;
     try {
       last ??= query.after ?? (await get("/events/page", { limit: 1 }, signal)).latest;
+      await inSight(signal);
+      if (signal.aborted) return;
+      seen = whileInSight(signal);
       const headers = { Accept: "text/event-stream", "Last-Event-ID": last };
-      const answer = await request(`/events${search(query)}`, { headers, signal });
+      const answer = await request(`/events${search(query)}`, { headers, signal: seen.signal });
       connected(true);
       for await (const event of parsed(answer.body)) {
         last = event.id ?? last;
@@ -77,8 +82,11 @@ export async function events(query, handler, connected, signal) {
       }
     } catch (error) {
       if (signal.aborted) return;
+      if (seen?.signal.aborted) continue;
       if (error.status === 401 || error.status === 403) throw error;
       if (error.status < 500 && error.status > 0) why = error.message;
+    } finally {
+      seen?.abort();
     }
     connected(false, why);
     await new Promise((resume) => setTimeout(resume, 1500));
