@@ -146,17 +146,51 @@ def test_a_stream_that_is_refused_is_not_a_service_that_is_away(visit, archive):
     page.get_by_text("What happens is not seen here: 20 streams are open; trying again…").wait_for()
 
 
-def test_a_list_that_did_not_come_is_not_said_to_be_empty(visit, archive):
-    visit.forgive("ERR_FAILED", "The service does not answer", "It may be down")
+def test_a_list_that_did_not_come_is_not_said_to_be_empty_and_comes_by_itself(visit, archive):
+    visit.forgive("ERR_FAILED")
     page = visit(f"{archive.url}/#/?show=experiments")
     page.locator("tr.experiment").nth(19).wait_for()
 
     page.route("**/experiments?*", lambda route: route.abort())
-    with page.expect_event("requestfailed"):
-        page.get_by_label("State").select_option("CANCELLED")
-    page.locator("tr.experiment input").first.check()
-
+    page.get_by_label("State").select_option("CANCELLED")
+    page.get_by_role("heading", name="The service does not answer").wait_for()
+    assert page.locator("tr.experiment").count() == 0
     assert page.get_by_text("Nothing here is like that").count() == 0
+    page.unroute("**/experiments?*")
+
+    page.locator("tr.experiment").first.wait_for()
+    page.get_by_role("heading", name="The service does not answer").wait_for(state="detached")
+
+
+def test_more_of_a_list_that_does_not_come_is_said_and_asked_for_again(visit, archive):
+    visit.forgive("500")
+    page = visit(f"{archive.url}/#/?show=experiments")
+    page.locator("tr.experiment").nth(19).wait_for()
+
+    busy = {"status": 500, "title": "Busy"}
+    page.route("**/experiments?*cursor=*", lambda route: route.fulfill(status=500, json=busy))
+    page.get_by_role("button", name="Show more").click()
+    page.get_by_role("heading", name="Busy").wait_for()
+    assert page.locator("tr.experiment").count() == 20
+    page.unroute("**/experiments?*cursor=*")
+    page.get_by_role("button", name="Try again").click()
+
+    page.locator("tr.experiment").nth(59).wait_for()
+    page.get_by_role("heading", name="Busy").wait_for(state="detached")
+
+
+def test_the_parts_of_a_long_list_meet_whatever_came_went_or_moved(visit, archive):
+    page = visit(f"{archive.url}/{QUIET}")
+    following = """async ([page, former]) => {
+      const { following } = await import("/assets/dashboard/views/list/seam.js");
+      const named = (ids) => [...ids].map((id) => ({ id }));
+      return following(named(page), named(former)).map(({ id }) => id).join("");
+    }"""
+
+    pages = ("abcd", "nabc", "bcde", "aben", "fabc", "cdn", "xyz", "")
+    found = [page.evaluate(following, [each, "abcdef"]) for each in pages]
+
+    assert found == ["ef", "def", "f", "f", "de", "ef", "", ""]
 
 
 def test_a_part_that_could_not_be_had_for_a_while_is_not_left_as_it_was(visit, archive):
