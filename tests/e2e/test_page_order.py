@@ -45,7 +45,16 @@ def test_after_a_break_everything_is_asked_for_anew_until_it_is_there_also_if_so
     assert page.evaluate(FOLLOWED) == [[], [], [3]]
 
 
-@pytest.mark.parametrize("view", ["experiments/%", "experiments/..%2F..", "studies/%E0%A4%A"])
+@pytest.mark.parametrize(
+    "view",
+    [
+        "experiments/%",
+        "experiments/..%2F..",
+        "studies/%E0%A4%A",
+        "replay?experiment=../studies",
+        "toy?experiment=..%2Fcatalogue%3F",
+    ],
+)
 def test_an_address_that_cannot_be_an_id_is_no_page(visit, archive, view):
     page = visit(f"{archive.url}/#/{view}")
 
