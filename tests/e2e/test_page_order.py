@@ -6,6 +6,7 @@ import re
 import pytest
 
 QUIET = "#/toy"  # a view that asks for nothing
+QUEUED = {"robot": "toy_function", "strategies": ["random"], "budget": "smoke"}
 FOLLOWED = """
 async () => {
   const { follow } = await import("/assets/dashboard/lib/live.js");
@@ -216,3 +217,37 @@ def test_a_part_that_could_not_be_had_for_a_while_is_not_left_as_it_was(visit, a
     page.unroute("**/repetitions")
 
     page.locator("tbody .pill.cancelled").first.wait_for()
+
+
+def test_what_was_saved_is_shown_though_nothing_can_be_looked_at_any_more(visit, archive):
+    visit.forgive("ERR_FAILED")
+    study = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
+    page = visit(f"{archive.url}/#/studies/{study}")
+    page.get_by_role("button", name="Edit name and notes").click()
+    page.get_by_label("Name", exact=True).fill("second name")
+
+    page.route("**/*", lambda route: route.abort() if route.request.method == "GET" else route.continue_())
+    page.get_by_role("button", name="Save").click()
+
+    page.get_by_role("heading", name="second name").wait_for()
+    page.locator("dialog").wait_for(state="detached")
+    page.unroute("**/*")
+    archive.http.post(f"/studies/{study}/cancel")
+
+
+def test_a_change_whose_answer_was_lost_is_not_taken_for_somebody_elses(visit, archive):
+    visit.forgive("ERR_FAILED", "412")
+    study = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
+    page = visit(f"{archive.url}/#/studies/{study}")
+    page.get_by_role("button", name="Edit name and notes").click()
+    page.get_by_label("Name", exact=True).fill("second name")
+
+    page.route(f"**/studies/{study}", lambda route: (route.fetch(), route.abort()))
+    page.get_by_role("button", name="Save").click()
+    page.locator("dialog").get_by_text("It may be down").wait_for()
+    page.unroute(f"**/studies/{study}")
+    page.get_by_role("button", name="Save").click()
+
+    page.get_by_role("heading", name="second name").wait_for()
+    page.locator("dialog").wait_for(state="detached")
+    archive.http.post(f"/studies/{study}/cancel")

@@ -17,19 +17,16 @@ export const get = async (path, query = {}, signal = undefined) =>
   (await request(path + search(query), { signal })).json();
 
 /** The JSON at `path`, and the tag that a change of it names. */
-export async function tagged(path, signal = undefined) {
-  const answer = await request(path, { signal });
-  return { value: read(await answer.text()), tag: answer.headers.get("ETag") };
-}
+export const tagged = async (path, signal = undefined) => withTag(await request(path, { signal }));
 
 /** The file at `path`. */
 export const blob = async (path, query = {}) => (await request(path + search(query), {})).blob();
 
 /** What the service made of a POST. */
-export const post = (path, body = undefined, headers = {}) => send("POST", path, body, headers);
+export const post = async (path, body = undefined, headers = {}) => (await send("POST", path, body, headers)).json();
 
-/** What the service made of a PATCH. */
-export const patch = (path, body, headers = {}) => send("PATCH", path, body, headers);
+/** What the service made of a PATCH, and its tag. */
+export const patch = async (path, body, headers = {}) => withTag(await send("PATCH", path, body, headers));
 
 /** A query as it stands in an address: `?a=1&a=2`, or nothing. */
 export function search(query) {
@@ -38,10 +35,11 @@ export function search(query) {
   return pairs.length ? `?${new URLSearchParams(pairs)}` : "";
 }
 
-async function send(method, path, body, headers) {
+const withTag = async (answer) => ({ value: read(await answer.text()), tag: answer.headers.get("ETag") });
+
+function send(method, path, body, headers) {
   const json = body === undefined ? {} : { body: written(body) };
-  const answer = await request(path, { method, headers: { "Content-Type": "application/json", ...headers }, ...json });
-  return answer.json();
+  return request(path, { method, headers: { "Content-Type": "application/json", ...headers }, ...json });
 }
 
 /** Ask, and raise what is wrong as a Problem. Addresses are relative, so that the service may live below a prefix. */
