@@ -251,3 +251,26 @@ def test_a_change_whose_answer_was_lost_is_not_taken_for_somebody_elses(visit, a
     page.get_by_role("heading", name="second name").wait_for()
     page.locator("dialog").wait_for(state="detached")
     archive.http.post(f"/studies/{study}/cancel")
+
+
+def test_an_estimate_that_comes_late_does_not_wipe_away_why_the_study_was_refused(visit, archive):
+    visit.forgive("429")
+    page = visit(f"{archive.url}/#/new")
+    page.locator(".panel .big").wait_for()
+    late = []
+    page.route("**/studies/estimate", lambda route: late.append(route))
+    page.route("**/studies", lambda route: route.fulfill(status=429, json={"status": 429, "title": "Too many"}))
+
+    page.get_by_label("Name", exact=True).fill("one too many")
+    with page.expect_request("**/studies/estimate"):
+        page.get_by_role("button", name="Submit the study").click()
+    refusal = page.get_by_role("alert").get_by_text("Too many").first
+    refusal.wait_for()
+    with page.expect_response("**/studies/estimate"):
+        late[-1].continue_()
+    page.wait_for_timeout(200)
+    assert refusal.is_visible()
+    page.unroute("**/studies/estimate")
+    page.get_by_label("Name", exact=True).fill("another")
+
+    refusal.wait_for(state="detached")
