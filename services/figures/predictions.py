@@ -1,6 +1,7 @@
 """What simulators said of a controller, against what reality said."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import dist, sqrt
 
 from schemas.predictions import Prediction
@@ -10,12 +11,25 @@ from services.figures.words import counted, heading, limits, number, printable, 
 
 BEFORE, AFTER = "Before tuning on it", "After tuning on it"
 
-Pair = tuple[Prediction, float, float]
-"""A prediction, and what it says: fitness in simulation and in reality."""
+
+@dataclass(frozen=True)
+class _Whole:
+    """A sample with its fitness in all three: in the simulators before and after tuning on it, and in reality."""
+
+    sample: Prediction
+    before: float
+    after: float
+    real: float
+
+
+Pair = tuple[float, float]
+"""Fitness in simulation and in reality."""
 
 
 def predictions_figure(items: Sequence[Prediction], *, unit: str = "", pending: int = 0, title: str = "") -> Figure:
     """The fitness of each sample in simulation against its fitness in reality, with the diagonal on which they agree.
+
+    A sample that misses one of the three is left out: before and after are compared over the same samples.
 
     Args:
         items: the samples.
@@ -23,15 +37,15 @@ def predictions_figure(items: Sequence[Prediction], *, unit: str = "", pending: 
         pending: how many more there are, which are not computed yet.
         title: above the figure.
     """
-    before = [(each, each.simulated_before) for each in items]
-    after = [(each, each.simulated_after) for each in items]
-    drawn = {BEFORE: _pairs(before), AFTER: _pairs(after)}
-    values = [value for pairs in drawn.values() for _, *both in pairs for value in both]
+    whole = _whole(items)
+    drawn = {BEFORE: [(each.before, each.real) for each in whole], AFTER: [(each.after, each.real) for each in whole]}
+    told = tuple(f"repetition {each.sample.repetition}, iteration {each.sample.iteration}" for each in whole)
+    values = [value for pairs in drawn.values() for both in pairs for value in both]
     ends = limits(values)
     marks = (
         Diagonal("Simulation agrees with reality", Style(INK, "dashed", "circle")) if values else None,
-        _points(BEFORE, drawn[BEFORE], style_of(1), hollow=True),
-        _points(AFTER, drawn[AFTER], style_of(0), hollow=False),
+        _points(BEFORE, drawn[BEFORE], told, style_of(1), hollow=True),
+        _points(AFTER, drawn[AFTER], told, style_of(0), hollow=False),
     )
     panel = Panel(
         tuple(mark for mark in marks if mark is not None),
@@ -50,19 +64,18 @@ def predictions_figure(items: Sequence[Prediction], *, unit: str = "", pending: 
     )
 
 
-def _pairs(said: Sequence[tuple[Prediction, float | None]]) -> list[Pair]:
-    return [(each, value, each.fitness) for each, value in said if value is not None and each.fitness is not None]
+def _whole(items: Sequence[Prediction]) -> list[_Whole]:
+    found = []
+    for each in items:
+        before, after, real = each.simulated_before, each.simulated_after, each.fitness
+        if before is not None and after is not None and real is not None:
+            found.append(_Whole(each, before, after, real))
+    return found
 
 
-def _points(name: str, pairs: Sequence[Pair], style: Style, *, hollow: bool) -> Points:
-    return Points(
-        name,
-        tuple(real for _, _, real in pairs),
-        tuple(simulated for _, simulated, _ in pairs),
-        style,
-        hover=tuple(f"repetition {each.repetition}, iteration {each.iteration}" for each, _, _ in pairs),
-        hollow=hollow,
-    )
+def _points(name: str, pairs: Sequence[Pair], told: tuple[str, ...], style: Style, *, hollow: bool) -> Points:
+    simulated, real = tuple(each for each, _ in pairs), tuple(each for _, each in pairs)
+    return Points(name, real, simulated, style, hover=told, hollow=hollow)
 
 
 def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], pending: int, unit: str) -> str:
@@ -77,14 +90,14 @@ def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], pending:
     parts += [
         f"{name}: root-mean-square error {number(_error(pairs), 2)}{shown}." for name, pairs in drawn.items() if pairs
     ]
-    left_out = sum(None in (each.fitness, each.simulated_before, each.simulated_after) for each in items)
+    left_out = len(items) - len(drawn[BEFORE])
     parts += [f"{counted([left_out], 'sample')} left out: a measurement or the physics failed."] if left_out else []
     parts += [f"{counted([pending], 'sample')} still being computed."] if pending else []
     return " ".join(parts)
 
 
 def _error(pairs: Sequence[Pair]) -> float:
-    _, simulated, real = zip(*pairs, strict=True)
+    simulated, real = zip(*pairs, strict=True)
     return dist(simulated, real) / sqrt(len(pairs))  # without squares, which physics that explodes has no numbers for
 
 
