@@ -7,7 +7,7 @@ from math import dist, sqrt
 from schemas.predictions import Prediction
 from services.figures.marks import Axis, Diagonal, Figure, Panel, Points, Table
 from services.figures.style import INK, Style, style_of
-from services.figures.words import counted, heading, limits, number, printable, with_unit
+from services.figures.words import counted, drawable, heading, limits, number, printable, with_unit
 
 BEFORE, AFTER = "Before tuning on it", "After tuning on it"
 
@@ -29,7 +29,8 @@ Pair = tuple[float, float]
 def predictions_figure(items: Sequence[Prediction], *, unit: str = "", pending: int = 0, title: str = "") -> Figure:
     """The fitness of each sample in simulation against its fitness in reality, with the diagonal on which they agree.
 
-    A sample that misses one of the three is left out: before and after are compared over the same samples.
+    A sample that misses one of the three, or has one too large to be reckoned with, is left out: before and after are
+    compared over the same samples.
 
     Args:
         items: the samples.
@@ -67,7 +68,7 @@ def predictions_figure(items: Sequence[Prediction], *, unit: str = "", pending: 
 def _whole(items: Sequence[Prediction]) -> list[_Whole]:
     found = []
     for each in items:
-        before, after, real = each.simulated_before, each.simulated_after, each.fitness
+        before, after, real = map(drawable, (each.simulated_before, each.simulated_after, each.fitness))
         if before is not None and after is not None and real is not None:
             found.append(_Whole(each, before, after, real))
     return found

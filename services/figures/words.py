@@ -7,6 +7,7 @@ from math import isfinite
 
 LONGEST = 60  # characters of a name in a figure
 TITLE = 200  # of a title, which has as many lines as it needs
+LARGEST = 1e300  # of what is drawn: sums and the room around it are numbers still
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -72,9 +73,9 @@ def power(value: float) -> str:
     return ten if mantissa == "1" else f"{mantissa}·{ten}"
 
 
-def finite(value: float | None) -> float | None:
-    """The value, or None in place of nan and infinity."""
-    return value if value is not None and isfinite(value) else None
+def drawable(value: float | None) -> float | None:
+    """The value; None in place of nan, infinity, and what is too large to be reckoned with."""
+    return value if value is not None and abs(value) <= LARGEST else None
 
 
 def limits(values: Iterable[float | None], *, margin: float = 0.05) -> tuple[float, float]:

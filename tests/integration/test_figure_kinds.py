@@ -1,5 +1,6 @@
 """What is in the figures of one experiment: simulators, predictions, squared error, and curves against their cost."""
 
+import json
 from warnings import catch_warnings
 
 import pytest
@@ -9,6 +10,8 @@ from services.core.arrays import frozen
 from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred
 from services.core.types import Tuned as TunedStep
 from services.efforts import abscissa
+from services.figures.chart import chart
+from services.figures.curves import curves_figure
 from services.figures.files import render_file
 from services.figures.marks import Diagonal, Figure, Level, Line, Mark, Points
 from services.figures.predictions import AFTER, BEFORE, predictions_figure
@@ -17,7 +20,7 @@ from services.figures.squared_error import squared_error_figure
 from services.store.session import Store
 from services.tuned import tunings
 from tests.experiments import run, toy
-from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, prediction, tuned
+from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, curve, point, prediction, tuned
 
 
 def marks(figure: Figure, panel: int = 0) -> dict[str, Mark]:
@@ -164,6 +167,36 @@ def test_what_exploding_physics_says_is_drawn_too():
     # matplotlib looks for ticks beyond the greatest number
     with catch_warnings(action="ignore", category=RuntimeWarning):
         assert render_file(tuning, "svg")
+
+
+def test_what_is_too_large_to_be_reckoned_with_is_left_out_as_what_failed():
+    huge = 1.7e308
+    predicted = predictions_figure([prediction(huge, -huge, 1.0), prediction(0.5, 1.0, 1.0, 1)])
+    tuning = squared_error_figure({1: {0: huge, 1: huge, 2: 1.0}, 2: {0: huge, 1: huge}}, each=True)
+
+    assert marks(predicted)[BEFORE].y == (0.5,)
+    assert "1\N{NO-BREAK SPACE}sample left out" in predicted.caption
+    assert marks(tuning)["Best simulator"].x[0] == 1
+    assert "4\N{NO-BREAK SPACE}values left out" in tuning.caption
+    assert squared_error_figure({1: {0: huge}}).empty
+
+
+@pytest.mark.parametrize("large", [1e300, 1.7e308])
+def test_every_figure_is_drawn_however_large_its_numbers_are(large: float):
+    ends = [point(at, value, sd=large) for at, value in enumerate((large, -large, 1.0))]
+    figures = [
+        curves_figure([curve("a", *ends)], band="sd", each=True),
+        curves_figure([curve("a", *ends)], band="interval"),
+        curves_figure([curve("a", point(0, large, sd=large)).model_copy(update={"direct": True})]),
+        predictions_figure([prediction(large, -large, large), prediction(0.5, 1.0, 1.0, 1)]),
+        squared_error_figure({1: {0: large, 1: large, 2: 1.0}, 2: {0: large}}, each=True),
+        squared_error_figure({1: {0: large}, 2: {0: large, 1: large}}),
+    ]
+
+    for figure in figures:
+        json.dumps(chart(figure), allow_nan=False)
+        with catch_warnings(action="ignore", category=RuntimeWarning):
+            assert render_file(figure, "svg")
 
 
 def log(first: int, *, iterations: int, fitness: float | None = 1.0):
