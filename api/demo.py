@@ -1,7 +1,7 @@
 """The main job on small budgets, through the real service: what `gaplab demo` and `make demo` run.
 
 It starts the service on a free port of this machine, with a database in a folder, and submits two studies over HTTP:
-the toy function at the paper's protocol, then the walking quadruped. Killed and run again in the same folder, it goes
+the toy function, then the walking quadruped. Killed and run again in the same folder, it goes
 on where it was; run again after it has finished, it starts anew beside the old results.
 """
 

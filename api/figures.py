@@ -13,6 +13,7 @@ from services.figures.chart import chart
 from services.figures.files import render_file
 from services.figures.html import render_html
 from services.figures.marks import Figure
+from services.figures.words import TITLE
 
 MEDIA_TYPES = {
     "json": "application/json",
@@ -29,7 +30,7 @@ class Drawing(Parameters):
     format: Literal["html", "json", "svg", "png", "pdf"] = Field(
         default="html", description="a page that needs nothing else, data for Plotly, or a file for a paper"
     )
-    title: str | None = Field(default=None, max_length=200, description="above it; left out: what it is of")
+    title: str | None = Field(default=None, max_length=TITLE, description="above it; left out: what it is of")
     width: float = Field(default=3.5, ge=2.5, le=20, description="of a file, in inches: a column has 3.5, a page 7.2")
     caption: bool = Field(default=True, description="of a file: whether the caption is drawn beneath")
 

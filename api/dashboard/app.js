@@ -14,6 +14,7 @@ const VIEWS = [
   [/^\/studies\/([\w-]+)$/, "study", ["id"]],
   [/^\/experiments\/([\w-]+)$/, "experiment", ["id"]],
 ];
+const ID = /^[\w-]*$/;  // with dots and slashes in it, a path of the service would be another
 
 const AWAY = new Set([0, 502, 503, 504]);
 const AGAIN_MS = 2000;
@@ -27,6 +28,7 @@ function wanted() {
     const found = pattern.exec(path);
     if (!found) continue;
     const parameters = new URLSearchParams(query);
+    if (!ID.test(parameters.get("experiment") ?? "")) return null;
     keys.forEach((key, at) => parameters.set(key, found[at + 1]));
     return { name, parameters };
   }

@@ -18,7 +18,7 @@ from services.figures.marks import Figure
 from services.figures.predictions import predictions_figure
 from services.figures.simulators import simulators_figure
 from services.figures.squared_error import squared_error_figure
-from services.figures.words import spoken
+from services.figures.words import TITLE, spoken
 from services.predictions import predictions
 from services.resolution import is_direct, spec_of
 from services.store.session import Store
@@ -133,7 +133,9 @@ def _draw_nothing(kind: str, request: Request) -> None:
 
 
 def _title(store: Store, query: ExperimentDrawing) -> str:
-    return spoken(experiments.read_experiment(store, query.experiment).name) if query.title is None else query.title
+    if query.title is not None:
+        return query.title
+    return spoken(experiments.read_experiment(store, query.experiment).name, TITLE)
 
 
 def _explained(store: Store, query: ExperimentDrawing, figure: Figure) -> Figure:

@@ -7,7 +7,7 @@ from typing import Literal
 from schemas.curves import Curve, CurvePoint
 from services.figures.marks import Axis, Figure, Level, Line, Mark, Panel, Table
 from services.figures.style import INK, Style, style_of
-from services.figures.words import counted, number, printable, told_apart, with_unit
+from services.figures.words import counted, drawable, heading, number, told_apart, with_unit
 
 Band = Literal["interval", "sd"]
 
@@ -55,7 +55,8 @@ def curves_figure(
 ) -> Figure:
     """The recorded fitness of experiments against their number of real-world evaluations, or what that cost.
 
-    A point without a mean (no repetition got there yet) is left out; a band needs two repetitions.
+    A point without a mean (no repetition got there yet), or with one too large to be reckoned with, is left out; a band
+    needs two repetitions.
 
     Args:
         curves: in the order of the legend.
@@ -65,6 +66,7 @@ def curves_figure(
         against: the horizontal axis; left out: the number of real-world evaluations.
         each: whether every repetition has a thin line behind the mean.
     """
+    curves = [_drawable(one) for one in curves]
     band = band or _telling_band(curves)
     names = told_apart([(one.name, one.experiment) for one in curves])
     placed = [_placed(name, one, against) for name, one in zip(names, curves, strict=True)]
@@ -78,12 +80,22 @@ def curves_figure(
     y = Axis(with_unit("Fitness in reality", {one.unit for one in curves}), _limits(marks))
     return Figure(
         name="curves",
-        title=printable(title),
+        title=heading(title),
         panels=(Panel(tuple(marks), x, y),),
         caption=_caption(lines, levels, BANDS[band], against, each=each),
         alt=_alt(lines, levels, x, y),
         table=_table(placed),
     )
+
+
+def _drawable(curve: Curve) -> Curve:
+    """The curve without what is too large to be reckoned with."""
+    return curve.model_copy(update={"points": tuple(map(_drawable_point, curve.points))})
+
+
+def _drawable_point(point: CurvePoint) -> CurvePoint:
+    known = {name: drawable(getattr(point, name)) for name in ("mean", "sd", "lower", "upper")}
+    return point.model_copy(update={**known, "values": tuple(map(drawable, point.values))})
 
 
 def _placed(name: str, curve: Curve, against: Abscissa | None) -> _Placed:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from schemas.replays import Interval, Replay, ReplayWorld
 from services.figures.marks import Axis, Bars, Figure, Level, Line, Mark, Panel, Table
 from services.figures.style import INK, Style, style_of
-from services.figures.words import limits, number, printable
+from services.figures.words import heading, limits, number
 
 COUNTED = Style(INK, "dotted", "circle")
 
@@ -26,7 +26,7 @@ def gait_figure(replay: Replay, *, title: str | None = None) -> Figure:
     time = Axis("Time (s)", (0.0, replay.times_s[-1]))
     return Figure(
         name="gait",
-        title=printable(own if title is None else title),
+        title=heading(own if title is None else title),
         panels=(
             _footfall(replay, worlds, time),
             _over_time("Height of base (m)", replay, [(name, world.heights_m) for name, world in worlds], time),

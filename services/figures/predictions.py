@@ -1,23 +1,38 @@
 """What simulators said of a controller, against what reality said."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import dist, sqrt
 
 from schemas.predictions import Prediction
 from services.figures.marks import Axis, Diagonal, Figure, Panel, Points, Table
 from services.figures.style import INK, Style, style_of
-from services.figures.words import counted, limits, number, printable, with_unit
+from services.figures.words import counted, drawable, heading, limits, number, printable, with_unit
 
 BEFORE, AFTER = "Before tuning on it", "After tuning on it"
 
-Pair = tuple[Prediction, float, float]
-"""A prediction, and what it says: fitness in simulation and in reality."""
+
+@dataclass(frozen=True)
+class _Whole:
+    """A sample with its fitness in all three: in the simulators before and after tuning on it, and in reality."""
+
+    sample: Prediction
+    before: float
+    after: float
+    real: float
+
+
+Pair = tuple[float, float]
+"""Fitness in simulation and in reality."""
 
 
 def predictions_figure(
     items: Sequence[Prediction], *, unit: str = "", pending: int = 0, left_out: int = 0, title: str = ""
 ) -> Figure:
     """The fitness of each sample in simulation against its fitness in reality, with the diagonal on which they agree.
+
+    A sample that misses one of the three, or has one too large to be reckoned with, is left out: before and after are
+    compared over the same samples.
 
     Args:
         items: the samples.
@@ -26,15 +41,15 @@ def predictions_figure(
         left_out: how many more there are, of later repetitions, which never will be.
         title: above the figure.
     """
-    before = [(each, each.simulated_before) for each in items]
-    after = [(each, each.simulated_after) for each in items]
-    drawn = {BEFORE: _pairs(before), AFTER: _pairs(after)}
-    values = [value for pairs in drawn.values() for _, *both in pairs for value in both]
+    whole = _whole(items)
+    drawn = {BEFORE: [(each.before, each.real) for each in whole], AFTER: [(each.after, each.real) for each in whole]}
+    told = tuple(f"repetition {each.sample.repetition}, iteration {each.sample.iteration}" for each in whole)
+    values = [value for pairs in drawn.values() for both in pairs for value in both]
     ends = limits(values)
     marks = (
         Diagonal("Simulation agrees with reality", Style(INK, "dashed", "circle")) if values else None,
-        _points(BEFORE, drawn[BEFORE], style_of(1), hollow=True),
-        _points(AFTER, drawn[AFTER], style_of(0), hollow=False),
+        _points(BEFORE, drawn[BEFORE], told, style_of(1), hollow=True),
+        _points(AFTER, drawn[AFTER], told, style_of(0), hollow=False),
     )
     panel = Panel(
         tuple(mark for mark in marks if mark is not None),
@@ -44,7 +59,7 @@ def predictions_figure(
     )
     return Figure(
         name="predictions",
-        title=printable(title),
+        title=heading(title),
         panels=(panel,),
         caption=_caption(items, drawn, unit, pending, left_out),
         alt=_alt(drawn),
@@ -53,19 +68,18 @@ def predictions_figure(
     )
 
 
-def _pairs(said: Sequence[tuple[Prediction, float | None]]) -> list[Pair]:
-    return [(each, value, each.fitness) for each, value in said if value is not None and each.fitness is not None]
+def _whole(items: Sequence[Prediction]) -> list[_Whole]:
+    found = []
+    for each in items:
+        before, after, real = map(drawable, (each.simulated_before, each.simulated_after, each.fitness))
+        if before is not None and after is not None and real is not None:
+            found.append(_Whole(each, before, after, real))
+    return found
 
 
-def _points(name: str, pairs: Sequence[Pair], style: Style, *, hollow: bool) -> Points:
-    return Points(
-        name,
-        tuple(real for _, _, real in pairs),
-        tuple(simulated for _, simulated, _ in pairs),
-        style,
-        hover=tuple(f"repetition {each.repetition}, iteration {each.iteration}" for each, _, _ in pairs),
-        hollow=hollow,
-    )
+def _points(name: str, pairs: Sequence[Pair], told: tuple[str, ...], style: Style, *, hollow: bool) -> Points:
+    simulated, real = tuple(each for each, _ in pairs), tuple(each for _, each in pairs)
+    return Points(name, real, simulated, style, hover=told, hollow=hollow)
 
 
 def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], unit: str, pending: int, left_out: int) -> str:
@@ -80,7 +94,7 @@ def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], unit: st
     parts += [
         f"{name}: root-mean-square error {number(_error(pairs), 2)}{shown}." for name, pairs in drawn.items() if pairs
     ]
-    failed = sum(None in (each.fitness, each.simulated_before, each.simulated_after) for each in items)
+    failed = len(items) - len(drawn[BEFORE])
     parts += [f"{counted([failed], 'sample')} left out: a measurement or the physics failed."] if failed else []
     parts += [f"{counted([left_out], 'sample')} of later repetitions left out: they are too many."] if left_out else []
     parts += [f"{counted([pending], 'sample')} still being computed."] if pending else []
@@ -88,7 +102,7 @@ def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], unit: st
 
 
 def _error(pairs: Sequence[Pair]) -> float:
-    _, simulated, real = zip(*pairs, strict=True)
+    simulated, real = zip(*pairs, strict=True)
     return dist(simulated, real) / sqrt(len(pairs))  # without squares, which physics that explodes has no numbers for
 
 

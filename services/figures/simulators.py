@@ -6,7 +6,7 @@ from itertools import combinations
 
 from services.figures.marks import Axis, Figure, Level, Mark, Panel, Points, Table
 from services.figures.style import INK, Style
-from services.figures.words import counted, limits, number, printable, spoken, with_unit
+from services.figures.words import counted, heading, limits, number, spoken, with_unit
 
 IN_PAIRS = 3
 """Of more tunables there are too many pairs to look at: each has a panel of its own, against iterations."""
@@ -68,7 +68,7 @@ def simulators_figure(
         panels = [_alone(shown, dimensions, at, truth or {}) for at in range(len(dimensions))]
     return Figure(
         name="simulators",
-        title=printable(title),
+        title=heading(title),
         panels=tuple(panels) if shown else tuple(_emptied(each) for each in panels),
         caption=_caption(tuned, shown, truth),
         alt=_alt(shown, dimensions, truth or {}),

@@ -5,7 +5,7 @@ from statistics import median, quantiles
 
 from services.figures.marks import Axis, Figure, Line, Number, Panel, Table
 from services.figures.style import style_of
-from services.figures.words import counted, limits, number, printable
+from services.figures.words import counted, drawable, heading, limits, number, printable
 
 WIDE = 30.0
 """Medians that differ by this factor are drawn on a logarithmic axis."""
@@ -22,11 +22,12 @@ def squared_error_figure(
     """The squared error of the best simulator after each iteration that tuned: its median and quartiles.
 
     Args:
-        errors: by iteration, of each repetition that got there.
+        errors: by iteration, of each repetition that got there; what is too large to be reckoned with is left out.
         unit: of fitness.
         title: above the figure.
         each: whether every repetition has a thin line behind the median.
     """
+    errors = {at: {one: drawable(value) for one, value in found.items()} for at, found in errors.items()}
     there = {at: [value for value in found.values() if value is not None] for at, found in sorted(errors.items())}
     there = {at: found for at, found in there.items() if found}
     line = _median(there)
@@ -39,7 +40,7 @@ def squared_error_figure(
     )
     return Figure(
         name="squared-error",
-        title=printable(title),
+        title=heading(title),
         panels=(panel,),
         caption=_caption(errors, there, each=each),
         alt=_alt(line),

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from schemas.toys import Toy
 from services.figures.marks import Arrow, Axis, Figure, Line, Mark, Panel, Points, Table
 from services.figures.style import COLORS, INK, Style
-from services.figures.words import number, printable, spoken, with_unit
+from services.figures.words import heading, number, spoken, with_unit
 
 REALITY = Style(INK, "dashed", "circle")
 SIMULATION = Style(COLORS[0], "solid", "circle")
@@ -28,7 +28,7 @@ def toy_figure(toys: Sequence[Toy], *, title: str | None = None) -> Figure:
     own = f"{spoken(first.name)}, repetition {first.repetition}{'' if several else f', iteration {first.iteration}'}"
     return Figure(
         name="toy",
-        title=printable(own if title is None else title),
+        title=heading(own if title is None else title),
         panels=tuple(_panel(each, titled=several) for each in toys),
         caption=_caption(toys),
         alt="The fitness of each gene, in reality and in simulation. " + " ".join(map(_told, toys)),

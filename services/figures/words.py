@@ -5,21 +5,28 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from math import isfinite
 
-LONGEST = 60  # characters of a name or a title in a figure
+LONGEST = 60  # characters of a name in a figure
+TITLE = 200  # of a title, which has as many lines as it needs
+LARGEST = 1e300  # of what is drawn: sums and the room around it are numbers still
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def spoken(name: str) -> str:
+def spoken(name: str, longest: int = LONGEST) -> str:
     """`known_fit` is written *Known fit*; a name that a person gave stays as it is."""
     identifier = re.fullmatch(r"[a-z][a-z0-9_]*", name)
-    return printable(name.replace("_", " ").capitalize() if identifier else name)
+    return printable(name.replace("_", " ").capitalize() if identifier else name, longest)
 
 
-def printable(text: str) -> str:
-    """The text as every renderer can show it, cut to a line."""
+def heading(text: str) -> str:
+    """A title as every renderer can show it."""
+    return printable(text, TITLE)
+
+
+def printable(text: str, longest: int = LONGEST) -> str:
+    """The text as every renderer can show it, cut to so many characters."""
     shown = "".join(each if each.isprintable() else "\N{REPLACEMENT CHARACTER}" for each in text)
-    return shown if len(shown) <= LONGEST else f"{shown[: LONGEST - 1]}…"
+    return shown if len(shown) <= longest else f"{shown[: longest - 1]}…"
 
 
 def told_apart(named: Sequence[tuple[str, str]]) -> list[str]:
@@ -66,9 +73,9 @@ def power(value: float) -> str:
     return ten if mantissa == "1" else f"{mantissa}·{ten}"
 
 
-def finite(value: float | None) -> float | None:
-    """The value, or None in place of nan and infinity."""
-    return value if value is not None and isfinite(value) else None
+def drawable(value: float | None) -> float | None:
+    """The value; None in place of nan, infinity, and what is too large to be reckoned with."""
+    return value if value is not None and abs(value) <= LARGEST else None
 
 
 def limits(values: Iterable[float | None], *, margin: float = 0.05) -> tuple[float, float]:

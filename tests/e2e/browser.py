@@ -41,7 +41,7 @@ def chromium():
 
 
 class Chromium:
-    """One browser; each `visit` has a context of its own, and what goes wrong in it is kept until `check`."""
+    """One browser; each `visit` has a context of its own, and what goes wrong in it is kept until `end`."""
 
     def __init__(self):
         self._playwright = sync_playwright().start()
@@ -54,17 +54,9 @@ class Chromium:
         self._troubles = []
         self._forgiven = []
 
-    def visit(self, url, *, dark=False, width=1280, height=900):
-        """A page at the address, in light or dark, as wide as a screen or a phone."""
-        context = self._browser.new_context(
-            color_scheme="dark" if dark else "light",
-            viewport={"width": width, "height": height},
-            reduced_motion="reduce",
-        )
-        context.grant_permissions(["clipboard-read", "clipboard-write"])
-        context.set_default_timeout(60_000)
-        self._contexts.append(context)
-        page = context.new_page()
+    def visit(self, url, *, beside=None, **how):
+        """A page at the address: in another tab of the window of the page `beside`, or in a window of its own."""
+        page = (beside.context if beside else self._window(**how)).new_page()
         page.on("console", lambda said: said.type == "error" and self._note(f"console: {said.text}"))
         page.on("pageerror", lambda error: self._note(f"error: {error}"))
         page.on("requestfailed", self._failed)
@@ -87,6 +79,18 @@ class Chromium:
     def close(self):
         self._browser.close()
         self._playwright.stop()
+
+    def _window(self, *, dark=False, width=1280, height=900):
+        """In light or dark, as wide as a screen or a phone."""
+        context = self._browser.new_context(
+            color_scheme="dark" if dark else "light",
+            viewport={"width": width, "height": height},
+            reduced_motion="reduce",
+        )
+        context.grant_permissions(["clipboard-read", "clipboard-write"])
+        context.set_default_timeout(60_000)
+        self._contexts.append(context)
+        return context
 
     def _failed(self, request):
         if request.failure != "net::ERR_ABORTED":  # a view that is left stops what it asked for

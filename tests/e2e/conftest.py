@@ -1,7 +1,8 @@
 """Fixtures of the tests in a browser.
 
 `visit(address, dark=…, width=…)` opens the page in Chromium, and fails the test if the console, a script or a request
-reports an error; `visit.forgive(pattern, …)` names those that a test causes. `archive` is the API alone on a database
+reports an error; `visit(address, beside=page)` does so in another tab of that page's window, which shares its
+connections; `visit.forgive(pattern, …)` names those that a test causes. `archive` is the API alone on a database
 with ended studies, `api` the same on the one of `written`, which tests fill as workers would, `shared_service` the real
 service with workers.
 """

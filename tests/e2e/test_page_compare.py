@@ -133,6 +133,26 @@ def test_what_should_not_be_compared_is_warned_of(archive, ids, visit):
     expect(warned).to_have_count(0)
 
 
+def test_what_differs_between_robots_and_realities_of_one_name_is_said(archive, visit):
+    page = visit(f"{archive.url}/#/compare")
+    warnings = """async (specs) => {
+      const { warnings } = await import("/assets/dashboard/views/compare/remarks.js");
+      return warnings(specs.map((spec, at) => ["AB"[at], { id: String(at), study: null, spec }]));
+    }"""
+    specs = [
+        {
+            "robot": {"name": "quadruped", "options": {"counted_s": seconds, "legs": 4}},
+            "reality": {"engine": {"name": "mujoco", "options": {"solver": solver}}, "parameters": {"restitution": 0}},
+        }
+        for seconds, solver in ((5, "newton"), (10, "cg"))
+    ]
+
+    robots, realities = page.evaluate(warnings, specs)
+
+    assert "A: quadruped (counted s 5); B: quadruped (counted s 10)." in robots
+    assert 'A: mujoco (solver "newton"), restitution 0; B: mujoco (solver "cg"), restitution 0.' in realities
+
+
 def test_a_reality_that_is_hidden_is_not_taken_for_the_same(api, written, visit):
     first, second = (experiments.submit_experiment(written, toy(name=name)).id for name in ("one", "two"))
     page = visit(address(api, first, second, "nowhere"))

@@ -6,6 +6,7 @@ import re
 import pytest
 
 QUIET = "#/toy"  # a view that asks for nothing
+QUEUED = {"robot": "toy_function", "strategies": ["random"], "budget": "smoke"}
 FOLLOWED = """
 async () => {
   const { follow } = await import("/assets/dashboard/lib/live.js");
@@ -45,7 +46,16 @@ def test_after_a_break_everything_is_asked_for_anew_until_it_is_there_also_if_so
     assert page.evaluate(FOLLOWED) == [[], [], [3]]
 
 
-@pytest.mark.parametrize("view", ["experiments/%", "experiments/..%2F..", "studies/%E0%A4%A"])
+@pytest.mark.parametrize(
+    "view",
+    [
+        "experiments/%",
+        "experiments/..%2F..",
+        "studies/%E0%A4%A",
+        "replay?experiment=../studies",
+        "toy?experiment=..%2Fcatalogue%3F",
+    ],
+)
 def test_an_address_that_cannot_be_an_id_is_no_page(visit, archive, view):
     page = visit(f"{archive.url}/#/{view}")
 
@@ -146,17 +156,51 @@ def test_a_stream_that_is_refused_is_not_a_service_that_is_away(visit, archive):
     page.get_by_text("What happens is not seen here: 20 streams are open; trying again…").wait_for()
 
 
-def test_a_list_that_did_not_come_is_not_said_to_be_empty(visit, archive):
-    visit.forgive("ERR_FAILED", "The service does not answer", "It may be down")
+def test_a_list_that_did_not_come_is_not_said_to_be_empty_and_comes_by_itself(visit, archive):
+    visit.forgive("ERR_FAILED")
     page = visit(f"{archive.url}/#/?show=experiments")
     page.locator("tr.experiment").nth(19).wait_for()
 
     page.route("**/experiments?*", lambda route: route.abort())
-    with page.expect_event("requestfailed"):
-        page.get_by_label("State").select_option("CANCELLED")
-    page.locator("tr.experiment input").first.check()
-
+    page.get_by_label("State").select_option("CANCELLED")
+    page.get_by_role("heading", name="The service does not answer").wait_for()
+    assert page.locator("tr.experiment").count() == 0
     assert page.get_by_text("Nothing here is like that").count() == 0
+    page.unroute("**/experiments?*")
+
+    page.locator("tr.experiment").first.wait_for()
+    page.get_by_role("heading", name="The service does not answer").wait_for(state="detached")
+
+
+def test_more_of_a_list_that_does_not_come_is_said_and_asked_for_again(visit, archive):
+    visit.forgive("500")
+    page = visit(f"{archive.url}/#/?show=experiments")
+    page.locator("tr.experiment").nth(19).wait_for()
+
+    busy = {"status": 500, "title": "Busy"}
+    page.route("**/experiments?*cursor=*", lambda route: route.fulfill(status=500, json=busy))
+    page.get_by_role("button", name="Show more").click()
+    page.get_by_role("heading", name="Busy").wait_for()
+    assert page.locator("tr.experiment").count() == 20
+    page.unroute("**/experiments?*cursor=*")
+    page.get_by_role("button", name="Try again").click()
+
+    page.locator("tr.experiment").nth(59).wait_for()
+    page.get_by_role("heading", name="Busy").wait_for(state="detached")
+
+
+def test_the_parts_of_a_long_list_meet_whatever_came_went_or_moved(visit, archive):
+    page = visit(f"{archive.url}/{QUIET}")
+    following = """async ([page, former]) => {
+      const { following } = await import("/assets/dashboard/views/list/seam.js");
+      const named = (ids) => [...ids].map((id) => ({ id }));
+      return following(named(page), named(former)).map(({ id }) => id).join("");
+    }"""
+
+    pages = ("abcd", "nabc", "bcde", "aben", "fabc", "cdn", "xyz", "")
+    found = [page.evaluate(following, [each, "abcdef"]) for each in pages]
+
+    assert found == ["ef", "def", "f", "f", "de", "ef", "", ""]
 
 
 def test_a_part_that_could_not_be_had_for_a_while_is_not_left_as_it_was(visit, archive):
@@ -173,3 +217,60 @@ def test_a_part_that_could_not_be_had_for_a_while_is_not_left_as_it_was(visit, a
     page.unroute("**/repetitions")
 
     page.locator("tbody .pill.cancelled").first.wait_for()
+
+
+def test_what_was_saved_is_shown_though_nothing_can_be_looked_at_any_more(visit, archive):
+    visit.forgive("ERR_FAILED")
+    study = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
+    page = visit(f"{archive.url}/#/studies/{study}")
+    page.get_by_role("button", name="Edit name and notes").click()
+    page.get_by_label("Name", exact=True).fill("second name")
+
+    page.route("**/*", lambda route: route.abort() if route.request.method == "GET" else route.continue_())
+    page.get_by_role("button", name="Save").click()
+
+    page.get_by_role("heading", name="second name").wait_for()
+    page.locator("dialog").wait_for(state="detached")
+    page.unroute("**/*")
+    archive.http.post(f"/studies/{study}/cancel")
+
+
+def test_a_change_whose_answer_was_lost_is_not_taken_for_somebody_elses(visit, archive):
+    visit.forgive("ERR_FAILED", "412")
+    study = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
+    page = visit(f"{archive.url}/#/studies/{study}")
+    page.get_by_role("button", name="Edit name and notes").click()
+    page.get_by_label("Name", exact=True).fill("second name")
+
+    page.route(f"**/studies/{study}", lambda route: (route.fetch(), route.abort()))
+    page.get_by_role("button", name="Save").click()
+    page.locator("dialog").get_by_text("It may be down").wait_for()
+    page.unroute(f"**/studies/{study}")
+    page.get_by_role("button", name="Save").click()
+
+    page.get_by_role("heading", name="second name").wait_for()
+    page.locator("dialog").wait_for(state="detached")
+    archive.http.post(f"/studies/{study}/cancel")
+
+
+def test_an_estimate_that_comes_late_does_not_wipe_away_why_the_study_was_refused(visit, archive):
+    visit.forgive("429")
+    page = visit(f"{archive.url}/#/new")
+    page.locator(".panel .big").wait_for()
+    late = []
+    page.route("**/studies/estimate", lambda route: late.append(route))
+    page.route("**/studies", lambda route: route.fulfill(status=429, json={"status": 429, "title": "Too many"}))
+
+    page.get_by_label("Name", exact=True).fill("one too many")
+    with page.expect_request("**/studies/estimate"):
+        page.get_by_role("button", name="Submit the study").click()
+    refusal = page.get_by_role("alert").get_by_text("Too many").first
+    refusal.wait_for()
+    with page.expect_response("**/studies/estimate"):
+        late[-1].continue_()
+    page.wait_for_timeout(200)
+    assert refusal.is_visible()
+    page.unroute("**/studies/estimate")
+    page.get_by_label("Name", exact=True).fill("another")
+
+    refusal.wait_for(state="detached")

@@ -1,5 +1,6 @@
 """What is in the figures of one experiment: simulators, predictions, squared error, and curves against their cost."""
 
+import json
 from warnings import catch_warnings
 
 import pytest
@@ -9,6 +10,8 @@ from services.core.arrays import frozen
 from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred
 from services.core.types import Tuned as TunedStep
 from services.efforts import abscissa
+from services.figures.chart import chart
+from services.figures.curves import curves_figure
 from services.figures.files import render_file
 from services.figures.marks import Diagonal, Figure, Level, Line, Mark, Points
 from services.figures.predictions import AFTER, BEFORE, predictions_figure
@@ -17,7 +20,7 @@ from services.figures.squared_error import squared_error_figure
 from services.store.session import Store
 from services.tuned import tunings
 from tests.experiments import run, toy
-from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, prediction, tuned
+from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, curve, point, prediction, tuned
 
 
 def marks(figure: Figure, panel: int = 0) -> dict[str, Mark]:
@@ -86,14 +89,14 @@ def test_predictions_are_drawn_before_and_after_with_the_line_of_agreement():
     found = marks(figure)
     (panel,) = figure.panels
     assert (found[BEFORE].x, found[BEFORE].y) == ((1.0, 1.0), (0.5, 1.5))
-    assert (found[AFTER].x, found[AFTER].y) == ((1.0, 1.0, 0.3), (0.9, 1.1, 0.3))
+    assert (found[AFTER].x, found[AFTER].y) == ((1.0, 1.0), (0.9, 1.1))
     assert any(isinstance(each, Diagonal) for each in panel.marks)
     assert panel.x.limits == panel.y.limits
     assert (panel.x.label, panel.y.label) == ("Fitness in reality (m/s)", "Fitness in simulation (m/s)")
     told = figure.caption.replace("\N{NO-BREAK SPACE}", " ")
     assert "4 samples of 2 repetitions" in told
     assert "Before tuning on it: root-mean-square error 0.5 m/s." in told
-    assert "After tuning on it: root-mean-square error 0.082 m/s." in told
+    assert "After tuning on it: root-mean-square error 0.1 m/s." in told
     assert "2 samples left out: a measurement or the physics failed." in told
     assert "3 samples of later repetitions left out: they are too many." in told
     assert "2 samples still being computed." in told
@@ -146,10 +149,14 @@ def test_the_band_of_squared_errors_is_told_of_only_where_there_is_one():
     assert "band: from the first to the third quartile." in several.caption
 
 
-def test_every_sample_that_misses_one_of_its_points_is_counted_as_left_out():
-    figure = predictions_figure([prediction(None, 0.3, 0.3), prediction(0.3, None, 0.3, 1)])
+def test_a_sample_that_misses_one_of_its_points_is_left_out_of_both_so_that_they_are_of_the_same_samples():
+    halves = [prediction(None, 0.3, 0.3), prediction(0.3, None, 0.3, 1)]
+    figure = predictions_figure([prediction(0.5, 0.4, 0.3), prediction(0.1, 0.2, 0.3, 1), *halves])
 
     assert "2\N{NO-BREAK SPACE}samples left out" in figure.caption
+    assert "Before tuning on it: root-mean-square error 0.2." in figure.caption
+    assert "before tuning on it, 2 samples are off by 0.2" in figure.alt
+    assert predictions_figure(halves).empty
 
 
 def test_what_exploding_physics_says_is_drawn_too():
@@ -161,6 +168,36 @@ def test_what_exploding_physics_says_is_drawn_too():
     # matplotlib looks for ticks beyond the greatest number
     with catch_warnings(action="ignore", category=RuntimeWarning):
         assert render_file(tuning, "svg")
+
+
+def test_what_is_too_large_to_be_reckoned_with_is_left_out_as_what_failed():
+    huge = 1.7e308
+    predicted = predictions_figure([prediction(huge, -huge, 1.0), prediction(0.5, 1.0, 1.0, 1)])
+    tuning = squared_error_figure({1: {0: huge, 1: huge, 2: 1.0}, 2: {0: huge, 1: huge}}, each=True)
+
+    assert marks(predicted)[BEFORE].y == (0.5,)
+    assert "1\N{NO-BREAK SPACE}sample left out" in predicted.caption
+    assert marks(tuning)["Best simulator"].x[0] == 1
+    assert "4\N{NO-BREAK SPACE}values left out" in tuning.caption
+    assert squared_error_figure({1: {0: huge}}).empty
+
+
+@pytest.mark.parametrize("large", [1e300, 1.7e308])
+def test_every_figure_is_drawn_however_large_its_numbers_are(large: float):
+    ends = [point(at, value, sd=large) for at, value in enumerate((large, -large, 1.0))]
+    figures = [
+        curves_figure([curve("a", *ends)], band="sd", each=True),
+        curves_figure([curve("a", *ends)], band="interval"),
+        curves_figure([curve("a", point(0, large, sd=large)).model_copy(update={"direct": True})]),
+        predictions_figure([prediction(large, -large, large), prediction(0.5, 1.0, 1.0, 1)]),
+        squared_error_figure({1: {0: large, 1: large, 2: 1.0}, 2: {0: large}}, each=True),
+        squared_error_figure({1: {0: large}, 2: {0: large, 1: large}}),
+    ]
+
+    for figure in figures:
+        json.dumps(chart(figure), allow_nan=False)
+        with catch_warnings(action="ignore", category=RuntimeWarning):
+            assert render_file(figure, "svg")
 
 
 def log(first: int, *, iterations: int, fitness: float | None = 1.0):

@@ -128,10 +128,11 @@ def test_a_file_is_as_wide_as_asked_for_and_without_its_caption_lower():
 @pytest.mark.parametrize("words", ["a title of many words " * 9, "x" * 200])
 def test_long_titles_are_broken_and_long_names_shortened_in_their_middle(words: str):
     first, second = (curve(words, point(0, 1.0)).model_copy(update={"experiment": each}) for each in "ab")
-    figure = replace(curves_figure([first, second]), title=words, caption=words)
+    figure = replace(curves_figure([first, second], title=words), caption=words)
 
     picture = pixels(figure)
 
+    assert figure.title == words
     edge = np.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])[:, :3]
     assert edge.min() > 0.99, "something is cut off at the edge"
     with rc_context(LOOK):

@@ -16,7 +16,7 @@ from tests.soak.soak import soak
 
 KINDS = {"sqlite": Sqlite, "postgres": Postgres}
 
-FAULT_S = 7.0
+FAULT_S = 5.5
 """That a fault takes on two cores, with what comes after it."""
 
 
@@ -25,7 +25,7 @@ def main():
     parser.add_argument("--faults", type=int, default=1000, help="in all; half of them on each database")
     parser.add_argument("--seed", type=int, help="left out: a new one")
     parser.add_argument("--database", choices=KINDS, action="append", help="left out: both, one after the other")
-    parser.add_argument("--at-once", type=int, default=4, help="faults that may come together")
+    parser.add_argument("--at-once", type=int, default=8, help="faults that may come together")
     parser.add_argument("--folder", type=Path, help="for logs and histories; left out: they are not kept")
     given = parser.parse_args()
     seed = SystemRandom().randrange(10**6) if given.seed is None else given.seed

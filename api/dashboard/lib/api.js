@@ -1,6 +1,7 @@
 /** The service: what is asked of it, what it answers, and what happens there. */
 
 import { read, written } from "./json.js";
+import { inSight, whileInSight } from "./sight.js";
 import { token } from "./token.js";
 
 /** A problem that the service answered with, or that it did not answer (status 0). */
@@ -16,19 +17,16 @@ export const get = async (path, query = {}, signal = undefined) =>
   (await request(path + search(query), { signal })).json();
 
 /** The JSON at `path`, and the tag that a change of it names. */
-export async function tagged(path, signal = undefined) {
-  const answer = await request(path, { signal });
-  return { value: read(await answer.text()), tag: answer.headers.get("ETag") };
-}
+export const tagged = async (path, signal = undefined) => withTag(await request(path, { signal }));
 
 /** The file at `path`. */
 export const blob = async (path, query = {}) => (await request(path + search(query), {})).blob();
 
 /** What the service made of a POST. */
-export const post = (path, body = undefined, headers = {}) => send("POST", path, body, headers);
+export const post = async (path, body = undefined, headers = {}) => (await send("POST", path, body, headers)).json();
 
-/** What the service made of a PATCH. */
-export const patch = (path, body, headers = {}) => send("PATCH", path, body, headers);
+/** What the service made of a PATCH, and its tag. */
+export const patch = async (path, body, headers = {}) => withTag(await send("PATCH", path, body, headers));
 
 /** A query as it stands in an address: `?a=1&a=2`, or nothing. */
 export function search(query) {
@@ -37,10 +35,11 @@ export function search(query) {
   return pairs.length ? `?${new URLSearchParams(pairs)}` : "";
 }
 
-async function send(method, path, body, headers) {
+const withTag = async (answer) => ({ value: read(await answer.text()), tag: answer.headers.get("ETag") });
+
+function send(method, path, body, headers) {
   const json = body === undefined ? {} : { body: written(body) };
-  const answer = await request(path, { method, headers: { "Content-Type": "application/json", ...headers }, ...json });
-  return answer.json();
+  return request(path, { method, headers: { "Content-Type": "application/json", ...headers }, ...json });
 }
 
 /** Ask, and raise what is wrong as a Problem. Addresses are relative, so that the service may live below a prefix. */
@@ -60,16 +59,20 @@ async function request(path, options) {
 /**
  * Server-sent events after `query.after`, or from now on, for as long as `signal` lasts: `handler({ kind, id, data })` for each of them, and
  * `connected(true | false, why)` as the stream comes and goes, with why the service refused it. It is taken up again where it broke off,
- * without a hole.
+ * without a hole. A page that is out of sight lets go of it without a word, until it is in sight again.
  */
 export async function events(query, handler, connected, signal) {
   let last = null;
   while (!signal.aborted) {
     let why = "";
+    let seen = null;
     try {
       last ??= query.after ?? (await get("/events/page", { limit: 1 }, signal)).latest;
+      await inSight(signal);
+      if (signal.aborted) return;
+      seen = whileInSight(signal);
       const headers = { Accept: "text/event-stream", "Last-Event-ID": last };
-      const answer = await request(`/events${search(query)}`, { headers, signal });
+      const answer = await request(`/events${search(query)}`, { headers, signal: seen.signal });
       connected(true);
       for await (const event of parsed(answer.body)) {
         last = event.id ?? last;
@@ -77,8 +80,11 @@ export async function events(query, handler, connected, signal) {
       }
     } catch (error) {
       if (signal.aborted) return;
+      if (seen?.signal.aborted) continue;
       if (error.status === 401 || error.status === 403) throw error;
       if (error.status < 500 && error.status > 0) why = error.message;
+    } finally {
+      seen?.abort();
     }
     connected(false, why);
     await new Promise((resume) => setTimeout(resume, 1500));

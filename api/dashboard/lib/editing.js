@@ -5,22 +5,25 @@ import { ask } from "./dialog.js";
 
 const CHANGED_MEANWHILE = 412;
 
-/** Ask for them, and send them to `address` with the tag of what was looked at; `shown()` is what the page shows now. */
+/**
+ * Ask for them, and send them to `address` with the tag of what was looked at; `shown()` is what the page shows now, and
+ * what they were changed to is what it takes, with its tag.
+ */
 export function edit(page, address, shown) {
   const { name, notes } = shown();
   let tag = page.tag;
   const act = async (values) => {
     try {
-      await patch(address, { name: values.name, notes: values.notes || null }, { "If-Match": tag });
+      page.take(await patch(address, { name: values.name, notes: values.notes || null }, { "If-Match": tag }));
     } catch (error) {
       if (error.status !== CHANGED_MEANWHILE) throw error;
       await page.look();
       tag = page.tag;
       const { name: theirs, notes: written } = shown();
+      if (theirs === values.name && (written ?? "") === values.notes) return;  // it was saved, and the answer was lost
       const detail = `Somebody changed it meanwhile: its name is “${theirs}”, its notes are “${written ?? ""}”. Save again to write over that.`;
       throw new Problem({ status: error.status, title: error.title, detail });
     }
-    await page.look();
   };
   ask({
     title: "Edit name and notes",

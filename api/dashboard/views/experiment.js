@@ -23,11 +23,11 @@ export async function show(root, parameters, signal) {
   const found = await tagged(`/experiments/${id}`, signal);
   const page = { id, signal, latest, experiment: found.value, tag: found.tag, parts: sections(signal) };
   const top = head(page);
-  page.look = async () => {
-    const now = await tagged(`/experiments/${id}`, signal);
-    Object.assign(page, { experiment: now.value, tag: now.tag });
+  page.take = ({ value, tag }) => {
+    Object.assign(page, { experiment: value, tag });
     top.update();
   };
+  page.look = async () => page.take(await tagged(`/experiments/${id}`, signal));
   const drawn = figures(page);
   root.replaceChildren(
     top.element,

@@ -4,9 +4,10 @@ import { get } from "../lib/api.js";
 import { h } from "../lib/dom.js";
 import { follow } from "../lib/live.js";
 import { rows } from "../lib/rows.js";
-import { empty, loading } from "../lib/states.js";
+import { empty, failed, loading } from "../lib/states.js";
 import { addressOf, filters, isFiltered, wantedBy } from "./list/filters.js";
 import { experimentRow, heads, studyRow } from "./list/rows.js";
+import { following } from "./list/seam.js";
 import { selectionBar } from "./list/selection.js";
 
 const AT_ONCE = 20;
@@ -33,6 +34,7 @@ export async function show(root, parameters, signal) {
   const head = h("div", { class: "titled" }, h("h1", {}, "Studies and experiments"), h("a", { class: "button", href: "#/new" }, "New study"));
   root.replaceChildren(head, place, list.element);
   await changed(wantedBy(parameters));
+  if (signal.aborted) return;
   follow({}, () => list.refresh(), signal);
   const clock = setInterval(() => list.draw(), MINUTE_MS);
   signal.addEventListener("abort", () => clearInterval(clock));
@@ -41,7 +43,7 @@ export async function show(root, parameters, signal) {
 /** The table, as much of it as was asked for. */
 class List {
   constructor(signal, unit) {
-    Object.assign(this, { signal, unit, open: new Set(), items: [], next: null, wanted: null, turn: 0 });
+    Object.assign(this, { signal, unit, open: new Set(), items: [], next: null, wanted: null, turn: 0, trouble: null });
     const body = h("tbody");
     const make = (each) => (each.value.experiments ? studyRow(each, this) : experimentRow(each, this));
     this.fill = rows(body, (each) => `${each.value.id} ${each.nested ?? ""}`, make);
@@ -53,10 +55,18 @@ class List {
     this.ticked = () => { this.bar.update(); this.draw(); };
   }
 
-  /** Another list than before. */
+  /** Another list than before. If it does not come, that stands in place of the former one. */
   async ask(wanted) {
     Object.assign(this, { wanted, next: null });
-    await this.refresh(AT_ONCE, []);
+    const coming = this.refresh(AT_ONCE, []);
+    const { turn } = this;
+    try {
+      await coming;
+    } catch (error) {
+      if (turn !== this.turn || this.signal.aborted) return;
+      this.items = [];
+      this.fail(error, () => this.ask(wanted));
+    }
   }
 
   /** The same list anew, as long as it is. */
@@ -65,25 +75,35 @@ class List {
     const { show: kind, ...which } = this.wanted;
     const page = await get(`/${kind}`, { ...which, limit }, this.signal);
     if (turn !== this.turn || this.signal.aborted) return;
-    const rest = (former ?? this.items).slice(limit);
+    const all = former ?? this.items;
+    const rest = all.length > limit ? following(page.items, all) : [];
+    if (former || !this.items.length) this.trouble = null;
     Object.assign(this, { items: [...page.items, ...rest], next: rest.length ? this.next : page.next });
     this.draw();
   }
 
-  /** What follows. */
+  /** What follows. If it does not come, that is said below the list. */
   async lengthen() {
     const asked = this.wanted;
     const { show: kind, ...which } = asked;
     this.more.disabled = true;
+    this.trouble = null;
     try {
       const page = await get(`/${kind}`, { ...which, limit: AT_ONCE * 2, cursor: this.next }, this.signal);
       if (asked !== this.wanted) return;  // another list has taken its place
       this.items.push(...page.items);
       this.next = page.next;
       this.draw();
+    } catch (error) {
+      if (asked === this.wanted && !this.signal.aborted) this.fail(error, () => this.lengthen());
     } finally {
       this.more.disabled = false;
     }
+  }
+
+  fail(error, again) {
+    this.trouble = failed(error, again, "h2");
+    this.draw();
   }
 
   toggle(id) {
@@ -97,7 +117,8 @@ class List {
     this.fill(shown);
     this.table.hidden = !shown.length;
     this.more.hidden = !this.next;
-    this.note.replaceChildren(...(shown.length ? [] : [this.nothing()]));
+    const note = this.trouble ?? (shown.length ? null : this.nothing());
+    if (!note || note !== this.note.firstChild) this.note.replaceChildren(...(note ? [note] : []));
   }
 
   nothing() {

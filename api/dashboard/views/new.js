@@ -24,7 +24,7 @@ export async function show(root, parameters, signal) {
 /** The form, its draft, and what the service says of it. */
 class Form {
   constructor(catalogue, signal) {
-    Object.assign(this, { catalogue, signal, draft: null, places: new Places(), timer: null, turn: 0, key: null, keyOf: null });
+    Object.assign(this, { catalogue, signal, draft: null, places: new Places(), timer: null, turn: 0, refused: false, key: null, keyOf: null });
     this.panel = panel();
     this.parts = h("div", { class: "parts" });
     this.element = h("form", { class: "new", novalidate: true, onsubmit: (event) => this.submit(event) }, this.parts, this.panel.element);
@@ -60,21 +60,25 @@ class Form {
 
   /** Ask the service what the spec costs and what is wrong with it, soon. */
   check(after = TYPING_MS) {
+    this.refused = false;
     this.panel.show(specOf(this.draft));
     clearTimeout(this.timer);
     this.timer = setTimeout(() => this.estimate(), after);
   }
 
+  /** What was said of a submission that was refused stays until something is changed. */
   async estimate() {
     const turn = ++this.turn;
+    const overtaken = () => turn !== this.turn || this.signal.aborted;
     try {
       const found = await post("/studies/estimate", specOf(this.draft));
-      if (turn !== this.turn || this.signal.aborted) return;
+      if (overtaken()) return;
+      this.panel.estimate(found);
+      if (this.refused) return;
       this.places.show([]);
       this.panel.refuse([]);
-      this.panel.estimate(found);
     } catch (error) {
-      if (turn === this.turn && !this.signal.aborted) this.refuse(error, "Once what is marked is right, this says what it costs.");
+      if (!overtaken() && !this.refused) this.refuse(error, "Once what is marked is right, this says what it costs.");
     }
   }
 
@@ -93,6 +97,7 @@ class Form {
       location.hash = `#/studies/${study.id}`;
     } catch (error) {
       if (this.signal.aborted) return;
+      this.refused = true;
       this.refuse(error, "It was not submitted: what is marked is not right yet.");
       this.parts.querySelector("[aria-invalid]")?.focus();
       this.panel.busy(false);

@@ -22,12 +22,12 @@ export async function show(root, parameters, signal) {
   const page = { id, signal, study: found.value, tag: found.tag, unit: (experiment) => units[experiment.spec.robot.name] ?? "" };
   const top = head(page);
   const below = experiments(page);
-  page.look = async () => {
-    const now = await tagged(`/studies/${id}`, signal);
-    Object.assign(page, { study: now.value, tag: now.tag });
+  page.take = ({ value, tag }) => {
+    Object.assign(page, { study: value, tag });
     top.update();
     below.update();
   };
+  page.look = async () => page.take(await tagged(`/studies/${id}`, signal));
   const drawn = curves(page);
   root.replaceChildren(top.element, drawn.element, below.element, lines(page));
   follow({ study: id, after: latest }, async (events) => {

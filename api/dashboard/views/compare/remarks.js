@@ -26,13 +26,13 @@ export function warnings(found) {
   const realities = groups(found, reality(found));
   const said = [];
   if (robots.length > 1) {
-    const which = named(robots, ({ spec }) => spec.robot.name);
+    const which = named(robots, ({ spec }) => plugin(spec.robot, found.map(([, each]) => each.spec.robot)));
     said.push(`⚠ Different robots: ${which}. Their fitness does not mean the same, and differences between them say nothing.`);
   }
   if (realities.length > 1 && realities.some(({ key }) => key.startsWith("hidden"))) {
     said.push("⚠ Some realities are hidden until their experiments have ended: whether all of these have the same cannot be said yet.");
   } else if (realities.length > 1) {
-    said.push(`⚠ Different realities: ${named(realities, told)}. A difference may come from the reality, not from the strategy.`);
+    said.push(`⚠ Different realities: ${named(realities, (each) => told(each, found))}. A difference may come from the reality, not from the strategy.`);
   }
   return said;
 }
@@ -62,10 +62,19 @@ function reality(found) {
 
 const hidden = ({ spec }) => Object.values(spec.reality.parameters ?? {}).some((each) => each === null) || !spec.reality.parameters;
 
-function told({ spec }) {
-  const values = Object.entries(spec.reality.parameters).map(([name, value]) => `${name.replaceAll("_", " ")} ${value}`);
-  return [spec.reality.engine?.name, ...values].filter(Boolean).join(", ");
+function told({ spec: { reality: { engine, parameters } } }, found) {
+  const engines = found.map(([, { spec }]) => spec.reality.engine).filter(Boolean);
+  return [engine && plugin(engine, engines), ...Object.entries(parameters).map(valued)].filter(Boolean).join(", ");
 }
+
+/** Its name, with the options in which it differs from others of that name. */
+function plugin({ name, options = {} }, all) {
+  const others = all.filter((each) => each.name === name).map((each) => each.options ?? {});
+  const own = Object.entries(options).filter(([key, value]) => others.some((each) => text(each[key]) !== text(value)));
+  return own.length ? `${name} (${own.map(valued).join(", ")})` : name;
+}
+
+const valued = ([name, value]) => `${name.replaceAll("_", " ")} ${text(value)}`;
 
 const named = (all, say) => all.map(({ members }) => `${members.map(([short]) => short).join(", ")}: ${say(members[0][1])}`).join("; ");
 
