@@ -202,7 +202,7 @@ class Supervisor:
         except Conflict:
             for run in runs:
                 try:
-                    execution.complete(self._store, run.claim)
+                    execution.complete_all(self._store, [run.claim])
                 except Conflict as error:
                     run.lost = f"it ended too early: {error}"
 
