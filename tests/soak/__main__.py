@@ -17,7 +17,7 @@ from tests.soak.soak import soak
 KINDS = {"sqlite": Sqlite, "postgres": Postgres}
 
 FAULT_S = 5.5
-"""That a fault takes on two cores, with what comes after it."""
+"""That a fault took on two cores, with what came after it, while the other database had its own."""
 
 
 def main():
