@@ -12,6 +12,9 @@ from tests.e2e.browser import axe, fits, screenshot
 FLAT = "HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...options) \
 { return kind === 'webgl2' ? null : get.call(this, kind, ...options); })(HTMLCanvasElement.prototype.getContext)"
 
+LATE = "() => { const react = Plotly.react; const late = () => new Promise((resume) => setTimeout(resume, 500)); \
+Plotly.react = (...given) => late().then(() => react(...given)); }"
+
 
 @pytest.fixture(scope="module")
 def walker(archive):
@@ -132,6 +135,22 @@ def test_the_cursor_of_the_gait_follows_the_time_and_a_click_moves_it(visit, arc
 
     assert then["x"] > at + 20
     eventually(page, lambda: abs(time_of(page) - 1) < 0.03)
+
+
+def test_the_cursor_follows_a_gait_that_is_painted_late_at_another_width(visit, archive, walker):
+    page = replay(visit, archive, walker)
+    page.wait_for_selector(".gait .main-svg")
+    page.get_by_label("Time", exact=True).fill("1.5")
+    page.locator(".gait .cursor").wait_for(state="visible")
+    page.evaluate(LATE)
+
+    page.set_viewport_size({"width": 400, "height": 900})
+
+    def on_the_time():
+        cursor, plotted = page.locator(".gait .cursor").bounding_box(), page.locator(".gait .bglayer").bounding_box()
+        return plotted["width"] < 400 and abs(cursor["x"] - plotted["x"] - plotted["width"] / 2) < 20
+
+    eventually(page, on_the_time)
 
 
 def test_another_controller_or_simulator_is_chosen_and_is_in_the_address(visit, archive, walker):

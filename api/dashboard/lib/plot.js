@@ -25,7 +25,7 @@ function plotly() {
 /**
  * Draw `/figures/{kind}` into `element`, with its caption and its words for those who do not see it.
  * Returns a function that draws it anew, with another query if one is given, and says whether it is as of now; its `drawn` is when it was
- * drawn at first.
+ * drawn at first. After each painting the event `painted` rises from it, for what stands over the figure.
  */
 export function plot(element, kind, query, signal) {
   const canvas = h("div", { class: "plot" });
@@ -60,6 +60,7 @@ export function plot(element, kind, query, signal) {
     canvas.style.height = layout.height ? `${layout.height}px` : "";
     await library.react(canvas, data, layout, { displayModeBar: false });
     drawn = true;
+    canvas.dispatchEvent(new Event("painted", { bubbles: true }));
   };
   let painting = Promise.resolve();
   /** One after the other: of two at once Plotly may keep the size of the one that began first. */

@@ -28,9 +28,7 @@ export function gait(asked, replay, to, signal) {
     const x = layout()?.xaxis;
     if (x?._length) to(x.p2l(event.clientX - place.querySelector(".plot").getBoundingClientRect().left - x._offset));
   });
-  const sizes = new ResizeObserver(() => cursor(now));
-  sizes.observe(framed);
-  signal.addEventListener("abort", () => sizes.disconnect());
+  place.addEventListener("painted", () => cursor(now));
   plot(place, "gait", asked, signal);
   return { element: h("section", { class: "card" }, h("h2", {}, "Gait"), framed, figureFiles("gait", asked, `gaplab-${asked.experiment}-gait`)), cursor };
 }
