@@ -22,7 +22,10 @@ class Provenance(Frozen):
     system: str
     spec_version: int
     plugins: dict[str, str] = Field(
-        default={}, description="files of plug-ins from outside gaplab, each with a hash of its content"
+        default={}, description="modules from outside gaplab and what is in packages, each with a hash of its content"
+    )
+    outside: dict[str, str] = Field(
+        default={}, description="by kind and name, the file of each of these plug-ins that is no engine, with its hash"
     )
 
 
@@ -39,7 +42,8 @@ class ProvenanceRead(Frozen):
     """Under what an experiment was computed: nothing as long as it has not begun."""
 
     computed_with: str | None = Field(
-        default=None, description="engines, machine and version of the spec; a supervisor with others leaves it alone"
+        default=None,
+        description="engines, machine, version of the spec, own plug-ins; a supervisor with others leaves it alone",
     )
     refused_by: str | None = Field(default=None, description="what a supervisor has that has left it alone")
     uses: tuple[ProvenanceUse, ...] = ()

@@ -34,7 +34,7 @@ def claim(store: Store, owner: str, limit: int, under: Provenance | None = None)
         owner: who runs them.
         limit: how many at most.
         under: what they are to be computed with; this process's own if left out. An experiment that was begun under
-            other engine versions, another architecture or another version of the spec is left alone.
+            other engines or plug-ins, another architecture or version of the spec is left alone.
     """
     own = under or provenance()
     return store.write(lambda session: leases.claim(session, owner, limit, own)) if limit > 0 else ()

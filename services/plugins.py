@@ -37,18 +37,18 @@ def load() -> None:
 
 
 def digests() -> dict[str, str]:
-    """The files of the folders, each with twelve letters that change with its content; none without folders.
+    """The modules of the folders and all that is in packages, each with twelve letters that change with its content.
 
-    Files that have a name in common, data beside plug-ins in several folders, have their letters in common as well.
+    What else lies there, a database perhaps, is no part of a plug-in: data belongs into a package.
     """
-    found: dict[str, bytes] = {}
+    found: dict[str, str] = {}
     for folder in outside.folders():
-        for path in sorted(folder.rglob("*")):
+        packages = sorted(path.parent for path in folder.glob("*/__init__.py"))
+        for path in sorted([*folder.glob("*.py"), *(each for package in packages for each in package.rglob("*"))]):
             parts = path.relative_to(folder).parts
             if path.is_file() and not any(each.startswith(".") or each == "__pycache__" for each in parts):
-                name = "/".join(parts)
-                found[name] = found.get(name, b"") + path.read_bytes()
-    return {name: sha256(content).hexdigest()[:12] for name, content in found.items()}
+                found["/".join(parts)] = sha256(path.read_bytes()).hexdigest()[:12]
+    return found
 
 
 def digest_of(file: str) -> str:

@@ -20,7 +20,7 @@ def read(store: Store, experiment_id: str) -> ProvenanceRead:
 
 
 def accept_versions(store: Store, experiment_id: str) -> ExperimentRead:
-    """Let the experiment go on under other engine versions than it was begun with: those of the next supervisor.
+    """Let the experiment go on under other engines or plug-ins than it was begun with: those of the next supervisor.
 
     Raises:
         NotFound: no such experiment.

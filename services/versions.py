@@ -2,15 +2,21 @@
 
 import platform
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, packages_distributions, version
 from pathlib import Path
+from typing import Any
 
 from schemas.provenance import Provenance
+from services.core.optimizers import optimizers
 from services.core.outside import file_of
+from services.core.registry import Registry
+from services.core.robots import robots
+from services.core.strategies import strategies
+from services.core.tunables import tunables
 from services.engines import engines
 from services.engines.base import Engine
 from services.plugins import digest, digest_of, digests
@@ -57,6 +63,7 @@ def provenance() -> Provenance:
         system=platform.platform(),
         spec_version=SPEC_VERSION,
         plugins=digests(),
+        outside=dict(_outside((strategies, robots, tunables, optimizers))),
     )
 
 
@@ -66,6 +73,14 @@ def _engine(engine: type[Engine]) -> str:
     if (file := file_of(engine)) is not None:
         return f"{file} {digest_of(file)}" + (f", {library}" if library else "")
     return library or "of gaplab's own"
+
+
+def _outside(registries: Iterable[Registry[Any]]) -> Iterator[tuple[str, str]]:
+    """The plug-ins that are not gaplab's own, each with what changes when its numbers may."""
+    for registry in registries:
+        for name, plugin in registry.items():
+            if (file := file_of(plugin)) is not None:
+                yield f"{registry.kind} {name}", f"{file} {digest_of(file)}"
 
 
 @cache

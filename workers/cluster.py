@@ -24,7 +24,8 @@ class Cluster:
 
     Attributes:
         workers: repetitions to run at once; None for as many as there are cores.
-        versions: that each node must have; none on a Ray of our own, which runs what this process runs.
+        versions: that each process must have that runs a repetition. A Ray of our own is on this machine, but starts
+            processes whenever it needs some, and files may be edited in between.
     """
 
     workers: int | None
@@ -60,10 +61,11 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
     try:
         if settings.ray_address:
             _join(settings.ray_address)
-            yield Cluster(settings.workers, versions())
+            workers = settings.workers
         else:
             _start(settings.workers)
-            yield Cluster(None, {})
+            workers = None
+        yield Cluster(workers, versions())
     finally:
         ray.shutdown()
 

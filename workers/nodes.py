@@ -6,7 +6,7 @@ import ray
 from ray.exceptions import RayError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-from services.core.errors import ClusterUnusable
+from services.core.errors import ClusterUnusable, PluginBroken
 from services.versions import Versions as Versions
 from services.versions import versions as versions
 
@@ -18,9 +18,14 @@ def check_here(expected: Versions) -> None:
     """Do nothing if this process has what the supervisor has.
 
     Raises:
-        ClusterUnusable: it has not; the message says what.
+        ClusterUnusable: it has not, or a plug-in from outside is broken here; the message says what.
     """
-    _compare(platform.node(), versions(), expected)
+    try:
+        found = versions()
+    except PluginBroken as error:
+        msg = f"the node {platform.node()} cannot use a plug-in that the supervisor has: {error}"
+        raise ClusterUnusable(msg) from error
+    _compare(platform.node(), found, expected)
 
 
 def check_nodes() -> None:
@@ -51,7 +56,10 @@ def _compare(node: str, found: Versions, expected: Versions) -> None:
     wrong = [name for name in expected if found.get(name) != expected[name]]
     if wrong:
         theirs, ours = (", ".join(f"{name} {has.get(name, 'none')}" for name in wrong) for has in (found, expected))
-        msg = f"the node {node} has {theirs} where the supervisor has {ours}: install the same on all nodes"
+        msg = (
+            f"the node {node} has {theirs} where the supervisor has {ours}: install the same on all nodes, "
+            "or start the supervisor again if files were changed since it started"
+        )
         raise ClusterUnusable(msg)
 
 

@@ -38,5 +38,5 @@ class History:
         return self._read(ProvenanceRead, self._get(f"/experiments/{part(id)}/provenance"))
 
     def accept_versions(self: "Client", id: str) -> ExperimentRead:  # noqa: A002 - as the API says
-        """Let an experiment go on under other engine versions than it was begun with."""
+        """Let an experiment go on under other engines or plug-ins than it was begun with."""
         return self._read(ExperimentRead, self._request("POST", f"/experiments/{part(id)}/accept-versions"))

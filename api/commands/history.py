@@ -43,7 +43,7 @@ def accept_versions(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Let an experiment go on under other engine versions than it was begun with."""
+    """Let an experiment go on under other engines or plug-ins than it was begun with."""
     with connect(url) as client:
         found = client.accept_versions(id)
     if as_json:

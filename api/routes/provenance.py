@@ -28,7 +28,7 @@ def read_provenance(id: Id, store: StoreDep) -> ProvenanceRead:  # noqa: A002 - 
     responses={200: examples.shown(examples.EXPERIMENT, "The next supervisor goes on with it"), **documented(404, 409)},
 )
 def accept_versions(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
-    """Let an experiment go on under other engine versions than it was begun with: those of the next supervisor.
+    """Let an experiment go on under other engines or plug-ins than it was begun with: those of the next supervisor.
 
     Its numbers need not be those that the first versions would have given, and which were used is recorded.
     """

@@ -19,7 +19,7 @@ class Service:
         http: a client of it.
     """
 
-    def __init__(self, folder, database_url=None):
+    def __init__(self, folder, database_url=None, plugins=""):
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
@@ -31,6 +31,7 @@ class Service:
             "GAPLAB_PORT": str(port),
             "GAPLAB_WORKERS": "2",
             "GAPLAB_LEASE_S": "5",
+            "GAPLAB_PLUGINS": str(plugins),
         }
         self._process = None
 
@@ -38,13 +39,13 @@ class Service:
         with self._log.open("ab") as log:
             command = [sys.executable, "-m", "api.cli", "serve"]
             self._process = subprocess.Popen(command, env=self._environment, stdout=log, stderr=log)
-        wait_until(self._answers, 60, lambda: self._log.read_text())
+        wait_until(self._answers, 60, self.log)
         return self
 
     def stop(self, how=signal.SIGINT):
         """In order, as Ctrl-C does."""
         self._process.send_signal(how)
-        assert self._process.wait(40) == 0, self._log.read_text()
+        assert self._process.wait(40) == 0, self.log()
 
     def kill(self):
         """Everything at once, with no time to say goodbye: the API, the supervisor, Ray and its workers."""
@@ -54,6 +55,12 @@ class Service:
             except ProcessLookupError:
                 continue
         self._process.wait()
+
+    def kill_repetitions(self):
+        """The processes of Ray that compute repetitions, and nothing else."""
+        for pid in self.processes():
+            if Path(f"/proc/{pid}/cmdline").read_bytes().startswith(b"ray::run"):
+                os.kill(pid, signal.SIGKILL)
 
     def processes(self):
         """Everything that runs with this service's port in its environment."""
@@ -66,6 +73,9 @@ class Service:
             except OSError:
                 continue
         return found
+
+    def log(self):
+        return self._log.read_text()
 
     def close(self):
         self.http.close()

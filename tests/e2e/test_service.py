@@ -19,6 +19,20 @@ TOY = {
     "seed": 5,
 }
 SLOW_TOY = TOY | {"budget": {"controller_evaluations": 1_500, "selection_evaluations": 300}, "iterations": 2}
+OWN = '''
+"""A strategy."""
+
+from gaplab.plugins import Strategy
+
+
+class Own(Strategy):
+    """The fittest."""
+
+    name = "own"
+
+    def select(self, belief, search, rng):
+        return search(lambda genomes, fitnesses: fitnesses[:, 0])
+'''
 QUADRUPED = {
     "strategies": [
         "simulated_fit",
@@ -32,10 +46,22 @@ QUADRUPED = {
 
 
 @pytest.fixture
-def service(tmp_path):
-    service = Service(tmp_path)
-    yield service
-    service.close()
+def service_in():
+    """Makes services, which are closed at the end."""
+    made = []
+
+    def make(folder, **how):
+        made.append(Service(folder, **how))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+
+
+@pytest.fixture
+def service(tmp_path, service_in):
+    return service_in(tmp_path)
 
 
 def computed_here(spec):
@@ -106,6 +132,35 @@ def test_killed_in_the_middle_it_goes_on_where_it_was_with_the_same_numbers(serv
     assert before["progress"]["iterations_done"] >= 5
     assert service.finish(f"/studies/{study}", within_s=400)["state"] == "COMPLETED"
     assert told_by(service, study) == computed_here(SLOW_TOY)
+
+
+@pytest.mark.parametrize("edited", [OWN.replace("fittest", "very fittest"), "class Own("])
+def test_no_half_of_an_experiment_is_computed_with_a_strategy_that_was_edited_meanwhile(tmp_path, service_in, edited):
+    own = tmp_path / "own.py"
+    own.write_text(OWN)
+    service = service_in(tmp_path, plugins=tmp_path)
+    service.start()
+    spec = {each: SLOW_TOY[each] for each in ("robot", "budget", "seed")} | {"repetitions": 3, "iterations": 5}
+    path = f"/experiments/{service.post('/experiments', spec | {'strategy': 'own'})['id']}"
+    wait_until(lambda: service.get(path)["progress"]["iterations_done"] >= 1, 60)
+
+    own.write_text(edited)
+    service.kill_repetitions()
+    wait_until(lambda: service.log().count("another starts in") >= 1, 60, service.log)
+    own.write_text(OWN.replace("fittest", "very fittest"))
+
+    def refused():
+        return [each for each in service.get(path)["warnings"] if "strategy own (own.py" in each]
+
+    wait_until(refused, 60, service.log)
+    before = service.get(path)
+    assert before["state"] == "RUNNING"
+    assert before["progress"]["iterations_done"] < 3 * 6
+    assert service.http.post(f"{path}/accept-versions").status_code == 200
+    assert service.finish(path, within_s=200)["state"] == "COMPLETED"
+    assert refused() == []
+    first, second = service.get(f"{path}/provenance")["uses"]
+    assert first["provenance"]["outside"] != second["provenance"]["outside"]
 
 
 def test_stopped_in_order_it_leaves_no_process_behind(service):

@@ -74,11 +74,12 @@ def test_rollouts_are_spread_if_there_are_several(alone, pool, spreads):
 
 
 def until(pool, alone, batch):
-    """Ask until so many rollouts are what keeps the cores busy."""
+    """Wait until so many rollouts are what keeps the cores busy; one call has said that there is work for them."""
     deadline = time.monotonic() + 60
+    pool(*asked(alone, batch, 1))
     while pool.batch() != batch:
         assert time.monotonic() < deadline
-        pool(*asked(alone, 3, 1))
+        time.sleep(0.05)
 
 
 def test_it_asks_for_as_many_rollouts_at_a_time_as_keep_the_cores_busy(alone, pool):

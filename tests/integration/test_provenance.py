@@ -30,14 +30,15 @@ ALIKE = HERE.model_copy(
         "python": "3.11.99",
         "commit": "f" * 40,
         "engines": HERE.engines | {"pybullet": "pybullet 9"},  # this experiment does not use it
+        "outside": {"strategy careful": "careful.py 0123456789ab"},  # nor this
     }
 )
 
 
-def begun(store):
+def begun(store, under=HERE):
     """An experiment with a step, queued again."""
     experiments.submit_experiment(store, toy(repetitions=2))
-    (claim,) = execution.claim(store, "me", 1)
+    (claim,) = execution.claim(store, "me", 1, under)
     execution.record(store, claim, next(some_log()))
     execution.hand_back(store, claim)
     return claim.experiment_id
@@ -114,6 +115,34 @@ def test_a_supervisor_with_another_of_what_decides_leaves_it_alone_and_the_exper
     refused = events.page(store, 0, Which(kinds=frozenset({EventKind.VERSIONS_REFUSED})), limit=9).items
     assert [each.body["refused_by"] for each in refused] == [provenance.read(store, id_).refused_by]
     assert len(execution.claim(store, "me", 9)) == 2
+
+
+def with_own(**files):
+    """A provenance with plug-ins from outside: by kind and name, the file."""
+    return HERE.model_copy(update={"outside": {key.replace("__", " "): file for key, file in files.items()}})
+
+
+@pytest.mark.parametrize("kind", ["strategy__simulated_fit", "robot__toy_function", "tunable__dynamic_friction"])
+def test_a_plug_in_of_ones_own_that_was_edited_or_is_gone_decides_too(store, kind):
+    mine = with_own(**{kind: "own.py 0123456789ab", "strategy__other": "other.py 0123456789ab"})
+    id_ = begun(store, mine)
+
+    assert execution.claim(store, "other", 9, with_own(**{kind: "own.py ba9876543210"})) == ()
+    assert execution.claim(store, "other", 9, HERE) == ()
+    (warning,) = experiments.read_experiment(store, id_).warnings
+    assert f"{kind.replace('__', ' ')} (own.py 0123456789ab)" in warning
+    assert "own.py ba9876543210" in warning
+
+    edited_another = with_own(**{kind: "own.py 0123456789ab", "strategy__other": "other.py ba9876543210"})
+    assert len(execution.claim(store, "me", 9, edited_another)) == 2
+
+
+def test_what_decides_may_be_long(store):
+    kind, file = "strategy__simulated_fit", f"{'long' * 100}.py 0123456789ab"
+    id_ = begun(store, with_own(**{kind: file}))
+
+    assert file in provenance.read(store, id_).computed_with
+    assert len(execution.claim(store, "me", 9, with_own(**{kind: file}))) == 2
 
 
 def test_one_that_differs_only_in_what_changes_no_number_goes_on(store):

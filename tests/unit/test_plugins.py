@@ -140,15 +140,14 @@ def test_what_is_in_the_folder_has_a_hash_and_files_that_python_keeps_have_none(
     assert plugins.digest() != digest
 
 
-def test_files_of_one_name_in_several_folders_count_both(put: Put, tmp_path: Path):
-    for folder in ("mine", "yours"):
-        put(folder)
-        (tmp_path / folder / "friction.csv").write_text("1.0")
-    before = plugins.digests()["friction.csv"]
+def test_data_counts_in_a_package_and_not_beside_modules(put: Put):
+    home = put(careful=CAREFUL)
+    for folder, file in (("glide", "__init__.py"), ("glide", "friction.csv"), ("results", "curve.csv")):
+        (home / folder).mkdir(exist_ok=True)
+        (home / folder / file).write_text("1.0")
+    (home / "gaplab.db").write_text("a database")
 
-    (tmp_path / "mine" / "friction.csv").write_text("0.5")
-
-    assert plugins.digests()["friction.csv"] != before
+    assert set(plugins.digests()) == {"careful.py", "glide/__init__.py", "glide/friction.csv"}
 
 
 def test_a_package_may_have_its_plug_in_in_any_of_its_files(put: Put):
@@ -190,7 +189,15 @@ found = provenance()
 print("careful" in [each.name for each in catalogue().strategies])
 print(sorted(found.plugins) == ["careful.py", "glide.py"])
 print(versions()["plug-ins"])
-print(decisive(found, ["glide"]))
+spec = {
+    "engine": {"name": "glide"},
+    "reality": {},
+    "robot": {"name": "toy_function"},
+    "optimizer": {"name": "steady_state"},
+    "tunables": [],
+}
+for strategy in ("careful", "random"):
+    print(decisive(found, spec | {"strategy": {"name": strategy}}))
 """
 
 GLIDE = '''
@@ -206,7 +213,7 @@ class Glide(Analytic):
 '''
 
 
-def test_every_process_with_the_variable_has_them_and_an_engines_content_decides_who_goes_on(tmp_path: Path):
+def test_every_process_with_the_variable_has_them_and_their_content_decides_who_goes_on(tmp_path: Path):
     home = tmp_path / "mine"
     home.mkdir()
     (home / "careful.py").write_text(CAREFUL)
@@ -220,13 +227,17 @@ def test_every_process_with_the_variable_has_them_and_an_engines_content_decides
         return done.stdout.splitlines()
 
     before = ask()
+    (home / "careful.py").write_text(CAREFUL.replace("the middle", "the very middle"))
+    careful = ask()
     (home / "glide.py").write_text(GLIDE.replace("another name", "yet another name"))
-    after = ask()
+    both = ask()
 
-    assert before[:2] == after[:2] == ["True", "True"]
-    assert before[2] != after[2]
-    assert before[3] != after[3]
+    assert before[:2] == careful[:2] == both[:2] == ["True", "True"]
+    assert len({before[2], careful[2], both[2]}) == 3
     assert before[3].startswith("glide (glide.py ")
+    assert ", strategy careful (careful.py " in before[3]
+    assert len({before[3], careful[3], both[3]}) == 3
+    assert before[4] == careful[4] != both[4]  # of an experiment with a strategy of gaplab's own
 
 
 @pytest.mark.parametrize("module", ["api", "workers"])

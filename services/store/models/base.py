@@ -11,7 +11,7 @@ from schemas.lifecycle import Ending, State
 from schemas.records import MeasurementKind
 from services.store.clock import UtcDateTime
 
-REVISION = "0007"
+REVISION = "0008"
 """The migration that makes these tables; a database at any other revision is not ours to touch."""
 
 SPEC_VERSION = 1

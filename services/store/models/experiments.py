@@ -46,7 +46,7 @@ class ExperimentRow(Base):
         max_parallel: repetitions that run at once; NULL for any number.
         running: repetitions that somebody has claimed.
         claimable: whether one more may be claimed now. Both are kept by `repository/settling.py`.
-        computed_with: engines, machine and version of the spec, as its first steps had them.
+        computed_with: engines, machine, version of the spec and plug-ins from outside, as its first steps had them.
         refused_by: what a supervisor has that did not go on with it, for it is not the same.
         sensitivity_id: of the check of what it tunes.
         token_id: of the token that submitted it; NULL where none is needed.
@@ -79,8 +79,8 @@ class ExperimentRow(Base):
     max_parallel: Mapped[int | None]
     running: Mapped[int] = mapped_column(default=0)
     claimable: Mapped[bool] = mapped_column(default=True)
-    computed_with: Mapped[str | None] = mapped_column(String(300))
-    refused_by: Mapped[str | None] = mapped_column(String(300))
+    computed_with: Mapped[str | None] = mapped_column(Text)
+    refused_by: Mapped[str | None] = mapped_column(Text)
     sensitivity_id: Mapped[str | None] = mapped_column(String(32), index=True)
     token_id: Mapped[str | None] = mapped_column(String(32))
     notes: Mapped[str | None] = mapped_column(Text)

@@ -47,7 +47,7 @@ def unwanted(session: Session, waiting: Sequence[Claim], under: Provenance) -> t
     """
     row, experiments = ExperimentRow, sorted({each.experiment_id for each in waiting})
     over = session.scalars(select(row.id).where(row.id.in_(experiments), row.state.in_(ASKED))).all()
-    gone = {*over, *ahead(session, experiments, permitted(under))}
+    gone = {*over, *ahead(session, experiments, permitted(session, under))}
     return tuple(each for each in waiting if each.experiment_id in gone)
 
 

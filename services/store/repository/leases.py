@@ -32,7 +32,7 @@ def claim(session: Session, owner: str, limit: int, under: Provenance) -> tuple[
 
     Experiments that were computed with something else than what it is under are left alone, and say so.
     """
-    ids = next_repetitions(session, limit, provenance.permitted(under))
+    ids = next_repetitions(session, limit, provenance.permitted(session, under))
     if len(ids) < limit:
         provenance.refuse(session, under)
     if not ids:

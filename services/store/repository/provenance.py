@@ -1,13 +1,14 @@
 """Provenance: recorded with the claims of supervisors, and what it forbids them to claim.
 
 An experiment keeps what its first steps were computed with: its engines with their libraries, the machine's
-architecture, the version of the spec. A supervisor that has another of these leaves it alone until a person accepts it.
+architecture, the version of the spec, its plug-ins from outside gaplab. A supervisor that has another of these leaves
+it alone until a person accepts it.
 """
 
 import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 from hashlib import sha256
-from itertools import combinations_with_replacement
 from typing import Any, TypeAlias
 
 from sqlalchemy import ColumnElement, func, select, update
@@ -28,21 +29,24 @@ _INSERT: dict[str, _Insert] = {"sqlite": sqlite.insert, "postgresql": postgresql
 
 def id_of(under: Provenance) -> str:
     """The id of a provenance: it follows from the facts; that there are no plug-ins from outside is none."""
-    facts = under.model_dump(mode="json", exclude=None if under.plugins else {"plugins"})
+    none = {name for name in ("plugins", "outside") if not getattr(under, name)}
+    facts = under.model_dump(mode="json", exclude=none)
     return sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def decisive(under: Provenance, engines: Sequence[str]) -> str:
-    """What of it two supervisors must have in common to go on with the same experiment, which uses these engines."""
-    named = (f"{each} ({under.engines.get(each, 'none')})" for each in sorted(set(engines)))
-    return ", ".join([*named, under.architecture, f"spec {under.spec_version}"])
+def decisive(under: Provenance, spec: Mapping[str, Any]) -> str:
+    """What of it two supervisors must have in common to go on with the same experiment."""
+    engines = (_engine(under, each) for each in sorted(_engines(spec)))
+    outside = (_outside(under, each) for each in _others(spec) if each in under.outside)
+    return ", ".join([*engines, *_machine(under), *outside])
 
 
-def permitted(under: Provenance) -> ColumnElement[bool]:
+def permitted(session: Session, under: Provenance) -> ColumnElement[bool]:
     """That an experiment may be claimed under this: it has not begun, or with the same; and its spec can be read."""
     row = ExperimentRow
-    pairs = combinations_with_replacement(sorted(under.engines), 2)  # a simulator's engine and reality's
-    same = row.computed_with.in_([decisive(under, pair) for pair in pairs])
+    begun = row.claimable.is_(True) & row.computed_with.is_not(None)
+    found = session.scalars(select(row.computed_with).where(begun).distinct())
+    same = row.computed_with.in_([each for each in found if each is not None and _holds(each, under)])
     return (row.spec_version <= under.spec_version) & (row.computed_with.is_(None) | same)
 
 
@@ -56,7 +60,7 @@ def record(session: Session, under: Provenance, claims: Sequence[Claim]) -> None
     uses = [{"experiment_id": each, "provenance_id": id_} for each in specs]
     session.execute(insert(ExperimentProvenanceRow).values(uses).on_conflict_do_nothing())
     for experiment, spec in specs.items():
-        _bind(session, experiment, decisive(under, _engines(spec)))
+        _bind(session, experiment, decisive(under, spec))
     row = RepetitionRow
     session.execute(update(row).where(row.id.in_([each.repetition_id for each in claims])).values(provenance_id=id_))
     for each in claims:
@@ -73,10 +77,12 @@ def insert_unless_there(session: Session, rows: Sequence[Mapping[str, Any]]) -> 
 def refuse(session: Session, under: Provenance) -> int:
     """Say of each experiment that waits and may not be claimed under this why that is, once; how many they were."""
     row = ExperimentRow
-    waiting = row.claimable.is_(True) & row.refused_by.is_(None) & row.computed_with.is_not(None) & ~permitted(under)
+    waiting = (
+        row.claimable.is_(True) & row.refused_by.is_(None) & row.computed_with.is_not(None) & ~permitted(session, under)
+    )
     found = session.execute(select(row.id, row.spec, row.computed_with).where(waiting).order_by(row.id)).all()
     for experiment, spec, before in found:
-        theirs = decisive(under, _engines(spec))
+        theirs = decisive(under, spec)
         new = update(row).where(row.id == experiment, row.refused_by.is_(None)).values(refused_by=theirs)
         if session.execute(new.returning(row.id)).first() is not None:
             note(session, EventKind.VERSIONS_REFUSED, experiment, computed_with=before, refused_by=theirs)
@@ -141,7 +147,32 @@ def _bind(session: Session, experiment: str, to: str) -> None:
     session.execute(unbound.values(computed_with=to, refused_by=None))
 
 
-def _engines(spec: Mapping[str, Any]) -> list[str]:
+def _holds(text: str, under: Provenance) -> bool:
+    """Whether each of the parts of what `decisive` says is so under this."""
+    true = [*(_engine(under, each) for each in under.engines), *_machine(under)]
+    part = "|".join(map(re.escape, [*true, *(_outside(under, each) for each in under.outside)]))
+    return re.fullmatch(rf"(?:{part})(?:, (?:{part}))*", text) is not None
+
+
+def _engine(under: Provenance, name: str) -> str:
+    return f"{name} ({under.engines.get(name, 'none')})"
+
+
+def _machine(under: Provenance) -> tuple[str, str]:
+    return under.architecture, f"spec {under.spec_version}"
+
+
+def _outside(under: Provenance, which: str) -> str:
+    return f"{which} ({under.outside[which]})"
+
+
+def _engines(spec: Mapping[str, Any]) -> set[str]:
     """The engine of the simulators, and that of reality."""
     chosen = (spec.get("engine"), spec["reality"].get("engine"))
-    return [each["name"] for each in chosen if each]
+    return {each["name"] for each in chosen if each}
+
+
+def _others(spec: Mapping[str, Any]) -> list[str]:
+    """Its plug-ins of the other kinds, each as a provenance calls it."""
+    single = [f"{kind} {spec[kind]['name']}" for kind in ("strategy", "robot", "optimizer")]
+    return [*single, *(f"tunable {each['name']}" for each in spec["tunables"])]
