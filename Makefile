@@ -29,7 +29,7 @@ bench: .venv/installed-dev  ## the table of speeds, as ratios within one run
 docs: .venv/installed-dev  ## the reference in docs/reference/, written out of the code
 	$(BIN)/python -m docs.generate
 
-soak: .venv/installed-dev  ## a thousand random faults on the real service, and whether it kept its word: an hour and a half
+soak: .venv/installed-dev  ## a thousand random faults on the real service, and whether it kept its word: three quarters of an hour
 	$(BIN)/python -m tests.soak $(if $(FAULTS),--faults $(FAULTS)) $(if $(SEED),--seed $(SEED))
 
 clean:  ## remove the environment and what tools cached; results stay

@@ -2,7 +2,9 @@
 
 import argparse
 import signal
+import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from random import SystemRandom
 from statistics import median
@@ -24,27 +26,45 @@ def main():
     parser = argparse.ArgumentParser(prog="python -m tests.soak", description=__doc__)
     parser.add_argument("--faults", type=int, default=1000, help="in all; half of them on each database")
     parser.add_argument("--seed", type=int, help="left out: a new one")
-    parser.add_argument("--database", choices=KINDS, action="append", help="left out: both, one after the other")
+    parser.add_argument("--database", choices=KINDS, help="left out: both at once, each in a process")
     parser.add_argument("--at-once", type=int, default=8, help="faults that may come together")
     parser.add_argument("--folder", type=Path, help="for logs and histories; left out: they are not kept")
     given = parser.parse_args()
-    seed = SystemRandom().randrange(10**6) if given.seed is None else given.seed
-    console, kinds = Console(), given.database or list(KINDS)
-    expected = given.faults * FAULT_S + 120
-    console.print(f"{given.faults} faults with --seed {seed} on {', '.join(kinds)}: about {_duration(expected)}")
+    given.seed = SystemRandom().randrange(10**6) if given.seed is None else given.seed
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # what was started is ended
-    kept = 0
     with TemporaryDirectory(prefix="gaplab-soak-") as temporary:
-        for index, name in enumerate(kinds):
-            folder = (given.folder or Path(temporary)) / name
-            folder.mkdir(parents=True)
-            number = _share(given.faults, index, len(kinds))
-            outcome = soak(
-                folder, KINDS[name], number, seed, given.at_once, lambda told: console.print(told, style="dim")
-            )
-            show(console, outcome)
-            kept += not outcome.violations
-    return 0 if kept == len(kinds) else 1
+        given.folder = given.folder or Path(temporary)
+        return here(given) if given.database else side_by_side(given)
+
+
+def here(given):
+    """Hurt a service on one database."""
+    console = Console()
+    expected = given.faults * FAULT_S + 120
+    console.print(f"{given.faults} faults with --seed {given.seed} on {given.database}: about {_duration(expected)}")
+    folder = given.folder / given.database
+    folder.mkdir(parents=True)
+    tell = partial(console.print, f"{given.database}:", style="dim")
+    outcome = soak(folder, KINDS[given.database], given.faults, given.seed, given.at_once, tell)
+    show(console, outcome)
+    return 1 if outcome.violations else 0
+
+
+def side_by_side(given):
+    """Hurt a service on each database, in processes of their own."""
+    common = ["--seed", str(given.seed), "--at-once", str(given.at_once), "--folder", str(given.folder)]
+    running = []
+    try:
+        for index, name in enumerate(KINDS):
+            faults = str(_share(given.faults, index, len(KINDS)))
+            command = [sys.executable, "-m", "tests.soak", "--database", name, "--faults", faults, *common]
+            running.append(subprocess.Popen(command))
+        return max([each.wait() for each in running])
+    finally:
+        for each in running:
+            each.terminate()
+        for each in running:
+            each.wait()
 
 
 def show(console, outcome):
