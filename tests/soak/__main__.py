@@ -44,7 +44,7 @@ def here(given):
     console.print(f"{given.faults} faults with --seed {given.seed} on {given.database}: about {_duration(expected)}")
     folder = given.folder / given.database
     folder.mkdir(parents=True)
-    tell = partial(console.print, f"{given.database}:", style="dim")
+    tell = partial(console.print, style="dim")
     outcome = soak(folder, KINDS[given.database], given.faults, given.seed, given.at_once, tell)
     show(console, outcome)
     return 1 if outcome.violations else 0
