@@ -25,7 +25,7 @@ class Provenance(Frozen):
         default={}, description="modules from outside gaplab and what is in packages, each with a hash of its content"
     )
     outside: dict[str, str] = Field(
-        default={}, description="by kind and name, the file of each of these plug-ins that is no engine, with its hash"
+        default={}, description="by kind and name, the file of each of these plug-ins, with its hash"
     )
 
 

@@ -25,6 +25,7 @@ from services.resolution import expected_rollouts, is_direct, resolve_experiment
 from services.store.repository import attempts, experiments, reads, results, sensitivity, verbs
 from services.store.repository.experiments import Extent
 from services.store.session import Session, Store
+from services.versions import outside
 
 R = TypeVar("R")
 
@@ -52,7 +53,7 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
     def create(session: Session) -> ExperimentRead:
         check_load(session, [resolved], admitted)
         row = experiments.insert_experiment(session, resolved, extent_of(resolved), token=admitted.token)
-        sensitivity.queue_for(session, [row])
+        sensitivity.queue_for(session, [row], outside())
         return reads.read_experiments(session, [row])[0]
 
     return once(store, admitted, spec, ExperimentRead, create)
@@ -87,7 +88,7 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
             )
             for position, each in enumerate(resolved)
         ]
-        sensitivity.queue_for(session, rows)
+        sensitivity.queue_for(session, rows, outside())
         return reads.read_studies(session, [study])[0]
 
     return once(store, admitted, spec, StudyRead, create)

@@ -16,6 +16,7 @@ from services.store.lease import CheckClaim as CheckClaim
 from services.store.models import SensitivityRow
 from services.store.repository import sensitivity
 from services.store.session import Store
+from services.versions import outside
 
 
 def submit(store: Store, spec: SensitivitySpec) -> SensitivityRead:
@@ -35,7 +36,9 @@ def admit(store: Store, spec: SensitivitySpec, admitted: Admission) -> Once[Sens
         KeyReused: the key stands for another request.
     """
     checked = resolve_sensitivity(spec)
-    return once(store, admitted, spec, SensitivityRead, lambda session: _read(sensitivity.queue(session, checked)))
+    return once(
+        store, admitted, spec, SensitivityRead, lambda session: _read(sensitivity.queue(session, checked, outside()))
+    )
 
 
 def read(store: Store, id: str) -> SensitivityRead:  # noqa: A002 - as the API says

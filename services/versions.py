@@ -2,7 +2,7 @@
 
 import platform
 import subprocess
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from hashlib import sha256
@@ -63,8 +63,20 @@ def provenance() -> Provenance:
         system=platform.platform(),
         spec_version=SPEC_VERSION,
         plugins=digests(),
-        outside=dict(_outside((strategies, robots, tunables, optimizers))),
+        outside=outside(),
     )
+
+
+@cache
+def outside() -> Mapping[str, str]:
+    """The plug-ins that are not gaplab's own, by kind and name, each with what changes when its numbers may."""
+    registries: tuple[Registry[Any], ...] = (strategies, robots, engines, tunables, optimizers)
+    return {
+        f"{registry.kind} {name}": f"{file} {digest_of(file)}"
+        for registry in registries
+        for name, plugin in registry.items()
+        if (file := file_of(plugin)) is not None
+    }
 
 
 def _engine(engine: type[Engine]) -> str:
@@ -73,14 +85,6 @@ def _engine(engine: type[Engine]) -> str:
     if (file := file_of(engine)) is not None:
         return f"{file} {digest_of(file)}" + (f", {library}" if library else "")
     return library or "of gaplab's own"
-
-
-def _outside(registries: Iterable[Registry[Any]]) -> Iterator[tuple[str, str]]:
-    """The plug-ins that are not gaplab's own, each with what changes when its numbers may."""
-    for registry in registries:
-        for name, plugin in registry.items():
-            if (file := file_of(plugin)) is not None:
-                yield f"{registry.kind} {name}", f"{file} {digest_of(file)}"
 
 
 @cache

@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from secrets import token_hex
 from threading import Event
 
 from services import logs, plugins
@@ -39,12 +40,14 @@ def serve(settings: Settings) -> int:
 def choose_authentication(settings: Settings) -> None:
     """A Ray of our own asks for a token whatever the environment says, and a cluster is shown one unless that says no.
 
-    Ray reads it when it is imported. Of itself it shows its token to a cluster that it started, but to no other.
+    Ray reads it when it is imported. Of itself it shows its token to a cluster that it started, but to no other; and it
+    keeps that in a file of the home folder which other users may read, where one in the environment is ours alone.
     """
     if settings.ray_address:
         os.environ.setdefault("RAY_AUTH_MODE", "token")
     else:
         os.environ["RAY_AUTH_MODE"] = "token"
+        os.environ["RAY_AUTH_TOKEN"] = token_hex(32)
 
 
 def check(settings: Settings) -> int:

@@ -14,12 +14,12 @@ from enum import StrEnum
 from functools import cache
 from typing import Any, get_args, get_type_hints
 
-from sqlalchemy import JSON, BigInteger, Boolean, Float, Integer, String, Table
+from sqlalchemy import JSON, BigInteger, Boolean, Integer, String, Table
 from sqlalchemy import Column as TableColumn
 from sqlalchemy.orm import Mapper
 
 from services.store.clock import UtcDateTime
-from services.store.models import Base
+from services.store.models import Base, Number
 
 EXPORTED = (
     "provenance",
@@ -148,7 +148,7 @@ def _kind(table: str, column: TableColumn[Any]) -> Kind:
         (UtcDateTime, Kind.MOMENT),
         (Boolean, Kind.TRUTH),
         (Integer, Kind.WHOLE),
-        (Float, Kind.REAL),
+        (Number, Kind.REAL),
         (String, Kind.TEXT),
     )
     if isinstance(column.type, JSON):

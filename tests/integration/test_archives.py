@@ -140,6 +140,17 @@ def test_whatever_numbers_and_names_go_there_and_back(store, other, unpacked_her
     assert repr(shown(other, submitted)) == repr(shown(store, submitted))
 
 
+def test_a_zero_has_no_sign_in_either_database(store, other, unpacked_here):
+    submitted = finished(store, list(some_log(recorded=-0.0)), repetitions=1)
+    archive = exported(export_experiment(store, submitted))
+
+    import_archive(other, BytesIO(archive))
+
+    assert exported(export_experiment(other, submitted)) == archive
+    values = [value for point in reports.curve(store, submitted).points for value in point.values if value is not None]
+    assert copysign(1, values[0]) == 1
+
+
 def test_an_archive_may_arrive_twice_at_once(store, other, unpacked_here, monkeypatch):
     archive, free = exported(export_experiment(store, finished(store))), repository.free
 

@@ -154,7 +154,7 @@ def test_an_experiment_submitted_while_its_check_ends_is_told_of_it(store):
     with ThreadPoolExecutor(1) as pool:
         with store.transaction() as session:
             row = insert_experiment(session, spec, experiments.extent_of(spec))
-            queue_for(session, [row])
+            queue_for(session, [row], {})
             ending = pool.submit(sensitivity.complete, store, check, [])
             time.sleep(0.3)  # it waits for what is locked here
         assert ending.result(timeout=30)

@@ -40,6 +40,8 @@ def listening():
 with cluster(Settings(workers=1)):
     address = ray.get_runtime_context().gcs_address
     print("AT", address, *sorted(set(listening())))
+    token = os.environ["RAY_AUTH_TOKEN"].encode()
+    print("SHOWN" if any(token in command for _, command in processes()) else "SECRET")
     asking = f"GcsClient(address={address!r}).internal_kv_keys(b'', None); print('IN')"
     stranger = f"from ray._raylet import GcsClient; {asking}"
     without = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
@@ -51,13 +53,13 @@ with cluster(Settings(workers=1)):
 LOOPBACK = {"0100007F", "0000000000000000FFFF00000100007F", "00000000000000000000000001000000"}
 
 
-def test_our_own_ray_listens_on_loopback_and_refuses_a_stranger_whatever_the_environment_says():
+def test_our_own_ray_listens_on_loopback_and_refuses_a_stranger_whatever_the_environment_says(tmp_path: Path):
     root = Path(__file__).parents[2]
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
 
     done = subprocess.run(
         [sys.executable, "-c", OWN],
-        env=inherited | {"PYTHONPATH": str(root), "RAY_AUTH_MODE": "disabled"},
+        env=inherited | {"PYTHONPATH": str(root), "RAY_AUTH_MODE": "disabled", "HOME": str(tmp_path)},
         capture_output=True,
         text=True,
         timeout=180,
@@ -71,6 +73,8 @@ def test_our_own_ray_listens_on_loopback_and_refuses_a_stranger_whatever_the_env
     assert len(found) > 0
     assert set(found) <= LOOPBACK
     assert done.stdout.count("REFUSED\n") == 2, done.stdout
+    assert "SECRET\n" in done.stdout
+    assert not (tmp_path / ".ray").exists()  # where Ray keeps a token that everybody may read
 
 
 def test_a_ray_of_our_own_that_would_ask_nobody_is_not_started(monkeypatch: pytest.MonkeyPatch):

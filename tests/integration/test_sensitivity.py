@@ -73,6 +73,25 @@ def test_the_same_robot_engine_and_tunables_are_checked_once(store):
     assert str(SECRET) not in sensitivity.read(store, asked.id).model_dump_json()
 
 
+@pytest.mark.parametrize("kind", ["robot toy_function", "engine analytic", "tunable dynamic_friction"])
+def test_what_was_edited_since_is_checked_anew_and_earlier_experiments_keep_their_check(store, monkeypatch, kind):
+    def edited(file):
+        for module in (experiments, sensitivity):
+            monkeypatch.setattr(module, "outside", lambda: {kind: file, "robot other": file})
+
+    edited("own.py 0123456789ab")
+    before = experiments.submit_experiment(store, toy())
+    asked_before = sensitivity.submit(store, settings())
+    edited("own.py ba9876543210")
+    after = experiments.submit_experiment(store, toy())
+    asked_after = sensitivity.submit(store, settings())
+    other = experiments.submit_experiment(store, toy(tunables=["static_friction"], robot="toy_function"))
+
+    assert before.sensitivity == asked_before.id != after.sensitivity == asked_after.id
+    assert experiments.read_experiment(store, before.id).sensitivity == before.sensitivity
+    assert other.sensitivity not in {before.sensitivity, after.sensitivity}
+
+
 def test_a_study_has_one_check_and_the_direct_baseline_alone_has_none(store):
     common = toy().model_dump(exclude={"strategy", "name"})
     study = experiments.submit_study(store, StudySpec.model_validate(common | {"strategies": ["random", "direct"]}))

@@ -23,6 +23,7 @@ from services.store.models.attempts import AttemptRow as AttemptRow
 from services.store.models.base import REVISION as REVISION
 from services.store.models.base import SPEC_VERSION as SPEC_VERSION
 from services.store.models.base import Base as Base
+from services.store.models.base import Number as Number
 from services.store.models.checkpoints import CheckpointRow as CheckpointRow
 from services.store.models.events import EventCounterRow as EventCounterRow
 from services.store.models.events import EventRow as EventRow

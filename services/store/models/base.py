@@ -4,7 +4,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any, ClassVar
 
-from sqlalchemy import JSON, Double, Enum, MetaData
+from sqlalchemy import JSON, Dialect, Double, Enum, MetaData, TypeDecorator
 from sqlalchemy.orm import DeclarativeBase
 
 from schemas.lifecycle import Ending, State
@@ -30,6 +30,17 @@ def _words(kind: type[StrEnum], name: str) -> Enum:
     )
 
 
+class Number(TypeDecorator[float]):
+    """A double without the sign of a zero: SQLite keeps none, and an archive has the same bits from each database."""
+
+    impl = Double
+    cache_ok = True
+
+    def process_bind_param(self, value: float | None, dialect: Dialect) -> float | None:  # noqa: ARG002
+        """-0.0 as 0.0."""
+        return None if value is None else value + 0.0
+
+
 class Base(DeclarativeBase):
     """The base of all tables: every constraint has a name, so that a migration can name it."""
 
@@ -44,7 +55,7 @@ class Base(DeclarativeBase):
     )
     type_annotation_map: ClassVar[dict[Any, Any]] = {
         datetime: UtcDateTime(),
-        float: Double(),
+        float: Number(),
         list[float]: JSON(none_as_null=True),
         list[dict[str, Any]]: JSON(none_as_null=True),
         dict[str, Any]: JSON(none_as_null=True),

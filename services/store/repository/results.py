@@ -115,7 +115,7 @@ def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, flo
     found: dict[str, list[float]] = {}
     for experiment, best in session.execute(query):
         if best is not None:
-            found.setdefault(experiment, []).append(best + 0.0)  # of 0.0 and -0.0 either may be the maximum
+            found.setdefault(experiment, []).append(best)
     return {experiment: _mean(each) for experiment, each in found.items()}
 
 

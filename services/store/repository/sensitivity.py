@@ -1,7 +1,7 @@
 """Sensitivity checks: queued, found, and run under a lease like that of a repetition."""
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from hashlib import sha256
@@ -40,18 +40,29 @@ class Warned:
     warnings: tuple[str, ...] = ()
 
 
-def id_of(spec: Checked) -> str:
-    """The id of the check: it follows from what is checked, and from the version of how."""
-    text = json.dumps([VERSION, spec.model_dump(mode="json")], sort_keys=True)
+def id_of(spec: Checked, outside: Mapping[str, str]) -> str:
+    """The id of the check: it follows from what is checked, and from the version of how.
+
+    Args:
+        spec: what is checked.
+        outside: by kind and name, the files of plug-ins from outside; an edited one is checked anew.
+    """
+    names = (
+        f"robot {spec.robot.name}",
+        f"engine {spec.engine.name}",
+        *(f"tunable {each.name}" for each in spec.tunables),
+    )
+    files = [outside[each] for each in names if each in outside]
+    text = json.dumps([VERSION, spec.model_dump(mode="json"), *files], sort_keys=True)
     return sha256(text.encode()).hexdigest()[:16]
 
 
-def queue(session: Session, spec: Checked) -> SensitivityRow:
+def queue(session: Session, spec: Checked, outside: Mapping[str, str]) -> SensitivityRow:
     """The check of this, QUEUED if there was none or it had FAILED; it does not end before the session's transaction.
 
     Else whoever ends it would not see, and not tell, the experiments that are submitted with it.
     """
-    row, id_ = SensitivityRow, id_of(spec)
+    row, id_ = SensitivityRow, id_of(spec, outside)
     insert = _INSERT[session.get_bind().dialect.name]
     moment = session.execute(select(now())).scalar_one()
     values = {"id": id_, "spec": spec.model_dump(mode="json"), "created_at": moment}
@@ -61,11 +72,11 @@ def queue(session: Session, spec: Checked) -> SensitivityRow:
     return session.get_one(row, id_, populate_existing=True, with_for_update={"read": True})
 
 
-def queue_for(session: Session, experiments: Iterable[ExperimentRow]) -> None:
+def queue_for(session: Session, experiments: Iterable[ExperimentRow], outside: Mapping[str, str]) -> None:
     """The check of what these experiments tune, as `queue` does; they have it in common, and may all tune nothing."""
     tuning = [row for row in experiments if row.iterations > 1]
     for each in tuning[:1]:
-        check = queue(session, checked(each.spec))
+        check = queue(session, checked(each.spec), outside)
         for row in tuning:
             row.sensitivity_id = check.id
         session.flush()
@@ -86,8 +97,11 @@ def get(session: Session, id_: str) -> SensitivityRow:
 
 
 def warned(session: Session, experiments: Iterable[ExperimentRow]) -> dict[str, Warned]:
-    """What the checks of these experiments say, by experiment; those that tune nothing have none."""
-    ids = {each.id: id_of(checked(each.spec)) for each in experiments if each.iterations > 1}
+    """What the checks of these experiments say, by experiment; those that tune nothing have none.
+
+    One whose row names no check, for it came in an archive, has that of the same tunables, if there is one.
+    """
+    ids = {each.id: each.sensitivity_id or id_of(checked(each.spec), {}) for each in experiments if each.iterations > 1}
     row = SensitivityRow
     found = {
         each.id: Warned(each.id, warnings(each))
