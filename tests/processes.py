@@ -18,6 +18,18 @@ def processes():
             continue
 
 
+def processes_with(variable):
+    """Processes that have this in their environment, as `NAME=value`."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            if variable.encode() in (path / "environ").read_bytes().split(b"\0"):
+                found.append(int(path.name))
+        except OSError:  # it has ended
+            continue
+    return found
+
+
 def is_ours(pid):
     """Whether the process descends from this one."""
     while pid > 1 and pid != os.getpid():

