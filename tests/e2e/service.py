@@ -9,7 +9,7 @@ import time
 
 import httpx2
 
-from tests.processes import processes_with
+from tests.processes import processes, processes_with
 
 
 class Service:
@@ -59,8 +59,9 @@ class Service:
 
     def kill_repetitions(self):
         """The processes of Ray that compute repetitions, and nothing else."""
-        for pid in self.processes():
-            if Path(f"/proc/{pid}/cmdline").read_bytes().startswith(b"ray::run"):
+        ours = set(self.processes())
+        for pid, command in processes():
+            if pid in ours and command.startswith(b"ray::run"):
                 os.kill(pid, signal.SIGKILL)
 
     def processes(self):
