@@ -96,6 +96,7 @@ def test_a_ray_of_our_own_that_would_ask_nobody_is_not_started(monkeypatch: pyte
 def test_only_a_cluster_of_others_may_go_without_a_token(
     monkeypatch: pytest.MonkeyPatch, address: str | None, before: str | None, after: str
 ):
+    monkeypatch.setenv("RAY_AUTH_TOKEN", "theirs")  # Ray has read its own already; what is set here must not stay
     monkeypatch.setenv("RAY_AUTH_MODE", before or "")
     if before is None:
         monkeypatch.delenv("RAY_AUTH_MODE")
@@ -103,3 +104,4 @@ def test_only_a_cluster_of_others_may_go_without_a_token(
     choose_authentication(Settings(ray_address=address))
 
     assert os.environ["RAY_AUTH_MODE"] == after
+    assert (os.environ["RAY_AUTH_TOKEN"] == "theirs") == (address is not None)
