@@ -123,10 +123,10 @@ def findings(row: SensitivityRow) -> tuple[Sensitivity, ...]:
 
 
 def claim(session: Session, owner: str) -> CheckClaim | None:
-    """The oldest queued check, RUNNING from now on, and the owner's; None if there is none."""
+    """The oldest queued check that nobody else claims now: RUNNING from now on, the owner's; None if there is none."""
     row = SensitivityRow
     oldest = select(row.id).where(row.state == State.QUEUED).order_by(row.created_at, row.id).limit(1)
-    if (id_ := session.scalar(oldest)) is None:
+    if (id_ := session.scalar(oldest.with_for_update(skip_locked=True))) is None:
         return None
     claimed = session.execute(
         update(row)
