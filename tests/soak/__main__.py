@@ -59,7 +59,8 @@ def side_by_side(given):
             faults = str(_share(given.faults, index, len(KINDS)))
             command = [sys.executable, "-m", "tests.soak", "--database", name, "--faults", faults, *common]
             running.append(subprocess.Popen(command))
-        return max([each.wait() for each in running])
+        codes = [each.wait() for each in running]
+        return int(any(codes))  # of one that a signal ended it is negative
     finally:
         for each in running:
             each.terminate()
