@@ -66,7 +66,7 @@ POINTS: dict[str, Wrap] = {
     "commit": around(DefaultDialect, "do_commit"),
     "acknowledgement": around(Supervisor, "_store_received"),
     "heartbeat": around(execution, "heartbeat"),
-    "completion": around(execution, "complete_all"),
+    "completion": around(execution, "complete"),
     "hand back": around(execution, "hand_back"),
     "requeue of what was lost": around(execution, "requeue_lost"),
 }

@@ -102,3 +102,6 @@ MOVES: dict[State, frozenset[State]] = {
     State.CANCELLED: frozenset({State.QUEUED}),
 }
 """Of experiments and repetitions alike; from CANCELLED only a repetition moves, whose experiment is extended."""
+
+CHECK_MOVES = MOVES | {State.FAILED: frozenset({State.QUEUED})}
+"""Moves of a sensitivity check: a failed one is queued again when its settings are submitted again."""

@@ -198,18 +198,18 @@ class Supervisor:
 
     def _complete(self, runs: list[Run]) -> None:
         try:
-            execution.complete_all(self._store, [run.claim for run in runs])
+            execution.complete(self._store, *(run.claim for run in runs))
         except Conflict:
             for run in runs:
                 try:
-                    execution.complete_all(self._store, [run.claim])
+                    execution.complete(self._store, run.claim)
                 except Conflict as error:
                     run.lost = f"it ended too early: {error}"
 
     def _drop_all_but(self, held: list[Claim] | tuple[Claim, ...]) -> None:
         """Stop the runs whose claim holds no more: cancelled, paused, stopped, given back, or taken over."""
-        keys = {(claim.repetition_id, claim.epoch) for claim in held}
-        for run in [each for each in self._runs if (each.claim.repetition_id, each.claim.epoch) not in keys]:
+        keys = {(claim.id, claim.epoch) for claim in held}
+        for run in [each for each in self._runs if (each.claim.id, each.claim.epoch) not in keys]:
             run.cancel()
             self._runs.remove(run)
             log.info("dropped, it is no longer ours", extra=run.place)

@@ -93,6 +93,12 @@ def checked(spec: Mapping[str, Any]) -> Checked:
     return Checked.model_validate({name: spec[name] for name in ("robot", "engine", "tunables")})
 
 
+def without_truth(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the spec with null in place of each of reality's parameters."""
+    reality = spec["reality"]
+    return {**spec, "reality": reality | {"parameters": dict.fromkeys(reality["parameters"])}}
+
+
 def vector(values: FloatArray) -> list[float]:
     """A JSON array; its numbers read back exactly."""
     return [float(each) for each in values]

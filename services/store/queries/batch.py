@@ -39,7 +39,7 @@ class Batch:
 
     def add(self, claim: Claim, timed: TimedStep) -> None:
         """One step of the claim's repetition."""
-        step, key = timed.step, (claim.repetition_id, timed.step.iteration)
+        step, key = timed.step, (claim.id, timed.step.iteration)
         columns = self._columns[key]
         columns.update(mapping.iteration_columns(step))
         columns["seconds"] += timed.seconds

@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar, cast
 
-from sqlalchemy import ColumnElement, Table, and_, bindparam, select, tuple_, update
+from sqlalchemy import Table, bindparam, select, tuple_, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
@@ -44,18 +44,6 @@ _ADVANCE = (
 R = TypeVar("R", IterationRow, MeasurementRow, SimulatorRow)
 
 
-def mine(claim: Claim) -> ColumnElement[bool]:
-    """That the claim still holds; goes into the WHERE of every write."""
-    row = RepetitionRow
-    return and_(row.id == claim.repetition_id, row.epoch == claim.epoch, row.state == State.RUNNING)
-
-
-def any_of(claims: Sequence[Claim]) -> ColumnElement[bool]:
-    """That a lease is one of these claims'; with `state = RUNNING`, that it still holds."""
-    row = RepetitionRow
-    return tuple_(row.id, row.epoch).in_([(each.repetition_id, each.epoch) for each in claims])
-
-
 def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -> tuple[Claim, ...]:
     """Append the steps to the logs of their repetitions; the claims that still hold, which alone were written.
 
@@ -76,7 +64,7 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
         for each in steps:
             batch.add(claim, each)
     batch.write(session)
-    checkpoints.forget(session, [claim.repetition_id for claim, steps in fresh.items() if steps and lengths[claim][1]])
+    checkpoints.forget(session, [claim.id for claim, steps in fresh.items() if steps and lengths[claim][1]])
     checkpoints.write(
         session, {claim: _parts(deliveries[claim], *lengths[claim], len(fresh[claim])) for claim in fresh}
     )
@@ -103,7 +91,7 @@ def is_whole(session: Session, repetition: RepetitionRow) -> bool:
 
 def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, tuple[int, int]]:
     """How many steps the log of each claim that holds has, and checkpoints of the next; locked for the transaction."""
-    by_key = {(each.repetition_id, each.epoch): each for each in claims}
+    by_key = {(each.id, each.epoch): each for each in claims}
     row = RepetitionRow
     found = session.execute(
         select(row.id, row.epoch, row.steps, row.checkpoints)
@@ -138,7 +126,7 @@ def _parts(delivered: Iterable[Delivered], length: int, parts: int, new: int) ->
 def _move(claim: Claim, length: int, steps: Sequence[TimedStep]) -> dict[str, Any]:
     costs = [mapping.cost(each.step) for each in steps]
     return {
-        "of_id": claim.repetition_id,
+        "of_id": claim.id,
         "of_epoch": claim.epoch,
         "from_steps": length,
         "to_steps": length + len(steps),
