@@ -93,7 +93,7 @@ def extend_experiment(
     What is there stands, and the whole equals an experiment that was submitted with these totals. With the totals that
     it has, one that was stopped is brought to its end.
     """
-    return extension.extend_experiment(store, id, extension, admitted)
+    return extend_totals(store, id, extension, admitted)
 
 
 @router.patch(
