@@ -11,17 +11,18 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import migrations
-from services import execution, experiments
-from services.archives import export_study
-from services.core.loop import repetition
-from services.execution import Checkpoint, TimedStep
-from services.simulation import setting
-from services.store.session import Store
+from gaplab import migrations
+from gaplab.services.archives import export_study
+from gaplab.services.core.loop import repetition
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.running.execution import Checkpoint, TimedStep
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.session import Store
+from gaplab.workers.checkpoints import recorded
 from tests.numbers.kept import FOLDER, HALF_WAY, MACHINE, machine
 from tests.numbers.specs import HALF_WAY as HALF_WAY_SPEC
 from tests.numbers.specs import STUDIES
-from workers.checkpoints import recorded
 
 OWNER = "kept"
 STEPS, CHECKPOINTS = 6, 3
@@ -49,7 +50,7 @@ def new_store(file):
 
 def computed(store, spec):
     """The archive of a study, computed by the pure loop."""
-    study = experiments.submit_study(store, spec).id
+    study = submission.submit_study(store, spec).id
     while claims := execution.claim(store, OWNER, 100):
         for claim in claims:
             for step in repetition(setting(claim.spec, claim.number)):
@@ -63,7 +64,7 @@ def computed(store, spec):
 
 def interrupt(store):
     """Leave `HALF_WAY_SPEC` as a supervisor leaves it that is killed in the middle of a step."""
-    experiments.submit_experiment(store, HALF_WAY_SPEC)
+    submission.submit_experiment(store, HALF_WAY_SPEC)
     claim, *_ = execution.claim(store, OWNER, 2)
     delivered, steps, checkpoints = recorded(setting(claim.spec, claim.number), (), (), 0.02), 0, 0
     for item in delivered:

@@ -4,7 +4,7 @@ The budgets are tiny, so that all of it together is computed in seconds. A chang
 `python -m tests.numbers.keep`; the tests read what the archives hold.
 """
 
-from schemas.spec import ExperimentSpec, StudySpec
+from gaplab.schemas.spec import ExperimentSpec, StudySpec
 
 _ENSEMBLE = {"simulators": 3}
 _QUADRUPED = {

@@ -9,12 +9,13 @@ from math import isfinite
 import numpy as np
 import pytest
 
-from schemas.spec import ExperimentSpec
-from services import experiments, reports
-from services.archives import export_study, import_archive
-from services.core.loop import repetition
-from services.core.types import Measured, Probed, Selected, Transferred, Tuned
-from services.simulation import setting
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.archives import export_study, import_archive
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.types import Measured, Probed, Selected, Transferred, Tuned
+from gaplab.services.experiments import submission
+from gaplab.services.results import curves
+from gaplab.services.specs.assembly import setting
 from tests.numbers.kept import FOLDER, ITERATION, archive, exact, members, numbers, other_machine, other_versions
 from tests.numbers.specs import STUDIES
 
@@ -105,10 +106,10 @@ def test_an_import_shows_the_kept_numbers(kept, store):
     assert not imported.called_off
     for experiment, curve in zip(found["experiment"], found["curves"], strict=True):
         id_ = experiment["id"]
-        assert experiments.read_experiment(store, id_).spec == experiment["spec"]
-        assert pages(experiments.list_samples, store, id_, SAMPLE) == kept_samples(found, id_)
-        assert pages(experiments.list_simulators, store, id_, SIMULATOR) == kept_simulators(found, experiment)
-        shown = reports.curve(store, id_)
+        assert submission.read_experiment(store, id_).spec == experiment["spec"]
+        assert pages(submission.list_samples, store, id_, SAMPLE) == kept_samples(found, id_)
+        assert pages(submission.list_simulators, store, id_, SIMULATOR) == kept_simulators(found, experiment)
+        shown = curves.curve(store, id_)
         assert chosen(shown.model_dump(mode="json"), curve) == exact(curve)
         assert points(shown) == kept_points(found, id_)
 
