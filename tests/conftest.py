@@ -17,8 +17,8 @@ from tempfile import TemporaryDirectory
 import psycopg
 import pytest
 
-import migrations
-from services.store.session import Store
+from gaplab import migrations
+from gaplab.services.store.session import Store
 
 _DATABASES = ("sqlite", "postgres")
 _numbers = count()
