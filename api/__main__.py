@@ -2,11 +2,11 @@
 
 import sys
 
-from api.exits import CommandError
-from api.server import listen, serve_api
-from services import logs
-from services.core.errors import GaplabError
-from services.settings import Settings
+from gaplab.api.commands.exit_codes import CommandError
+from gaplab.api.process.server import listen, serve_api
+from gaplab.services import logs
+from gaplab.services.core.errors import GaplabError
+from gaplab.services.settings import Settings
 
 
 def main() -> None:

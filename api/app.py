@@ -6,14 +6,14 @@ from importlib.metadata import version
 from fastapi import Depends, FastAPI
 from fastapi.middleware.gzip import GZipMiddleware
 
-from api import documentation, problems
-from api.access import Access
-from api.dependencies import refuse_doubles
-from api.feed import Feed
-from api.limits import BodyLimit, Streams
-from api.metrics import Measured, Metrics
-from api.pages import Headers
-from api.routes import (
+from gaplab.api.http import documentation, problems
+from gaplab.api.http.access import Access
+from gaplab.api.http.dependencies import refuse_doubles
+from gaplab.api.http.event_feed import Feed
+from gaplab.api.http.limits import BodyLimit, Streams
+from gaplab.api.http.metrics import Measured, Metrics
+from gaplab.api.http.security_headers import Headers
+from gaplab.api.routes import (
     archives,
     catalogue,
     curves,
@@ -31,9 +31,9 @@ from api.routes import (
     sensitivity,
     studies,
 )
-from services.physics import Physics
-from services.settings import Limits, Settings
-from services.store.session import Store
+from gaplab.services.replay.process import Physics
+from gaplab.services.settings import Limits, Settings
+from gaplab.services.store.session import Store
 
 DESCRIPTION = """
 Closes the *reality gap*: tunes a robot simulator from a handful of real-world evaluations, and compares the strategies

@@ -9,8 +9,8 @@ from rich.table import Table
 
 from benchmarks import curves, mujoco, overhead, physics, physx, pool, savings, service, supervisor, turns
 from benchmarks.measure import Row
-from services.engines.mujoco import MuJoCo
-from services.engines.physx import PhysX
+from gaplab.services.engines.mujoco import MuJoCo
+from gaplab.services.engines.physx import PhysX
 
 
 def main() -> None:

@@ -11,15 +11,16 @@ from time import perf_counter, sleep
 import httpx2
 import uvicorn
 
-import migrations
-from api.app import create_app
 from benchmarks.measure import Row
-from schemas.spec import StudySpec
-from services import execution, experiments
-from services.core.loop import repetition
-from services.execution import TimedStep
-from services.simulation import setting
-from services.store.session import Store
+from gaplab import migrations
+from gaplab.api.app import create_app
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.running.execution import TimedStep
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.session import Store
 
 CALLS = 200
 SPEC = StudySpec.model_validate(
@@ -35,7 +36,7 @@ SPEC = StudySpec.model_validate(
 
 def fill(store: Store) -> str:
     """A finished study of seven experiments × 40 repetitions × 10 iterations; its id."""
-    study = experiments.submit_study(store, SPEC).id
+    study = submission.submit_study(store, SPEC).id
     while claims := execution.claim(store, "benchmark", 40):
         for claim in claims:
             steps = [TimedStep(step, 0.0) for step in repetition(setting(claim.spec, claim.number))]

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import psycopg
 
-import migrations
-from schemas.spec import ExperimentSpec
-from services import experiments
-from services.store.session import Store
+from gaplab import migrations
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.experiments import submission
+from gaplab.services.store.session import Store
 
 
 class Databases:
@@ -30,7 +30,7 @@ class Databases:
             self._execute('CREATE DATABASE "kill_template"')
         migrations.upgrade(self._template)
         store = Store(self._template)
-        experiments.submit_experiment(store, spec)
+        submission.submit_experiment(store, spec)
         store.dispose()
 
     def new(self) -> str:

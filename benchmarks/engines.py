@@ -12,16 +12,16 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from benchmarks.physics import TUNED
-from services.core.arrays import FloatArray, Genome, Genomes
-from services.core.optimizers.base import maximise
-from services.core.optimizers.steady_state import SteadyState
-from services.core.robots.quadruped import Quadruped
-from services.core.streams import stream
-from services.core.tunables import tunables
-from services.core.world import Motion
-from services.engines import engines
-from services.engines.base import Engine
-from services.simulation import Simulation
+from gaplab.services.core.arrays import FloatArray, Genome, Genomes
+from gaplab.services.core.optimizers.base import maximise
+from gaplab.services.core.optimizers.steady_state import SteadyState
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.streams import stream
+from gaplab.services.core.tunables import tunables
+from gaplab.services.core.world import Motion
+from gaplab.services.engines import engines
+from gaplab.services.engines.base import Engine
+from gaplab.services.specs.assembly import Simulation
 
 ROBOT = Quadruped()
 TRUTH = np.array([[1.0, 0.8, 0.0]])

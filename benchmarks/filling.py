@@ -9,11 +9,11 @@ import numpy as np
 from sqlalchemy import insert
 from sqlalchemy.orm import Session
 
-from schemas.lifecycle import State
-from schemas.records import MeasurementKind
-from schemas.spec import ExperimentSpec
-from services.resolution import expected_rollouts, resolve_experiment
-from services.store.models import (
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.records import MeasurementKind
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
+from gaplab.services.store.models import (
     Base,
     ExperimentRow,
     IterationRow,
@@ -22,7 +22,7 @@ from services.store.models import (
     SimulatorRow,
     StudyRow,
 )
-from services.store.session import Store
+from gaplab.services.store.session import Store
 
 IN_A_STUDY = 7
 """Experiments, as in the paper's Fig. 4."""

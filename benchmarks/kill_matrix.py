@@ -24,13 +24,13 @@ from sqlalchemy.engine.default import DefaultDialect
 from benchmarks.databases import Databases
 from benchmarks.supervisor import postgres
 from benchmarks.without_ray import SPEC, work
-from services import execution
-from services.core import loop
-from services.store.models import CheckpointRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
-from services.store.repository import checkpoints, steps
-from services.store.session import Store
-from workers.checkpoints import Recorder
-from workers.supervisor import Supervisor
+from gaplab.services.core import loop
+from gaplab.services.running import execution
+from gaplab.services.store.models import CheckpointRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
+from gaplab.services.store.queries import checkpoints, steps
+from gaplab.services.store.session import Store
+from gaplab.workers.checkpoints import Recorder
+from gaplab.workers.supervisor import Supervisor
 
 CHANCE = {"owner", "epoch", "attempts", "losses", "error", "seconds"}
 CHANCE |= {"heartbeat_at", "started_at", "ended_at", "measured_at"}

@@ -18,12 +18,12 @@ from tempfile import TemporaryDirectory
 from rich.console import Console
 from rich.table import Table
 
-import migrations
-from api.own import own_service
 from benchmarks.clients import FOLLOW, READERS, READS, SUBMIT, SUBMITTERS, Load, Measured
 from benchmarks.filling import IN_A_STUDY, REPETITIONS, SAMPLES, fill
 from benchmarks.supervisor import postgres
-from services.store.session import Store
+from gaplab import migrations
+from gaplab.api.process.local_service import own_service
+from gaplab.services.store.session import Store
 
 UNLIMITED = {f"GAPLAB_MAX_{name}": str(10**6) for name in ("EXPERIMENTS", "EXPERIMENTS_PER_TOKEN")}
 """What is submitted is never computed here, so that a thousand would soon wait."""

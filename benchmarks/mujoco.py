@@ -8,13 +8,13 @@ from mujoco import rollout as library
 
 from benchmarks.measure import Row, rates, ratio
 from benchmarks.physics import SWITCHING, TUNED, genomes
-from services.core.robots.quadruped import Quadruped
-from services.core.tunables import tunables
-from services.engines.base import Engine
-from services.engines.mujoco import MuJoCo
-from services.engines.mujoco.scene import Scene, _in_force
-from services.engines.pybullet import PyBullet
-from services.simulation import Simulation
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.tunables import tunables
+from gaplab.services.engines.base import Engine
+from gaplab.services.engines.mujoco import MuJoCo
+from gaplab.services.engines.mujoco.scene import Scene, _in_force
+from gaplab.services.engines.pybullet import PyBullet
+from gaplab.services.specs.assembly import Simulation
 
 ROBOT = Quadruped()
 MANY = 96

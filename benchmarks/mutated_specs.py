@@ -20,10 +20,10 @@ from typing import Any
 
 from fastapi.testclient import TestClient
 
-import migrations
-from api.app import create_app
-from services.settings import Limits
-from services.store.session import Store
+from gaplab import migrations
+from gaplab.api.app import create_app
+from gaplab.services.settings import Limits
+from gaplab.services.store.session import Store
 
 WITHIN_S = 1.0
 
@@ -32,8 +32,8 @@ OUTSIDE = (
     "../../../etc/passwd",
     "file:///etc/passwd",
     "http://127.0.0.1:9/plugin.py",
-    "services.engines.pybullet.engine:PyBullet",
-    "services.store.session.Store",
+    "gaplab.services.engines.pybullet.engine:PyBullet",
+    "gaplab.services.store.session.Store",
     "os.system",
     "__import__('os').system('id')",
     "services/engines/analytic.py",

@@ -11,8 +11,8 @@ import pybullet
 
 from benchmarks.physics import genomes
 from benchmarks.urdf import urdf
-from services.core.arrays import Genome
-from services.core.robots.quadruped import Quadruped
+from gaplab.services.core.arrays import Genome
+from gaplab.services.core.robots.quadruped import Quadruped
 
 STEP_S = 1 / 240
 """PyBullet's default; its default of 50 solver iterations stays as well."""

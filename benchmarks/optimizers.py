@@ -13,18 +13,18 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from schemas.plugin import PluginRef
-from schemas.spec import ExperimentSpec
-from services.core.arrays import FloatArray, Genomes, Parameters
-from services.core.counted import Counted
-from services.core.loop import Setting
-from services.core.optimizers import optimizers
-from services.core.optimizers.base import Optimizer, maximise
-from services.core.streams import stream
-from services.core.tuning import Misfit
-from services.core.types import Sample, Space
-from services.resolution import resolve_experiment
-from services.simulation import setting
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.arrays import FloatArray, Genomes, Parameters
+from gaplab.services.core.counted import Counted
+from gaplab.services.core.loop import Setting
+from gaplab.services.core.optimizers import optimizers
+from gaplab.services.core.optimizers.base import Optimizer, maximise
+from gaplab.services.core.streams import stream
+from gaplab.services.core.tuning import Misfit
+from gaplab.services.core.types import Sample, Space
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
 
 CONTROLLERS = 10_000
 SIMULATORS = 2_000

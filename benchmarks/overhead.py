@@ -8,11 +8,11 @@ import numpy as np
 
 from benchmarks.measure import Row
 from benchmarks.physics import genomes, simulation
-from services.core.arrays import FloatArray, Genomes
-from services.core.optimizers.base import maximise
-from services.core.optimizers.steady_state import SteadyState
-from services.core.robots.quadruped import Quadruped
-from services.core.streams import stream
+from gaplab.services.core.arrays import FloatArray, Genomes
+from gaplab.services.core.optimizers.base import maximise
+from gaplab.services.core.optimizers.steady_state import SteadyState
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.streams import stream
 
 STEPS = 20_000
 ROLLOUTS = 5_000

@@ -19,10 +19,10 @@ from tempfile import TemporaryDirectory
 from rich.console import Console
 from rich.table import Table
 
-import migrations
 from benchmarks.filling import fill
-from services.archives import import_archive
-from services.store.session import Store
+from gaplab import migrations
+from gaplab.services.archives import import_archive
+from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import Chromium
 

@@ -7,13 +7,13 @@ import numpy as np
 import pybullet
 
 from benchmarks.measure import Row, rates, ratio
-from services.core.arrays import Genomes, Parameters
-from services.core.robots.quadruped import Quadruped
-from services.core.tunables import tunables
-from services.core.world import Motion
-from services.engines.pybullet import PyBullet
-from services.engines.pybullet.scene import Scene
-from services.simulation import Simulation
+from gaplab.services.core.arrays import Genomes, Parameters
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.tunables import tunables
+from gaplab.services.core.world import Motion
+from gaplab.services.engines.pybullet import PyBullet
+from gaplab.services.engines.pybullet.scene import Scene
+from gaplab.services.specs.assembly import Simulation
 
 TUNED = ("static_friction", "dynamic_friction", "restitution")
 GENOMES = 12

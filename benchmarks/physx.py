@@ -8,17 +8,17 @@ from scipy import stats
 
 from benchmarks.measure import Row, rates, ratio
 from benchmarks.physics import SWITCHING, TUNED, edges, genomes
-from services.core.arrays import Fitnesses, Genome, Genomes
-from services.core.optimizers.base import maximise
-from services.core.optimizers.steady_state import SteadyState
-from services.core.robots.quadruped import Quadruped
-from services.core.streams import stream
-from services.core.tunables import tunables
-from services.core.world import Motion
-from services.engines.base import Engine
-from services.engines.physx import PhysX
-from services.engines.pybullet import PyBullet
-from services.simulation import Simulation
+from gaplab.services.core.arrays import Fitnesses, Genome, Genomes
+from gaplab.services.core.optimizers.base import maximise
+from gaplab.services.core.optimizers.steady_state import SteadyState
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.streams import stream
+from gaplab.services.core.tunables import tunables
+from gaplab.services.core.world import Motion
+from gaplab.services.engines.base import Engine
+from gaplab.services.engines.physx import PhysX
+from gaplab.services.engines.pybullet import PyBullet
+from gaplab.services.specs.assembly import Simulation
 
 ROBOT = Quadruped()
 NEARBY = [np.array([values]) for values in ((1.02, 0.8, 0.0), (1.0, 0.81, 0.0), (1.0, 0.8, 0.02), (0.5, 0.5, 0.0))]

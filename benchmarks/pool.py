@@ -8,15 +8,15 @@ import ray
 
 from benchmarks.measure import Row, ratio
 from benchmarks.physics import SWITCHING, genomes, simulation
-from schemas.spec import ExperimentSpec
-from services.core.loop import repetition
-from services.execution import Claim, TimedStep
-from services.resolution import resolve_experiment
-from services.settings import Settings
-from services.simulation import setting
-from workers import repetition as task
-from workers.checkpoints import CHECKPOINT_S
-from workers.cluster import cluster
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.running.execution import Claim, TimedStep
+from gaplab.services.settings import Settings
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.workers import repetition as task
+from gaplab.workers.checkpoints import CHECKPOINT_S
+from gaplab.workers.cluster import cluster
 
 SPEC = ExperimentSpec.model_validate(
     {

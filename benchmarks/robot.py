@@ -12,17 +12,17 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from services.core.arrays import FloatArray, Genome
-from services.core.optimizers.base import maximise
-from services.core.optimizers.steady_state import SteadyState
-from services.core.robots.quadruped import BODY_M, COUNTED_S, PERIOD_S, SETTLING_S, Quadruped, QuadrupedOptions
-from services.core.streams import stream
-from services.core.tunables import tunables
-from services.core.tuning import Misfit, squared_errors, tune
-from services.core.types import Sample, Space
-from services.core.world import Motion
-from services.engines.pybullet import PyBullet
-from services.simulation import Simulation
+from gaplab.services.core.arrays import FloatArray, Genome
+from gaplab.services.core.optimizers.base import maximise
+from gaplab.services.core.optimizers.steady_state import SteadyState
+from gaplab.services.core.robots.quadruped import BODY_M, COUNTED_S, PERIOD_S, SETTLING_S, Quadruped, QuadrupedOptions
+from gaplab.services.core.streams import stream
+from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tuning import Misfit, squared_errors, tune
+from gaplab.services.core.types import Sample, Space
+from gaplab.services.core.world import Motion
+from gaplab.services.engines.pybullet import PyBullet
+from gaplab.services.specs.assembly import Simulation
 
 NAMES = ("static_friction", "dynamic_friction", "restitution")
 EPISODE_S = SETTLING_S + COUNTED_S

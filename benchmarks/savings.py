@@ -1,12 +1,12 @@
 """Rollouts that a whole study at desk budgets is spared, none of which could have changed a number."""
 
 from benchmarks.measure import Row
-from schemas.spec import ExperimentSpec
-from services.core.loop import repetition
-from services.core.strategies import strategies
-from services.core.types import Cost, Selected, Transferred, Tuned
-from services.resolution import resolve_experiment
-from services.simulation import setting
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.types import Cost, Selected, Transferred, Tuned
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
 
 REPETITIONS = 3
 

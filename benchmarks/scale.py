@@ -3,7 +3,7 @@
 Physics is all that is counted. A computation of W core-seconds, whose longest chain of steps that wait for each other
 takes S seconds, takes at least max(W / P, S) on P cores, and at most W / P + S if no core idles while there is work
 (Brent 1974). The longest chain is that of a repetition of *informative*: one newcomer after another, and within a
-newcomer as many rollouts at a time as `workers.pool` spreads.
+newcomer as many rollouts at a time as `gaplab.workers.pool` spreads.
 """
 
 from collections.abc import Iterator
@@ -17,16 +17,16 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.physics import TUNED, genomes
-from schemas.spec import ExperimentSpec, StudySpec
-from services.core.arrays import Parameters
-from services.core.robots.quadruped import Quadruped
-from services.core.strategies import strategies
-from services.core.tunables import tunables
-from services.engines import engines
-from services.engines.base import Engine
-from services.resolution import resolve_study
-from services.simulation import Simulation
-from workers.pool import LEAST_S
+from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.core.arrays import Parameters
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.tunables import tunables
+from gaplab.services.engines import engines
+from gaplab.services.engines.base import Engine
+from gaplab.services.specs.assembly import Simulation
+from gaplab.services.specs.resolution import resolve_study
+from gaplab.workers.pool import LEAST_S
 
 CORES = (2, 16, 64, 1_000)
 FIGURE_4 = StudySpec(direct_repetitions=100)

@@ -10,14 +10,14 @@ from time import sleep
 
 import numpy as np
 
-from api.own import own_service
 from benchmarks import naive
 from benchmarks.measure import Row, rates, ratio
-from schemas.spec import ExperimentSpec
-from services.core.loop import repetition
-from services.core.types import Selected, Transferred, Tuned
-from services.resolution import resolve_experiment
-from services.simulation import setting
+from gaplab.api.process.local_service import own_service
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.types import Selected, Transferred, Tuned
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
 
 SPEC = ExperimentSpec.model_validate(
     {

@@ -10,19 +10,19 @@ from time import perf_counter
 
 import ray
 
-import migrations
 from benchmarks.measure import Row
-from schemas.spec import ExperimentSpec
-from services import experiments
-from services.execution import Claim, Delivered
-from services.resolution import resolve_experiment
-from services.settings import Settings
-from services.simulation import setting
-from services.store.session import Store
-from workers.checkpoints import recorded
-from workers.cluster import cluster
-from workers.repetition import batches
-from workers.supervisor import Run, Supervisor
+from gaplab import migrations
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.experiments import submission
+from gaplab.services.running.execution import Claim, Delivered
+from gaplab.services.settings import Settings
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.session import Store
+from gaplab.workers.checkpoints import recorded
+from gaplab.workers.cluster import cluster
+from gaplab.workers.repetition import batches
+from gaplab.workers.supervisor import Run, Supervisor
 
 AT_ONCE = 200
 """Repetitions under way: what a hundred cores are given."""
@@ -83,7 +83,7 @@ def steps_per_second(url: str, kind: type[Supervisor], delivered: Batches) -> fl
     """From a queued experiment to its end."""
     migrations.upgrade(url)
     store = Store(url)
-    experiment = experiments.submit_experiment(store, SPEC).id
+    experiment = submission.submit_experiment(store, SPEC).id
     ours = kind(store, delivered)
     begun = perf_counter()
     idle = 0
@@ -91,7 +91,7 @@ def steps_per_second(url: str, kind: type[Supervisor], delivered: Batches) -> fl
         ours.step()
         idle = 0 if ours.busy else idle + 1
     seconds = perf_counter() - begun
-    assert experiments.read_experiment(store, experiment).progress.completed == SPEC.repetitions
+    assert submission.read_experiment(store, experiment).progress.completed == SPEC.repetitions
     store.dispose()
     return (SPEC.repetitions or 0) * sum(map(len, delivered)) / seconds
 

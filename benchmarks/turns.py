@@ -7,14 +7,15 @@ from time import perf_counter
 
 from sqlalchemy import insert, text
 
-import migrations
 from benchmarks.measure import Row
 from benchmarks.supervisor import postgres
-from schemas.spec import ExperimentSpec
-from services import execution, experiments
-from services.store.clock import now
-from services.store.models import ExperimentRow, RepetitionRow
-from services.store.session import Store
+from gaplab import migrations
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.store.clock import now
+from gaplab.services.store.models import ExperimentRow, RepetitionRow
+from gaplab.services.store.session import Store
 
 WAITING = 10_000
 REPETITIONS = 40
@@ -26,7 +27,7 @@ SPEC = ExperimentSpec.model_validate({"strategy": "random", "robot": "toy_functi
 
 def fill(store: Store, count: int) -> None:
     """One experiment that is submitted, and so many like it."""
-    like = experiments.submit_experiment(store, SPEC).id
+    like = submission.submit_experiment(store, SPEC).id
     if not count:
         return
     with store.transaction() as session:

@@ -1,6 +1,6 @@
 """A World as a URDF file: what a user would hand to PyBullet."""
 
-from services.core.world import Body, Box, Joint, World
+from gaplab.services.core.world import Body, Box, Joint, World
 
 
 def urdf(world: World) -> str:

@@ -5,18 +5,18 @@ from time import sleep
 
 from sqlalchemy import select
 
-from schemas.lifecycle import State
-from schemas.spec import ExperimentSpec
-from services import execution
-from services.execution import Claim
-from services.simulation import setting
-from services.store.models import RepetitionRow
-from services.store.session import Store
-from workers import supervisor
-from workers.checkpoints import recorded
-from workers.repetition import batches
-from workers.run import Run
-from workers.supervisor import Supervisor
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.running import execution
+from gaplab.services.running.execution import Claim
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.models import RepetitionRow
+from gaplab.services.store.session import Store
+from gaplab.workers import supervisor
+from gaplab.workers.checkpoints import recorded
+from gaplab.workers.repetition import batches
+from gaplab.workers.run import Run
+from gaplab.workers.supervisor import Supervisor
 
 SPEC = ExperimentSpec.model_validate(
     {

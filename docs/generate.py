@@ -12,16 +12,16 @@ from typing import Any
 
 import typer
 
-from api.app import create_app
-from api.cli import app
-from api.client import Client
-from api.completion import KINDS
-from api.exits import MEANINGS
-from schemas.plugin import BudgetRead, PluginRead
-from services.catalogue import catalogue
-from services.plugins import VARIABLE
-from services.settings import Limits, Settings, variable_of
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.api.clients.client import Client
+from gaplab.api.commands.cli import app
+from gaplab.api.commands.completion import KINDS
+from gaplab.api.commands.exit_codes import MEANINGS
+from gaplab.schemas.plugin import BudgetRead, PluginRead
+from gaplab.services.plugins.catalogue import catalogue
+from gaplab.services.plugins.folders import VARIABLE
+from gaplab.services.settings import Limits, Settings, variable_of
+from gaplab.services.store.session import Store
 
 FOLDER = Path(__file__).parent / "reference"
 MADE = "<!-- Made by `make docs`; what is changed here is lost. -->"

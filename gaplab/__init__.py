@@ -14,24 +14,24 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from api.client import Client as Client
-    from api.client import ExperimentFailed as ExperimentFailed
-    from api.client import ExtraMissing as ExtraMissing
-    from api.client import ServiceError as ServiceError
-    from api.client import ServiceUnreachable as ServiceUnreachable
-    from api.clients.figures import Figure as Figure
-    from api.exits import CommandError as CommandError
-    from api.own import local_service as local_service
+    from gaplab.api.clients.client import Client as Client
+    from gaplab.api.clients.client import ExperimentFailed as ExperimentFailed
+    from gaplab.api.clients.client import ExtraMissing as ExtraMissing
+    from gaplab.api.clients.client import ServiceError as ServiceError
+    from gaplab.api.clients.client import ServiceUnreachable as ServiceUnreachable
+    from gaplab.api.clients.figures import Figure as Figure
+    from gaplab.api.commands.exit_codes import CommandError as CommandError
+    from gaplab.api.process.local_service import local_service as local_service
 
 _HOMES = {
-    "Client": "api.client",
-    "CommandError": "api.exits",
-    "ExperimentFailed": "api.client",
-    "ExtraMissing": "api.client",
-    "Figure": "api.clients.figures",
-    "ServiceError": "api.client",
-    "ServiceUnreachable": "api.client",
-    "local_service": "api.own",
+    "Client": "gaplab.api.clients.client",
+    "CommandError": "gaplab.api.commands.exit_codes",
+    "ExperimentFailed": "gaplab.api.clients.client",
+    "ExtraMissing": "gaplab.api.clients.client",
+    "Figure": "gaplab.api.clients.figures",
+    "ServiceError": "gaplab.api.clients.client",
+    "ServiceUnreachable": "gaplab.api.clients.client",
+    "local_service": "gaplab.api.process.local_service",
 }
 
 __all__ = [

@@ -7,9 +7,9 @@ from alembic.config import Config
 from alembic.util import CommandError
 from sqlalchemy import Connection, text
 
-from services.core.errors import StoreUnavailable
-from services.store import troubles
-from services.store.engine import WRITES, open_engine
+from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.store import database_errors
+from gaplab.services.store.engine import WRITES, open_engine
 
 _LOCK = 0x6761706C6162
 """Of the migration, among the advisory locks of a Postgres database: "gaplab"."""
@@ -33,7 +33,7 @@ def upgrade(url: str) -> None:
     """
     engine = open_engine(url, enforce_foreign_keys=False)
     try:
-        with troubles.named(), engine.execution_options(**{WRITES: True}).begin() as connection:
+        with database_errors.named(), engine.execution_options(**{WRITES: True}).begin() as connection:
             if connection.dialect.name == "postgresql":
                 connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
             command.upgrade(configuration(connection), "head")

@@ -2,9 +2,9 @@
 
 import sys
 
-from migrations import upgrade
-from services.core.errors import StoreUnavailable
-from services.settings import Settings
+from gaplab.migrations import upgrade
+from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.settings import Settings
 
 
 def main() -> None:

@@ -1,11 +1,11 @@
-"""Alembic's entry: compares and migrates the tables of `services.store.models`."""
+"""Alembic's entry: compares and migrates the tables of `gaplab.services.store.models`."""
 
 from alembic import context
 from sqlalchemy import Connection
 
-from services.settings import Settings
-from services.store.engine import WRITES, open_engine
-from services.store.models import Base
+from gaplab.services.settings import Settings
+from gaplab.services.store.engine import WRITES, open_engine
+from gaplab.services.store.models import Base
 
 
 def migrate(connection: Connection) -> None:

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from schemas.base import Frozen
+from gaplab.schemas.base import Frozen
 
 FORMAT = 1
 """Of the archives that are written now, and the latest that is read."""

@@ -2,8 +2,8 @@
 
 from pydantic import Field
 
-from schemas.base import Frozen
-from schemas.lifecycle import State
+from gaplab.schemas.base import Frozen
+from gaplab.schemas.lifecycle import State
 
 
 class CurvePoint(Frozen):

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from schemas.base import Frozen, Label
+from gaplab.schemas.base import Frozen, Label
 
 
 class Edit(Frozen):

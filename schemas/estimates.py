@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from schemas.base import Frozen
+from gaplab.schemas.base import Frozen
 
 
 class EngineCost(Frozen):

@@ -4,7 +4,7 @@ from typing import Any
 
 from pydantic import Field
 
-from schemas.base import Frozen
+from gaplab.schemas.base import Frozen
 
 
 class Chart(Frozen):

@@ -6,7 +6,7 @@ from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from schemas.base import Frozen, Real
+from gaplab.schemas.base import Frozen, Real
 
 
 class Named(Frozen):

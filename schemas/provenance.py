@@ -4,7 +4,7 @@ from datetime import datetime
 
 from pydantic import Field
 
-from schemas.base import Frozen
+from gaplab.schemas.base import Frozen
 
 
 class Provenance(Frozen):

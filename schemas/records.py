@@ -9,8 +9,8 @@ from typing import Any, Generic, TypeVar
 
 from pydantic import Field
 
-from schemas.base import Frozen
-from schemas.lifecycle import Ending, State
+from gaplab.schemas.base import Frozen
+from gaplab.schemas.lifecycle import Ending, State
 
 T = TypeVar("T")
 

@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from schemas.base import Frozen
+from gaplab.schemas.base import Frozen
 
 Position = tuple[float, float, float]
 Orientation = tuple[float, float, float, float]

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from schemas.base import Count, Frozen, Priority
+from gaplab.schemas.base import Count, Frozen, Priority
 
 
 class ExtensionSpec(Frozen):

@@ -6,10 +6,10 @@ from typing import Annotated
 
 from pydantic import Field
 
-from schemas.base import Count, Frozen
-from schemas.lifecycle import State
-from schemas.plugin import PluginRef, TunableRef
-from schemas.spec import Settings
+from gaplab.schemas.base import Count, Frozen
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.plugin import PluginRef, TunableRef
+from gaplab.schemas.spec import Settings
 
 POINTS, EVALUATIONS = 17, 100
 

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from schemas.base import Count, Frozen, Label, Priority, Real, Seed
-from schemas.plugin import PluginRef, TunableRef
+from gaplab.schemas.base import Count, Frozen, Label, Priority, Real, Seed
+from gaplab.schemas.plugin import PluginRef, TunableRef
 
 BudgetName = Literal["smoke", "desk", "paper"]
 

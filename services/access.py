@@ -13,11 +13,11 @@ from hashlib import sha256
 from ipaddress import ip_address
 from secrets import token_hex
 
-from schemas.access import Role, TokenRead
-from services.core.errors import Forbidden, StoreUnavailable, Unauthenticated
-from services.store.models import TokenRow
-from services.store.repository import tokens
-from services.store.session import Store
+from gaplab.schemas.access import Role, TokenRead
+from gaplab.services.core.errors import Forbidden, StoreUnavailable, Unauthenticated
+from gaplab.services.store.models import TokenRow
+from gaplab.services.store.queries import tokens
+from gaplab.services.store.session import Store
 
 MAKE_ONE = "`gaplab token create --role admin` makes one"
 

@@ -5,9 +5,9 @@ All of them raise StoreUnavailable while the database cannot be used.
 
 from dataclasses import dataclass
 
-from schemas.events import EventKind, EventPage, EventRead
-from services.store.repository import events, experiments
-from services.store.session import Store
+from gaplab.schemas.events import EventKind, EventPage, EventRead
+from gaplab.services.store.queries import events, experiments
+from gaplab.services.store.session import Store
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import uvicorn
 
-from api.server import listen
+from gaplab.api.process.server import listen
 
 
 class Said(NamedTuple):

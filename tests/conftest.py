@@ -18,8 +18,8 @@ from typing import Any
 import psycopg
 import pytest
 
-import migrations
-from services.store.session import Store
+from gaplab import migrations
+from gaplab.services.store.session import Store
 from tests import postgres as servers
 
 _DATABASES = ("sqlite", "postgres")

@@ -5,12 +5,12 @@ from math import inf, isnan, nan
 
 import numpy as np
 
-from schemas.spec import ExperimentSpec
-from services import execution
-from services.core.arrays import frozen
-from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
-from services.execution import Claim
-from services.store.session import Store
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
+from gaplab.services.running import execution
+from gaplab.services.running.execution import Claim
+from gaplab.services.store.session import Store
 
 AWKWARD = (0.1 + 0.2, 1e-320, -1.7976931348623157e308, 2.0**-1074, 1 / 3, 5e-324, -0.0, 123456789.12345679)
 """Numbers that a careless store changes."""

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from schemas.plugin import PluginRef
-from services.core.loop import Setting
-from services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
-from services.core.strategies import strategies
-from services.core.types import Budget, Space
+from gaplab.schemas.plugin import PluginRef
+from gaplab.services.core.loop import Setting
+from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.types import Budget, Space
 
 TRUTH = np.array([0.7, 0.2])
 

@@ -1,26 +1,14 @@
 """Curves and figures for the tests of figures."""
 
-from schemas.curves import Curve, CurvePoint
-from schemas.lifecycle import State
-from schemas.predictions import Prediction
-from services.figures.curves import curves_figure
-from services.figures.marks import (
-    Arrow,
-    Axis,
-    Bars,
-    Diagonal,
-    Figure,
-    Label,
-    Level,
-    Line,
-    Panel,
-    Points,
-    Table,
-)
-from services.figures.predictions import predictions_figure
-from services.figures.simulators import Dimension, Tuned, simulators_figure
-from services.figures.squared_error import squared_error_figure
-from services.figures.style import style_of
+from gaplab.schemas.curves import Curve, CurvePoint
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.predictions import Prediction
+from gaplab.services.figures.kinds.curves import curves_figure
+from gaplab.services.figures.kinds.predictions import predictions_figure
+from gaplab.services.figures.kinds.simulators import Dimension, Tuned, simulators_figure
+from gaplab.services.figures.kinds.squared_error import squared_error_figure
+from gaplab.services.figures.marks import Arrow, Axis, Bars, Diagonal, Figure, Label, Level, Line, Panel, Points, Table
+from gaplab.services.figures.style import style_of
 
 NAMES = [
     "<script>alert(1)</script>",

@@ -2,10 +2,10 @@
 
 import sys
 
-from services import execution
-from services.settings import Settings
-from workers import supervisor
-from workers.__main__ import serve
+from gaplab.services.running import execution
+from gaplab.services.settings import Settings
+from gaplab.workers import supervisor
+from gaplab.workers.__main__ import serve
 
 STALE_S = 3.0
 HEARTBEATS = 60

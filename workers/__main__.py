@@ -8,17 +8,18 @@ from collections.abc import Callable
 from secrets import token_hex
 from threading import Event
 
-from services import logs, plugins
-from services.core.errors import ClusterUnusable, PluginBroken, StoreUnavailable
-from services.settings import Settings
-from services.store.session import Store
+from gaplab.services import logs
+from gaplab.services.core.errors import ClusterUnusable, PluginBroken, StoreUnavailable
+from gaplab.services.plugins import folders
+from gaplab.services.settings import Settings
+from gaplab.services.store.session import Store
 
 
 def serve(settings: Settings) -> int:
     """Work until SIGTERM or SIGINT; 1 if there is no cluster to work on."""
     choose_authentication(settings)
-    from workers.cluster import cluster  # Ray takes a second to import
-    from workers.supervisor import Supervisor
+    from gaplab.workers.cluster import cluster  # Ray takes a second to import
+    from gaplab.workers.supervisor import Supervisor
 
     logs.adopt("ray")
     logs.configure()
@@ -70,7 +71,7 @@ def main(arguments: list[str]) -> int:
         return 2
     try:
         settings = Settings.from_environment()
-        plugins.load()
+        folders.load()
     except (ValueError, PluginBroken) as error:
         sys.stderr.write(f"{error}\n")
         return 2

@@ -8,12 +8,12 @@ from time import perf_counter
 
 import numpy as np
 
-from services.core.arrays import Fitnesses, Genomes, Parameters
-from services.core.loop import Setting, repetition
-from services.core.ports import Simulate
-from services.core.recall import Answer, Recall, pack
-from services.core.types import Step
-from services.execution import Checkpoint, Delivered, TimedStep
+from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
+from gaplab.services.core.loop import Setting, repetition
+from gaplab.services.core.ports import Simulate
+from gaplab.services.core.recall import Answer, Recall, pack
+from gaplab.services.core.types import Step
+from gaplab.services.running.execution import Checkpoint, Delivered, TimedStep
 
 CHECKPOINT_S = 10.0
 """Between the checkpoints of a step; shorter ones have none. It bounds what a crash costs, and how long one waits for a

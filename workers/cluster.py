@@ -10,9 +10,9 @@ import ray
 from ray._private import ray_constants
 from ray.exceptions import RayError
 
-from services.core.errors import ClusterUnusable
-from services.settings import Settings
-from workers.nodes import Versions, check_nodes, versions
+from gaplab.services.core.errors import ClusterUnusable
+from gaplab.services.settings import Settings
+from gaplab.workers.nodes import Versions, check_nodes, versions
 
 OBJECT_STORE_BYTES = 100 * 2**20
 """Steps are small: nothing here needs a large object store."""

@@ -8,11 +8,11 @@ from typing import Any, TypeAlias
 import ray
 from ray.exceptions import RayError
 
-from schemas.spec import ExperimentSpec
-from services.core.arrays import Fitnesses, Genomes, Parameters
-from services.core.ports import Simulate
-from services.simulation import setting
-from workers.nodes import Versions, check_here
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
+from gaplab.services.core.ports import Simulate
+from gaplab.services.specs.assembly import setting
+from gaplab.workers.nodes import Versions, check_here
 
 LOOK_S = 1.0
 """How often it is looked which cores are idle."""

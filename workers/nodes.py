@@ -6,9 +6,9 @@ import ray
 from ray.exceptions import RayError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-from services.core.errors import ClusterUnusable, PluginBroken
-from services.versions import Versions as Versions
-from services.versions import versions as versions
+from gaplab.services.core.errors import ClusterUnusable, PluginBroken
+from gaplab.services.running.versions import Versions as Versions
+from gaplab.services.running.versions import versions as versions
 
 ANSWER_S = 60.0
 """How long a node may take to start a process and to say what it has."""

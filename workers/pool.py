@@ -7,12 +7,12 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.spec import ExperimentSpec
-from services.core.arrays import Fitnesses, Genomes, Parameters
-from services.core.ports import Simulate
-from workers.helpers import LOOK_S, Handle, Helpers
-from workers.nodes import Versions
-from workers.spread import Part, Spread, sizes
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
+from gaplab.services.core.ports import Simulate
+from gaplab.workers.helpers import LOOK_S, Handle, Helpers
+from gaplab.workers.nodes import Versions
+from gaplab.workers.spread import Part, Spread, sizes
 
 Rows: TypeAlias = NDArray[np.intp]
 

@@ -6,12 +6,12 @@ from time import perf_counter
 
 import ray
 
-from services.core.types import Measured, Probed
-from services.execution import Checkpoint, Claim, Delivered
-from services.simulation import setting
-from workers.checkpoints import recorded
-from workers.nodes import Versions, check_here
-from workers.pool import Pool
+from gaplab.services.core.types import Measured, Probed
+from gaplab.services.running.execution import Checkpoint, Claim, Delivered
+from gaplab.services.specs.assembly import setting
+from gaplab.workers.checkpoints import recorded
+from gaplab.workers.nodes import Versions, check_here
+from gaplab.workers.pool import Pool
 
 BATCH_S = 0.2
 """Steps shorter than this travel together; what reality answered never waits."""

@@ -6,8 +6,8 @@ import ray
 from ray import ObjectRefGenerator
 from ray.exceptions import RayError, RayTaskError
 
-from services.core.errors import ClusterUnusable
-from services.execution import Claim, Delivered
+from gaplab.services.core.errors import ClusterUnusable
+from gaplab.services.running.execution import Claim, Delivered
 
 
 @dataclass(eq=False)

@@ -7,17 +7,17 @@ import ray
 from ray import ObjectRef
 from ray.exceptions import RayError, RayTaskError
 
-from schemas.sensitivity import Checked, Sensitivity
-from services import sensitivity
-from services.core.errors import ClusterUnusable
-from services.core.optimizers.steady_state import SteadyState
-from services.core.sensitivity import Effort
-from services.core.sensitivity import check as check_tunables
-from services.execution import STALE_AFTER_S
-from services.sensitivity import CheckClaim
-from services.simulation import subject
-from services.store.session import Store
-from workers.nodes import Versions, check_here
+from gaplab.schemas.sensitivity import Checked, Sensitivity
+from gaplab.services.core.errors import ClusterUnusable
+from gaplab.services.core.optimizers.steady_state import SteadyState
+from gaplab.services.core.sensitivity import Effort
+from gaplab.services.core.sensitivity import check as check_tunables
+from gaplab.services.running import sensitivity
+from gaplab.services.running.execution import STALE_AFTER_S
+from gaplab.services.running.sensitivity import CheckClaim
+from gaplab.services.specs.assembly import subject
+from gaplab.services.store.session import Store
+from gaplab.workers.nodes import Versions, check_here
 
 LOOK_S = 0.2
 """Between looks for a check that is queued."""

@@ -9,9 +9,9 @@ from typing import TypeAlias
 import ray
 from ray.exceptions import RayError
 
-from services.core.arrays import Fitnesses, Genomes, Parameters
-from services.core.ports import Simulate
-from workers.helpers import Handle
+from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
+from gaplab.services.core.ports import Simulate
+from gaplab.workers.helpers import Handle
 
 Part: TypeAlias = tuple[Genomes, Parameters]
 

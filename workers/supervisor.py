@@ -14,15 +14,15 @@ from time import monotonic
 
 import ray
 
-from services import execution, supervisors
-from services.core.errors import Conflict, StoreUnavailable
-from services.execution import Claim
-from services.store.session import Store
-from workers import repetition
-from workers.checkpoints import CHECKPOINT_S
-from workers.nodes import Versions
-from workers.run import Run as Run
-from workers.sensitivity import Checks
+from gaplab.services.core.errors import Conflict, StoreUnavailable
+from gaplab.services.running import execution, supervisors
+from gaplab.services.running.execution import Claim
+from gaplab.services.store.session import Store
+from gaplab.workers import repetition
+from gaplab.workers.checkpoints import CHECKPOINT_S
+from gaplab.workers.nodes import Versions
+from gaplab.workers.run import Run as Run
+from gaplab.workers.sensitivity import Checks
 
 HEARTBEATS = 6
 """In the time after which a lease without one is lost."""

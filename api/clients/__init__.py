@@ -1,1 +1,1 @@
-"""What the Python client is put together from; `api.client` is what programs import."""
+"""What the Python client is put together from; `gaplab.api.clients.client` is what programs import."""

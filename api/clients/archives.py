@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from typing import IO, TYPE_CHECKING
 
-from schemas.archives import ImportRead
-from schemas.records import StudyRead
+from gaplab.schemas.archives import ImportRead
+from gaplab.schemas.records import StudyRead
 
 if TYPE_CHECKING:
-    from api.client import Client
+    from gaplab.api.clients.client import Client
 
 _CHUNK = 2**16
 

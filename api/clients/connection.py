@@ -11,8 +11,8 @@ from uuid import uuid4
 import httpx2
 from pydantic import TypeAdapter, ValidationError
 
-from api.clients.errors import ServiceError, ServiceUnreachable, problem_of
-from services.settings import Settings
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, problem_of
+from gaplab.services.settings import Settings
 
 T = TypeVar("T")
 

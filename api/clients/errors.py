@@ -3,8 +3,8 @@
 import httpx2
 from pydantic import ValidationError
 
-from schemas.problems import Problem
-from schemas.records import ExperimentRead, StudyRead
+from gaplab.schemas.problems import Problem
+from gaplab.schemas.records import ExperimentRead, StudyRead
 
 
 class ServiceError(Exception):

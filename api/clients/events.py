@@ -7,8 +7,8 @@ from typing import Any
 import httpx2
 from pydantic import ValidationError
 
-from api.clients.errors import ServiceError, ServiceUnreachable, is_for_good, problem_of
-from schemas.events import EventRead
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_for_good, problem_of
+from gaplab.schemas.events import EventRead
 
 RETRY_S = 1.0
 """Before a broken stream is opened again."""

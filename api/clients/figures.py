@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel
 
-from schemas.records import ExperimentRead, StudyRead
+from gaplab.schemas.records import ExperimentRead, StudyRead
 
 if TYPE_CHECKING:
-    from api.client import Client
+    from gaplab.api.clients.client import Client
 
 _FIGURES = "/figures/"
 

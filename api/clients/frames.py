@@ -4,15 +4,15 @@ import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from api.clients.errors import ExtraMissing
-from api.clients.life_cycle import part
-from schemas.predictions import Prediction, Predictions
-from schemas.records import MeasurementKind, Page, SampleRead, SimulatorRead
+from gaplab.api.clients.errors import ExtraMissing
+from gaplab.api.clients.life_cycle import part
+from gaplab.schemas.predictions import Prediction, Predictions
+from gaplab.schemas.records import MeasurementKind, Page, SampleRead, SimulatorRead
 
 if TYPE_CHECKING:
     import pandas
 
-    from api.client import Client
+    from gaplab.api.clients.client import Client
 
 T = TypeVar("T")
 

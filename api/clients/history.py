@@ -3,14 +3,14 @@
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from api.clients.events import follow as follow_events
-from api.clients.life_cycle import part
-from schemas.events import EventPage, EventRead
-from schemas.provenance import ProvenanceRead
-from schemas.records import ExperimentRead
+from gaplab.api.clients.events import follow as follow_events
+from gaplab.api.clients.life_cycle import part
+from gaplab.schemas.events import EventPage, EventRead
+from gaplab.schemas.provenance import ProvenanceRead
+from gaplab.schemas.records import ExperimentRead
 
 if TYPE_CHECKING:
-    from api.client import Client
+    from gaplab.api.clients.client import Client
 
 
 class History:

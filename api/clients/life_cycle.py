@@ -3,11 +3,11 @@
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from schemas.lifecycle import Verb
-from schemas.records import AttemptRead, ExperimentRead, StudyRead
+from gaplab.schemas.lifecycle import Verb
+from gaplab.schemas.records import AttemptRead, ExperimentRead, StudyRead
 
 if TYPE_CHECKING:
-    from api.client import Client
+    from gaplab.api.clients.client import Client
 
 
 def part(id: str) -> str:  # noqa: A002 - as the API says
@@ -16,7 +16,7 @@ def part(id: str) -> str:  # noqa: A002 - as the API says
 
 
 class LifeCycle:
-    """A part of the client: the verbs of `schemas.lifecycle`; its methods raise what the client's do."""
+    """A part of the client: the verbs of `gaplab.schemas.lifecycle`; its methods raise what the client's do."""
 
     def pause(self: "Client", id: str) -> ExperimentRead | StudyRead:  # noqa: A002 - as the API says
         """Let a study or an experiment finish the steps under way, and wait until it is resumed."""

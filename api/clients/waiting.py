@@ -5,13 +5,13 @@ import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from api.clients.errors import ExperimentFailed, ServiceError, ServiceUnreachable, is_for_good
-from api.notebook import follow_in_notebook, in_notebook
-from schemas.lifecycle import State
-from schemas.records import ExperimentRead, StudyRead
+from gaplab.api.clients.errors import ExperimentFailed, ServiceError, ServiceUnreachable, is_for_good
+from gaplab.api.clients.notebook import follow_in_notebook, in_notebook
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.records import ExperimentRead, StudyRead
 
 if TYPE_CHECKING:
-    from api.client import Client
+    from gaplab.api.clients.client import Client
 
 
 class Waiting:
@@ -90,8 +90,8 @@ def _somebody_looks(progress: bool | None) -> bool:
 def _shown(stages: Iterator[ExperimentRead | StudyRead]) -> ExperimentRead | StudyRead:
     if in_notebook():
         return follow_in_notebook(stages)
-    from api.display import console
-    from api.watch import follow
+    from gaplab.api.clients.display import console
+    from gaplab.api.clients.watch import follow
 
     return follow(stages, console(stderr=True))
 

@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 
-from api import completion
-from api.client import Client
-from api.exits import EXPLAINED
-from schemas.records import ExperimentRead, StudyRead
-from services.settings import Settings
+from gaplab.api.clients.client import Client
+from gaplab.api.commands import completion
+from gaplab.api.commands.exit_codes import EXPLAINED
+from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.services.settings import Settings
 
 app = typer.Typer(
     help="Closes the reality gap: tunes a robot simulator from a handful of real-world evaluations.",

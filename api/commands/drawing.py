@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
-from api.clients.figures import FORMATS
-from api.commands.base import AsJson, Ids, Url, app, connect
-from api.completion import figures
-from api.document import document
+from gaplab.api.clients.figures import FORMATS
+from gaplab.api.commands.base import AsJson, Ids, Url, app, connect
+from gaplab.api.commands.completion import figures
+from gaplab.api.commands.json_output import document
 
 
 @app.command()

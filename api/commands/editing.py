@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 from pydantic import ValidationError
 
-from api.commands.base import AsJson, Id, Url, app, connect
-from api.document import document
-from api.exits import CommandError, Exit
-from schemas.editing import Edit
+from gaplab.api.commands.base import AsJson, Id, Url, app, connect
+from gaplab.api.commands.exit_codes import CommandError, Exit
+from gaplab.api.commands.json_output import document
+from gaplab.schemas.editing import Edit
 
 
 @app.command()

@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from api.commands.base import AsJson, app
-from api.document import document
-from api.exits import MEANINGS
+from gaplab.api.commands.base import AsJson, app
+from gaplab.api.commands.exit_codes import MEANINGS
+from gaplab.api.commands.json_output import document
 
 
 class Topic(StrEnum):

@@ -7,12 +7,13 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from api import completion, display
-from api.commands.base import AsJson, ExperimentId, Url, app, connect
-from api.document import document
-from schemas.events import EventKind, EventRead
-from schemas.provenance import ProvenanceRead
-from schemas.records import StudyRead
+from gaplab.api.clients import display
+from gaplab.api.commands import completion
+from gaplab.api.commands.base import AsJson, ExperimentId, Url, app, connect
+from gaplab.api.commands.json_output import document
+from gaplab.schemas.events import EventKind, EventRead
+from gaplab.schemas.provenance import ProvenanceRead
+from gaplab.schemas.records import StudyRead
 
 
 @app.command()

@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 
-from api.commands.base import AsJson, Id, Url, app, connect
-from api.document import document
-from services.settings import Settings
-from services.store.backup import backup as copy
-from services.store.files import appearing
+from gaplab.api.commands.base import AsJson, Id, Url, app, connect
+from gaplab.api.commands.json_output import document
+from gaplab.services.settings import Settings
+from gaplab.services.store.atomic_files import appearing
+from gaplab.services.store.backup import backup as copy
 
 
 @app.command()

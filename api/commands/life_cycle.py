@@ -4,9 +4,9 @@ from typing import Annotated
 
 import typer
 
-from api.commands.base import AsJson, ExperimentId, Id, Url, app, connect
-from api.document import document
-from schemas.records import ExperimentRead, StudyRead
+from gaplab.api.commands.base import AsJson, ExperimentId, Id, Url, app, connect
+from gaplab.api.commands.json_output import document
+from gaplab.schemas.records import ExperimentRead, StudyRead
 
 Total = typer.Option(min=1, help="in all, not what is added; left out: as many as there are")
 

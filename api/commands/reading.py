@@ -8,18 +8,19 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from api import completion, display
-from api.client import Client
-from api.commands.base import AsJson, Id, Ids, Url, app, connect, experiments_of, print_warnings
-from api.commands.history import print_provenance
-from api.document import document
-from api.exits import CommandError, Exit
-from api.files import read_spec
-from schemas.lifecycle import State
-from schemas.misfit import MisfitRead
-from schemas.plugin import Catalogue
-from schemas.records import ExperimentRead, StudyRead
-from services.core.errors import unknown_name
+from gaplab.api.clients import display
+from gaplab.api.clients.client import Client
+from gaplab.api.commands import completion
+from gaplab.api.commands.base import AsJson, Id, Ids, Url, app, connect, experiments_of, print_warnings
+from gaplab.api.commands.exit_codes import CommandError, Exit
+from gaplab.api.commands.history import print_provenance
+from gaplab.api.commands.json_output import document
+from gaplab.api.commands.spec_files import read_spec
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.misfit import MisfitRead
+from gaplab.schemas.plugin import Catalogue
+from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.services.core.errors import unknown_name
 
 PAGE = 100
 """Experiments that are asked for at once."""

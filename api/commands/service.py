@@ -5,9 +5,9 @@ from typing import Annotated, Any
 
 import typer
 
-from api import display
-from api.commands.base import app
-from services.settings import Settings
+from gaplab.api.clients import display
+from gaplab.api.commands.base import app
+from gaplab.services.settings import Settings
 
 
 @app.command()
@@ -17,7 +17,7 @@ def serve(
     workers: Annotated[bool, typer.Option("--workers/--no-workers", help="run experiments, or only answer")] = True,
 ) -> None:
     """Run the service: migrate the database, answer over HTTP, and run what is queued. Ctrl-C ends it."""
-    from api.service import serve as run
+    from gaplab.api.process.service import serve as run
 
     run(_settings(host, port), workers=workers)
 
@@ -27,7 +27,7 @@ def demo(
     folder: Annotated[Path, typer.Option(help="for its database, figures and log")] = Path("results/demo"),
 ) -> None:
     """Run the main job on small budgets: six strategies and the direct baseline, on a toy, then on a quadruped."""
-    from api.demo import run
+    from gaplab.api.commands.demo import run
 
     run(folder, display.console())
 

@@ -4,15 +4,15 @@ from typing import Annotated
 
 import typer
 
-from api import display
-from api.client import Client
-from api.commands.base import AsJson, Url, app, connect, experiments_of, print_warnings
-from api.document import document
-from api.exits import CommandError, Exit
-from api.files import read_spec
-from api.watch import follow
-from schemas.lifecycle import State
-from schemas.records import ExperimentRead, StudyRead
+from gaplab.api.clients import display
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.watch import follow
+from gaplab.api.commands.base import AsJson, Url, app, connect, experiments_of, print_warnings
+from gaplab.api.commands.exit_codes import CommandError, Exit
+from gaplab.api.commands.json_output import document
+from gaplab.api.commands.spec_files import read_spec
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.records import ExperimentRead, StudyRead
 
 
 @app.command()

@@ -10,13 +10,13 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from api import display
-from api.commands.base import AsJson, app
-from api.document import document
-from schemas.access import Role
-from services import access
-from services.settings import Settings
-from services.store.session import Store
+from gaplab.api.clients import display
+from gaplab.api.commands.base import AsJson, app
+from gaplab.api.commands.json_output import document
+from gaplab.schemas.access import Role
+from gaplab.services import access
+from gaplab.services.settings import Settings
+from gaplab.services.store.session import Store
 
 tokens = typer.Typer(
     help="Tokens that the service lets in; on the database of GAPLAB_DATABASE_URL.", no_args_is_help=True
@@ -31,7 +31,7 @@ def create(
     as_json: AsJson = False,
 ) -> None:
     """Make a token, and print it this once: only its digest is stored."""
-    from api.service import migrate
+    from gaplab.api.process.service import migrate
 
     migrate(Settings.from_environment().database_url)
     with _store() as store:

@@ -4,16 +4,16 @@ from typing import Annotated
 
 import typer
 
-from api import display
-from api.client import Client
-from api.commands.base import AsJson, Id, Url, app, connect
-from api.commands.submitting import finish
-from api.document import document
-from api.exits import CommandError, Exit
-from api.monitor import looks
-from api.monitor import watch as show
-from api.watch import follow
-from schemas.records import ExperimentRead, StudyRead
+from gaplab.api.clients import display
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.watch import follow
+from gaplab.api.commands.base import AsJson, Id, Url, app, connect
+from gaplab.api.commands.exit_codes import CommandError, Exit
+from gaplab.api.commands.json_output import document
+from gaplab.api.commands.monitor import looks
+from gaplab.api.commands.monitor import watch as show
+from gaplab.api.commands.submitting import finish
+from gaplab.schemas.records import ExperimentRead, StudyRead
 
 
 @app.command()

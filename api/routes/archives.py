@@ -8,12 +8,12 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
-from api import examples
-from api.dependencies import Id, StoreDep
-from api.problems import documented
-from schemas.archives import ImportRead
-from services import archives
-from services.archives import Archive
+from gaplab.api.http import examples
+from gaplab.api.http.dependencies import Id, StoreDep
+from gaplab.api.http.problems import documented
+from gaplab.schemas.archives import ImportRead
+from gaplab.services import archives
+from gaplab.services.archives import Archive
 
 router = APIRouter(tags=["archives"])
 

@@ -2,10 +2,10 @@
 
 from fastapi import APIRouter, Request, Response
 
-from api import conditional
-from api.problems import documented
-from schemas.plugin import Catalogue
-from services.catalogue import catalogue
+from gaplab.api.http import conditional
+from gaplab.api.http.problems import documented
+from gaplab.schemas.plugin import Catalogue
+from gaplab.services.plugins.catalogue import catalogue
 
 router = APIRouter(tags=["catalogue"])
 

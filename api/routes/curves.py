@@ -6,12 +6,12 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
-from api import examples
-from api.dependencies import Id, Parameters, StoreDep
-from api.problems import documented
-from schemas.curves import Comparison, Curve
-from services import reports
-from services.core.errors import InvalidSpec
+from gaplab.api.http import examples
+from gaplab.api.http.dependencies import Id, Parameters, StoreDep
+from gaplab.api.http.problems import documented
+from gaplab.schemas.curves import Comparison, Curve
+from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.results import curves
 
 router = APIRouter(tags=["curves"])
 
@@ -55,7 +55,7 @@ def read_curve(
     query: Annotated[CurveQuery, Query()],
 ) -> Curve | Response:
     """Mean, SD, n and 95 % interval after each real-world evaluation, and the value of each repetition."""
-    curve = reports.curve(store, id)
+    curve = curves.curve(store, id)
     return _csv((curve,)) if query.format == "csv" else curve
 
 
@@ -74,7 +74,7 @@ def read_study_curves(
     query: Annotated[CurveQuery, Query()],
 ) -> tuple[Curve, ...] | Response:
     """The curves of a study's experiments, in its order."""
-    return _wanted(reports.study_curves(store, id), query)
+    return _wanted(curves.study_curves(store, id), query)
 
 
 @router.get(
@@ -88,7 +88,7 @@ def read_study_curves(
 )
 def read_curves(store: StoreDep, query: Annotated[CurvesQuery, Query()]) -> tuple[Curve, ...] | Response:
     """The curves of the experiments that are named, in that order."""
-    return _wanted(reports.curves(store, query.experiment), query)
+    return _wanted(curves.curves(store, query.experiment), query)
 
 
 @router.get(
@@ -100,7 +100,7 @@ def compare_experiments(store: StoreDep, query: Annotated[ComparisonQuery, Query
     """Every pair, by the paper's t-test and by Welch's and Mann-Whitney's, corrected after Holm over all pairs."""
     first, last = query.from_evaluations, query.to_evaluations
     try:
-        return reports.compare(store, query.experiment, from_evaluations=first, to_evaluations=last)
+        return curves.compare(store, query.experiment, from_evaluations=first, to_evaluations=last)
     except InvalidSpec as error:
         renamed = (replace(each, pointer=each.pointer.removesuffix("_evaluations")) for each in error.violations)
         raise InvalidSpec(renamed) from error
@@ -112,4 +112,4 @@ def _wanted(curves: tuple[Curve, ...], query: CurveQuery) -> tuple[Curve, ...] |
 
 def _csv(curves: tuple[Curve, ...]) -> Response:
     disposition = {"Content-Disposition": 'attachment; filename="gaplab-curves.csv"'}
-    return Response(reports.curves_csv(curves), media_type="text/csv", headers=disposition)
+    return Response(curves.curves_csv(curves), media_type="text/csv", headers=disposition)

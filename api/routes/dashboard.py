@@ -8,8 +8,8 @@ from typing import Final
 from fastapi import FastAPI
 from fastapi.responses import HTMLResponse
 
-from api.assets import Assets
-from api.pages import page
+from gaplab.api.http.assets import Assets
+from gaplab.api.http.security_headers import page
 
 FILES: Final = Path(__file__).parents[1] / "dashboard"
 

@@ -4,12 +4,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Request
 
-from api import estimate_examples, examples
-from api.dependencies import StoreDep
-from api.problems import documented
-from schemas.estimates import EstimateRead
-from schemas.spec import StudySpec
-from services import estimates
+from gaplab.api.http import estimate_examples, examples
+from gaplab.api.http.dependencies import StoreDep
+from gaplab.api.http.problems import documented
+from gaplab.schemas.estimates import EstimateRead
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.experiments import estimates
 
 router = APIRouter(tags=["studies"])
 

@@ -10,14 +10,14 @@ from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import Field
 
-from api import event_examples, examples
-from api.dependencies import CallerDep, Id, Parameters, StoreDep
-from api.feed import Feed
-from api.limits import Streams
-from api.problems import documented
-from schemas.events import EventKind, EventPage
-from services import events
-from services.events import Which
+from gaplab.api.http import event_examples, examples
+from gaplab.api.http.dependencies import CallerDep, Id, Parameters, StoreDep
+from gaplab.api.http.event_feed import Feed
+from gaplab.api.http.limits import Streams
+from gaplab.api.http.problems import documented
+from gaplab.schemas.events import EventKind, EventPage
+from gaplab.services import events
+from gaplab.services.events import Which
 
 router = APIRouter(prefix="/events", tags=["events"])
 

@@ -5,13 +5,13 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Body, Path, Query, Request, Response
 from pydantic import Field
 
-from api import conditional, examples, links
-from api.dependencies import AdmissionDep, CallerDep, Id, Paging, Revealing, StoreDep, created
-from api.problems import documented
-from schemas.editing import Edit
-from schemas.lifecycle import State
-from schemas.misfit import MisfitRead
-from schemas.records import (
+from gaplab.api.http import conditional, examples, links
+from gaplab.api.http.dependencies import AdmissionDep, CallerDep, Id, Paging, Revealing, StoreDep, created
+from gaplab.api.http.problems import documented
+from gaplab.schemas.editing import Edit
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.misfit import MisfitRead
+from gaplab.schemas.records import (
     AttemptRead,
     ExperimentRead,
     MeasurementKind,
@@ -20,10 +20,10 @@ from schemas.records import (
     SampleRead,
     SimulatorRead,
 )
-from schemas.spec import ExperimentSpec
-from services import editing, experiments
-from services.listing import Which
-from services.misfit import misfit
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.experiments import editing, submission
+from gaplab.services.experiments.listing import Which
+from gaplab.services.results.misfit import misfit
 
 router = APIRouter(prefix="/experiments", tags=["experiments"])
 
@@ -78,7 +78,7 @@ def submit_experiment(
     response: Response,
 ) -> ExperimentRead:
     """Queue an experiment. Whatever is left out is the paper's."""
-    done = experiments.admit_experiment(store, spec, admitted)
+    done = submission.admit_experiment(store, spec, admitted)
     return created(done, response, request.app.url_path_for("read_experiment", id=done.answer.id))
 
 
@@ -90,7 +90,7 @@ def submit_experiment(
 def list_experiments(store: StoreDep, which: Annotated[ExperimentFilter, Query()]) -> Page[ExperimentRead]:
     """The experiments, the newest first unless sorted otherwise. A cursor is good only for the list that gave it."""
     wanted = Which(**which.model_dump(exclude={"limit", "cursor"}))
-    return experiments.list_experiments(store, wanted, limit=which.limit, cursor=which.cursor)
+    return submission.list_experiments(store, wanted, limit=which.limit, cursor=which.cursor)
 
 
 @router.get(
@@ -111,7 +111,7 @@ def read_experiment(
     query: Annotated[Revealing, Query()],
 ) -> Response:
     """An experiment with its resolved spec; reality's parameters are null until it has ended."""
-    shown = experiments.read_experiment(store, id, reveal=query.permitted(caller))
+    shown = submission.read_experiment(store, id, reveal=query.permitted(caller))
     return conditional.tagged(request, shown, shown.edits)
 
 
@@ -147,7 +147,7 @@ def edit_experiment(
 )
 def list_repetitions(id: Id, store: StoreDep) -> tuple[RepetitionRead, ...]:  # noqa: A002 - the address says {id}
     """Every repetition with its state, and why it failed if it did."""
-    return tuple(experiments.list_repetitions(store, id))
+    return tuple(submission.list_repetitions(store, id))
 
 
 @router.get(
@@ -164,7 +164,7 @@ def list_samples(
     which: Annotated[SampleFilter, Query()],
 ) -> Page[SampleRead]:
     """Every genome that was tried in reality, with its fitness there."""
-    return experiments.list_samples(store, id, **which.model_dump())
+    return submission.list_samples(store, id, **which.model_dump())
 
 
 @router.get(
@@ -181,7 +181,7 @@ def list_simulators(
     which: Annotated[SimulatorFilter, Query()],
 ) -> Page[SimulatorRead]:
     """The simulators that were tuned on the samples, rank 0 the best of its iteration."""
-    return experiments.list_simulators(store, id, **which.model_dump())
+    return submission.list_simulators(store, id, **which.model_dump())
 
 
 @router.get(
@@ -205,4 +205,4 @@ def list_attempts(
     store: StoreDep,
 ) -> tuple[AttemptRead, ...]:
     """Who had the repetition, from when to when, how it ended, and why. One that was lost is queued again."""
-    return experiments.list_attempts(store, id, number)
+    return submission.list_attempts(store, id, number)

@@ -6,23 +6,24 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, FastAPI, Query, Request, Response
 from pydantic import Field, model_validator
 
-from api.dependencies import Id, PhysicsDep, StoreDep
-from api.figures import Drawing, answer, responses
-from api.problems import documented
-from schemas.figures import FigureRead
-from services import experiments, reports
-from services.core.errors import NotFound
-from services.efforts import abscissa
-from services.figures.curves import Band, curves_figure
-from services.figures.marks import Figure
-from services.figures.predictions import predictions_figure
-from services.figures.simulators import simulators_figure
-from services.figures.squared_error import squared_error_figure
-from services.figures.words import TITLE, spoken
-from services.predictions import predictions
-from services.resolution import is_direct, spec_of
-from services.store.session import Store
-from services.tuned import tunings
+from gaplab.api.http.dependencies import Id, PhysicsDep, StoreDep
+from gaplab.api.http.figures import Drawing, answer, responses
+from gaplab.api.http.problems import documented
+from gaplab.schemas.figures import FigureRead
+from gaplab.services.core.errors import NotFound
+from gaplab.services.experiments import submission
+from gaplab.services.figures.kinds.curves import Band, curves_figure
+from gaplab.services.figures.kinds.predictions import predictions_figure
+from gaplab.services.figures.kinds.simulators import simulators_figure
+from gaplab.services.figures.kinds.squared_error import squared_error_figure
+from gaplab.services.figures.marks import Figure
+from gaplab.services.figures.words import TITLE, spoken
+from gaplab.services.replay.predictions import predictions
+from gaplab.services.results import curves
+from gaplab.services.results.curve_costs import abscissa
+from gaplab.services.results.tuned_simulators import tunings
+from gaplab.services.specs.resolution import is_direct, spec_of
+from gaplab.services.store.session import Store
 
 router = APIRouter(prefix="/figures", tags=["figures"])
 
@@ -135,20 +136,20 @@ def _draw_nothing(kind: str, request: Request) -> None:
 def _title(store: Store, query: ExperimentDrawing) -> str:
     if query.title is not None:
         return query.title
-    return spoken(experiments.read_experiment(store, query.experiment).name, TITLE)
+    return spoken(submission.read_experiment(store, query.experiment).name, TITLE)
 
 
 def _explained(store: Store, query: ExperimentDrawing, figure: Figure) -> Figure:
     """The figure, which says so if it will always be empty."""
-    if not figure.empty or not is_direct(spec_of(experiments.read_experiment(store, query.experiment).spec)):
+    if not figure.empty or not is_direct(spec_of(submission.read_experiment(store, query.experiment).spec)):
         return figure
     return replace(figure, nothing=DIRECT, alt=f"Nothing: {DIRECT}.")
 
 
 def _curves(store: Store, query: CurvesDrawing) -> Figure:
-    studies = [experiments.read_study(store, each) for each in query.study]
-    curves = [curve for each in studies for curve in reports.study_curves(store, each.id)]
-    curves += reports.curves(store, query.experiment) if query.experiment else ()
+    studies = [submission.read_study(store, each) for each in query.study]
+    curves = [curve for each in studies for curve in curves.study_curves(store, each.id)]
+    curves += curves.curves(store, query.experiment) if query.experiment else ()
     curves = list({each.experiment: each for each in curves}.values())  # one that is asked for twice is one line
     title = query.title if query.title is not None else ", ".join(each.name for each in studies)
     against = None if query.x == "evaluations" else abscissa(store, curves, query.x, cost_s=query.cost_s)

@@ -3,9 +3,9 @@
 from fastapi import APIRouter
 from pydantic import Field
 
-from api.dependencies import StoreDep
-from api.problems import documented
-from schemas.base import Frozen
+from gaplab.api.http.dependencies import StoreDep
+from gaplab.api.http.problems import documented
+from gaplab.schemas.base import Frozen
 
 router = APIRouter(tags=["health"])
 

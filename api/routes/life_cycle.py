@@ -4,13 +4,13 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body
 
-from api import examples
-from api.dependencies import Id, LimitedDep, StoreDep
-from api.problems import documented
-from schemas.lifecycle import State, Verb
-from schemas.records import ExperimentRead, StudyRead
-from schemas.schedule import ExtensionSpec, ScheduleChange
-from services import life_cycle
+from gaplab.api.http import examples
+from gaplab.api.http.dependencies import Id, LimitedDep, StoreDep
+from gaplab.api.http.problems import documented
+from gaplab.schemas.lifecycle import State, Verb
+from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.schemas.schedule import ExtensionSpec, ScheduleChange
+from gaplab.services.experiments import life_cycle
 
 router = APIRouter()
 

@@ -3,8 +3,8 @@
 from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
-from api.metrics import Metrics
-from api.problems import documented
+from gaplab.api.http.metrics import Metrics
+from gaplab.api.http.problems import documented
 
 router = APIRouter(tags=["health"])
 

@@ -2,12 +2,12 @@
 
 from fastapi import APIRouter
 
-from api import event_examples, examples
-from api.dependencies import Id, StoreDep
-from api.problems import documented
-from schemas.provenance import ProvenanceRead
-from schemas.records import ExperimentRead
-from services import provenance
+from gaplab.api.http import event_examples, examples
+from gaplab.api.http.dependencies import Id, StoreDep
+from gaplab.api.http.problems import documented
+from gaplab.schemas.provenance import ProvenanceRead
+from gaplab.schemas.records import ExperimentRead
+from gaplab.services.running import provenance
 
 router = APIRouter(prefix="/experiments", tags=["experiments"])
 

@@ -5,15 +5,15 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
-from api.dependencies import Id, PhysicsDep, StoreDep
-from api.figures import Drawing, answer, responses
-from api.problems import documented
-from api.routes.replays import ReplayQuery
-from schemas.figures import FigureRead
-from services.figures.gait import gait_figure
-from services.figures.toy import toy_figure
-from services.replays import Wanted, replay
-from services.toys import toys
+from gaplab.api.http.dependencies import Id, PhysicsDep, StoreDep
+from gaplab.api.http.figures import Drawing, answer, responses
+from gaplab.api.http.problems import documented
+from gaplab.api.routes.replays import ReplayQuery
+from gaplab.schemas.figures import FigureRead
+from gaplab.services.figures.kinds.gait import gait_figure
+from gaplab.services.figures.kinds.toy import toy_figure
+from gaplab.services.replay.replays import Wanted, replay
+from gaplab.services.results.toy import toys
 
 router = APIRouter(prefix="/figures", tags=["figures"])
 

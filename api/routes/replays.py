@@ -5,12 +5,12 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
-from api import examples, replay_examples
-from api.dependencies import Id, Parameters, PhysicsDep, StoreDep
-from api.problems import documented
-from schemas.predictions import Predictions
-from schemas.replays import ControllerKind, Replay
-from services import predictions, replays
+from gaplab.api.http import examples, replay_examples
+from gaplab.api.http.dependencies import Id, Parameters, PhysicsDep, StoreDep
+from gaplab.api.http.problems import documented
+from gaplab.schemas.predictions import Predictions
+from gaplab.schemas.replays import ControllerKind, Replay
+from gaplab.services.replay import predictions, replays
 
 router = APIRouter(prefix="/experiments", tags=["replays"])
 

@@ -4,11 +4,11 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
-from api import examples, links
-from api.dependencies import AdmissionDep, Id, StoreDep, created
-from api.problems import documented
-from schemas.sensitivity import SensitivityRead, SensitivitySpec
-from services import sensitivity
+from gaplab.api.http import examples, links
+from gaplab.api.http.dependencies import AdmissionDep, Id, StoreDep, created
+from gaplab.api.http.problems import documented
+from gaplab.schemas.sensitivity import SensitivityRead, SensitivitySpec
+from gaplab.services.running import sensitivity
 
 router = APIRouter(prefix="/sensitivity", tags=["sensitivity"])
 

@@ -5,15 +5,15 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Body, Query, Request, Response
 from pydantic import Field
 
-from api import conditional, examples, links
-from api.dependencies import AdmissionDep, CallerDep, Id, Paging, Revealing, StoreDep, created
-from api.problems import documented
-from schemas.editing import Edit
-from schemas.lifecycle import State
-from schemas.records import Page, StudyRead
-from schemas.spec import StudySpec
-from services import editing, experiments
-from services.listing import Which
+from gaplab.api.http import conditional, examples, links
+from gaplab.api.http.dependencies import AdmissionDep, CallerDep, Id, Paging, Revealing, StoreDep, created
+from gaplab.api.http.problems import documented
+from gaplab.schemas.editing import Edit
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.records import Page, StudyRead
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.experiments import editing, submission
+from gaplab.services.experiments.listing import Which
 
 router = APIRouter(prefix="/studies", tags=["studies"])
 
@@ -47,7 +47,7 @@ def submit_study(
     response: Response,
 ) -> StudyRead:
     """Queue one experiment for each strategy, all else equal. Whatever is left out is the paper's."""
-    done = experiments.admit_study(store, spec, admitted)
+    done = submission.admit_study(store, spec, admitted)
     return created(done, response, request.app.url_path_for("read_study", id=done.answer.id))
 
 
@@ -59,7 +59,7 @@ def submit_study(
 def list_studies(store: StoreDep, which: Annotated[StudyFilter, Query()]) -> Page[StudyRead]:
     """The studies, the newest first unless sorted otherwise. A cursor is good only for the list that gave it."""
     wanted = Which(**which.model_dump(exclude={"limit", "cursor"}))
-    return experiments.list_studies(store, wanted, limit=which.limit, cursor=which.cursor)
+    return submission.list_studies(store, wanted, limit=which.limit, cursor=which.cursor)
 
 
 @router.get(
@@ -80,7 +80,7 @@ def read_study(
     query: Annotated[Revealing, Query()],
 ) -> Response:
     """A study with its experiments, their states and progress, and the time left."""
-    shown = experiments.read_study(store, id, reveal=query.permitted(caller))
+    shown = submission.read_study(store, id, reveal=query.permitted(caller))
     return conditional.tagged(request, shown, shown.edits)
 
 

@@ -4,7 +4,7 @@ An archive is a zip: a member for each exported table, as Parquet, or as JSON Li
 as `curves.json`, for whoever opens it; and `manifest.json`. The same content gives the same bytes.
 """
 
-from services.archives.reading import import_archive as import_archive
-from services.archives.writing import Archive as Archive
-from services.archives.writing import export_experiment as export_experiment
-from services.archives.writing import export_study as export_study
+from gaplab.services.archives.reading import import_archive as import_archive
+from gaplab.services.archives.writing import Archive as Archive
+from gaplab.services.archives.writing import export_experiment as export_experiment
+from gaplab.services.archives.writing import export_study as export_study

@@ -8,8 +8,8 @@ from math import isfinite
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
-from services.core.errors import InvalidArchive
-from services.store.portable import EXPERIMENT, Column, Kind, columns_of
+from gaplab.services.core.errors import InvalidArchive
+from gaplab.services.store.archive_columns import EXPERIMENT, Column, Kind, columns_of
 
 Row = dict[str, Any]
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from services.core.errors import InvalidArchive
-from services.store.models import RepetitionRow
-from services.store.repository import attempts, experiments, steps
-from services.store.session import Session
+from gaplab.services.core.errors import InvalidArchive
+from gaplab.services.store.models import RepetitionRow
+from gaplab.services.store.queries import attempts, experiments, steps
+from gaplab.services.store.session import Session
 
 
 def check_logs(session: Session, ids: Sequence[str]) -> None:

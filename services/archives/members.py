@@ -7,7 +7,7 @@ from hashlib import sha256
 from itertools import islice
 from typing import IO, Any
 
-from services.store.portable import Column, Kind, columns_of, is_nested
+from gaplab.services.store.archive_columns import Column, Kind, columns_of, is_nested
 
 MANIFEST, CURVES = "manifest.json", "curves.json"
 

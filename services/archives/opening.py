@@ -18,10 +18,10 @@ from zlib import error as ZlibError  # noqa: N812 - it is an error
 
 from pydantic import ValidationError
 
-from schemas.archives import FORMAT, Manifest, Member
-from services.archives.members import CURVES, MANIFEST, member_of
-from services.core.errors import InvalidArchive
-from services.store.portable import EXPORTED
+from gaplab.schemas.archives import FORMAT, Manifest, Member
+from gaplab.services.archives.members import CURVES, MANIFEST, member_of
+from gaplab.services.core.errors import InvalidArchive
+from gaplab.services.store.archive_columns import EXPORTED
 
 MOST_BYTES = 512 * 2**20
 """Of all members together, unpacked: a study of the paper's size has about ten million."""

@@ -14,25 +14,25 @@ from typing import IO, Any
 
 from pydantic import ValidationError
 
-from schemas.archives import ImportRead, Manifest
-from schemas.events import EventKind
-from schemas.lifecycle import Ending, State
-from schemas.provenance import Provenance
-from schemas.spec import ExperimentSpec, Schedule
-from services.archives.checking import checked
-from services.archives.logs import check_logs
-from services.archives.opening import open_archive
-from services.core.errors import Conflict, InvalidArchive
-from services.core.robots import robots
-from services.core.strategies import strategies
-from services.core.tunables import tunables
-from services.resolution import is_direct, spec_of
-from services.store.models import SPEC_VERSION, ExperimentRow, StudyRow
-from services.store.portable import EXPERIMENT, EXPORTED, REPETITION
-from services.store.repository import archives, provenance
-from services.store.repository.events import note
-from services.store.repository.settling import settle
-from services.store.session import Session, Store
+from gaplab.schemas.archives import ImportRead, Manifest
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.provenance import Provenance
+from gaplab.schemas.spec import ExperimentSpec, Schedule
+from gaplab.services.archives.checking import checked
+from gaplab.services.archives.logs import check_logs
+from gaplab.services.archives.opening import open_archive
+from gaplab.services.core.errors import Conflict, InvalidArchive
+from gaplab.services.core.robots import robots
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.tunables import tunables
+from gaplab.services.specs.resolution import is_direct, spec_of
+from gaplab.services.store.archive_columns import EXPERIMENT, EXPORTED, REPETITION
+from gaplab.services.store.models import SPEC_VERSION, ExperimentRow, StudyRow
+from gaplab.services.store.queries import archives, provenance
+from gaplab.services.store.queries.events import note
+from gaplab.services.store.queries.settling import settle
+from gaplab.services.store.session import Session, Store
 
 Row = dict[str, Any]
 

@@ -9,14 +9,14 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
 
 from pydantic import TypeAdapter
 
-from schemas.archives import FORMAT, Manifest, Member
-from schemas.curves import Curve
-from services import reports
-from services.archives.members import CURVES, MANIFEST, Hashed, member_of, write
-from services.store.models import REVISION, ExperimentRow
-from services.store.portable import EXPORTED
-from services.store.repository import archives, experiments, reads
-from services.store.session import Session, Store
+from gaplab.schemas.archives import FORMAT, Manifest, Member
+from gaplab.schemas.curves import Curve
+from gaplab.services.archives.members import CURVES, MANIFEST, Hashed, member_of, write
+from gaplab.services.results import curves
+from gaplab.services.store.archive_columns import EXPORTED
+from gaplab.services.store.models import REVISION, ExperimentRow
+from gaplab.services.store.queries import archives, experiments, reads
+from gaplab.services.store.session import Session, Store
 
 _MOMENT = (1980, 1, 1, 0, 0, 0)
 """Of every member, the earliest that a zip knows: the same content gives the same bytes."""
@@ -75,8 +75,8 @@ def _export(
             for table in EXPORTED:
                 rows = archives.rows(session, table, study=study, experiments=ids, hidden=hidden)
                 _add(archive, members, member_of(table), lambda into, table=table, rows=rows: write(table, rows, into))  # type: ignore[misc]
-            curves = TypeAdapter(tuple[Curve, ...]).dump_json(reports.curves_of(session, ids))
-            _add(archive, members, CURVES, lambda into: into.write(curves) and len(ids))
+            points = TypeAdapter(tuple[Curve, ...]).dump_json(curves.curves_of(session, ids))
+            _add(archive, members, CURVES, lambda into: into.write(points) and len(ids))
             manifest = Manifest(
                 format=FORMAT, gaplab=version("gaplab"), revision=REVISION, kind=kind, id=id_, members=members
             )

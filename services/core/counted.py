@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from services.core.arrays import Fitnesses, FloatArray, Genomes, Parameters
-from services.core.ports import Simulate
-from services.core.types import Cost
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes, Parameters
+from gaplab.services.core.ports import Simulate
+from gaplab.services.core.types import Cost
 
 
 class Count:

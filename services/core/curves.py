@@ -6,8 +6,8 @@ from math import isfinite
 import numpy as np
 from scipy import stats
 
-from schemas.curves import CurvePoint
-from services.core.arrays import FloatArray
+from gaplab.schemas.curves import CurvePoint
+from gaplab.services.core.arrays import FloatArray
 
 CONFIDENCE = 0.95
 

@@ -11,8 +11,8 @@ from math import ceil
 
 import numpy as np
 
-from services.core.arrays import Fitnesses, Genomes, Parameters
-from services.core.ports import Simulate
+from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
+from gaplab.services.core.ports import Simulate
 
 FARTHEST = 32
 """Newcomers to foresee at most; with one in ten that stays, more would help little."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from services.core.arrays import FloatArray
-from services.core.world import Body, Box, World
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.world import Body, Box, World
 
 TOUCHING_M = 0.002
 """A body whose lowest point is nearer to the ground than this touches it: engines push surfaces apart by less."""

@@ -11,16 +11,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
-from services.core.arrays import Genome, Parameters
-from services.core.counted import Counted
-from services.core.errors import PluginBroken
-from services.core.foresight import Foresight
-from services.core.optimizers.base import Ahead, Optimizer, maximise
-from services.core.ports import Reality, Simulate
-from services.core.strategies.base import Score, Search, Strategy
-from services.core.streams import stream
-from services.core.tuning import Misfit, draw_simulators, tune
-from services.core.types import (
+from gaplab.services.core.arrays import Genome, Parameters
+from gaplab.services.core.counted import Counted
+from gaplab.services.core.errors import PluginBroken
+from gaplab.services.core.foresight import Foresight
+from gaplab.services.core.optimizers.base import Ahead, Optimizer, maximise
+from gaplab.services.core.ports import Reality, Simulate
+from gaplab.services.core.strategies.base import Score, Search, Strategy
+from gaplab.services.core.streams import stream
+from gaplab.services.core.tuning import Misfit, draw_simulators, tune
+from gaplab.services.core.types import (
     Belief,
     Budget,
     Cost,

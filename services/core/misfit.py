@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from schemas.misfit import MisfitPoint, Spread, TunedSpread
-from services.core.arrays import FloatArray
-from services.core.curves import known
-from services.core.types import Space
+from gaplab.schemas.misfit import MisfitPoint, Spread, TunedSpread
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.curves import known
+from gaplab.services.core.types import Space
 
 AT_BOUND = 0.01
 """So near a bound, in units of the bounds' distance, is at it."""

@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from services.core.arrays import Fitnesses, Genome, Genomes, Parameters
+from gaplab.services.core.arrays import Fitnesses, Genome, Genomes, Parameters
 
 
 class Simulate(Protocol):

@@ -13,8 +13,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from services.core.arrays import Fitnesses, FloatArray, Genomes, Parameters
-from services.core.ports import Simulate
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes, Parameters
+from gaplab.services.core.ports import Simulate
 
 Answer: TypeAlias = tuple[Genomes, Parameters, Fitnesses]
 """`(n, g)`, `(m, p)` and the `(n, m)` that came of them."""

@@ -9,10 +9,10 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from pydantic import ValidationError
 
-from schemas.base import Frozen
-from schemas.plugin import PluginRead, PluginRef
-from services.core import outside
-from services.core.errors import InvalidSpec, PluginBroken, Violation, unknown_name
+from gaplab.schemas.base import Frozen
+from gaplab.schemas.plugin import PluginRead, PluginRef
+from gaplab.services.core import external_plugins
+from gaplab.services.core.errors import InvalidSpec, PluginBroken, Violation, unknown_name
 
 
 class NoOptions(Frozen):
@@ -82,10 +82,10 @@ class Registry(Mapping[str, type[P]], Generic[P]):
             and not isabstract(each)
             and hasattr(each, "name")
         }
-        for each in outside.classes(self._base):
+        for each in external_plugins.classes(self._base):
             if each.name in found:
-                of = outside.file_of(found[each.name]) or "gaplab itself"
-                msg = f"{outside.file_of(each)} has a {self.kind} called {each.name!r}, as {of} has: call it otherwise"
+                file, other = (external_plugins.file_of(plugin) for plugin in (each, found[each.name]))
+                msg = f"{file} has a {self.kind} called {each.name!r}, as {other or 'gaplab itself'} has: rename it"
                 raise PluginBroken(msg)
             found[each.name] = each
         return dict(sorted(found.items()))
@@ -131,7 +131,7 @@ class Registry(Mapping[str, type[P]], Generic[P]):
 
 def _source(plugin: type[Plugin]) -> str:
     """Where it says that it comes from, or its file, for one from outside that does not say."""
-    file = outside.file_of(plugin)
+    file = external_plugins.file_of(plugin)
     return f"{file} of GAPLAB_PLUGINS" if file and plugin.source == Plugin.source else plugin.source
 
 

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from services.core.arrays import Fitnesses, FloatArray, Genomes
-from services.core.types import Sample
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes
+from gaplab.services.core.types import Sample
 
 NEAREST = 1e-6
 """The least distance between a controller and a sample: at 0 the paper's 1/d is infinite."""

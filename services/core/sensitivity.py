@@ -21,12 +21,12 @@ from math import inf, isfinite, isnan
 
 import numpy as np
 
-from schemas.sensitivity import Sensitivity, Verdict
-from services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
-from services.core.optimizers.base import Optimizer, maximise
-from services.core.ports import Simulate
-from services.core.streams import stream
-from services.core.types import Space
+from gaplab.schemas.sensitivity import Sensitivity, Verdict
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
+from gaplab.services.core.optimizers.base import Optimizer, maximise
+from gaplab.services.core.ports import Simulate
+from gaplab.services.core.streams import stream
+from gaplab.services.core.types import Space
 
 RANDOM, EVOLVED = 3, 4
 """Controllers of a check, beside the known one."""

@@ -12,9 +12,9 @@ from math import inf, isfinite
 import numpy as np
 from scipy import stats
 
-from schemas.curves import Comparison, Test
-from services.core.arrays import FloatArray
-from services.core.curves import equal, known
+from gaplab.schemas.curves import Comparison, Test
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.curves import equal, known
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -5,11 +5,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.random import Generator
 
-from services.core.arrays import Fitnesses, FloatArray, Parameters
-from services.core.counted import Count
-from services.core.optimizers.base import Optimizer, maximise
-from services.core.ports import Simulate
-from services.core.types import Sample, Simulator, Space
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Parameters
+from gaplab.services.core.counted import Count
+from gaplab.services.core.optimizers.base import Optimizer, maximise
+from gaplab.services.core.ports import Simulate
+from gaplab.services.core.types import Sample, Simulator, Space
 
 ROUNDING = 1e-9
 """By how much a partial sum must exceed a limit, relatively, for the whole to exceed it whatever the rounding."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from services.core.arrays import FloatArray, Genome, Genomes, Parameters, frozen
+from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Parameters, frozen
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ SI units throughout; z points up; the ground is the plane z = 0. Lengths of boxe
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from services.core.arrays import FloatArray
+from gaplab.services.core.arrays import FloatArray
 
 Vector: TypeAlias = tuple[float, float, float]
 

@@ -1,6 +1,6 @@
 """Engines: one module in this folder is one engine."""
 
-from services.core.registry import Registry
-from services.engines.base import Engine
+from gaplab.services.core.registry import Registry
+from gaplab.services.engines.base import Engine
 
 engines: Registry[Engine] = Registry("engine", __name__, Engine)

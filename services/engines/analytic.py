@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from services.core.arrays import FloatArray
-from services.core.world import Motion, Trajectory, World
-from services.engines.base import Engine
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.world import Motion, Trajectory, World
+from gaplab.services.engines.base import Engine
 
 
 class Analytic(Engine):

@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from schemas.plugin import PluginRead
-from services.core.arrays import FloatArray
-from services.core.registry import Plugin
-from services.core.world import Motion, Recording, Trajectory, World
+from gaplab.schemas.plugin import PluginRead
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.registry import Plugin
+from gaplab.services.core.world import Motion, Recording, Trajectory, World
 
 ALL_FIELDS = frozenset(
     {

@@ -9,8 +9,8 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from services.core.arrays import FloatArray
-from services.core.world import Motion, Recording, Trajectory, World
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.world import Motion, Recording, Trajectory, World
 
 WARM_SCENES = 4
 """Worlds that differ in more than their material are kept warm up to this number; the longest unused one goes."""

@@ -7,6 +7,6 @@ is for Plotly, `html` for a page that needs nothing else, `files` for SVG, PNG a
 
 To add a figure, write one file here: a function that takes what is to be shown, as schemas or plain values, and gives a
 `Figure`; `squared_error` is a short one to begin from. Every renderer then draws it. For its address, add an endpoint
-`/figures/NAME` that returns `api.figures.answer(figure, query)`, as those in `api/routes/figures.py` do; its query is
-an `api.figures.Drawing` with parameters of its own.
+`/figures/NAME` that returns `answer(figure, query)` of `gaplab.api.http.figures`, as those in `api/routes/figures.py`
+do; its query is a `Drawing` with parameters of its own.
 """

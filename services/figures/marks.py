@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 
-from services.figures.style import INK, Style
+from gaplab.services.figures.style import INK, Style
 
 Number = float | None
 Numbers = tuple[Number, ...]

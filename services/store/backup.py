@@ -5,10 +5,10 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 
-from services.core.errors import StoreUnavailable, Unsupported
-from services.store import troubles
-from services.store.engine import open_engine
-from services.store.files import appearing
+from gaplab.services.core.errors import StoreUnavailable, Unsupported
+from gaplab.services.store import database_errors
+from gaplab.services.store.atomic_files import appearing
+from gaplab.services.store.engine import open_engine
 
 PG_DUMP = 'pg_dump --format=custom --file={file} "postgresql:${{GAPLAB_DATABASE_URL#*:}}"'
 """Before its first colon the URL may name a driver, as in postgresql+psycopg://, of which that tool knows nothing."""
@@ -38,7 +38,7 @@ def backup(url: str, file: Path) -> int:
         msg = f"there is no database at {source or 'no place'}, so there is nothing to copy"
         raise StoreUnavailable(msg)
     try:
-        with appearing(file, 0o600) as part, troubles.named(), engine.connect() as connection:
+        with appearing(file, 0o600) as part, database_errors.named(), engine.connect() as connection:
             _copy(connection.connection.driver_connection, part)
     finally:
         engine.dispose()

@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Tuple, literal, tuple_
 from sqlalchemy.orm import InstrumentedAttribute
 
-from services.core.errors import InvalidSpec, Violation
+from gaplab.services.core.errors import InvalidSpec, Violation
 
 Column = InstrumentedAttribute[Any] | ColumnElement[Any]
 

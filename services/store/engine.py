@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
 from sqlalchemy.exc import ArgumentError
 
-from services.core.errors import StoreUnavailable
+from gaplab.services.core.errors import StoreUnavailable
 
 WRITES = "gaplab_writes"
 """Execution option of a connection whose transactions will write."""

@@ -3,9 +3,9 @@
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from schemas.sensitivity import Checked
-from schemas.spec import ExperimentSpec
-from services.core.types import Step
+from gaplab.schemas.sensitivity import Checked
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.types import Step
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,7 @@ class Checkpoint:
     Attributes:
         step: the place of the step in the log.
         part: its number within the step, from 0.
-        answers: as `services.core.recall` packs them.
+        answers: as `gaplab.services.core.recall` packs them.
         seconds: of work that they took.
     """
 

@@ -4,11 +4,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import inf, isfinite, nan
 from typing import Any
 
-from schemas.records import MeasurementKind
-from schemas.sensitivity import Checked
-from services.core.arrays import FloatArray, frozen
-from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
-from services.store.models import IterationRow, MeasurementRow, SimulatorRow
+from gaplab.schemas.records import MeasurementKind
+from gaplab.schemas.sensitivity import Checked
+from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
+from gaplab.services.store.models import IterationRow, MeasurementRow, SimulatorRow
 
 _ORDER: tuple[type[Step], ...] = (Selected, Measured, Tuned, Transferred, Probed)
 

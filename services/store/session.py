@@ -10,11 +10,11 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session as Session
 from sqlalchemy.orm import sessionmaker
 
-from services.core.errors import StoreUnavailable
-from services.store import troubles
-from services.store.engine import WRITES, open_engine
-from services.store.models import REVISION
-from services.store.repository import events
+from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.store import database_errors
+from gaplab.services.store.engine import WRITES, open_engine
+from gaplab.services.store.models import REVISION
+from gaplab.services.store.queries import events
 
 T = TypeVar("T")
 
@@ -71,7 +71,7 @@ class Store:
                     with self._writer.begin() as session:
                         return work(session)
                 except DBAPIError as error:
-                    if not troubles.is_clash(error):
+                    if not database_errors.is_clash(error):
                         raise
                 self.retries += 1
                 time.sleep(0.01 * 2**attempt)
@@ -95,7 +95,7 @@ class Store:
     def _named(self) -> Iterator[None]:
         """Within it, troubles of the database are named, and counted."""
         try:
-            with troubles.named():
+            with database_errors.named():
                 yield
         except StoreUnavailable:
             self.errors += 1

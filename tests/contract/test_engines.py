@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from services.core.arrays import FloatArray
-from services.core.robots import robots
-from services.core.robots.base import Robot
-from services.core.tunables import tunables
-from services.core.world import Body, Box, Material, Motion, Sphere, Trajectory, World
-from services.engines import engines
-from services.engines.base import Engine
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.robots import robots
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.tunables import tunables
+from gaplab.services.core.world import Body, Box, Material, Motion, Sphere, Trajectory, World
+from gaplab.services.engines import engines
+from gaplab.services.engines.base import Engine
 
 
 class Pair(NamedTuple):
@@ -108,8 +108,8 @@ def test_engines_in_one_process_do_not_disturb_each_other(pair: Pair) -> None:
 
 
 SCRIPT = """
-from services.core.robots import robots
-from services.engines import engines
+from gaplab.services.core.robots import robots
+from gaplab.services.engines import engines
 engine, robot = engines[{engine!r}](), robots[{robot!r}]()
 trajectory = engine.rollout(robot.world, robot.motion(robot.known))
 print("bits:" + trajectory.positions_m.tobytes().hex())

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from services.core.optimizers import optimizers
-from services.core.optimizers.base import maximise
-from services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
-from services.core.types import Space
+from gaplab.services.core.optimizers import optimizers
+from gaplab.services.core.optimizers.base import maximise
+from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
+from gaplab.services.core.types import Space
 
 SPACE = Space.box([0.0, -2.0, 0.0], [1.0, 2.0, 5.0], [True, False, False])
 SUMMIT = np.array([0.9, 0.5, 4.0])

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.core.arrays import FloatArray
-from services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, World
-from services.engines import engines
-from services.engines.base import Engine
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, World
+from gaplab.services.engines import engines
+from gaplab.services.engines.base import Engine
 
 G = 9.81
 STEP_S = 1 / 100

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.core.kinematics import body_poses, clearances_m
-from services.core.robots import robots
-from services.core.robots.quadruped import Quadruped
-from services.engines import engines
-from services.engines.base import Engine
+from gaplab.services.core.kinematics import body_poses, clearances_m
+from gaplab.services.core.robots import robots
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.engines import engines
+from gaplab.services.engines.base import Engine
 
 INSTALLED = [name for name, engine in engines.items() if engine.available()]
 EMBODIED = [name for name in INSTALLED if engines[name].runs(Quadruped().world)]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from services.core.robots import robots
-from services.core.world import Trajectory
-from services.engines import engines
+from gaplab.services.core.robots import robots
+from gaplab.services.core.world import Trajectory
+from gaplab.services.engines import engines
 
 
 @pytest.mark.parametrize("name", sorted(robots))

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from schemas.plugin import PluginRef
-from services.core.scoring import uniqueness_penalty
-from services.core.strategies import strategies
-from services.core.types import Belief, Sample, Simulator, Space
+from gaplab.schemas.plugin import PluginRef
+from gaplab.services.core.scoring import uniqueness_penalty
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.types import Belief, Sample, Simulator, Space
 from tests.fakes import TRUTH, paraboloid
 
 SPACE = Space.box([0.0, 0.0], [1.0, 1.0], [True, False])

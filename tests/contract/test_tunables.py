@@ -4,8 +4,8 @@ from dataclasses import asdict
 
 import pytest
 
-from services.core.robots.quadruped import Quadruped
-from services.core.tunables import tunables
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.tunables import tunables
 
 
 def flattened(value, prefix=""):

@@ -31,7 +31,7 @@ class Api:
 
     def start(self):
         with self._log.open("ab") as log:
-            command = [sys.executable, "-m", "api"]
+            command = [sys.executable, "-m", "gaplab.api"]
             self._process = subprocess.Popen(command, env=self._environment, stdout=log, stderr=log)
         wait_until(self._answers, 120, lambda: self._log.read_text())
         return self

@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 
 from benchmarks.filling import fill
-from schemas.lifecycle import OPEN
-from services.archives import import_archive
-from services.experiments import cancel_experiment, list_experiments
-from services.listing import Which
-from services.store.session import Store
+from gaplab.schemas.lifecycle import OPEN
+from gaplab.services.archives import import_archive
+from gaplab.services.experiments.listing import Which
+from gaplab.services.experiments.submission import cancel_experiment, list_experiments
+from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import Chromium
 from tests.e2e.service import Service

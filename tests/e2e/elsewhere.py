@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager, suppress
 
 import psycopg
 
-from api.client import Client
+from gaplab.api.clients.client import Client
 from tests.e2e.reading import ROOT, commands
 from tests.e2e.service import wait_until
 from tests.postgres import Installation, Server

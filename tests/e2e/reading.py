@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import nbformat
 
-from api.own import LocalService, local_service
+from gaplab.api.process.local_service import LocalService, local_service
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))

@@ -38,7 +38,7 @@ class Service:
 
     def start(self):
         with self._log.open("ab") as log:
-            command = [sys.executable, "-m", "api.cli", "serve"]
+            command = [sys.executable, "-m", "gaplab", "serve"]
             self._process = subprocess.Popen(command, env=self._environment, stdout=log, stderr=log)
         wait_until(self._answers, 60, self.log)
         return self

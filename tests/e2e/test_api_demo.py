@@ -25,7 +25,9 @@ def specs(tmp_path: Path) -> Path:
 
 def demo(folder: Path, specs: Path) -> "subprocess.Popen[str]":
     script = (
-        "import sys; from pathlib import Path; from api.demo import run; from api.display import console\n"
+        "import sys; from pathlib import Path\n"
+        "from gaplab.api.clients.display import console\n"
+        "from gaplab.api.commands.demo import run\n"
         "run(Path(sys.argv[1]), console(), Path(sys.argv[2]))"
     )
     return subprocess.Popen(

@@ -6,7 +6,8 @@ from itertools import islice
 import pytest
 from playwright.sync_api import expect
 
-from services import execution, experiments
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import some_log, toy
 
@@ -154,7 +155,7 @@ def test_what_differs_between_robots_and_realities_of_one_name_is_said(archive, 
 
 
 def test_a_reality_that_is_hidden_is_not_taken_for_the_same(api, written, visit):
-    first, second = (experiments.submit_experiment(written, toy(name=name)).id for name in ("one", "two"))
+    first, second = (submission.submit_experiment(written, toy(name=name)).id for name in ("one", "two"))
     page = visit(address(api, first, second, "nowhere"))
     expect(page.locator(".remark.warned")).to_contain_text("hidden until their experiments have ended")
     expect(page.get_by_text("There is no experiment nowhere")).to_be_visible()
@@ -173,7 +174,7 @@ def test_of_many_experiments_the_figure_is_drawn_and_no_pair_is_tested(archive, 
 
 
 def test_it_grows_as_an_experiment_goes_on(api, written, visit):
-    submitted = experiments.submit_experiment(written, toy(name="growing", repetitions=2))
+    submitted = submission.submit_experiment(written, toy(name="growing", repetitions=2))
     claims = execution.claim(written, "tests", 2)
     logs = [some_log(2, recorded) for recorded in (1.0, 1.5)]
     page = visit(address(api, submitted.id))

@@ -8,9 +8,10 @@ import httpx2
 import pytest
 from playwright.sync_api import expect
 
-from schemas.events import EventKind
-from schemas.lifecycle import PERMITTED
-from services import execution, experiments
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.lifecycle import PERMITTED
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import some_log, toy
 
@@ -42,7 +43,7 @@ def markers(page):
 
 
 def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api, written, visit):
-    submitted = experiments.submit_experiment(written, toy(name="growing", repetitions=2, iterations=3))
+    submitted = submission.submit_experiment(written, toy(name="growing", repetitions=2, iterations=3))
     claims = execution.claim(written, "tests", 2)
     logs = [some_log(3, recorded) for recorded in (1.0, 1.5)]
     for claim, log in zip(claims, logs, strict=True):
@@ -75,7 +76,7 @@ def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api, written, 
 
 
 def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(api, written, visit):
-    submitted = experiments.submit_experiment(written, toy(repetitions=2))
+    submitted = submission.submit_experiment(written, toy(repetitions=2))
     for claim in execution.claim(written, "tests", 2):
         steps(written, claim, some_log())
     page = visit(address(api, submitted.id))
@@ -94,7 +95,7 @@ def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(a
 
 
 def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api, written, visit):
-    submitted = experiments.submit_experiment(written, toy(repetitions=1))
+    submitted = submission.submit_experiment(written, toy(repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)
     log = some_log()
     steps(written, claim, islice(log, 3))
@@ -113,7 +114,7 @@ def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api, written,
 
 
 def test_what_failed_is_said_with_its_reason_and_attempts(api, written, visit):
-    submitted = experiments.submit_experiment(written, toy(repetitions=1))
+    submitted = submission.submit_experiment(written, toy(repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)
     assert execution.fail(written, claim, "a foot fell off")
     page = visit(address(api, submitted.id))
@@ -126,7 +127,7 @@ def test_what_failed_is_said_with_its_reason_and_attempts(api, written, visit):
 
 
 def test_there_is_nothing_yet_or_no_such_experiment(api, written, visit):
-    submitted = experiments.submit_experiment(written, toy())
+    submitted = submission.submit_experiment(written, toy())
     page = visit(address(api, submitted.id, tab="samples"))
     expect(page.locator(".figure-curves")).to_contain_text("Nothing to draw yet.")
     page.get_by_role("tabpanel").scroll_into_view_if_needed()

@@ -5,8 +5,8 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 
-from schemas.access import Role
-from services.access import create_token
+from gaplab.schemas.access import Role
+from gaplab.services.access import create_token
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import axe, fits, screenshot
 

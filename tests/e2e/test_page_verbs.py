@@ -3,9 +3,10 @@
 import pytest
 from playwright.sync_api import expect
 
-from schemas.access import Role
-from services import execution, experiments
-from services.access import create_token
+from gaplab.schemas.access import Role
+from gaplab.services.access import create_token
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
 from tests.e2e.api_alone import Api
 from tests.experiments import run, toy
 
@@ -16,7 +17,7 @@ expect.set_options(timeout=SLOW_MS)
 @pytest.fixture
 def guarded(sqlite_url, sqlite_store, tmp_path):
     """A service with tokens, a reader's, and an experiment."""
-    submitted = experiments.submit_experiment(sqlite_store, toy(name="guarded"))
+    submitted = submission.submit_experiment(sqlite_store, toy(name="guarded"))
     token = create_token(sqlite_store, Role.READER).secret
     api = Api(sqlite_url, tmp_path / "api.log").start()
     yield api, token, submitted
@@ -28,7 +29,7 @@ def address(api, experiment):
 
 
 def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api, written, visit):
-    submitted = experiments.submit_experiment(written, toy())
+    submitted = submission.submit_experiment(written, toy())
     page = visit(address(api, submitted.id))
     verbs = page.get_by_role("group", name="Ask of this experiment")
     state = page.locator(".state-now")
@@ -57,7 +58,7 @@ def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api, written, vis
 
 
 def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api, written, visit):
-    submitted = experiments.submit_experiment(written, toy(repetitions=1))
+    submitted = submission.submit_experiment(written, toy(repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)
     run(written, claim)
     page = visit(address(api, submitted.id))
@@ -72,7 +73,7 @@ def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api, writt
 
 
 def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api, written, visit):
-    submitted = experiments.submit_experiment(written, toy(name="mine"))
+    submitted = submission.submit_experiment(written, toy(name="mine"))
     visit.forgive("412")
     page = visit(address(api, submitted.id))
     page.get_by_role("button", name="Edit name and notes").click()

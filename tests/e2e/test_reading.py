@@ -11,7 +11,7 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
-from api.own import LocalService
+from gaplab.api.process.local_service import LocalService
 from tests.e2e.reading import (
     DOCUMENTS,
     NOTEBOOKS,

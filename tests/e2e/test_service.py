@@ -2,11 +2,11 @@
 
 import pytest
 
-from schemas.spec import StudySpec
-from services.core.loop import repetition
-from services.core.types import Measured, Probed
-from services.resolution import resolve_study
-from services.simulation import setting
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.types import Measured, Probed
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_study
 from tests.e2e.service import Service, wait_until
 
 TOY = {

@@ -6,7 +6,7 @@ import time
 import pytest
 from sqlalchemy import text
 
-from services.store.session import Store
+from gaplab.services.store.session import Store
 from tests.e2e.service import Service, wait_until
 
 LONG_STEPS = {

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator
 import pytest
 from fastapi import FastAPI
 
-from api.app import create_app
-from api.cli import main
-from services import execution
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.api.commands.cli import main
+from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 from tests.commands import Gaplab, Said, served
 from tests.experiments import run, some_log
 

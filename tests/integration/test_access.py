@@ -9,16 +9,16 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from api.app import create_app
-from api.cli import main
-from api.client import Client
-from api.clients.connection import ServiceError
-from schemas.access import Role
-from services import access
-from services.access import authenticate, create_token, is_loopback
-from services.core.errors import Forbidden, NotFound, Unauthenticated
-from services.settings import Settings
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.connection import ServiceError
+from gaplab.api.commands.cli import main
+from gaplab.schemas.access import Role
+from gaplab.services import access
+from gaplab.services.access import authenticate, create_token, is_loopback
+from gaplab.services.core.errors import Forbidden, NotFound, Unauthenticated
+from gaplab.services.settings import Settings
+from gaplab.services.store.session import Store
 
 TOY = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "iterations": 1, "repetitions": 1}
 
@@ -173,7 +173,7 @@ def test_no_token_is_in_logs_answers_or_problems_whatever_happens(
     headers = bearer(sqlite_store, Role.READER)
     secret = headers["Authorization"].rpartition("_")[2]
     said = [lite.get("/experiments", headers=headers), lite.post("/experiments", json=TOY, headers=headers)]
-    monkeypatch.setattr("services.experiments.list_experiments", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("gaplab.services.experiments.submission.list_experiments", lambda *_, **__: 1 / 0)
     said.append(lite.get("/experiments", headers=headers))
     said.append(lite.get("/experiments", headers={"Authorization": f"Bearer gaplab_x_{secret}"}))
 

@@ -11,12 +11,12 @@ import pytest
 from fastapi.testclient import TestClient
 from jsonschema import Draft202012Validator
 
-from api.app import create_app
-from services import execution, sensitivity
-from services.core.optimizers.steady_state import SteadyState
-from services.core.sensitivity import Effort, check
-from services.simulation import subject
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.services.core.optimizers.steady_state import SteadyState
+from gaplab.services.core.sensitivity import Effort, check
+from gaplab.services.running import execution, sensitivity
+from gaplab.services.specs.assembly import subject
+from gaplab.services.store.session import Store
 from tests.experiments import run, some_log, toy
 
 TOY = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "iterations": 2, "repetitions": 3}

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from api.app import create_app
-from services.core.errors import StoreUnavailable
-from services.settings import Limits
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.settings import Limits
+from gaplab.services.store.session import Store
 
 MOST_BYTES = Limits().body_bytes
 LEAST = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke"}
@@ -339,7 +339,7 @@ def test_an_accident_inside_leaks_nothing_but_a_number_to_find_it_by(
     def fail(*_: object, **__: object) -> None:
         raise RuntimeError("the password is swordfish")
 
-    monkeypatch.setattr("services.experiments.read_study", fail)
+    monkeypatch.setattr("gaplab.services.experiments.submission.read_study", fail)
     answer = api.get("/studies/some")
 
     detail = problem(answer, 500)["detail"]

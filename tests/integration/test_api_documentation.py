@@ -11,9 +11,10 @@ from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
 from referencing.jsonschema import DRAFT202012
 
-from api.app import create_app
-from services import execution, experiments
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 from tests.experiments import run, toy
 
 METHODS = {"get", "post", "put", "patch", "delete"}
@@ -202,7 +203,7 @@ def test_every_example_of_a_spec_is_accepted(document: dict[str, Any], sqlite_st
 
 
 def _completed(store: Store) -> str:
-    experiment = experiments.submit_experiment(store, toy(repetitions=1, priority=10)).id
+    experiment = submission.submit_experiment(store, toy(repetitions=1, priority=10)).id
     run(store, *execution.claim(store, "me", 1))
     return experiment
 

@@ -13,18 +13,18 @@ from pathlib import Path
 
 import pytest
 
-from api import service
-from api.client import Client
-from api.exits import CommandError
-from api.launch import end, start
-from api.own import own_service
-from api.server import listen, refuse_strangers
-from api.service import Keeper, environment_of, migrate
-from schemas.access import Role
-from services.access import create_token, revoke_token
-from services.core.errors import StoreUnavailable, Unauthenticated
-from services.settings import Settings
-from services.store.session import Store
+from gaplab.api.clients.client import Client
+from gaplab.api.commands.exit_codes import CommandError
+from gaplab.api.process import service
+from gaplab.api.process.child_process import end, start
+from gaplab.api.process.local_service import own_service
+from gaplab.api.process.server import listen, refuse_strangers
+from gaplab.api.process.service import Keeper, environment_of, migrate
+from gaplab.schemas.access import Role
+from gaplab.services.access import create_token, revoke_token
+from gaplab.services.core.errors import StoreUnavailable, Unauthenticated
+from gaplab.services.settings import Settings
+from gaplab.services.store.session import Store
 
 
 def within(seconds: float, condition: Callable[[], object]) -> bool:
@@ -45,7 +45,7 @@ def alive(pid: int) -> bool:
 
 def serve(environment: dict[str, str], *arguments: str) -> "subprocess.Popen[str]":
     return subprocess.Popen(
-        [sys.executable, "-m", "api.cli", "serve", *arguments],
+        [sys.executable, "-m", "gaplab", "serve", *arguments],
         env=os.environ | environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -76,13 +76,13 @@ def test_a_service_migrates_its_database_answers_and_ends_in_order(tmp_path: Pat
     assert (tmp_path / "new.db").stat().st_size > 0
 
 
-@pytest.mark.parametrize("module", ["api.cli", "api"])
+@pytest.mark.parametrize("module", ["gaplab", "gaplab.api"])
 def test_beyond_loopback_a_service_without_a_token_does_not_start_and_says_how_to_make_one(
     tmp_path: Path, port: int, module: str
 ):
     environment = {"GAPLAB_DATABASE_URL": f"sqlite:///{tmp_path / 'new.db'}", "GAPLAB_HOST": "0.0.0.0"}
     migrate(environment["GAPLAB_DATABASE_URL"])
-    arguments = ["serve", "--no-workers"] if module == "api.cli" else []
+    arguments = ["serve", "--no-workers"] if module == "gaplab" else []
 
     refused = subprocess.run(
         [sys.executable, "-m", module, *arguments],
@@ -172,7 +172,7 @@ def test_a_keeper_that_is_stopped_ends_its_supervisor(tmp_path: Path):
 def test_a_child_ends_when_its_parent_is_killed_outright(tmp_path: Path):
     note = tmp_path / "pid"
     script = (
-        "import time; from api.launch import start; "
+        "import time; from gaplab.api.process.child_process import start; "
         f"open({str(note)!r}, 'w').write(str(start('http.server', '0', '--bind', '127.0.0.1').pid)); time.sleep(60)"
     )
     parent = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

@@ -14,8 +14,8 @@ from schemathesis.engine import from_schema
 from schemathesis.engine.events import EngineFinished, FatalError, NonFatalError, ScenarioFinished
 from schemathesis.schemas import BaseSchema
 
-from api.app import create_app
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.services.store.session import Store
 
 EXAMPLES = int(os.environ.get("SCHEMATHESIS_EXAMPLES", "5"))
 """Random requests for each operation; more of them take longer and find more."""

@@ -16,19 +16,21 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import insert
 
-from schemas.lifecycle import Ending, State
-from schemas.schedule import ExtensionSpec
-from schemas.spec import StudySpec
-from services import execution, experiments, life_cycle, reports
-from services.archives import export_experiment, export_study, import_archive, opening, unpacking
-from services.core.arrays import frozen
-from services.core.errors import Conflict, NotFound
-from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
-from services.misfit import misfit
-from services.store.models import Base, ExperimentRow, RepetitionRow, SimulatorRow
-from services.store.portable import EXPORTED
-from services.store.repository import archives as repository
-from services.store.repository.attempts import attempts_of
+from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.schedule import ExtensionSpec
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.archives import export_experiment, export_study, import_archive, opening, unpacking
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.errors import Conflict, NotFound
+from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
+from gaplab.services.experiments import life_cycle, submission
+from gaplab.services.results import curves
+from gaplab.services.results.misfit import misfit
+from gaplab.services.running import execution
+from gaplab.services.store.archive_columns import EXPORTED
+from gaplab.services.store.models import Base, ExperimentRow, RepetitionRow, SimulatorRow
+from gaplab.services.store.queries import archives as repository
+from gaplab.services.store.queries.attempts import attempts_of
 from tests.experiments import AWKWARD, run, some_log, toy
 
 EVERY = settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -74,7 +76,7 @@ def exported(archive):
 
 def finished(store, log=None, **changes):
     """The id of an experiment whose repetitions are all complete."""
-    submitted = experiments.submit_experiment(store, toy(**changes)).id
+    submitted = submission.submit_experiment(store, toy(**changes)).id
     while claims := execution.claim(store, "me", 9):
         for claim in claims:
             run(store, claim, iter(log) if log else some_log())
@@ -84,11 +86,11 @@ def finished(store, log=None, **changes):
 def shown(store, experiment):
     """Everything that the service shows of it, but for its sensitivity check, which is its tunables'."""
     return (
-        experiments.read_experiment(store, experiment).model_dump(exclude={"sensitivity"}),
-        experiments.list_repetitions(store, experiment),
-        experiments.list_samples(store, experiment),
-        experiments.list_simulators(store, experiment),
-        reports.curve(store, experiment),
+        submission.read_experiment(store, experiment).model_dump(exclude={"sensitivity"}),
+        submission.list_repetitions(store, experiment),
+        submission.list_samples(store, experiment),
+        submission.list_simulators(store, experiment),
+        curves.curve(store, experiment),
         misfit(store, experiment),
     )
 
@@ -147,7 +149,7 @@ def test_a_zero_has_no_sign_in_either_database(store, other, unpacked_here):
     import_archive(other, BytesIO(archive))
 
     assert exported(export_experiment(other, submitted)) == archive
-    values = [value for point in reports.curve(store, submitted).points for value in point.values if value is not None]
+    values = [value for point in curves.curve(store, submitted).points for value in point.values if value is not None]
     assert copysign(1, values[0]) == 1
 
 
@@ -170,11 +172,11 @@ def test_the_best_of_repetitions_whose_sum_is_no_number_is_one(store):
     greatest = 1.7e308
     id_ = finished(store, list(some_log(recorded=greatest)))
 
-    assert experiments.read_experiment(store, id_).best_fitness == pytest.approx(greatest)
+    assert submission.read_experiment(store, id_).best_fitness == pytest.approx(greatest)
 
 
 def test_a_study_goes_there_with_all_that_is_its_own(store, other):
-    study = experiments.submit_study(
+    study = submission.submit_study(
         store,
         StudySpec.model_validate(TOY_STUDY | {"strategies": ["random", "direct"]}),
     )
@@ -192,8 +194,8 @@ def test_a_study_goes_there_with_all_that_is_its_own(store, other):
 
     assert stored.study == study.id
     assert stored.experiments == tuple(each.id for each in study.experiments)
-    assert len(experiments.list_experiments(other).items) == 2
-    assert reports.study_curves(other, study.id) == reports.study_curves(store, study.id)
+    assert len(submission.list_experiments(other).items) == 2
+    assert curves.study_curves(other, study.id) == curves.study_curves(store, study.id)
     assert exported(export_study(other, study.id)) == archive
 
 
@@ -206,14 +208,14 @@ def _fitting(step, tunables):
 
 
 def test_an_experiment_of_a_study_goes_on_its_own(store, other):
-    study = experiments.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["random"]}))
+    study = submission.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["random"]}))
     (experiment,) = (each.id for each in study.experiments)
 
     import_archive(other, BytesIO(exported(export_experiment(store, experiment))))
 
-    assert experiments.read_experiment(other, experiment).study is None
+    assert submission.read_experiment(other, experiment).study is None
     with pytest.raises(NotFound):
-        experiments.read_study(other, study.id)
+        submission.read_study(other, study.id)
 
 
 def test_ids_that_are_taken_become_new_ones_and_the_rest_is_the_same(store):
@@ -230,7 +232,7 @@ def test_ids_that_are_taken_become_new_ones_and_the_rest_is_the_same(store):
 
 
 def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(store, other):
-    submitted = experiments.submit_experiment(store, toy()).id
+    submitted = submission.submit_experiment(store, toy()).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)
     for step in list(some_log())[:4]:
@@ -239,25 +241,25 @@ def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(sto
     stored = import_archive(other, BytesIO(exported(export_experiment(store, submitted))))
 
     assert stored.called_off == (submitted,)
-    assert experiments.read_experiment(other, submitted).state is State.CANCELLED
-    states = [each.state for each in experiments.list_repetitions(other, submitted)]
+    assert submission.read_experiment(other, submitted).state is State.CANCELLED
+    states = [each.state for each in submission.list_repetitions(other, submitted)]
     assert states == [State.COMPLETED, State.CANCELLED, State.CANCELLED]
     assert execution.claim(other, "me", 9) == ()
     assert execution.requeue_lost(other, stale_after_s=-1) == 0
-    assert reports.curve(other, submitted).points == reports.curve(store, submitted).points
-    assert experiments.list_samples(other, submitted) == experiments.list_samples(store, submitted)
-    assert experiments.read_experiment(store, submitted).state is State.RUNNING
+    assert curves.curve(other, submitted).points == curves.curve(store, submitted).points
+    assert submission.list_samples(other, submitted) == submission.list_samples(store, submitted)
+    assert submission.read_experiment(store, submitted).state is State.RUNNING
 
 
 @pytest.mark.parametrize("ended", [False, True])
 def test_reality_is_hidden_until_its_study_has_ended(store, other, ended):
     spec = TOY_STUDY | {"strategies": ["direct", "random"], "repetitions": 1}
     truth = {"reality": {"parameters": {"static_friction": 0.98765}}, "tunables": ["static_friction", "restitution"]}
-    study = experiments.submit_study(store, StudySpec.model_validate(spec | truth))
+    study = submission.submit_study(store, StudySpec.model_validate(spec | truth))
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim, some_log(0))
     if ended:
-        experiments.cancel_experiment(store, study.experiments[1].id)
+        submission.cancel_experiment(store, study.experiments[1].id)
 
     archives = [exported(export_study(store, study.id)), exported(export_experiment(store, study.experiments[0].id))]
 
@@ -267,20 +269,20 @@ def test_reality_is_hidden_until_its_study_has_ended(store, other, ended):
         assert (b"0.98765" in everything) is ended
         stored = import_archive(other, BytesIO(archive))
         first = stored.experiments[0]
-        found = experiments.read_experiment(other, first).spec["reality"]["parameters"]["static_friction"]
+        found = submission.read_experiment(other, first).spec["reality"]["parameters"]["static_friction"]
         assert found == (0.98765 if ended else None)
-        assert reports.curve(other, first).points == reports.curve(store, study.experiments[0].id).points
+        assert curves.curve(other, first).points == curves.curve(store, study.experiments[0].id).points
         assert misfit(other, first).points == ()
 
 
 def test_an_export_is_of_one_moment_while_a_supervisor_writes(store, other):
-    submitted = experiments.submit_experiment(store, toy(repetitions=6)).id
+    submitted = submission.submit_experiment(store, toy(repetitions=6)).id
     for claim in execution.claim(store, "me", 6):
         run(store, claim)
         archive = export_experiment(store, submitted)
         if claim.number == 3:
             stored = import_archive(other, archive.file)  # which refuses rows that are no whole logs
-            assert experiments.read_experiment(other, stored.experiments[0]).progress.completed == claim.number + 1
+            assert submission.read_experiment(other, stored.experiments[0]).progress.completed == claim.number + 1
         archive.file.close()
 
 
@@ -293,7 +295,7 @@ def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store):
         (row,) = map(json.loads, opened.read("experiment.jsonl").splitlines())
         manifest = json.loads(opened.read("manifest.json"))
 
-    samples = experiments.list_samples(sqlite_store, submitted).items
+    samples = submission.list_samples(sqlite_store, submitted).items
     assert len(measurements) == len(samples)
     sample = next(each for each in measurements if each["kind"] == "sample")
     assert np.array_equal(sample["genome"], AWKWARD)
@@ -305,7 +307,7 @@ def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store):
 
 
 def test_attempts_go_with_it_and_none_goes_on(store, other):
-    submitted = experiments.submit_experiment(store, toy(repetitions=2)).id
+    submitted = submission.submit_experiment(store, toy(repetitions=2)).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)
     assert execution.release(store, second, "its worker was lost")
@@ -327,7 +329,7 @@ def attempts(store, experiment, number):
 
 
 def test_what_came_without_its_reality_cannot_be_extended(store, other):
-    study = experiments.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["direct", "random"]}))
+    study = submission.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["direct", "random"]}))
     direct = study.experiments[0].id
     for claim in execution.claim(store, "me", 9):
         if claim.experiment_id == direct:
@@ -335,7 +337,7 @@ def test_what_came_without_its_reality_cannot_be_extended(store, other):
 
     import_archive(other, BytesIO(exported(export_study(store, study.id))))
 
-    assert experiments.read_experiment(other, direct).state is State.COMPLETED
+    assert submission.read_experiment(other, direct).state is State.COMPLETED
     with pytest.raises(Conflict, match="before its reality was shown"):
         life_cycle.extend_experiment(other, direct, ExtensionSpec(repetitions=3))
 
@@ -349,7 +351,7 @@ def test_times_keep_their_microseconds(store, other):
 
     import_archive(other, BytesIO(exported(export_experiment(store, submitted))))
 
-    assert experiments.read_experiment(other, submitted).created_at == moment
+    assert submission.read_experiment(other, submitted).created_at == moment
 
 
 def test_memory_does_not_grow_with_what_is_exported(sqlite_store):

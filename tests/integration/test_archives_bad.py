@@ -16,12 +16,13 @@ from fastapi.testclient import TestClient
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from api import limits
-from api.app import create_app
-from services import execution, experiments
-from services.archives import checking, export_experiment, import_archive, opening, reading, unpacking
-from services.core.errors import Conflict, InvalidArchive
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.api.http import limits
+from gaplab.services.archives import checking, export_experiment, import_archive, opening, reading, unpacking
+from gaplab.services.core.errors import Conflict, InvalidArchive
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 from tests.experiments import run, toy
 
 
@@ -31,7 +32,7 @@ def good(sqlite_template, tmp_path_factory):
     file = tmp_path_factory.mktemp("good") / "good.db"
     shutil.copy(sqlite_template, file)
     store = Store(f"sqlite:///{file}")
-    submitted = experiments.submit_experiment(store, toy(repetitions=2)).id
+    submitted = submission.submit_experiment(store, toy(repetitions=2)).id
     for claim in execution.claim(store, "me", 2):
         run(store, claim)
     with export_experiment(store, submitted).file as archive, zipfile.ZipFile(archive) as opened:
@@ -81,8 +82,8 @@ def rows_of(name, content):
 def refused(store, archive, *what):
     with pytest.raises(InvalidArchive) as refusal:
         import_archive(store, BytesIO(archive))
-    assert experiments.list_experiments(store).items == ()
-    assert experiments.list_studies(store).items == ()
+    assert submission.list_experiments(store).items == ()
+    assert submission.list_studies(store).items == ()
     assert all(each in str(refusal.value) for each in what), refusal.value
 
 
@@ -111,7 +112,7 @@ def set_in(rows, place, **values):
 def test_the_good_one_is_good(sqlite_store, good):
     stored = import_archive(sqlite_store, BytesIO(packed(good)))
 
-    assert experiments.read_experiment(sqlite_store, stored.experiments[0]).progress.completed == 2
+    assert submission.read_experiment(sqlite_store, stored.experiments[0]).progress.completed == 2
 
 
 @pytest.mark.parametrize("archive", [b"", b"no zip", b"PK\x03\x04" + bytes(100), b"PK\x05\x06" + b"\xff" * 18])
@@ -372,7 +373,7 @@ def test_whichever_bytes_are_damaged(sqlite_store, good, unpacked_here, data):
         import_archive(sqlite_store, BytesIO(archive))
     except InvalidArchive:
         return
-    stored = experiments.list_experiments(sqlite_store).items
+    stored = submission.list_experiments(sqlite_store).items
     assert all(each.progress.completed == 2 for each in stored)  # what was damaged means nothing, like a date
 
 

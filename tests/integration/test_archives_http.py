@@ -6,10 +6,11 @@ from zipfile import ZipFile
 import pytest
 from fastapi.testclient import TestClient
 
-from api.app import create_app
-from api.client import Client
-from services import execution, experiments
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.api.clients.client import Client
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 from tests.experiments import run, toy
 
@@ -22,7 +23,7 @@ def api(sqlite_store: Store) -> TestClient:
 @pytest.fixture
 def submitted(sqlite_store: Store) -> str:
     """An experiment that is complete."""
-    found = experiments.submit_experiment(sqlite_store, toy()).id
+    found = submission.submit_experiment(sqlite_store, toy()).id
     for claim in execution.claim(sqlite_store, "me", 9):
         run(sqlite_store, claim)
     return found

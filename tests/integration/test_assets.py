@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from api.app import create_app
-from api.routes.dashboard import FILES
-from schemas.spec import StudySpec
-from services.catalogue import catalogue
-from services.resolution import resolve_study
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.api.routes.dashboard import FILES
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.plugins.catalogue import catalogue
+from gaplab.services.specs.resolution import resolve_study
+from gaplab.services.store.session import Store
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PRESETS = {each["name"]: each["spec"] for each in json.loads((FILES / "presets.json").read_text())}

@@ -7,15 +7,17 @@ from threading import Event, Thread
 
 import pytest
 
-from api.cli import main
-from schemas.lifecycle import State
-from services import execution, experiments, reports
-from services.core.errors import StoreUnavailable, Unsupported
-from services.core.loop import repetition
-from services.simulation import setting
-from services.store import backup as backing_up
-from services.store.backup import backup
-from services.store.session import Store
+from gaplab.api.commands.cli import main
+from gaplab.schemas.lifecycle import State
+from gaplab.services.core.errors import StoreUnavailable, Unsupported
+from gaplab.services.core.loop import repetition
+from gaplab.services.experiments import submission
+from gaplab.services.results import curves
+from gaplab.services.running import execution
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store import backup as backing_up
+from gaplab.services.store.backup import backup
+from gaplab.services.store.session import Store
 from tests.experiments import toy
 
 
@@ -30,7 +32,7 @@ def work(store):
 
 def test_copies_made_while_a_supervisor_writes_go_on_to_the_same_end(sqlite_url, tmp_path):
     store = Store(sqlite_url)
-    submitted = experiments.submit_experiment(store, toy(repetitions=2)).id
+    submitted = submission.submit_experiment(store, toy(repetitions=2)).id
     worker = Thread(target=work, args=(store,))
     worker.start()
     copies = []
@@ -38,7 +40,7 @@ def test_copies_made_while_a_supervisor_writes_go_on_to_the_same_end(sqlite_url,
         copies.append(tmp_path / f"copy_{len(copies)}.db")
         backup(sqlite_url, copies[-1])
     worker.join()
-    end = reports.curve(store, submitted)
+    end = curves.curve(store, submitted)
     store.dispose()
 
     assert end.state is State.COMPLETED
@@ -50,7 +52,7 @@ def test_copies_made_while_a_supervisor_writes_go_on_to_the_same_end(sqlite_url,
         copy.check()
         execution.requeue_lost(copy, stale_after_s=-1)
         work(copy)
-        assert reports.curve(copy, submitted) == end
+        assert curves.curve(copy, submitted) == end
         copy.dispose()
 
 
@@ -64,7 +66,7 @@ def test_a_copy_waits_for_whoever_writes_and_has_all_of_it_or_nothing(sqlite_url
 
     copying = Thread(target=copy)
     copying.start()
-    experiments.submit_experiment(store, toy())
+    submission.submit_experiment(store, toy())
     with store.transaction() as session:
         session.connection().exec_driver_sql("UPDATE experiment SET name = 'written'")
         half_way.set()
@@ -72,7 +74,7 @@ def test_a_copy_waits_for_whoever_writes_and_has_all_of_it_or_nothing(sqlite_url
     store.dispose()
 
     copied = Store(f"sqlite:///{tmp_path / 'copy.db'}")
-    names = [each.name for each in experiments.list_experiments(copied).items]
+    names = [each.name for each in submission.list_experiments(copied).items]
     copied.dispose()
     assert names in (["written"], ["simulated_fit"])
     assert made == [(tmp_path / "copy.db").stat().st_size]

@@ -6,18 +6,19 @@ from threading import enumerate as threads
 import numpy as np
 import pytest
 
-from schemas.lifecycle import State
-from services import execution, experiments
-from services.core.errors import Conflict
-from services.core.loop import repetition
-from services.core.recall import unpack
-from services.execution import Checkpoint
-from services.store.models import CheckpointRow
-from services.store.repository.leases import MAX_LOSSES
+from gaplab.schemas.lifecycle import State
+from gaplab.services.core.errors import Conflict
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.recall import unpack
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.running.execution import Checkpoint
+from gaplab.services.store.models import CheckpointRow
+from gaplab.services.store.queries.leases import MAX_LOSSES
+from gaplab.workers.checkpoints import Recorder, recorded
 from tests.experiments import same, some_log, toy
 from tests.fakes import Recorder as Calls
 from tests.fakes import flat, paraboloid, small_setting
-from workers.checkpoints import Recorder, recorded
 
 
 def steps_of(told):
@@ -104,7 +105,7 @@ def checkpoints_left(store):
 
 
 def test_checkpoints_of_the_step_under_way_are_handed_out_with_the_claim(store):
-    experiments.submit_experiment(store, toy())
+    submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     first = next(some_log())
 
@@ -118,7 +119,7 @@ def test_checkpoints_of_the_step_under_way_are_handed_out_with_the_claim(store):
 
 
 def test_a_checkpoint_that_is_delivered_twice_is_stored_once(store):
-    experiments.submit_experiment(store, toy())
+    submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
 
     for delivered in ([part(0, 0)], [part(0, 0)], [part(0, 0), part(0, 1)]):
@@ -128,7 +129,7 @@ def test_a_checkpoint_that_is_delivered_twice_is_stored_once(store):
 
 
 def test_checkpoints_are_gone_once_their_step_is_recorded(store):
-    experiments.submit_experiment(store, toy())
+    submission.submit_experiment(store, toy())
     claims = execution.claim(store, "me", 2)
     execution.record_all(store, [(claim, [part(0, 0), part(0, 1)]) for claim in claims])
     first, second, *_ = [execution.TimedStep(each, 0.5) for each in some_log()]
@@ -143,7 +144,7 @@ def test_checkpoints_are_gone_once_their_step_is_recorded(store):
 
 @pytest.mark.parametrize("wrong", [part(0, 1), part(1, 0)])
 def test_a_checkpoint_that_would_leave_a_hole_is_refused(store, wrong):
-    experiments.submit_experiment(store, toy())
+    submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
 
     with pytest.raises(Conflict, match="next is part 0 of step 0"):
@@ -153,7 +154,7 @@ def test_a_checkpoint_that_would_leave_a_hole_is_refused(store, wrong):
 
 
 def test_a_late_checkpoint_of_a_holder_who_lost_the_lease_is_not_stored(store):
-    experiments.submit_experiment(store, toy())
+    submission.submit_experiment(store, toy())
     (late,) = execution.claim(store, "me", 1)
     execution.release(store, late, "killed")
     execution.claim(store, "you", 1)
@@ -164,29 +165,29 @@ def test_a_late_checkpoint_of_a_holder_who_lost_the_lease_is_not_stored(store):
 
 
 def test_one_that_gets_on_within_a_step_may_be_lost_any_number_of_times(store):
-    submitted = experiments.submit_experiment(store, toy(repetitions=1))
+    submitted = submission.submit_experiment(store, toy(repetitions=1))
 
     for number in range(2 * MAX_LOSSES):
         (claim,) = execution.claim(store, "me", 1)
         execution.record_all(store, [(claim, [part(0, number)])])
         execution.release(store, claim, "killed")
 
-    assert experiments.read_experiment(store, submitted.id).state is State.RUNNING
+    assert submission.read_experiment(store, submitted.id).state is State.RUNNING
 
 
 def test_cancelling_forgets_checkpoints(store):
-    submitted = experiments.submit_experiment(store, toy())
+    submitted = submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     execution.record_all(store, [(claim, [part(0, 0)])])
 
-    experiments.cancel_experiment(store, submitted.id)
+    submission.cancel_experiment(store, submitted.id)
 
     assert checkpoints_left(store) == 0
 
 
 @pytest.mark.parametrize("hopeless", [True, False])
 def test_a_repetition_that_fails_leaves_no_checkpoints(store, hopeless):
-    experiments.submit_experiment(store, toy(repetitions=1))
+    submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     execution.record_all(store, [(claim, [part(0, 0)])])
 
@@ -200,13 +201,13 @@ def test_a_repetition_that_fails_leaves_no_checkpoints(store, hopeless):
 
 
 def test_a_claim_that_timed_out_is_handed_back_and_those_that_are_known_stay(store):
-    submitted = experiments.submit_experiment(store, toy())
+    submitted = submission.submit_experiment(store, toy())
     (known,) = execution.claim(store, "me", 1)
     execution.claim(store, "me", 1)
     (others,) = execution.claim(store, "you", 1)
 
     assert execution.hand_back_unheard(store, "me", [known]) == 1
 
-    states = [(each.state, each.attempts) for each in experiments.list_repetitions(store, submitted.id)]
+    states = [(each.state, each.attempts) for each in submission.list_repetitions(store, submitted.id)]
     assert states == [(State.RUNNING, 1), (State.QUEUED, 0), (State.RUNNING, 1)]
     assert execution.heartbeat(store, [known, others]) == (known, others)

@@ -11,14 +11,14 @@ from typing import Any
 
 import pytest
 
-from api.client import Client, ServiceError, ServiceUnreachable
-from api.commands import reading
-from api.exits import Exit
-from services import execution, sensitivity
-from services.core.optimizers.steady_state import SteadyState
-from services.core.sensitivity import Effort, check
-from services.simulation import subject
-from services.store.session import Store
+from gaplab.api.clients.client import Client, ServiceError, ServiceUnreachable
+from gaplab.api.commands import reading
+from gaplab.api.commands.exit_codes import Exit
+from gaplab.services.core.optimizers.steady_state import SteadyState
+from gaplab.services.core.sensitivity import Effort, check
+from gaplab.services.running import execution, sensitivity
+from gaplab.services.specs.assembly import subject
+from gaplab.services.store.session import Store
 from tests.commands import Gaplab, served
 from tests.experiments import run, some_log
 

@@ -15,14 +15,15 @@ import pytest
 from fastapi.testclient import TestClient
 
 import gaplab
-from api.app import create_app
-from api.clients import connection, frames
-from api.clients import events as stream
 from gaplab import Client, ExperimentFailed, ExtraMissing, ServiceError, ServiceUnreachable
-from schemas.access import Role
-from schemas.events import EventKind, EventRead
-from services import access, execution
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.api.clients import connection, frames
+from gaplab.api.clients import events as stream
+from gaplab.schemas.access import Role
+from gaplab.schemas.events import EventKind, EventRead
+from gaplab.services import access
+from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 
 SMALL = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 3}
 BOTH = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "smoke", "repetitions": 3}
@@ -127,7 +128,7 @@ def test_curves_are_asked_for_in_parts_that_the_service_takes_and_come_in_order(
 
     assert network.asked == ["GET /curves"] * 2
     assert [each.experiment for each in curves] == many
-    monkeypatch.setattr("api.client.MOST_CURVES", 1)
+    monkeypatch.setattr("gaplab.api.clients.client.MOST_CURVES", 1)
     assert client.curves_csv([study.id]) == whole
 
 

@@ -15,13 +15,14 @@ import pytest
 import typer
 from rich.console import Console
 
-from api import completion, problems
-from api.cli import app
-from api.client import Client, ServiceError, ServiceUnreachable
-from api.exits import BY_STATUS, MEANINGS, Exit
-from api.monitor import Look, looks, spark, watch
-from services import execution
-from services.store.session import Store
+from gaplab.api.clients.client import Client, ServiceError, ServiceUnreachable
+from gaplab.api.commands import completion
+from gaplab.api.commands.cli import app
+from gaplab.api.commands.exit_codes import BY_STATUS, MEANINGS, Exit
+from gaplab.api.commands.monitor import Look, looks, spark, watch
+from gaplab.api.http import problems
+from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 
 STUDY = {
@@ -261,7 +262,7 @@ def test_where_no_service_answers_nothing_is_offered(monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_the_shell_gets_a_script_and_the_script_gets_commands_and_ids(url: str, study: str, shell: str):
     def ask(**environment: str) -> str:
-        command = [sys.executable, "-m", "api.cli"]
+        command = [sys.executable, "-m", "gaplab"]
         shown = os.environ | {"GAPLAB_URL": url} | environment
         done = subprocess.run(command, env=shown, capture_output=True, text=True, check=False)
         assert "Traceback" not in done.stderr

@@ -15,24 +15,26 @@ import pytest
 import uvicorn
 from fastapi.testclient import TestClient
 
-from api import feed as feeding
-from api.app import create_app
-from api.client import Client, ServiceError
-from api.feed import Feed
-from api.server import Server, listen
-from schemas.events import EventKind, EventPage, EventRead
-from schemas.lifecycle import Verb
-from schemas.schedule import ExtensionSpec
-from services import archives, events, execution, experiments, life_cycle, provenance, sensitivity
-from services.core.errors import NotFound
-from services.events import Which
-from services.resolution import resolve_experiment
-from services.store.repository.events import note, write
-from services.store.repository.experiments import insert_experiment
-from services.store.repository.leases import MAX_LOSSES
-from services.store.repository.sensitivity import queue_for
-from services.store.session import Store
-from services.versions import provenance as own
+from gaplab.api.app import create_app
+from gaplab.api.clients.client import Client, ServiceError
+from gaplab.api.http import event_feed as feeding
+from gaplab.api.http.event_feed import Feed
+from gaplab.api.process.server import Server, listen
+from gaplab.schemas.events import EventKind, EventPage, EventRead
+from gaplab.schemas.lifecycle import Verb
+from gaplab.schemas.schedule import ExtensionSpec
+from gaplab.services import archives, events
+from gaplab.services.core.errors import NotFound
+from gaplab.services.events import Which
+from gaplab.services.experiments import life_cycle, submission
+from gaplab.services.running import execution, provenance, sensitivity
+from gaplab.services.running.versions import provenance as own
+from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.queries.events import note, write
+from gaplab.services.store.queries.experiments import insert_experiment
+from gaplab.services.store.queries.leases import MAX_LOSSES
+from gaplab.services.store.queries.sensitivity import queue_for
+from gaplab.services.store.session import Store
 from tests.experiments import run, some_log, toy
 
 DEADLINE_S = 180
@@ -57,7 +59,7 @@ def within(condition) -> bool:
 
 
 def test_the_life_of_an_experiment_is_told_step_by_step(store):
-    id_ = experiments.submit_experiment(store, toy(repetitions=1, iterations=1)).id
+    id_ = submission.submit_experiment(store, toy(repetitions=1, iterations=1)).id
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim, some_log(1))
 
@@ -81,10 +83,10 @@ def test_the_life_of_an_experiment_is_told_step_by_step(store):
 
 
 def everything_that_can_happen(store: Store) -> None:
-    experiments.submit_experiment(store, toy(repetitions=1))
+    submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim)
-    experiments.submit_experiment(store, toy(repetitions=2))
+    submission.submit_experiment(store, toy(repetitions=2))
     fails, waits = execution.claim(store, "me", 2)
     execution.record(store, waits, next(some_log()))
     execution.fail(store, fails, "it is broken")
@@ -94,9 +96,9 @@ def everything_that_can_happen(store: Store) -> None:
     for _ in range(MAX_LOSSES):
         (waits,) = execution.claim(store, "me", 1)
         execution.release(store, waits, "killed")
-    cancelled = experiments.submit_experiment(store, toy())
+    cancelled = submission.submit_experiment(store, toy())
     execution.claim(store, "me", 1)
-    experiments.cancel_experiment(store, cancelled.id)
+    submission.cancel_experiment(store, cancelled.id)
     all_verbs(store)
     check = sensitivity.claim(store, "me")
     assert check is not None
@@ -105,7 +107,7 @@ def everything_that_can_happen(store: Store) -> None:
 
 def all_verbs(store: Store) -> None:
     """An experiment paused, resumed, stopped, extended; and another, imported."""
-    asked = experiments.submit_experiment(store, toy(repetitions=1)).id
+    asked = submission.submit_experiment(store, toy(repetitions=1)).id
     steps = some_log()
     for verb in (Verb.PAUSE, Verb.STOP):
         (claim,) = execution.claim(store, "me", 1)
@@ -114,7 +116,7 @@ def all_verbs(store: Store) -> None:
             continue
         if verb is Verb.PAUSE:
             life_cycle.ask_experiment(store, asked, Verb.RESUME)
-    whole = experiments.submit_experiment(store, toy(repetitions=1)).id
+    whole = submission.submit_experiment(store, toy(repetitions=1)).id
     run(store, *execution.claim(store, "me", 1))
     life_cycle.extend_experiment(store, whole, ExtensionSpec(repetitions=2))
     with archives.export_experiment(store, asked).file as file:
@@ -137,23 +139,23 @@ def test_every_kind_of_event_is_told_and_none_shows_where_reality_is(store):
 
 
 def test_an_experiment_submitted_after_its_check_is_told_of_it_at_once(store):
-    before = experiments.submit_experiment(store, toy()).id
+    before = submission.submit_experiment(store, toy()).id
     check = sensitivity.claim(store, "me")
     sensitivity.complete(store, check, [])
 
-    later = experiments.submit_experiment(store, toy()).id
+    later = submission.submit_experiment(store, toy()).id
 
     for each in (before, later):
         assert kinds(store, Which(experiment=each)) == ["submitted", "sensitivity_ended"]
 
 
 def test_an_experiment_submitted_while_its_check_ends_is_told_of_it(store):
-    experiments.submit_experiment(store, toy())
+    submission.submit_experiment(store, toy())
     check, spec = sensitivity.claim(store, "me"), resolve_experiment(toy())
 
     with ThreadPoolExecutor(1) as pool:
         with store.transaction() as session:
-            row = insert_experiment(session, spec, experiments.extent_of(spec))
+            row = insert_experiment(session, spec, submission.extent_of(spec))
             queue_for(session, [row], {})
             ending = pool.submit(sensitivity.complete, store, check, [])
             time.sleep(0.3)  # it waits for what is locked here
@@ -163,7 +165,7 @@ def test_an_experiment_submitted_while_its_check_ends_is_told_of_it(store):
 
 
 def test_a_step_that_is_delivered_twice_is_told_once(store):
-    experiments.submit_experiment(store, toy(repetitions=1))
+    submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
 
     for step in some_log():
@@ -174,7 +176,7 @@ def test_a_step_that_is_delivered_twice_is_told_once(store):
 
 
 def test_what_is_rolled_back_was_never_told_and_leaves_no_hole(store):
-    experiments.submit_experiment(store, toy())
+    submission.submit_experiment(store, toy())
 
     def fail(session) -> None:
         note(session, EventKind.CANCELLED, "nobody")
@@ -183,7 +185,7 @@ def test_what_is_rolled_back_was_never_told_and_leaves_no_hole(store):
 
     with pytest.raises(ZeroDivisionError):
         store.write(fail)
-    experiments.submit_experiment(store, toy())
+    submission.submit_experiment(store, toy())
 
     assert [(each.number, each.kind.value) for each in told(store)] == [(1, "submitted"), (2, "submitted")]
 
@@ -262,7 +264,7 @@ def test_a_reader_that_resumes_among_many_writers_misses_nothing(store):
 def test_supervisors_that_record_claim_and_end_at_once_do_not_wait_for_each_other_in_a_circle(postgres_store):
     store = postgres_store
     for _ in range(3):
-        experiments.submit_experiment(store, toy(repetitions=8))
+        submission.submit_experiment(store, toy(repetitions=8))
 
     def work(owner: str) -> int:
         done = 0
@@ -300,7 +302,7 @@ def take(stream: Iterator[EventRead], many: int) -> list[EventRead]:
 
 
 def test_a_stream_has_what_was_and_what_comes(store):
-    experiments.submit_experiment(store, toy(repetitions=1))
+    submission.submit_experiment(store, toy(repetitions=1))
     with served(store) as (url, feed), Client(url) as client:
         stream = client.events()
         first = take(stream, 1)
@@ -317,7 +319,7 @@ def test_a_stream_has_what_was_and_what_comes(store):
 
 
 def test_streams_are_filtered(sqlite_store):
-    wanted, other = (experiments.submit_experiment(sqlite_store, toy(repetitions=1)).id for _ in range(2))
+    wanted, other = (submission.submit_experiment(sqlite_store, toy(repetitions=1)).id for _ in range(2))
     for claim in execution.claim(sqlite_store, "me", 2):
         run(sqlite_store, claim)
     with served(sqlite_store) as (url, _), Client(url) as client:
@@ -333,7 +335,7 @@ def test_streams_are_filtered(sqlite_store):
 
 def test_a_stream_resumes_after_the_last_event_that_the_header_names(sqlite_store):
     for _ in range(5):
-        experiments.submit_experiment(sqlite_store, toy())
+        submission.submit_experiment(sqlite_store, toy())
     with served(sqlite_store) as (url, _), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
         with http.stream("GET", "/events?after=1", headers={"Last-Event-ID": "3"}) as answer:
             lines = answer.iter_lines()
@@ -351,7 +353,7 @@ def test_a_stream_that_fell_behind_catches_up_from_the_database(sqlite_store, mo
     monkeypatch.setattr(feeding, "PAGE", 3)
     with served(sqlite_store) as (url, feed), Client(url) as client:
         feed._recent = type(feed._recent)(maxlen=2)
-        experiments.submit_experiment(sqlite_store, toy(repetitions=1))
+        submission.submit_experiment(sqlite_store, toy(repetitions=1))
         stream = client.events()
         first = take(stream, 1)
         (claim,) = execution.claim(sqlite_store, "me", 1)
@@ -371,7 +373,7 @@ def test_all_streams_together_ask_the_database_once_a_look(sqlite_store, monkeyp
 
     monkeypatch.setattr(feeding.events, "page", counted)
     with served(sqlite_store) as (url, feed), Client(url) as client:
-        experiments.submit_experiment(sqlite_store, toy())
+        submission.submit_experiment(sqlite_store, toy())
         streams = [client.events() for _ in range(8)]
         for each in streams:
             take(each, 1)
@@ -379,7 +381,7 @@ def test_all_streams_together_ask_the_database_once_a_look(sqlite_store, monkeyp
         before, began = next(asked), time.monotonic()
         time.sleep(1.0)
         looks, seconds = next(asked) - before, time.monotonic() - began
-        experiments.submit_experiment(sqlite_store, toy())
+        submission.submit_experiment(sqlite_store, toy())
         second = [take(each, 1)[0].number for each in streams]
 
     assert looks <= seconds / feeding.EVERY_S + 2  # eight streams that each ask would be eight times as many
@@ -387,7 +389,7 @@ def test_all_streams_together_ask_the_database_once_a_look(sqlite_store, monkeyp
 
 
 def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(sqlite_store, monkeypatch):
-    experiments.submit_experiment(sqlite_store, toy())
+    submission.submit_experiment(sqlite_store, toy())
     page, failing = events.page, [False]
 
     def fail_once(*asked: object, **named: object) -> EventPage:
@@ -415,8 +417,8 @@ def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(sqlite_store, mo
 
 
 def test_a_stream_whose_reader_failed_is_resumed_by_the_client(sqlite_store, monkeypatch):
-    monkeypatch.setattr("api.clients.events.RETRY_S", 0.05)
-    experiments.submit_experiment(sqlite_store, toy())
+    monkeypatch.setattr("gaplab.api.clients.events.RETRY_S", 0.05)
+    submission.submit_experiment(sqlite_store, toy())
     latest, failing = events.latest, iter([True])
 
     def fail_once(store: Store) -> int:
@@ -462,13 +464,13 @@ def test_a_service_that_stops_ends_its_streams(sqlite_store):
 
 
 def test_a_client_goes_on_where_it_was_when_the_service_comes_back(sqlite_store, monkeypatch):
-    monkeypatch.setattr("api.clients.events.RETRY_S", 0.05)
-    experiments.submit_experiment(sqlite_store, toy())
+    monkeypatch.setattr("gaplab.api.clients.events.RETRY_S", 0.05)
+    submission.submit_experiment(sqlite_store, toy())
     with served(sqlite_store) as (url, _):
         client = Client(url)
         stream = client.events()
         found = take(stream, 1)
-    experiments.submit_experiment(sqlite_store, toy())
+    submission.submit_experiment(sqlite_store, toy())
 
     with ThreadPoolExecutor(1) as pool:
         second = pool.submit(take, stream, 1)  # nothing answers yet
@@ -493,13 +495,13 @@ def test_events_can_be_polled_page_by_page(store):
 
 
 def test_a_poll_may_wait_for_what_comes(sqlite_store):
-    id_ = experiments.submit_experiment(sqlite_store, toy()).id
+    id_ = submission.submit_experiment(sqlite_store, toy()).id
     with served(sqlite_store) as (url, feed), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
         asked = {"after": 1, "kind": "cancelled", "wait_s": 60}
         with ThreadPoolExecutor(1) as pool:
             answer = pool.submit(http.get, "/events/page", params=asked)
             assert within(lambda: feed.open == 1)
-            experiments.cancel_experiment(sqlite_store, id_)
+            submission.cancel_experiment(sqlite_store, id_)
             found = answer.result(DEADLINE_S).json()
         nothing = http.get("/events/page", params={"after": 2, "wait_s": 0.1}).json()
 
@@ -509,12 +511,12 @@ def test_a_poll_may_wait_for_what_comes(sqlite_store):
 
 
 def test_events_of_a_study_are_those_of_its_experiments(sqlite_store):
-    from schemas.spec import StudySpec
+    from gaplab.schemas.spec import StudySpec
 
-    study = experiments.submit_study(
+    study = submission.submit_study(
         sqlite_store, StudySpec.model_validate({"robot": "toy_function", "budget": "smoke", "strategies": ["random"]})
     )
-    experiments.submit_experiment(sqlite_store, toy())
+    submission.submit_experiment(sqlite_store, toy())
 
     found = told(sqlite_store, Which(study=study.id))
 

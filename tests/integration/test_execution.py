@@ -4,18 +4,19 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from schemas.lifecycle import State
-from services import execution, experiments
-from services.core.errors import Conflict
-from services.core.loop import repetition
-from services.core.types import Cost
-from services.simulation import setting
-from services.store.repository.leases import MAX_LOSSES
+from gaplab.schemas.lifecycle import State
+from gaplab.services.core.errors import Conflict
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.types import Cost
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.queries.leases import MAX_LOSSES
 from tests.experiments import run, same, some_log, toy
 
 
 def test_a_claim_has_the_resolved_spec_and_no_log_at_first(store):
-    submitted = experiments.submit_experiment(store, toy(reality={"parameters": {"static_friction": 0.9}}))
+    submitted = submission.submit_experiment(store, toy(reality={"parameters": {"static_friction": 0.9}}))
 
     (claim,) = execution.claim(store, "me", 1)
 
@@ -25,19 +26,19 @@ def test_a_claim_has_the_resolved_spec_and_no_log_at_first(store):
 
 
 def test_the_first_claim_starts_the_experiment(store):
-    started = experiments.submit_experiment(store, toy())
-    waiting = experiments.submit_experiment(store, toy())
+    started = submission.submit_experiment(store, toy())
+    waiting = submission.submit_experiment(store, toy())
 
     execution.claim(store, "me", 1)
 
-    assert experiments.read_experiment(store, started.id).state is State.RUNNING
-    assert experiments.read_experiment(store, started.id).started_at is not None
-    assert experiments.read_experiment(store, waiting.id).state is State.QUEUED
+    assert submission.read_experiment(store, started.id).state is State.RUNNING
+    assert submission.read_experiment(store, started.id).started_at is not None
+    assert submission.read_experiment(store, waiting.id).state is State.QUEUED
 
 
 def test_claims_of_many_owners_never_overlap(store):
     for _ in range(3):
-        experiments.submit_experiment(store, toy(repetitions=20))
+        submission.submit_experiment(store, toy(repetitions=20))
 
     def claim_all(owner):
         claimed = []
@@ -52,7 +53,7 @@ def test_claims_of_many_owners_never_overlap(store):
 
 
 def test_the_log_that_is_read_is_the_log_that_was_written(store):
-    experiments.submit_experiment(store, toy())
+    submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     for count, step in enumerate(some_log()):
         assert execution.record(store, claim, step)
@@ -64,7 +65,7 @@ def test_the_log_that_is_read_is_the_log_that_was_written(store):
 
 
 def test_a_step_that_is_delivered_twice_is_stored_once(store):
-    submitted = experiments.submit_experiment(store, toy())
+    submitted = submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
 
     for step in some_log():
@@ -75,11 +76,11 @@ def test_a_step_that_is_delivered_twice_is_stored_once(store):
 
     execution.release(store, claim, "killed")
     assert same(execution.claim(store, "me", 1)[0].log, tuple(some_log()))
-    assert experiments.read_experiment(store, submitted.id).progress.rollouts_done == 3 * 60 + 2 * 90
+    assert submission.read_experiment(store, submitted.id).progress.rollouts_done == 3 * 60 + 2 * 90
 
 
 def test_a_step_that_would_leave_a_hole_is_refused(store):
-    experiments.submit_experiment(store, toy())
+    submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     first, _, third, *_ = some_log()
     execution.record(store, claim, first)
@@ -100,7 +101,7 @@ def by_experiment(claims, *ids):
 
 
 def test_many_repetitions_at_once_are_recorded_as_one_step_after_another_would_be(store):
-    one_by_one, together = (experiments.submit_experiment(store, toy()).id for _ in range(2))
+    one_by_one, together = (submission.submit_experiment(store, toy()).id for _ in range(2))
     claims = by_experiment(execution.claim(store, "me", 6), one_by_one, together)
     ends = (13, 7, 2)
 
@@ -118,12 +119,12 @@ def test_many_repetitions_at_once_are_recorded_as_one_step_after_another_would_b
     again = by_experiment(execution.claim(store, "me", 6), one_by_one, together)
     assert same(tuple(each.log for each in again[:3]), tuple(each.log for each in again[3:]))
     assert [len(each.log) for each in again] == [*ends] * 2
-    first, second = (experiments.read_experiment(store, each) for each in (one_by_one, together))
+    first, second = (submission.read_experiment(store, each) for each in (one_by_one, together))
     assert first.progress == second.progress
 
 
 def test_of_many_deliveries_only_those_whose_claim_holds_are_written(store):
-    experiments.submit_experiment(store, toy())
+    submission.submit_experiment(store, toy())
     lost, *held = execution.claim(store, "me", 3)
     execution.release(store, lost, "killed")
 
@@ -135,7 +136,7 @@ def test_of_many_deliveries_only_those_whose_claim_holds_are_written(store):
 
 
 def test_a_hole_in_one_of_many_deliveries_refuses_them_all(store):
-    experiments.submit_experiment(store, toy())
+    submission.submit_experiment(store, toy())
     whole, holed, _ = execution.claim(store, "me", 3)
     first, _, third = tuple(some_log())[:3]
 
@@ -147,7 +148,7 @@ def test_a_hole_in_one_of_many_deliveries_refuses_them_all(store):
 
 
 def test_a_holder_who_wakes_up_late_cannot_write(store):
-    submitted = experiments.submit_experiment(store, toy(repetitions=1))
+    submitted = submission.submit_experiment(store, toy(repetitions=1))
     (late,) = execution.claim(store, "late", 1)
     assert execution.requeue_lost(store, stale_after_s=-1) == 1
     (present,) = execution.claim(store, "present", 1)
@@ -164,12 +165,12 @@ def test_a_holder_who_wakes_up_late_cannot_write(store):
 
     assert refused == (False,) * 5
     assert execution.heartbeat(store, [late, present]) == (present,)
-    assert experiments.read_experiment(store, submitted.id).state is State.RUNNING
+    assert submission.read_experiment(store, submitted.id).state is State.RUNNING
     assert execution.record(store, present, second)
 
 
 def test_a_heartbeat_keeps_a_claim(store):
-    experiments.submit_experiment(store, toy(repetitions=2))
+    submission.submit_experiment(store, toy(repetitions=2))
     claims = execution.claim(store, "me", 2)
 
     held = execution.heartbeat(store, claims)
@@ -180,29 +181,29 @@ def test_a_heartbeat_keeps_a_claim(store):
 
 
 def test_a_repetition_that_was_lost_is_queued_again_and_goes_on_from_its_log(store):
-    submitted = experiments.submit_experiment(store, toy(repetitions=1))
+    submitted = submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "killed", 1)
     first, *_ = some_log()
     execution.record(store, claim, first)
 
     assert execution.requeue_lost(store, stale_after_s=-1) == 1
 
-    (lost,) = experiments.list_repetitions(store, submitted.id)
+    (lost,) = submission.list_repetitions(store, submitted.id)
     (again,) = execution.claim(store, "me", 1)
     assert (lost.state, lost.attempts) == (State.QUEUED, 1)
     assert "not heard of" in lost.error
     assert (again.epoch, len(again.log)) == (2, 1)
-    assert experiments.read_experiment(store, submitted.id).state is State.RUNNING
+    assert submission.read_experiment(store, submitted.id).state is State.RUNNING
 
 
 def test_a_repetition_that_kills_its_workers_is_failed_in_the_end(store):
-    submitted = experiments.submit_experiment(store, toy(repetitions=1))
+    submitted = submission.submit_experiment(store, toy(repetitions=1))
 
     for _ in range(MAX_LOSSES):
         (claim,) = execution.claim(store, "me", 1)
         execution.release(store, claim, "its worker ran out of memory\0\udcff")
 
-    found = experiments.read_experiment(store, submitted.id)
+    found = submission.read_experiment(store, submitted.id)
     assert execution.claim(store, "me", 1) == ()
     assert found.state is State.FAILED
     assert found.ended_at is not None
@@ -212,7 +213,7 @@ def test_a_repetition_that_kills_its_workers_is_failed_in_the_end(store):
 
 
 def test_a_repetition_that_gets_on_may_be_lost_any_number_of_times(store):
-    experiments.submit_experiment(store, toy(repetitions=1))
+    submission.submit_experiment(store, toy(repetitions=1))
 
     for step in some_log():
         (claim,) = execution.claim(store, "me", 1)
@@ -224,47 +225,47 @@ def test_a_repetition_that_gets_on_may_be_lost_any_number_of_times(store):
 
 
 def test_a_repetition_may_be_handed_back_any_number_of_times(store):
-    experiment = experiments.submit_experiment(store, toy(repetitions=1)).id
+    experiment = submission.submit_experiment(store, toy(repetitions=1)).id
 
     for _ in range(MAX_LOSSES + 1):
         (claim,) = execution.claim(store, "me", 1)
         assert execution.hand_back(store, claim)
 
-    (found,) = experiments.list_repetitions(store, experiment)
+    (found,) = submission.list_repetitions(store, experiment)
     assert (found.state, found.attempts, found.error) == (State.QUEUED, 0, None)
     assert not execution.hand_back(store, claim)
 
 
 def test_the_experiment_is_completed_with_its_last_repetition(store):
-    submitted = experiments.submit_experiment(store, toy(repetitions=3))
+    submitted = submission.submit_experiment(store, toy(repetitions=3))
     claims = execution.claim(store, "me", 3)
     states = []
 
     run(store, claims[0])
-    states.append(experiments.read_experiment(store, submitted.id).state)
+    states.append(submission.read_experiment(store, submitted.id).state)
     execution.fail(store, claims[1], "the code raised")
-    states.append(experiments.read_experiment(store, submitted.id).state)
+    states.append(submission.read_experiment(store, submitted.id).state)
     run(store, claims[2])
 
-    found = experiments.read_experiment(store, submitted.id)
+    found = submission.read_experiment(store, submitted.id)
     assert [*states, found.state] == [State.RUNNING, State.RUNNING, State.COMPLETED]
     assert (found.progress.completed, found.progress.failed, found.reasons) == (2, 1, ("the code raised",))
     assert found.ended_at >= found.started_at >= found.created_at
 
 
 def test_an_experiment_fails_when_all_of_its_repetitions_do_and_says_each_reason_once(store):
-    submitted = experiments.submit_experiment(store, toy(repetitions=3))
+    submitted = submission.submit_experiment(store, toy(repetitions=3))
 
     for claim, reason in zip(execution.claim(store, "me", 3), ("zero division", "a key", "zero division"), strict=True):
         assert execution.fail(store, claim, reason)
 
-    found = experiments.read_experiment(store, submitted.id)
+    found = submission.read_experiment(store, submitted.id)
     assert found.state is State.FAILED
     assert found.reasons == ("zero division", "a key")
 
 
 def test_repetitions_that_end_at_once_end_their_experiment(store):
-    submitted = experiments.submit_experiment(store, toy(repetitions=8))
+    submitted = submission.submit_experiment(store, toy(repetitions=8))
     claims = execution.claim(store, "me", 8)
     for claim in claims:
         for step in some_log():
@@ -274,11 +275,11 @@ def test_repetitions_that_end_at_once_end_their_experiment(store):
         ended = list(pool.map(lambda claim: execution.complete(store, claim), claims))
 
     assert all(ended)
-    assert experiments.read_experiment(store, submitted.id).state is State.COMPLETED
+    assert submission.read_experiment(store, submitted.id).state is State.COMPLETED
 
 
 def test_a_repetition_with_iterations_missing_is_not_completed(store):
-    submitted = experiments.submit_experiment(store, toy(repetitions=1))
+    submitted = submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     for step in some_log(iterations=1):
         execution.record(store, claim, step)
@@ -286,33 +287,33 @@ def test_a_repetition_with_iterations_missing_is_not_completed(store):
     with pytest.raises(Conflict, match="1 iterations are missing"):
         execution.complete(store, claim)
 
-    assert experiments.read_experiment(store, submitted.id).state is State.RUNNING
+    assert submission.read_experiment(store, submitted.id).state is State.RUNNING
 
 
 def test_a_cancelled_experiment_refuses_its_running_repetitions_and_keeps_what_is_stored(store):
-    submitted = experiments.submit_experiment(store, toy())
+    submitted = submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     first, second, *_ = some_log()
     execution.record(store, claim, first)
 
-    experiments.cancel_experiment(store, submitted.id)
+    submission.cancel_experiment(store, submitted.id)
 
     assert not execution.record(store, claim, second)
     assert not execution.complete(store, claim)
     assert not execution.release(store, claim, "cancelled")
     assert execution.heartbeat(store, [claim]) == ()
     assert execution.claim(store, "me", 9) == ()
-    assert {each.state for each in experiments.list_repetitions(store, submitted.id)} == {State.CANCELLED}
-    assert len(experiments.list_simulators(store, submitted.id).items) == 2
+    assert {each.state for each in submission.list_repetitions(store, submitted.id)} == {State.CANCELLED}
+    assert len(submission.list_simulators(store, submitted.id).items) == 2
 
 
 def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(store):
-    ids = [experiments.submit_experiment(store, toy(repetitions=1)).id for _ in range(10)]
+    ids = [submission.submit_experiment(store, toy(repetitions=1)).id for _ in range(10)]
     claims = execution.claim(store, "me", 10)
 
     def cancel(experiment):
         try:
-            experiments.cancel_experiment(store, experiment)
+            submission.cancel_experiment(store, experiment)
         except Conflict:
             return "ended before"
         return "cancelled"
@@ -322,18 +323,18 @@ def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(st
         cancelled = [pool.submit(cancel, each) for each in ids]
 
     assert [each.result() for each in failed] == [each.result() == "ended before" for each in cancelled]
-    assert all(experiments.read_experiment(store, each).state.ended for each in ids)
+    assert all(submission.read_experiment(store, each).state.ended for each in ids)
 
 
 def test_progress_counts_what_the_steps_took(store):
-    submitted = experiments.submit_experiment(store, toy())
+    submitted = submission.submit_experiment(store, toy())
     waiting = submitted.progress
     first, second, _ = execution.claim(store, "me", 3)
     run(store, first)
     for step in list(some_log())[:4]:
         execution.record(store, second, step, seconds=0.5)
 
-    progress = experiments.read_experiment(store, submitted.id).progress
+    progress = submission.read_experiment(store, submitted.id).progress
 
     spent = Cost(3 * 60 + 2 * 90, 3 * 3 + 2 * 3)
     assert (waiting.iterations_done, waiting.rollouts_done, waiting.seconds_left) == (0, 0, None)
@@ -346,17 +347,17 @@ def test_progress_counts_what_the_steps_took(store):
 
 
 def test_nothing_is_left_to_do_at_the_end(store):
-    submitted = experiments.submit_experiment(store, toy(repetitions=1))
+    submitted = submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
 
     run(store, claim)
 
-    assert experiments.read_experiment(store, submitted.id).progress.seconds_left == 0
+    assert submission.read_experiment(store, submitted.id).progress.seconds_left == 0
 
 
 @pytest.mark.parametrize("strategy", ["simulated_fit_and_informative", "known_fit", "direct"])
 def test_a_repetition_killed_after_every_step_ends_as_one_that_never_stopped(store, strategy):
-    experiments.submit_experiment(store, toy(strategy=strategy, repetitions=1))
+    submission.submit_experiment(store, toy(strategy=strategy, repetitions=1))
     claim, steps = execution.claim(store, "me", 1)[0], []
 
     while (step := next(repetition(setting(claim.spec, claim.number), claim.log), None)) is not None:
@@ -372,10 +373,10 @@ def test_a_repetition_killed_after_every_step_ends_as_one_that_never_stopped(sto
 
 def test_the_budgeted_rollouts_are_those_that_a_repetition_takes_or_saves(store):
     for strategy in ("simulated_fit_and_informative", "known_fit", "direct"):
-        experiments.submit_experiment(store, toy(strategy=strategy, repetitions=1))
+        submission.submit_experiment(store, toy(strategy=strategy, repetitions=1))
     for claim in execution.claim(store, "me", 3):
         run(store, claim, repetition(setting(claim.spec, claim.number)))
 
-    found = [each.progress for each in experiments.list_experiments(store).items]
+    found = [each.progress for each in submission.list_experiments(store).items]
 
     assert [each.rollouts_done + each.rollouts_saved for each in found] == [each.rollouts for each in found]

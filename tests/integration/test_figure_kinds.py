@@ -5,20 +5,22 @@ from warnings import catch_warnings
 
 import pytest
 
-from services import execution, experiments, reports
-from services.core.arrays import frozen
-from services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred
-from services.core.types import Tuned as TunedStep
-from services.efforts import abscissa
-from services.figures.chart import chart
-from services.figures.curves import curves_figure
-from services.figures.files import render_file
-from services.figures.marks import Diagonal, Figure, Level, Line, Mark, Points
-from services.figures.predictions import AFTER, BEFORE, predictions_figure
-from services.figures.simulators import MOST, REALITY, simulators_figure
-from services.figures.squared_error import squared_error_figure
-from services.store.session import Store
-from services.tuned import tunings
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred
+from gaplab.services.core.types import Tuned as TunedStep
+from gaplab.services.experiments import submission
+from gaplab.services.figures.kinds.curves import curves_figure
+from gaplab.services.figures.kinds.predictions import AFTER, BEFORE, predictions_figure
+from gaplab.services.figures.kinds.simulators import MOST, REALITY, simulators_figure
+from gaplab.services.figures.kinds.squared_error import squared_error_figure
+from gaplab.services.figures.marks import Diagonal, Figure, Level, Line, Mark, Points
+from gaplab.services.figures.matplotlib.files import render_file
+from gaplab.services.figures.plotly.chart import chart
+from gaplab.services.results import curves
+from gaplab.services.results.curve_costs import abscissa
+from gaplab.services.results.tuned_simulators import tunings
+from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 from tests.experiments import run, toy
 from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, curve, point, prediction, tuned
 
@@ -215,37 +217,37 @@ def log(first: int, *, iterations: int, fitness: float | None = 1.0):
 @pytest.fixture
 def experiment(store: Store) -> str:
     """Two repetitions of three that have ended, of 20 and 40 rollouts at first, and 30 and 60 with each iteration."""
-    made = experiments.submit_experiment(store, toy(repetitions=3)).id
+    made = submission.submit_experiment(store, toy(repetitions=3)).id
     for claim in execution.claim(store, "test", limit=2):
         run(store, claim, log(claim.number + 1, iterations=2))
     return made
 
 
 def test_rollouts_are_counted_from_the_start_over_those_that_got_there(store: Store, experiment: str):
-    curves = reports.curves(store, [experiment])
+    found_curves = curves.curves(store, [experiment])
 
-    found = abscissa(store, curves, "rollouts")
+    found = abscissa(store, found_curves, "rollouts")
 
     assert found.label == "Rollouts in simulation"
     assert [found.at[experiment, at] for at in range(3)] == [30, 75, 120]
 
 
 def test_the_baseline_which_is_drawn_across_has_no_say_in_the_units_of_the_axis(store: Store, experiment: str):
-    direct = experiments.submit_experiment(store, toy(strategy="direct", repetitions=1)).id
+    direct = submission.submit_experiment(store, toy(strategy="direct", repetitions=1)).id
     (claim,) = (each for each in execution.claim(store, "test", limit=2) if each.experiment_id == direct)
     genome = frozen([0.5])
     steps = TunedStep(0, ()), Transferred(0, genome, 1.0, Cost(10_000_000)), Probed(0, 1.0, 1.0)
     run(store, claim, iter(steps))
 
-    found = abscissa(store, reports.curves(store, [experiment, direct]), "rollouts")
+    found = abscissa(store, curves.curves(store, [experiment, direct]), "rollouts")
 
     assert found.label == "Rollouts in simulation"
 
 
 def test_time_is_that_of_evaluations_and_of_simulation_as_measured(store: Store, experiment: str):
-    curves = reports.curves(store, [experiment])
+    found_curves = curves.curves(store, [experiment])
 
-    simulated, both = (abscissa(store, curves, "time", cost_s=each) for each in (0, 3600))
+    simulated, both = (abscissa(store, found_curves, "time", cost_s=each) for each in (0, 3600))
 
     steps = [3, 8, 13]  # of half a second each
     assert simulated.label == "Time (s)"
@@ -257,7 +259,7 @@ def test_time_is_that_of_evaluations_and_of_simulation_as_measured(store: Store,
 
 def test_reality_is_among_the_simulators_only_once_all_of_its_study_have_ended(store: Store, experiment: str):
     running = tunings(store, experiment)
-    experiments.cancel_experiment(store, experiment)
+    submission.cancel_experiment(store, experiment)
     ended = tunings(store, experiment)
 
     assert running.truth is None

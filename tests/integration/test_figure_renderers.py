@@ -13,13 +13,13 @@ import pytest
 from matplotlib import rc_context
 from plotly.graph_objects import Figure as Chart
 
-from services.figures.chart import chart
-from services.figures.curves import curves_figure
-from services.figures.files import COLUMN_IN, DPI, LOOK, FileFormat, render_file
-from services.figures.html import render_html
-from services.figures.lettering import lines, shortened, width_in
-from services.figures.marks import Figure
-from services.figures.style import INK
+from gaplab.services.figures.kinds.curves import curves_figure
+from gaplab.services.figures.marks import Figure
+from gaplab.services.figures.matplotlib.files import COLUMN_IN, DPI, LOOK, FileFormat, render_file
+from gaplab.services.figures.matplotlib.text_size import lines, shortened, width_in
+from gaplab.services.figures.plotly.chart import chart
+from gaplab.services.figures.plotly.html import render_html
+from gaplab.services.figures.style import INK
 from tests.figures import DIRECT, EVERYTHING, FIGURES, NAMES, RISING, curve, point
 
 SVG = "{http://www.w3.org/2000/svg}"

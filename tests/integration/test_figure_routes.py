@@ -10,13 +10,14 @@ import pytest
 from fastapi.testclient import TestClient
 from plotly.graph_objects import Figure
 
-from api.app import create_app
-from api.figures import MEDIA_TYPES
-from schemas.spec import StudySpec
-from services import execution, experiments
-from services.core.loop import repetition
-from services.simulation import setting
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.api.http.figures import MEDIA_TYPES
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.session import Store
 from tests.experiments import run
 
 STUDY = {
@@ -43,7 +44,7 @@ def api(sqlite_store: Store) -> Iterator[TestClient]:
 def experiment(sqlite_store: Store) -> str:
     """The first of a study of which only it has ended."""
     spec = STUDY | {"reality": {"parameters": {"static_friction": HIDDEN, "dynamic_friction": 0.3}}}
-    made = experiments.submit_study(sqlite_store, StudySpec.model_validate(spec)).experiments[0].id
+    made = submission.submit_study(sqlite_store, StudySpec.model_validate(spec)).experiments[0].id
     for claim in execution.claim(sqlite_store, "test", limit=20):
         if claim.experiment_id == made:
             run(sqlite_store, claim)

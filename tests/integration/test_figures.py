@@ -2,11 +2,11 @@
 
 import pytest
 
-from schemas.curves import CurvePoint
-from services.figures.curves import Abscissa, curves_figure
-from services.figures.marks import Arrow, Axis, Bars, Figure, Label, Level, Line, Points
-from services.figures.style import COLORS, style_of
-from services.figures.words import limits, power
+from gaplab.schemas.curves import CurvePoint
+from gaplab.services.figures.kinds.curves import Abscissa, curves_figure
+from gaplab.services.figures.marks import Arrow, Axis, Bars, Figure, Label, Level, Line, Points
+from gaplab.services.figures.style import COLORS, style_of
+from gaplab.services.figures.words import limits, power
 from tests.figures import DIRECT, RISING, curve, point
 
 

@@ -15,15 +15,16 @@ from fastapi.testclient import TestClient
 from httpx2 import Response
 from pyarrow import parquet
 
-from api.app import create_app
-from schemas.access import Role
-from schemas.spec import StudySpec
-from services import execution, experiments
-from services.access import create_token
-from services.core.loop import repetition
-from services.settings import Limits
-from services.simulation import setting
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.schemas.access import Role
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.access import create_token
+from gaplab.services.core.loop import repetition
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.settings import Limits
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.session import Store
 
 HIDDEN = {"static_friction": 0.7319462853, "dynamic_friction": 0.2846190537}
 STUDY = {
@@ -67,7 +68,7 @@ def run_halfway(store: Store) -> None:
 @pytest.fixture
 def running(store: Store, log: pytest.LogCaptureFixture) -> dict[str, str]:
     """Ids of a study that runs, by what they are of."""
-    study = experiments.submit_study(store, StudySpec.model_validate(STUDY))
+    study = submission.submit_study(store, StudySpec.model_validate(STUDY))
     run_halfway(store)
     first, second, _ = study.experiments
     return {"studies": study.id, "experiments": first.id, "other": second.id, "sensitivity": first.sensitivity or ""}
@@ -168,7 +169,7 @@ def test_neither_submission_nor_its_repetition_nor_an_edit_or_its_end_tells(
 def test_an_accident_of_the_database_logs_no_spec(
     sqlite_store: Store, log: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ):
-    from services.store.repository import experiments as repository
+    from gaplab.services.store.queries import experiments as repository
 
     api = TestClient(create_app(sqlite_store), raise_server_exceptions=False)
     monkeypatch.setattr(repository, "new_id", lambda: "same")

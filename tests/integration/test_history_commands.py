@@ -5,10 +5,11 @@ import sys
 
 import pytest
 
-from api.cli import main
-from api.exits import Exit
-from services import execution, experiments
-from services.versions import provenance
+from gaplab.api.commands.cli import main
+from gaplab.api.commands.exit_codes import Exit
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.running.versions import provenance
 from tests.experiments import run, some_log, toy
 from tests.integration.test_events import served
 
@@ -30,8 +31,8 @@ def gaplab(sqlite_store, monkeypatch, capsys):
 
 
 def test_events_are_printed_a_line_each(sqlite_store, gaplab):
-    id_ = experiments.submit_experiment(sqlite_store, toy(repetitions=1)).id
-    experiments.submit_experiment(sqlite_store, toy())
+    id_ = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    submission.submit_experiment(sqlite_store, toy())
     run(sqlite_store, execution.claim(sqlite_store, "me", 1)[0])
 
     code, out, _ = gaplab("events", id_)
@@ -49,7 +50,7 @@ def test_events_are_printed_a_line_each(sqlite_store, gaplab):
 
 
 def test_a_refusal_is_shown_and_can_be_lifted(sqlite_store, gaplab):
-    id_ = experiments.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    id_ = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     execution.record(sqlite_store, claim, next(some_log()))
     execution.hand_back(sqlite_store, claim)

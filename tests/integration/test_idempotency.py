@@ -10,17 +10,17 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import func, select, update
 
-from api.app import create_app
-from api.client import Client
-from api.clients import connection
-from schemas.access import Role
-from schemas.spec import ExperimentSpec
-from services import admission, experiments
-from services.access import create_token
-from services.admission import Admission
-from services.core.errors import InvalidSpec
-from services.store.models import ExperimentRow, IdempotencyRow, RepetitionRow
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.api.clients import connection
+from gaplab.api.clients.client import Client
+from gaplab.schemas.access import Role
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.access import create_token
+from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.experiments import limits, submission
+from gaplab.services.experiments.limits import Admission
+from gaplab.services.store.models import ExperimentRow, IdempotencyRow, RepetitionRow
+from gaplab.services.store.session import Store
 
 TOY = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "iterations": 1, "repetitions": 2}
 STUDY = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "smoke"}
@@ -104,7 +104,7 @@ def test_duplicates_at_the_same_moment_create_one(store: Store):
 
     def submit(_: int) -> tuple[str, bool]:
         barrier.wait()
-        done = experiments.admit_experiment(store, spec, Admission(key="k"))
+        done = submission.admit_experiment(store, spec, Admission(key="k"))
         return done.answer.id, done.replayed
 
     with ThreadPoolExecutor(threads) as pool:
@@ -121,12 +121,12 @@ def test_key_and_work_are_committed_together_or_not_at_all(store: Store, monkeyp
 
     spec = ExperimentSpec.model_validate(TOY)
     with monkeypatch.context() as patch:
-        patch.setattr("services.admission.idempotency.keep", fail)
+        patch.setattr("gaplab.services.experiments.limits.idempotency.keep", fail)
         with pytest.raises(InvalidSpec):
-            experiments.admit_experiment(store, spec, Admission(key="k"))
+            submission.admit_experiment(store, spec, Admission(key="k"))
 
     assert (count(store, ExperimentRow), count(store, IdempotencyRow)) == (0, 0)
-    assert not experiments.admit_experiment(store, spec, Admission(key="k")).replayed
+    assert not submission.admit_experiment(store, spec, Admission(key="k")).replayed
 
 
 def test_a_key_is_forgotten_after_a_week(store: Store, api: TestClient):
@@ -134,7 +134,7 @@ def test_a_key_is_forgotten_after_a_week(store: Store, api: TestClient):
     with store.transaction() as session:
         moment = session.scalar(select(IdempotencyRow.created_at))
         assert moment
-        session.execute(update(IdempotencyRow).values(created_at=moment - admission.KEYS_LIVE - timedelta(minutes=1)))
+        session.execute(update(IdempotencyRow).values(created_at=moment - limits.KEYS_LIVE - timedelta(minutes=1)))
 
     again = api.post("/experiments", json=TOY, headers={"Idempotency-Key": "k"})
 
@@ -159,4 +159,4 @@ def test_a_client_whose_answer_is_lost_asks_again_and_creates_one(sqlite_store: 
     with Client("http://testserver", transport=Losing()) as client:
         made = client.submit(TOY)
 
-    assert [each.id for each in experiments.list_experiments(sqlite_store).items] == [made.id]
+    assert [each.id for each in submission.list_experiments(sqlite_store).items] == [made.id]

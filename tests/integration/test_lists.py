@@ -6,11 +6,13 @@ import pytest
 from sqlalchemy import event
 
 from benchmarks.filling import IN_A_STUDY, experiment_id, fill, study_id
-from schemas.lifecycle import State
-from services import execution, experiments, listing, reports
-from services.archives import export_study, import_archive
-from services.store.models import Base
-from services.store.repository.listing import Which
+from gaplab.schemas.lifecycle import State
+from gaplab.services.archives import export_study, import_archive
+from gaplab.services.experiments import listing, submission
+from gaplab.services.results import curves
+from gaplab.services.running import execution
+from gaplab.services.store.models import Base
+from gaplab.services.store.queries.listing import Which
 from tests.experiments import toy
 
 READS = {
@@ -18,10 +20,10 @@ READS = {
     "experiments of a study": lambda store: listing.list_experiments(store, Which(study=study_id(0))),
     "experiments in a state": lambda store: listing.list_experiments(store, Which(state=State.COMPLETED)),
     "studies": lambda store: listing.list_studies(store, limit=2),
-    "an experiment": lambda store: experiments.read_experiment(store, experiment_id(0)),
-    "samples": lambda store: experiments.list_samples(store, experiment_id(0)),
-    "a curve": lambda store: reports.curve(store, experiment_id(0)),
-    "a study's curves": lambda store: reports.study_curves(store, study_id(0)),
+    "an experiment": lambda store: submission.read_experiment(store, experiment_id(0)),
+    "samples": lambda store: submission.list_samples(store, experiment_id(0)),
+    "a curve": lambda store: curves.curve(store, experiment_id(0)),
+    "a study's curves": lambda store: curves.study_curves(store, study_id(0)),
 }
 
 
@@ -57,8 +59,8 @@ def test_what_benchmarks_fill_a_database_with_is_what_the_service_stores(store, 
     shown = listing.list_experiments(store, Which(study=study_id(0))).items
     assert {each.state for each in shown} == {State.COMPLETED}
     assert all(each.progress.iterations_done == each.progress.iterations == 44 for each in shown)
-    assert [point.n for point in reports.curve(store, experiment_id(3)).points] == [4] * 11
-    submitted = experiments.submit_experiment(store, toy())
+    assert [point.n for point in curves.curve(store, experiment_id(3)).points] == [4] * 11
+    submitted = submission.submit_experiment(store, toy())
     assert {each.experiment_id for each in execution.claim(store, "me", 9)} == {submitted.id}
 
 

@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from api.app import create_app
-from schemas.lifecycle import State
-from services import execution
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.schemas.lifecycle import State
+from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 
 TOY = {"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "iterations": 1, "repetitions": 1}
 NAMES = ["béta", "Alpha", "alpha 50%", "line\nbreak", "delta_1", "alpha"]

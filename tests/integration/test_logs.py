@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import httpx2
 import pytest
 
-from services import logs
+from gaplab.services import logs
 from tests.integration.test_api_processes import within
 
 SECRET = "Zm9vYmFyLTEyMzQ1"
@@ -118,10 +118,10 @@ def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_car
     """The real process: every line of it is JSON, probes are left out, and no secret that it was given is in any."""
     log = tmp_path / "log"
     script = (
-        "import sys; from api import service; from api.server import listen\n"
+        "import sys; from gaplab.api.process import service; from gaplab.api.process.server import listen\n"
         "taken = listen('127.0.0.1', 0); service.listen = lambda *_: taken\n"
         "open(sys.argv[1], 'w').write(str(taken.getsockname()[1]))\n"
-        "from services.settings import Settings\n"
+        "from gaplab.services.settings import Settings\n"
         f"service.serve(Settings(database_url='sqlite:///{tmp_path / 'gaplab.db'}'), workers=False)\n"
     )
     place = tmp_path / "port"

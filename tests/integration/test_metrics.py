@@ -5,11 +5,12 @@ from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
 from sqlalchemy import event
 
-from api import metrics
-from api.app import create_app
-from services import execution, experiments, supervisors
-from services.core.errors import StoreUnavailable
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.api.http import metrics
+from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution, supervisors
+from gaplab.services.store.session import Store
 from tests.experiments import run, toy
 
 
@@ -22,8 +23,8 @@ def read(api: TestClient) -> dict[tuple[str, ...], float]:
 
 
 def test_it_counts_what_the_database_holds(store):
-    experiments.submit_experiment(store, toy())
-    experiments.cancel_experiment(store, experiments.submit_experiment(store, toy()).id)
+    submission.submit_experiment(store, toy())
+    submission.cancel_experiment(store, submission.submit_experiment(store, toy()).id)
     first, _ = execution.claim(store, "me", 2)
     run(store, first)
     supervisors.heartbeat(store, "me")
@@ -36,7 +37,7 @@ def test_it_counts_what_the_database_holds(store):
     states = {"QUEUED": 1, "RUNNING": 1, "COMPLETED": 1, "FAILED": 0, "CANCELLED": 3}
     assert {state: found["gaplab_repetitions", state] for state in states} == states
     assert found["gaplab_experiments", "RUNNING"] == found["gaplab_experiments", "CANCELLED"] == 1
-    progress = experiments.read_experiment(store, first.experiment_id).progress
+    progress = submission.read_experiment(store, first.experiment_id).progress
     assert found["gaplab_rollouts_total",] == progress.rollouts_done
     assert found["gaplab_steps_total",] == 13
     assert found["gaplab_rollouts_queued",] == progress.rollouts * 2 / 3
@@ -48,7 +49,7 @@ def test_it_counts_what_the_database_holds(store):
 
 def test_requests_are_counted_by_route_and_not_by_what_was_asked(sqlite_store):
     api = TestClient(create_app(sqlite_store))
-    id_ = experiments.submit_experiment(sqlite_store, toy()).id
+    id_ = submission.submit_experiment(sqlite_store, toy()).id
     for path in (f"/experiments/{id_}", f"/experiments/{id_}", "/experiments/nobody", "/no/such/1", "/no/such/2"):
         api.get(path)
     api.request("BREW", "/experiments")

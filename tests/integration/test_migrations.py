@@ -13,11 +13,11 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, inspect
 
-import migrations
-from services.core.errors import StoreUnavailable
-from services.store.engine import WRITES, open_engine
-from services.store.models import REVISION, Base
-from services.store.session import Store
+from gaplab import migrations
+from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.store.engine import WRITES, open_engine
+from gaplab.services.store.models import REVISION, Base
+from gaplab.services.store.session import Store
 
 
 def tables(connection: Connection) -> set[str]:
@@ -110,7 +110,7 @@ def test_a_database_of_a_later_version_is_left_as_it_is(store_url):
 @pytest.mark.parametrize("place", ["sqlite:////no/such/folder/gaplab.db", "postgresql://me:secret@127.0.0.1:1/none"])
 def test_migrating_an_unreachable_database_is_refused_in_one_sentence(place):
     run = subprocess.run(
-        [sys.executable, "-m", "migrations"],
+        [sys.executable, "-m", "gaplab.migrations"],
         env=os.environ | {"GAPLAB_DATABASE_URL": place},
         cwd=Path(__file__).parents[2],
         capture_output=True,

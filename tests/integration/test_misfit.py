@@ -2,17 +2,18 @@
 
 import pytest
 
-from services import execution, experiments
-from services.core.errors import NotFound
-from services.core.types import Measured, Sample, Selected, Simulator, Transferred, Tuned
-from services.misfit import misfit
+from gaplab.services.core.errors import NotFound
+from gaplab.services.core.types import Measured, Sample, Selected, Simulator, Transferred, Tuned
+from gaplab.services.experiments import submission
+from gaplab.services.results.misfit import misfit
+from gaplab.services.running import execution
 from tests.experiments import run, some_log, toy
 
 SECRET = 0.987654321
 
 
 def test_the_misfit_is_that_of_the_best_simulator_of_each_repetition(store):
-    experiment = experiments.submit_experiment(store, toy(repetitions=2)).id
+    experiment = submission.submit_experiment(store, toy(repetitions=2)).id
     for claim in execution.claim(store, "me", 2):
         run(store, claim)
 
@@ -29,7 +30,7 @@ def test_the_misfit_is_that_of_the_best_simulator_of_each_repetition(store):
 
 
 def test_repetitions_that_are_under_way_count_as_far_as_they_are(store):
-    experiment = experiments.submit_experiment(store, toy(repetitions=2)).id
+    experiment = submission.submit_experiment(store, toy(repetitions=2)).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)
     for step in list(some_log())[:6]:  # up to the tuning of iteration 1
@@ -41,7 +42,7 @@ def test_repetitions_that_are_under_way_count_as_far_as_they_are(store):
 
 
 def test_a_coefficient_at_its_bound_is_remarked_on(store):
-    experiment = experiments.submit_experiment(store, toy(repetitions=1, iterations=1)).id
+    experiment = submission.submit_experiment(store, toy(repetitions=1, iterations=1)).id
     (claim,) = execution.claim(store, "me", 1)
     simulators = (Simulator([1.5, 0.7], 0.04),)
     log = [
@@ -63,9 +64,9 @@ def test_a_coefficient_at_its_bound_is_remarked_on(store):
 
 
 def test_an_experiment_without_results_has_no_misfit_yet_and_the_direct_baseline_never(store):
-    waiting = experiments.submit_experiment(store, toy()).id
+    waiting = submission.submit_experiment(store, toy()).id
     execution.claim(store, "me", 9)
-    direct = experiments.submit_experiment(store, toy(strategy="direct", repetitions=1)).id
+    direct = submission.submit_experiment(store, toy(strategy="direct", repetitions=1)).id
     (claim,) = execution.claim(store, "me", 9)
     run(store, claim, some_log(iterations=0))
 
@@ -75,7 +76,7 @@ def test_an_experiment_without_results_has_no_misfit_yet_and_the_direct_baseline
 
 def test_nothing_of_reality_is_shown(store):
     spec = toy(repetitions=1, reality={"parameters": {"static_friction": SECRET}})
-    experiment = experiments.submit_experiment(store, spec).id
+    experiment = submission.submit_experiment(store, spec).id
     run(store, execution.claim(store, "me", 1)[0])
 
     assert str(SECRET) not in misfit(store, experiment).model_dump_json()

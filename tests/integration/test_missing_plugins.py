@@ -5,20 +5,20 @@ from copy import deepcopy
 import pytest
 from fastapi.testclient import TestClient
 
-from api.app import create_app
-from services import experiments
-from services.core.errors import InvalidSpec
-from services.execution import claim
-from services.resolution import spec_of
-from services.simulation import setting
-from services.store.models import ExperimentRow
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.experiments import submission
+from gaplab.services.running.execution import claim
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import spec_of
+from gaplab.services.store.models import ExperimentRow
+from gaplab.services.store.session import Store
 from tests.experiments import run, toy
 
 
 def experiment_without(store: Store, kind: str) -> str:
     """The id of one that is computed, and whose plug-in of this kind is not installed any more."""
-    made = experiments.submit_experiment(store, toy(repetitions=1))
+    made = submission.submit_experiment(store, toy(repetitions=1))
     (one,) = claim(store, "me", 1)
     run(store, one)
     with store.transaction() as session:

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.core.arrays import FloatArray
-from services.core.robots.quadruped import Quadruped
-from services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, World
-from services.engines.mujoco import MuJoCo
-from services.engines.mujoco.callback import callbacks
-from services.engines.mujoco.layout import layout
-from services.engines.mujoco.scene import ROWS, Scene, _in_force
-from services.engines.stepping import WARM_SCENES
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, World
+from gaplab.services.engines.mujoco import MuJoCo
+from gaplab.services.engines.mujoco.callback import callbacks
+from gaplab.services.engines.mujoco.layout import layout
+from gaplab.services.engines.mujoco.scene import ROWS, Scene, _in_force
+from gaplab.services.engines.stepping import WARM_SCENES
 
 mujoco = pytest.importorskip("mujoco")
 structs = pytest.importorskip("mujoco.introspect.structs")
@@ -137,7 +137,7 @@ def test_its_fields_are_where_mujocos_description_of_itself_says() -> None:
 
 def test_importing_the_engine_does_not_load_its_libraries() -> None:
     script = (
-        "import sys; from services.engines import engines; list(engines);"
+        "import sys; from gaplab.services.engines import engines; list(engines);"
         "assert not {'mujoco', 'numba'} & set(sys.modules)"
     )
 
@@ -148,8 +148,8 @@ def test_importing_the_engine_does_not_load_its_libraries() -> None:
 def test_it_is_listed_with_its_install_line_where_one_of_its_libraries_is_missing(
     missing: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("services.engines.mujoco.engine.find_spec", lambda name: name != missing or None)
-    monkeypatch.setattr("services.engines.base.find_spec", lambda name: None if name == missing else True)
+    monkeypatch.setattr("gaplab.services.engines.mujoco.engine.find_spec", lambda name: name != missing or None)
+    monkeypatch.setattr("gaplab.services.engines.base.find_spec", lambda name: None if name == missing else True)
 
     described = MuJoCo.describe()
 
@@ -206,8 +206,8 @@ def test_a_rollout_that_fails_does_not_harm_the_others_of_its_call(engine: MuJoC
 
 def test_warnings_are_neither_printed_nor_written_to_a_file(tmp_path: Path) -> None:
     script = (
-        "from dataclasses import replace; from services.core.robots.quadruped import Quadruped;"
-        "from services.engines.mujoco import MuJoCo; import os; robot = Quadruped();"
+        "from dataclasses import replace; from gaplab.services.core.robots.quadruped import Quadruped;"
+        "from gaplab.services.engines.mujoco import MuJoCo; import os; robot = Quadruped();"
         f"engine = MuJoCo(); os.chdir({str(tmp_path)!r});"
         "engine.rollout(replace(robot.world, gravity_m_s2=-1e300), robot.motion(robot.known))"
     )

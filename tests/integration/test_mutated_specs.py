@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from api.app import create_app
 from benchmarks.mutated_specs import OUTSIDE, WHOLE, measure, mutated
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.services.store.session import Store
 
 
 @pytest.fixture

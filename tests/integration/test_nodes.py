@@ -10,15 +10,15 @@ import pytest
 import ray
 from ray.cluster_utils import Cluster
 
-from schemas.lifecycle import State
-from services import experiments
-from services.core.errors import ClusterUnusable
-from services.settings import Settings
+from gaplab.schemas.lifecycle import State
+from gaplab.services.core.errors import ClusterUnusable
+from gaplab.services.experiments import submission
+from gaplab.services.settings import Settings
+from gaplab.workers import nodes
+from gaplab.workers import repetition as task
+from gaplab.workers.cluster import cluster
+from gaplab.workers.supervisor import Supervisor
 from tests.integration.test_workers import expected, run, stored, toy
-from workers import nodes
-from workers import repetition as task
-from workers.cluster import cluster
-from workers.supervisor import Supervisor
 
 ROOT = Path(__file__).parents[2]
 NODE = {"num_cpus": 1, "object_store_memory": 100 * 2**20}
@@ -66,7 +66,7 @@ def ran_on(tmp_path, monkeypatch):
 @pytest.mark.parametrize("joined", [2, 4], indirect=True)
 def test_the_numbers_do_not_depend_on_how_many_nodes_there_are(joined, sqlite_store, ran_on, in_one_process, request):
     count = request.node.callspec.params["joined"]
-    experiment = experiments.submit_experiment(sqlite_store, SPEC).id
+    experiment = submission.submit_experiment(sqlite_store, SPEC).id
 
     run(Supervisor(sqlite_store, joined.capacity, joined.versions), sqlite_store, experiment)
 
@@ -77,7 +77,7 @@ def test_the_numbers_do_not_depend_on_how_many_nodes_there_are(joined, sqlite_st
 
 @pytest.mark.parametrize("joined", [4], indirect=True)
 def test_a_node_lost_in_the_middle_costs_no_result(joined, head, sqlite_store, ran_on, in_one_process):
-    experiment = experiments.submit_experiment(sqlite_store, SPEC).id
+    experiment = submission.submit_experiment(sqlite_store, SPEC).id
     supervisor = Supervisor(sqlite_store, joined.capacity, joined.versions)
     run(supervisor, sqlite_store, experiment, until=lambda: len(ran_on()) == 4)
 
@@ -85,7 +85,7 @@ def test_a_node_lost_in_the_middle_costs_no_result(joined, head, sqlite_store, r
     head.remove_node(busy, allow_graceful=False)
     run(supervisor, sqlite_store, experiment)
 
-    repetitions = experiments.list_repetitions(sqlite_store, experiment)
+    repetitions = submission.list_repetitions(sqlite_store, experiment)
     assert [each.state for each in repetitions] == [State.COMPLETED] * 4
     assert sum(each.attempts for each in repetitions) > 4
     assert stored(sqlite_store, experiment) == in_one_process
@@ -102,13 +102,13 @@ def test_a_cluster_whose_nodes_have_other_versions_is_refused(joined, monkeypatc
 
 @pytest.mark.parametrize("joined", [2], indirect=True)
 def test_a_node_that_joins_with_other_versions_ends_the_work_before_a_step_of_it_is_stored(joined, sqlite_store):
-    experiment = experiments.submit_experiment(sqlite_store, toy()).id
+    experiment = submission.submit_experiment(sqlite_store, toy()).id
     supervisor = Supervisor(sqlite_store, joined.capacity, joined.versions | {"gaplab": "0.0.1"})
 
     with pytest.raises(ClusterUnusable, match=r"the supervisor has gaplab 0\.0\.1"):
         supervisor.serve(Event())
 
-    repetitions = experiments.list_repetitions(sqlite_store, experiment)
+    repetitions = submission.list_repetitions(sqlite_store, experiment)
     assert {(each.state, each.attempts) for each in repetitions} == {(State.QUEUED, 0)}
     assert stored(sqlite_store, experiment) == [[], [], []]
 
@@ -116,9 +116,9 @@ def test_a_node_that_joins_with_other_versions_ends_the_work_before_a_step_of_it
 WITH_A_TOKEN = """
 import os, subprocess, sys, time
 from ray.cluster_utils import Cluster
-from schemas.spec import ExperimentSpec
-from services import experiments
-from services.store.session import Store
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.experiments import submission as experiments
+from gaplab.services.store.session import Store
 
 spec = ExperimentSpec.model_validate_json(sys.argv[1])
 store = Store(os.environ["GAPLAB_DATABASE_URL"])
@@ -126,7 +126,7 @@ experiment = experiments.submit_experiment(store, spec).id
 head = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
 os.environ["GAPLAB_RAY_ADDRESS"] = head.address
 del os.environ["RAY_AUTH_MODE"]  # the supervisor's own default
-with subprocess.Popen([sys.executable, "-m", "workers", "serve"]) as supervisor:
+with subprocess.Popen([sys.executable, "-m", "gaplab.workers", "serve"]) as supervisor:
     deadline = time.monotonic() + 60
     while not (state := experiments.read_experiment(store, experiment).state).ended and time.monotonic() < deadline:
         time.sleep(0.1)
@@ -155,7 +155,7 @@ def test_a_cluster_that_asks_for_a_token_is_given_it(environment):
 
 def test_without_the_token_the_supervisor_says_so_and_ends(environment, tmp_path):
     (tmp_path / "token").unlink()
-    call = [sys.executable, "-m", "workers", "serve"]
+    call = [sys.executable, "-m", "gaplab.workers", "serve"]
     environment["GAPLAB_RAY_ADDRESS"] = "127.0.0.1:6379"
 
     done = subprocess.run(call, env=environment, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)

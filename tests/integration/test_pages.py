@@ -7,8 +7,8 @@ from hashlib import sha256
 import pytest
 from fastapi.testclient import TestClient
 
-from api.app import create_app
-from services.store.session import Store
+from gaplab.api.app import create_app
+from gaplab.services.store.session import Store
 
 TOY = {"strategy": "random", "robot": "toy_function", "budget": "smoke"}
 

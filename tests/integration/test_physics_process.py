@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
-from services.physics import NICENESS, Memory, Physics
+from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
+from gaplab.services.replay.process import NICENESS, Memory, Physics
 
 DEADLINE_S = 120.0
 
@@ -123,8 +123,11 @@ def test_who_waits_too_long_for_others_is_told_to_try_again():
 
 
 def test_the_process_ends_with_the_one_that_started_it_however_that_ends():
-    program = "from services.physics import Physics; import os; p = Physics(); print(p.ask(os.getpid), flush=True); "
-    command = [sys.executable, "-c", program + "input()"]
+    program = (
+        "import os; from gaplab.services.replay.process import Physics\n"
+        "physics = Physics(); print(physics.ask(os.getpid), flush=True); input()"
+    )
+    command = [sys.executable, "-c", program]
     parent = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=Path(__file__).parents[2])
     child = int(parent.stdout.readline())
     assert not gone(child)

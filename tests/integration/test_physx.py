@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from schemas.spec import ExperimentSpec
-from services.core.arrays import FloatArray
-from services.core.robots.quadruped import Quadruped
-from services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, Vector, World
-from services.engines.physx import PhysX
-from services.engines.physx.scene import Scene
-from services.engines.stepping import WARM_SCENES
-from services.resolution import resolve_experiment
-from services.simulation import setting
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, Vector, World
+from gaplab.services.engines.physx import PhysX
+from gaplab.services.engines.physx.scene import Scene
+from gaplab.services.engines.stepping import WARM_SCENES
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
 
 if not PhysX.available():
     pytest.skip(PhysX.install, allow_module_level=True)
@@ -61,7 +61,9 @@ def turned(engine: PhysX, world: World, target: float, steps: int) -> Scene:
 
 
 def test_importing_the_engine_does_not_load_its_library() -> None:
-    script = "import sys; from services.engines import engines; list(engines); assert 'sapien' not in sys.modules"
+    script = (
+        "import sys; from gaplab.services.engines import engines; list(engines); assert 'sapien' not in sys.modules"
+    )
 
     subprocess.run([sys.executable, "-c", script], check=True)
 
@@ -69,8 +71,8 @@ def test_importing_the_engine_does_not_load_its_library() -> None:
 def test_a_rollout_says_nothing_and_warns_of_nothing() -> None:
     script = """
 from dataclasses import replace
-from services.core.robots.quadruped import Quadruped
-from services.engines.physx import PhysX
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.engines.physx import PhysX
 robot = Quadruped()
 for gravity in (9.81, 1e9):
     PhysX().rollout(replace(robot.world, gravity_m_s2=gravity), robot.motion(robot.known))

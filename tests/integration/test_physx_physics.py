@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from services.core.arrays import FloatArray
-from services.core.world import Body, Box, Joint, Material, Motion, Sphere, World
-from services.engines.physx import PhysX
-from services.engines.physx.scene import Scene
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Sphere, World
+from gaplab.services.engines.physx import PhysX
+from gaplab.services.engines.physx.scene import Scene
 
 if not PhysX.available():
     pytest.skip(PhysX.install, allow_module_level=True)

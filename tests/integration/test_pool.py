@@ -9,15 +9,15 @@ import pytest
 import ray
 
 from benchmarks import pool as benchmark
-from schemas.spec import ExperimentSpec
-from services.core.loop import repetition
-from services.resolution import resolve_experiment
-from services.settings import Settings
-from services.simulation import setting
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.settings import Settings
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.workers.cluster import cluster
+from gaplab.workers.pool import Pool
+from gaplab.workers.spread import Spread, sizes
 from tests.processes import processes_of_ray
-from workers.cluster import cluster
-from workers.pool import Pool
-from workers.spread import Spread, sizes
 
 SPEC = resolve_experiment(ExperimentSpec.model_validate({"strategy": "informative", "budget": "smoke"}))
 

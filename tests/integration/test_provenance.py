@@ -9,14 +9,16 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import text
 
-from api.app import create_app
-from schemas.events import EventKind
-from schemas.lifecycle import State
-from services import events, execution, experiments, provenance, versions
-from services.core.errors import Conflict, StoreUnavailable
-from services.events import Which
-from services.store.models import SPEC_VERSION
-from services.store.repository import leases
+from gaplab.api.app import create_app
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.lifecycle import State
+from gaplab.services import events
+from gaplab.services.core.errors import Conflict, StoreUnavailable
+from gaplab.services.events import Which
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution, provenance, versions
+from gaplab.services.store.models import SPEC_VERSION
+from gaplab.services.store.queries import leases
 from tests.experiments import run, same, some_log, toy
 
 HERE = versions.provenance()
@@ -37,7 +39,7 @@ ALIKE = HERE.model_copy(
 
 def begun(store, under=HERE):
     """An experiment with a step, queued again."""
-    experiments.submit_experiment(store, toy(repetitions=2))
+    submission.submit_experiment(store, toy(repetitions=2))
     (claim,) = execution.claim(store, "me", 1, under)
     execution.record(store, claim, next(some_log()))
     execution.hand_back(store, claim)
@@ -45,7 +47,7 @@ def begun(store, under=HERE):
 
 
 def test_it_is_recorded_with_the_first_claim(store):
-    id_ = experiments.submit_experiment(store, toy(repetitions=2)).id
+    id_ = submission.submit_experiment(store, toy(repetitions=2)).id
     assert provenance.read(store, id_).uses == ()
 
     execution.claim(store, "me", 2)
@@ -56,7 +58,7 @@ def test_it_is_recorded_with_the_first_claim(store):
 
 
 def test_of_two_that_begin_it_at_once_one_is_bound_and_the_other_leaves_it_alone(store):
-    id_ = experiments.submit_experiment(store, toy(repetitions=2)).id
+    id_ = submission.submit_experiment(store, toy(repetitions=2)).id
 
     with ThreadPoolExecutor(1) as pool:
         with store.transaction() as session:
@@ -109,7 +111,7 @@ def test_a_supervisor_with_another_of_what_decides_leaves_it_alone_and_the_exper
     assert execution.claim(store, "other", 9, OTHERS[what]) == ()
     assert execution.claim(store, "other", 9, OTHERS[what]) == ()
 
-    (warning,) = experiments.read_experiment(store, id_).warnings
+    (warning,) = submission.read_experiment(store, id_).warnings
     assert "does not go on" in warning
     assert f"gaplab accept-versions {id_}" in warning
     refused = events.page(store, 0, Which(kinds=frozenset({EventKind.VERSIONS_REFUSED})), limit=9).items
@@ -129,7 +131,7 @@ def test_a_plug_in_of_ones_own_that_was_edited_or_is_gone_decides_too(store, kin
 
     assert execution.claim(store, "other", 9, with_own(**{kind: "own.py ba9876543210"})) == ()
     assert execution.claim(store, "other", 9, HERE) == ()
-    (warning,) = experiments.read_experiment(store, id_).warnings
+    (warning,) = submission.read_experiment(store, id_).warnings
     assert f"{kind.replace('__', ' ')} (own.py 0123456789ab)" in warning
     assert "own.py ba9876543210" in warning
 
@@ -153,7 +155,7 @@ def test_one_that_differs_only_in_what_changes_no_number_goes_on(store):
 
 def test_what_it_leaves_alone_keeps_nothing_else_waiting(store):
     begun(store)
-    later = experiments.submit_experiment(store, toy(repetitions=1)).id
+    later = submission.submit_experiment(store, toy(repetitions=1)).id
 
     claims = execution.claim(store, "other", 1, OTHERS["architecture"])
 
@@ -183,7 +185,7 @@ def test_accepted_it_goes_on_from_its_log_and_both_are_recorded(store):
 
 
 def test_there_is_nothing_to_accept_before_it_has_begun_or_after_it_has_ended(store):
-    id_ = experiments.submit_experiment(store, toy(repetitions=1)).id
+    id_ = submission.submit_experiment(store, toy(repetitions=1)).id
 
     with pytest.raises(Conflict, match="has not begun"):
         provenance.accept_versions(store, id_)
@@ -205,13 +207,13 @@ def test_over_http(sqlite_store):
 
 
 def test_a_spec_of_a_later_version_is_not_read_and_not_run(store):
-    id_ = experiments.submit_experiment(store, toy()).id
+    id_ = submission.submit_experiment(store, toy()).id
     with store.transaction() as session:
         session.execute(text("UPDATE experiment SET spec_version = 99"))
 
     with pytest.raises(StoreUnavailable, match=rf"'{id_}' is of version 99, .* reads up to {SPEC_VERSION}"):
-        experiments.read_experiment(store, id_)
+        submission.read_experiment(store, id_)
     assert execution.claim(store, "me", 9) == ()
-    later = experiments.submit_experiment(store, toy(repetitions=1))
+    later = submission.submit_experiment(store, toy(repetitions=1))
     assert [each.experiment_id for each in execution.claim(store, "me", 9)] == [later.id]
-    assert experiments.read_experiment(store, later.id).state is State.RUNNING
+    assert submission.read_experiment(store, later.id).state is State.RUNNING

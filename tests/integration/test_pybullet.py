@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.core.arrays import FloatArray
-from services.core.robots.quadruped import Quadruped
-from services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, World
-from services.engines.pybullet import PyBullet
-from services.engines.pybullet.stick_slip import StickSlip
-from services.engines.stepping import WARM_SCENES
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, World
+from gaplab.services.engines.pybullet import PyBullet
+from gaplab.services.engines.pybullet.stick_slip import StickSlip
+from gaplab.services.engines.stepping import WARM_SCENES
 
 pytest.importorskip("pybullet")
 
@@ -37,7 +37,9 @@ def path(engine: PyBullet, world: World, motion: Motion = MOTION) -> FloatArray:
 
 
 def test_importing_the_engine_does_not_load_its_library() -> None:
-    script = "import sys; from services.engines import engines; list(engines); assert 'pybullet' not in sys.modules"
+    script = (
+        "import sys; from gaplab.services.engines import engines; list(engines); assert 'pybullet' not in sys.modules"
+    )
 
     subprocess.run([sys.executable, "-c", script], check=True)
 

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from services.core.arrays import FloatArray
-from services.core.world import Body, Box, Joint, Material, Motion, Sphere, World
-from services.engines.pybullet import PyBullet
-from services.engines.pybullet.scene import Scene
-from services.engines.pybullet.stick_slip import StickSlip
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Sphere, World
+from gaplab.services.engines.pybullet import PyBullet
+from gaplab.services.engines.pybullet.scene import Scene
+from gaplab.services.engines.pybullet.stick_slip import StickSlip
 
 pybullet: ModuleType = pytest.importorskip("pybullet")
 

@@ -7,20 +7,20 @@ from pathlib import Path
 
 import pytest
 
-from services.core.errors import ClusterUnusable
-from services.settings import Settings
-from workers.__main__ import choose_authentication
-from workers.cluster import cluster
+from gaplab.services.core.errors import ClusterUnusable
+from gaplab.services.settings import Settings
+from gaplab.workers.__main__ import choose_authentication
+from gaplab.workers.cluster import cluster
 
 OWN = """
 import os, subprocess, sys
-from services.settings import Settings
+from gaplab.services.settings import Settings
 from tests.processes import is_ours, processes
-from workers.__main__ import choose_authentication
+from gaplab.workers.__main__ import choose_authentication
 
 choose_authentication(Settings())
 import ray
-from workers.cluster import cluster
+from gaplab.workers.cluster import cluster
 
 def listening():
     sockets = {}

@@ -4,18 +4,19 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from api.app import create_app
-from schemas.replays import Replay
-from services import execution, experiments
-from services.core.errors import InvalidSpec, NotFound
-from services.core.loop import repetition
-from services.core.types import Probed, Transferred, Tuned
-from services.engines.analytic import speed
-from services.figures.gait import gait_figure
-from services.figures.marks import Arrow, Bars, Line, Points
-from services.figures.toy import toy_figure
-from services.simulation import setting
-from services.toys import toys
+from gaplab.api.app import create_app
+from gaplab.schemas.replays import Replay
+from gaplab.services.core.errors import InvalidSpec, NotFound
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.types import Probed, Transferred, Tuned
+from gaplab.services.engines.analytic import speed
+from gaplab.services.experiments import submission
+from gaplab.services.figures.kinds.gait import gait_figure
+from gaplab.services.figures.kinds.toy import toy_figure
+from gaplab.services.figures.marks import Arrow, Bars, Line, Points
+from gaplab.services.results.toy import toys
+from gaplab.services.running import execution
+from gaplab.services.specs.assembly import setting
 from tests.experiments import toy
 
 FORMATS = {"html": b"<!doctype", "svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
@@ -61,7 +62,7 @@ def marks(figure, kind):
 
 def walked(store, **changes):
     """The id of an experiment on the toy function that has ended, and the log of its first repetition."""
-    submitted = experiments.submit_experiment(store, toy(repetitions=1, iterations=3, **changes)).id
+    submitted = submission.submit_experiment(store, toy(repetitions=1, iterations=3, **changes)).id
     (claim,) = execution.claim(store, "me", 1)
     log = list(repetition(setting(claim.spec, 0)))
     for step in log:
@@ -139,7 +140,7 @@ def test_several_iterations_are_panels_and_none_is_the_last(sqlite_store):
 
 
 def test_the_true_function_is_hidden_until_the_experiment_has_ended(sqlite_store):
-    running = experiments.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    running = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     log = repetition(setting(claim.spec, 0))
     for _ in range(8):
@@ -155,8 +156,8 @@ def test_the_true_function_is_hidden_until_the_experiment_has_ended(sqlite_store
 
 
 def test_what_is_not_there_is_refused_and_what_is_not_yet_there_is_empty(sqlite_store):
-    waiting = experiments.submit_experiment(sqlite_store, toy(repetitions=1)).id
-    walking = experiments.submit_experiment(sqlite_store, toy(robot="quadruped", repetitions=1)).id
+    waiting = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    walking = submission.submit_experiment(sqlite_store, toy(robot="quadruped", repetitions=1)).id
 
     assert toy_figure(toys(sqlite_store, waiting, 0, [])).empty
     for repetition_, iterations in ((1, [0]), (0, [3])):
@@ -167,7 +168,7 @@ def test_what_is_not_there_is_refused_and_what_is_not_yet_there_is_empty(sqlite_
 
 
 def test_the_direct_baseline_has_no_simulators_and_its_fittest_is_in_reality(sqlite_store):
-    experiment = experiments.submit_experiment(sqlite_store, toy(strategy="direct", repetitions=1)).id
+    experiment = submission.submit_experiment(sqlite_store, toy(strategy="direct", repetitions=1)).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     for step in repetition(setting(claim.spec, 0)):
         execution.record(sqlite_store, claim, step)

@@ -7,17 +7,18 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from api.app import create_app
-from schemas.replays import Replay
-from schemas.spec import ExperimentSpec
-from services import execution, experiments
-from services.core.arrays import frozen
-from services.core.loop import repetition
-from services.core.robots.quadruped import Quadruped
-from services.core.types import Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
-from services.predictions import predictions
-from services.simulation import setting
-from services.store.repository.experiments import get_experiment
+from gaplab.api.app import create_app
+from gaplab.schemas.replays import Replay
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.types import Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
+from gaplab.services.experiments import submission
+from gaplab.services.replay.predictions import predictions
+from gaplab.services.running import execution
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.queries.experiments import get_experiment
 from tests.experiments import run, toy
 
 UNTUNED, BEST = (0.5, 0.3), (1.1, 0.7)
@@ -44,7 +45,7 @@ def quadruped(**changes):
 
 def walked(store, **changes):
     """Id and log of an experiment of which one iteration is over, and the next is measured but not tuned."""
-    submitted = experiments.submit_experiment(store, quadruped(**changes)).id
+    submitted = submission.submit_experiment(store, quadruped(**changes)).id
     (claim,) = execution.claim(store, "me", 1)
     setting_ = setting(claim.spec, 0)
     known = Quadruped().known
@@ -128,7 +129,7 @@ def test_what_is_not_there_is_not_found_and_what_is_not_yet_there_is_a_conflict(
 
 
 def test_a_robot_without_a_body_has_nothing_to_show(sqlite_store, api):
-    experiment = experiments.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    experiment = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
     run(sqlite_store, *execution.claim(sqlite_store, "me", 1))
 
     answer = api.get(f"/experiments/{experiment}/replay")
@@ -138,7 +139,7 @@ def test_a_robot_without_a_body_has_nothing_to_show(sqlite_store, api):
 
 
 def test_the_direct_baseline_is_seen_in_reality_alone(sqlite_store, api):
-    experiment = experiments.submit_experiment(sqlite_store, quadruped(strategy="direct")).id
+    experiment = submission.submit_experiment(sqlite_store, quadruped(strategy="direct")).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     known = Quadruped().known
     real = setting(claim.spec, 0).reality(known)
@@ -213,7 +214,7 @@ def test_what_was_computed_once_is_remembered(sqlite_store, app, api):
 
 
 def test_predictions_are_of_the_simulators_before_and_after_a_sample(store, app):
-    experiment = experiments.submit_experiment(store, toy(repetitions=2)).id
+    experiment = submission.submit_experiment(store, toy(repetitions=2)).id
     errors = {}
     for claim in execution.claim(store, "me", 2):
         for step in repetition(setting(claim.spec, claim.number)):
@@ -247,7 +248,7 @@ def test_predictions_take_a_while_and_are_pending_meanwhile(sqlite_store, app):
 def test_samples_for_which_there_is_no_room_are_left_out_and_not_waited_for(sqlite_store, app, api, monkeypatch):
     experiment, _, claim = walked(sqlite_store)
     execution.record(sqlite_store, claim, Tuned(2, (Simulator(frozen(BEST)),)))
-    monkeypatch.setattr("services.predictions.MOST_KEPT", 1)
+    monkeypatch.setattr("gaplab.services.replay.predictions.MOST_KEPT", 1)
 
     found = api.get(f"/experiments/{experiment}/predictions").json()
     figure = api.get(f"/figures/predictions?experiment={experiment}&format=json").json()

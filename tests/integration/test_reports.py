@@ -4,10 +4,12 @@ import csv
 
 import pytest
 
-from schemas.lifecycle import State
-from schemas.spec import StudySpec
-from services import execution, experiments, reports
-from services.core.errors import InvalidSpec, NotFound
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.core.errors import InvalidSpec, NotFound
+from gaplab.services.experiments import submission
+from gaplab.services.results import curves
+from gaplab.services.running import execution
 from tests.experiments import run, some_log, toy
 
 
@@ -17,7 +19,7 @@ def study_with_results(store, recorded=(1.0, 2.0)):
         "repetitions": 2,
         "strategies": ["simulated_fit", "direct"],
     }
-    study = experiments.submit_study(store, StudySpec.model_validate(spec))
+    study = submission.submit_study(store, StudySpec.model_validate(spec))
     claims = execution.claim(store, "me", 9)
     first, second, *direct = sorted(claims, key=lambda each: (each.spec.strategy.name == "direct", each.number))
     run(store, first, some_log(recorded=recorded[0]))
@@ -31,7 +33,7 @@ def study_with_results(store, recorded=(1.0, 2.0)):
 def test_a_curve_has_the_recorded_fitness_of_each_repetition_at_each_count(store):
     study = study_with_results(store)
 
-    found = reports.curve(store, study.experiments[0].id)
+    found = curves.curve(store, study.experiments[0].id)
 
     assert (found.experiment, found.strategy, found.unit) == (study.experiments[0].id, "simulated_fit", "m/s")
     assert (found.state, found.direct) == (State.RUNNING, False)
@@ -44,26 +46,26 @@ def test_a_curve_has_the_recorded_fitness_of_each_repetition_at_each_count(store
 def test_the_curve_of_direct_is_one_point_at_zero(store):
     study = study_with_results(store)
 
-    found = reports.curve(store, study.experiments[1].id)
+    found = curves.curve(store, study.experiments[1].id)
 
     assert found.direct
     assert [(point.evaluations, point.values) for point in found.points] == [(0, (1.0, 2.0))]
 
 
 def test_a_curve_without_results_has_empty_points(store):
-    experiment = experiments.submit_experiment(store, toy()).id
+    experiment = submission.submit_experiment(store, toy()).id
 
-    found = reports.curve(store, experiment)
+    found = curves.curve(store, experiment)
 
     assert [(point.n, point.mean) for point in found.points] == [(0, None)] * 3
 
 
 def test_a_failed_measurement_is_no_value_of_the_curve(store):
-    experiment = experiments.submit_experiment(store, toy(repetitions=1)).id
+    experiment = submission.submit_experiment(store, toy(repetitions=1)).id
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim, some_log(recorded=float("nan")))
 
-    found = reports.curve(store, experiment)
+    found = curves.curve(store, experiment)
 
     assert [point.values for point in found.points] == [(None,)] * 3
 
@@ -72,27 +74,27 @@ def test_the_curves_of_a_study_are_those_of_its_experiments_in_order(store):
     study = study_with_results(store)
     ids = [each.id for each in study.experiments]
 
-    found = reports.study_curves(store, study.id)
+    found = curves.study_curves(store, study.id)
 
     assert [each.experiment for each in found] == ids
-    assert found == reports.curves(store, ids) == tuple(reports.curve(store, each) for each in ids)
+    assert found == curves.curves(store, ids) == tuple(curves.curve(store, each) for each in ids)
 
 
 def test_the_curves_of_what_is_not_there_are_not_found(store):
     study = study_with_results(store)
 
     with pytest.raises(NotFound, match="no-such"):
-        reports.curves(store, [study.experiments[0].id, "no-such"])
+        curves.curves(store, [study.experiments[0].id, "no-such"])
     with pytest.raises(NotFound, match="no-such"):
-        reports.study_curves(store, "no-such")
+        curves.study_curves(store, "no-such")
 
 
 def test_a_comparison_pools_the_whole_range_and_direct_counts_at_any(sqlite_store):
     study = study_with_results(sqlite_store)
     ids = [each.id for each in study.experiments]
 
-    (whole,) = reports.compare(sqlite_store, ids)
-    (one,) = reports.compare(sqlite_store, ids, from_evaluations=1, to_evaluations=1)
+    (whole,) = curves.compare(sqlite_store, ids)
+    (one,) = curves.compare(sqlite_store, ids, from_evaluations=1, to_evaluations=1)
 
     assert (whole.from_evaluations, whole.to_evaluations) == (1, 2)
     assert (whole.n_first, whole.n_second) == (3, 2)
@@ -101,9 +103,9 @@ def test_a_comparison_pools_the_whole_range_and_direct_counts_at_any(sqlite_stor
 
 
 def test_a_comparison_is_of_every_pair(sqlite_store):
-    ids = [experiments.submit_experiment(sqlite_store, toy()).id for _ in range(3)]
+    ids = [submission.submit_experiment(sqlite_store, toy()).id for _ in range(3)]
 
-    found = reports.compare(sqlite_store, ids)
+    found = curves.compare(sqlite_store, ids)
 
     assert [(each.first, each.second) for each in found] == [(ids[0], ids[1]), (ids[0], ids[2]), (ids[1], ids[2])]
     assert {each.student.p for each in found} == {None}
@@ -111,26 +113,26 @@ def test_a_comparison_is_of_every_pair(sqlite_store):
 
 @pytest.mark.parametrize("bounds", [(2, 1), (-1, 2), (3, None)])
 def test_a_range_that_is_none_is_refused(sqlite_store, bounds):
-    ids = [experiments.submit_experiment(sqlite_store, toy()).id for _ in range(2)]
+    ids = [submission.submit_experiment(sqlite_store, toy()).id for _ in range(2)]
 
     with pytest.raises(InvalidSpec, match="range"):
-        reports.compare(sqlite_store, ids, from_evaluations=bounds[0], to_evaluations=bounds[1])
+        curves.compare(sqlite_store, ids, from_evaluations=bounds[0], to_evaluations=bounds[1])
 
 
 def test_a_comparison_needs_two_experiments(sqlite_store):
-    one = experiments.submit_experiment(sqlite_store, toy()).id
+    one = submission.submit_experiment(sqlite_store, toy()).id
 
     for ids in ([], [one], [one, one]):
         with pytest.raises(InvalidSpec, match="two or more"):
-            reports.compare(sqlite_store, ids)
+            curves.compare(sqlite_store, ids)
 
 
 def test_the_csv_has_a_line_for_each_value(sqlite_store):
     study = study_with_results(sqlite_store, recorded=(0.1 + 0.2, 1 / 3))
 
-    lines = list(csv.DictReader(reports.curves_csv(reports.study_curves(sqlite_store, study.id)).splitlines()))
+    lines = list(csv.DictReader(curves.curves_csv(curves.study_curves(sqlite_store, study.id)).splitlines()))
 
-    assert tuple(lines[0]) == reports.COLUMNS
+    assert tuple(lines[0]) == curves.COLUMNS
     assert len(lines) == 5 + 2
     assert [float(each["fitness"]) for each in lines[:2]] == [0.1 + 0.2, 1 / 3]
     assert {each["strategy"] for each in lines} == {"simulated_fit", "direct"}

@@ -4,17 +4,18 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from schemas.lifecycle import State
-from schemas.sensitivity import Sensitivity, SensitivitySpec, Verdict
-from schemas.spec import StudySpec
-from services import execution, experiments, sensitivity
-from services.core.errors import InvalidSpec, NotFound
-from services.core.optimizers.steady_state import SteadyState
-from services.core.sensitivity import Effort, check
-from services.resolution import resolve_sensitivity
-from services.simulation import subject
-from services.store.models import SensitivityRow
-from services.store.repository.leases import MAX_LOSSES
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.sensitivity import Sensitivity, SensitivitySpec, Verdict
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.core.errors import InvalidSpec, NotFound
+from gaplab.services.core.optimizers.steady_state import SteadyState
+from gaplab.services.core.sensitivity import Effort, check
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution, sensitivity
+from gaplab.services.specs.assembly import subject
+from gaplab.services.specs.resolution import resolve_sensitivity
+from gaplab.services.store.models import SensitivityRow
+from gaplab.services.store.queries.leases import MAX_LOSSES
 from tests.experiments import toy
 
 SECRET = 0.987654321
@@ -44,7 +45,7 @@ def checks(store):
 
 
 def test_submitting_an_experiment_queues_a_check_of_what_it_tunes(store):
-    experiment = experiments.submit_experiment(store, toy())
+    experiment = submission.submit_experiment(store, toy())
 
     found = sensitivity.read(store, experiment.sensitivity)
 
@@ -59,12 +60,12 @@ def test_submitting_an_experiment_queues_a_check_of_what_it_tunes(store):
 
 
 def test_the_same_robot_engine_and_tunables_are_checked_once(store):
-    first = experiments.submit_experiment(store, toy())
-    second = experiments.submit_experiment(
+    first = submission.submit_experiment(store, toy())
+    second = submission.submit_experiment(
         store, toy(strategy="random", seed=7, budget="desk", reality={"parameters": {"static_friction": SECRET}})
     )
     asked = sensitivity.submit(store, settings(seed=3))
-    narrower = experiments.submit_experiment(store, toy(tunables=[{"name": "static_friction", "upper": 1.0}]))
+    narrower = submission.submit_experiment(store, toy(tunables=[{"name": "static_friction", "upper": 1.0}]))
     finer = sensitivity.submit(store, settings(points=33))
 
     assert first.sensitivity == second.sensitivity == asked.id
@@ -76,43 +77,43 @@ def test_the_same_robot_engine_and_tunables_are_checked_once(store):
 @pytest.mark.parametrize("kind", ["robot toy_function", "engine analytic", "tunable dynamic_friction"])
 def test_what_was_edited_since_is_checked_anew_and_earlier_experiments_keep_their_check(store, monkeypatch, kind):
     def edited(file):
-        for module in (experiments, sensitivity):
+        for module in (submission, sensitivity):
             monkeypatch.setattr(module, "outside", lambda: {kind: file, "robot other": file})
 
     edited("own.py 0123456789ab")
-    before = experiments.submit_experiment(store, toy())
+    before = submission.submit_experiment(store, toy())
     asked_before = sensitivity.submit(store, settings())
     edited("own.py ba9876543210")
-    after = experiments.submit_experiment(store, toy())
+    after = submission.submit_experiment(store, toy())
     asked_after = sensitivity.submit(store, settings())
-    other = experiments.submit_experiment(store, toy(tunables=["static_friction"], robot="toy_function"))
+    other = submission.submit_experiment(store, toy(tunables=["static_friction"], robot="toy_function"))
 
     assert before.sensitivity == asked_before.id != after.sensitivity == asked_after.id
-    assert experiments.read_experiment(store, before.id).sensitivity == before.sensitivity
+    assert submission.read_experiment(store, before.id).sensitivity == before.sensitivity
     assert other.sensitivity not in {before.sensitivity, after.sensitivity}
 
 
 def test_a_study_has_one_check_and_the_direct_baseline_alone_has_none(store):
     common = toy().model_dump(exclude={"strategy", "name"})
-    study = experiments.submit_study(store, StudySpec.model_validate(common | {"strategies": ["random", "direct"]}))
+    study = submission.submit_study(store, StudySpec.model_validate(common | {"strategies": ["random", "direct"]}))
 
     strategies = {each.strategy: each.sensitivity for each in study.experiments}
 
     assert strategies == {"random": checks(store)[0], "direct": None}
-    other = experiments.submit_experiment(store, toy(strategy="direct", tunables=["restitution"]))
+    other = submission.submit_experiment(store, toy(strategy="direct", tunables=["restitution"]))
     assert other.sensitivity is None
     assert len(checks(store)) == 1
 
 
 def test_experiments_that_are_submitted_at_once_share_a_check(store):
     with ThreadPoolExecutor(4) as pool:
-        submitted = list(pool.map(lambda seed: experiments.submit_experiment(store, toy(seed=seed)), range(8)))
+        submitted = list(pool.map(lambda seed: submission.submit_experiment(store, toy(seed=seed)), range(8)))
 
     assert len({each.sensitivity for each in submitted}) == len(checks(store)) == 1
 
 
 def test_what_a_check_finds_is_shown_and_warns_the_experiments(store):
-    experiment = experiments.submit_experiment(store, toy()).id
+    experiment = submission.submit_experiment(store, toy()).id
     claim = sensitivity.claim(store, "me")
     found = check(subject(claim.spec), SteadyState(), Effort(claim.spec.points, claim.spec.evaluations))
 
@@ -125,19 +126,19 @@ def test_what_a_check_finds_is_shown_and_warns_the_experiments(store):
         "grip over 0 to 1.5 does nothing: it changes fitness by 0.1 % of what controllers differ by",
         "slip over 0 to 1.5 is rough: 70 % of what it does to fitness jumps from value to value",
     )
-    assert experiments.read_experiment(store, experiment).warnings == read.warnings
-    assert experiments.list_experiments(store).items[0].warnings == read.warnings
+    assert submission.read_experiment(store, experiment).warnings == read.warnings
+    assert submission.list_experiments(store).items[0].warnings == read.warnings
 
 
 def test_the_toys_tunables_are_smooth_and_warn_of_nothing(store):
-    experiment = experiments.submit_experiment(store, toy(tunables=["static_friction", "restitution"])).id
+    experiment = submission.submit_experiment(store, toy(tunables=["static_friction", "restitution"])).id
     claim = sensitivity.claim(store, "me")
     found = check(subject(claim.spec), SteadyState(), Effort(claim.spec.points, claim.spec.evaluations))
 
     sensitivity.complete(store, claim, found)
 
     assert {each.verdict for each in found} == {Verdict.SMOOTH}
-    assert experiments.read_experiment(store, experiment).warnings == ()
+    assert submission.read_experiment(store, experiment).warnings == ()
 
 
 def test_a_tunable_between_bounds_too_narrow_to_matter_does_nothing():
@@ -149,12 +150,12 @@ def test_a_tunable_between_bounds_too_narrow_to_matter_does_nothing():
 
 
 def test_a_failed_check_fails_no_experiment_and_says_why(store):
-    experiment = experiments.submit_experiment(store, toy()).id
+    experiment = submission.submit_experiment(store, toy()).id
     claim = sensitivity.claim(store, "me")
 
     assert sensitivity.fail(store, claim, "ValueError: nul\0")
 
-    found = experiments.read_experiment(store, experiment)
+    found = submission.read_experiment(store, experiment)
     assert found.state is State.QUEUED
     assert found.warnings == (
         "the sensitivity check failed, so that nothing is known of the tunables: ValueError: nul?",

@@ -14,17 +14,18 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule, run_state_machine_as_test
 
-from schemas.lifecycle import ENDS, PERMITTED, Ending, State, Verb
-from schemas.schedule import ExtensionSpec
-from schemas.spec import ExperimentSpec
-from services import execution, experiments, life_cycle
-from services.core.errors import Conflict, InvalidSpec
-from services.core.loop import repetition
-from services.execution import Claim, TimedStep
-from services.resolution import resolve_experiment
-from services.simulation import setting
-from services.store.models import AttemptRow, ExperimentRow, RepetitionRow
-from services.store.repository.steps import logs
+from gaplab.schemas.lifecycle import ENDS, PERMITTED, Ending, State, Verb
+from gaplab.schemas.schedule import ExtensionSpec
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.errors import Conflict, InvalidSpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.experiments import life_cycle, submission
+from gaplab.services.running import execution
+from gaplab.services.running.execution import Claim, TimedStep
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.models import AttemptRow, ExperimentRow, RepetitionRow
+from gaplab.services.store.queries.steps import logs
 from tests.fakes import flat
 
 MOST_ITERATIONS, MOST_REPETITIONS = 2, 3
@@ -134,7 +135,7 @@ class LifeCycle(RuleBasedStateMachine):
     @precondition(lambda self: len(self.experiments) < 2)
     @rule(iterations=st.integers(1, MOST_ITERATIONS), repetitions=st.integers(1, MOST_REPETITIONS - 1))
     def submit(self, iterations, repetitions):
-        read = experiments.submit_experiment(self.store, spec(iterations, repetitions))
+        read = submission.submit_experiment(self.store, spec(iterations, repetitions))
         made = [Repetition() for _ in range(repetitions)]
         self.experiments.append(Experiment(read.id, iterations, made))
 

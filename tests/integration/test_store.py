@@ -10,11 +10,12 @@ import psycopg
 import pytest
 from sqlalchemy import event, text
 
-import migrations
-from services import execution, experiments
-from services.core.errors import StoreUnavailable
-from services.store.repository.experiments import lock
-from services.store.session import Store
+from gaplab import migrations
+from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.store.queries.experiments import lock
+from gaplab.services.store.session import Store
 from tests.experiments import same, some_log, toy
 
 
@@ -38,7 +39,7 @@ def log_of(store):
 
 @pytest.mark.parametrize("steps", range(1, 6))
 def test_a_kill_between_any_two_statements_leaves_nothing_half_written(store, steps):
-    experiments.submit_experiment(store, toy(repetitions=1))
+    submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     log = list(some_log())[: steps + 3]
     for step in log[:-1]:
@@ -90,8 +91,8 @@ def record_or_die(store, claim, step):
 
 CHILD = """
 import sys
-from services import execution
-from services.store.session import Store
+from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 from tests.experiments import some_log
 store = Store(sys.argv[1])
 (claim,) = execution.claim(store, "child", 1)
@@ -102,7 +103,7 @@ for count, step in enumerate(some_log(30), start=1):
 
 
 def test_what_was_acknowledged_survives_kill_9(sqlite_url, sqlite_store):
-    experiments.submit_experiment(sqlite_store, toy(repetitions=1, iterations=30))
+    submission.submit_experiment(sqlite_store, toy(repetitions=1, iterations=30))
     root = Path(__file__).parents[2]
 
     with subprocess.Popen([sys.executable, "-c", CHILD, sqlite_url], stdout=subprocess.PIPE, cwd=root) as child:
@@ -123,7 +124,7 @@ def test_on_sqlite_a_commit_returns_when_no_power_loss_can_undo_it(sqlite_store)
 
 
 def test_a_commit_whose_answer_was_lost_is_delivered_again_without_harm(store):
-    experiments.submit_experiment(store, toy(repetitions=1))
+    submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     first, *_ = some_log()
 
@@ -140,7 +141,7 @@ def test_a_commit_whose_answer_was_lost_is_delivered_again_without_harm(store):
 
 
 def test_writers_wait_for_each_other(store):
-    experiment = experiments.submit_experiment(store, toy()).id
+    experiment = submission.submit_experiment(store, toy()).id
 
     def rename(number):
         with store.transaction() as session:
@@ -157,14 +158,14 @@ def test_writers_wait_for_each_other(store):
 def test_a_read_sees_one_moment(postgres_store):
     with postgres_store.reading() as session:
         before = session.scalar(text("SELECT count(*) FROM experiment"))
-        experiments.submit_experiment(postgres_store, toy())
+        submission.submit_experiment(postgres_store, toy())
         after = session.scalar(text("SELECT count(*) FROM experiment"))
 
     assert before == after == 0
 
 
 def test_a_deadlock_is_tried_again(postgres_store):
-    ids = [experiments.submit_experiment(postgres_store, toy()).id for _ in range(2)]
+    ids = [submission.submit_experiment(postgres_store, toy()).id for _ in range(2)]
     together, attempts = Barrier(2), []
 
     def lock_both(order):
@@ -188,7 +189,7 @@ def test_a_deadlock_is_tried_again(postgres_store):
 
 
 def test_the_store_recovers_from_lost_connections(postgres_store):
-    experiments.submit_experiment(postgres_store, toy())
+    submission.submit_experiment(postgres_store, toy())
     url = postgres_store._engine.url.set(drivername="postgresql").render_as_string(hide_password=False)
 
     with psycopg.connect(url, autocommit=True) as connection:
@@ -197,7 +198,7 @@ def test_the_store_recovers_from_lost_connections(postgres_store):
             " WHERE datname = current_database() AND pid <> pg_backend_pid()"
         )
 
-    assert len(experiments.list_experiments(postgres_store).items) == 1
+    assert len(submission.list_experiments(postgres_store).items) == 1
 
 
 def test_a_connection_lost_in_the_midst_is_unavailability(postgres_store):
@@ -205,7 +206,7 @@ def test_a_connection_lost_in_the_midst_is_unavailability(postgres_store):
         session.execute(text("SELECT pg_terminate_backend(pg_backend_pid())"))
 
 
-@pytest.mark.parametrize("use", [experiments.list_studies, lambda store: execution.claim(store, "me", 1)])
+@pytest.mark.parametrize("use", [submission.list_studies, lambda store: execution.claim(store, "me", 1)])
 def test_to_have_no_connection_free_is_unavailability(sqlite_store, monkeypatch, use):
     pool = sqlite_store._engine.pool
     monkeypatch.setattr(pool, "_timeout", 0.01)
@@ -225,15 +226,15 @@ def test_an_unreachable_database_is_unavailable_and_recovers_by_itself(tmp_path)
     store = Store(url)
 
     with pytest.raises(StoreUnavailable, match="cannot be used now"):
-        experiments.submit_experiment(store, toy())
+        submission.submit_experiment(store, toy())
     folder.mkdir()
     migrations.upgrade(url)
 
-    assert experiments.submit_experiment(store, toy()).id
+    assert submission.submit_experiment(store, toy()).id
     store.dispose()
 
 
-@pytest.mark.parametrize("use", [Store.check, experiments.list_studies, lambda store: execution.claim(store, "me", 1)])
+@pytest.mark.parametrize("use", [Store.check, submission.list_studies, lambda store: execution.claim(store, "me", 1)])
 def test_an_unreachable_server_is_unavailable_and_the_message_has_no_password(use):
     store = Store("postgresql://me:secret@127.0.0.1:1/none")
 
@@ -243,7 +244,7 @@ def test_an_unreachable_server_is_unavailable_and_the_message_has_no_password(us
     assert "secret" not in str(caught.value)
 
 
-@pytest.mark.parametrize("use", [Store.check, experiments.list_studies, lambda store: execution.claim(store, "me", 1)])
+@pytest.mark.parametrize("use", [Store.check, submission.list_studies, lambda store: execution.claim(store, "me", 1)])
 def test_a_database_without_the_schema_is_unavailable(database_url, use):
     store = Store(database_url)
 

@@ -12,20 +12,21 @@ import pytest
 from ray.exceptions import RayTaskError, WorkerCrashedError
 
 from benchmarks.without_ray import OPEN, SPEC, Here, HereRun, Stop
-from schemas.lifecycle import State
-from schemas.spec import ExperimentSpec
-from services import execution, experiments, sensitivity
-from services.core.errors import StoreUnavailable
-from services.core.optimizers.steady_state import SteadyState
-from services.core.sensitivity import Effort, check
-from services.simulation import setting, subject
-from services.store.models import CheckpointRow, RepetitionRow, SensitivityRow
-from services.store.repository.steps import logs
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.core.optimizers.steady_state import SteadyState
+from gaplab.services.core.sensitivity import Effort, check
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution, sensitivity
+from gaplab.services.specs.assembly import setting, subject
+from gaplab.services.store.models import CheckpointRow, RepetitionRow, SensitivityRow
+from gaplab.services.store.queries.steps import logs
+from gaplab.workers import sensitivity as checking
+from gaplab.workers import supervisor
+from gaplab.workers.checkpoints import recorded
+from gaplab.workers.repetition import batches
 from tests.fakes import flat
-from workers import sensitivity as checking
-from workers import supervisor
-from workers.checkpoints import recorded
-from workers.repetition import batches
 
 MODULES = {"execution": execution, "sensitivity": sensitivity}
 
@@ -119,7 +120,7 @@ BROKEN = ExperimentSpec.model_validate(
 
 def outcome(store):
     """What came of everything, after supervisors that are stopped and started until all has ended."""
-    names = {experiments.submit_experiment(store, each).id: each.name for each in (SPEC, BROKEN)}
+    names = {submission.submit_experiment(store, each).id: each.name for each in (SPEC, BROKEN)}
     rounds = 0
     while unfinished(store):
         assert rounds < 100

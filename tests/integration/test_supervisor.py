@@ -7,11 +7,12 @@ import sys
 import time
 from pathlib import Path
 
-from services import execution, experiments
-from services.settings import Settings
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.settings import Settings
+from gaplab.workers.cluster import cluster
+from gaplab.workers.supervisor import Supervisor
 from tests.experiments import toy
-from workers.cluster import cluster
-from workers.supervisor import Supervisor
 
 DEADLINE_S = 180
 
@@ -29,7 +30,7 @@ def test_a_supervisor_whose_ray_died_ends_so_that_another_is_started(sqlite_url,
     environment = os.environ | {"GAPLAB_DATABASE_URL": sqlite_url, "GAPLAB_WORKERS": "1"}
     log, deadline = tmp_path / "log", time.monotonic() + DEADLINE_S
     with log.open("wb") as output:
-        command = [sys.executable, "-m", "workers", "serve"]
+        command = [sys.executable, "-m", "gaplab.workers", "serve"]
         process = subprocess.Popen(command, env=environment, stdout=output, stderr=output)
     while b"ready for" not in log.read_bytes():
         assert time.monotonic() < deadline, log.read_text()
@@ -42,7 +43,7 @@ def test_a_supervisor_whose_ray_died_ends_so_that_another_is_started(sqlite_url,
 
 
 def test_work_goes_to_another_when_its_holder_was_silent_for_as_long_as_a_lease_is_set_to(store):
-    experiments.submit_experiment(store, toy(repetitions=1))
+    submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "silent", 1)
     patient, hasty = (Supervisor(store, lambda: 0, lease_s=lease_s) for lease_s in (60, 0.2))
     time.sleep(0.5)

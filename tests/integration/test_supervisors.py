@@ -12,20 +12,21 @@ from threading import Event
 
 import pytest
 
-from schemas.lifecycle import Ending, State, Verb
-from schemas.spec import ExperimentSpec
-from services import execution, experiments, life_cycle
-from services.core.loop import repetition
-from services.resolution import resolve_experiment
-from services.settings import Settings
-from services.simulation import setting
-from services.store.models import RepetitionRow
-from services.store.repository.steps import logs
+from gaplab.schemas.lifecycle import Ending, State, Verb
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.experiments import life_cycle, submission
+from gaplab.services.running import execution
+from gaplab.services.settings import Settings
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.models import RepetitionRow
+from gaplab.services.store.queries.steps import logs
+from gaplab.workers.cluster import cluster
+from gaplab.workers.supervisor import Supervisor
 from tests.fakes import flat
 from tests.processes import processes_of_ray
 from tests.supervising import impatient
-from workers.cluster import cluster
-from workers.supervisor import Supervisor
 
 DEADLINE_S = 180
 
@@ -71,15 +72,15 @@ def wait(until, do=lambda: time.sleep(0.1)):
 
 
 def state(store, experiment):
-    return experiments.read_experiment(store, experiment).state
+    return submission.read_experiment(store, experiment).state
 
 
 def attempts(store, experiment, repetitions):
-    return [each for number in range(repetitions) for each in experiments.list_attempts(store, experiment, number)]
+    return [each for number in range(repetitions) for each in submission.list_attempts(store, experiment, number)]
 
 
 def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numbers(store):
-    experiment = experiments.submit_experiment(store, spec(3)).id
+    experiment = submission.submit_experiment(store, spec(3)).id
     supervisor = Supervisor(store, lambda: 3)
     wait(lambda: len(stored(store, experiment)[0]) > 1, supervisor.step)
 
@@ -99,9 +100,9 @@ def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numb
 
 
 def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sqlite_store):
-    experiment = experiments.submit_experiment(sqlite_store, spec(3)).id
+    experiment = submission.submit_experiment(sqlite_store, spec(3)).id
     supervisor = Supervisor(sqlite_store, lambda: 3)
-    done = lambda: experiments.read_experiment(sqlite_store, experiment).progress.iterations_done  # noqa: E731
+    done = lambda: submission.read_experiment(sqlite_store, experiment).progress.iterations_done  # noqa: E731
     wait(done, supervisor.step)
 
     life_cycle.ask_experiment(sqlite_store, experiment, Verb.STOP)
@@ -115,21 +116,21 @@ def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sq
 
 
 def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite_store):
-    large = experiments.submit_experiment(sqlite_store, spec(8)).id
+    large = submission.submit_experiment(sqlite_store, spec(8)).id
     supervisor = Supervisor(sqlite_store, lambda: 4)
     wait(lambda: len(stored(sqlite_store, large)[0]) > 1, supervisor.step)
-    small = experiments.submit_experiment(sqlite_store, spec(1, controller_evaluations=100)).id
+    small = submission.submit_experiment(sqlite_store, spec(1, controller_evaluations=100)).id
 
     wait(lambda: state(sqlite_store, small).ended, supervisor.step)
 
     begun = [len(each) > 0 for each in stored(sqlite_store, large)]
-    experiments.cancel_experiment(sqlite_store, large)
+    submission.cancel_experiment(sqlite_store, large)
     wait(lambda: not (supervisor.busy or processes_of_ray("run")), supervisor.step)
     assert sum(begun) <= 4  # the two that ran, and who had the cores that they left
 
 
 def test_two_supervisors_on_one_database_do_nothing_twice(store):
-    ids = [experiments.submit_experiment(store, spec(2)).id for _ in range(2)]
+    ids = [submission.submit_experiment(store, spec(2)).id for _ in range(2)]
     stop = Event()
 
     with ThreadPoolExecutor(2) as pool:
@@ -169,7 +170,7 @@ def other(store_url, tmp_path):
 def test_a_supervisor_that_slept_past_its_lease_writes_nothing_any_more(store, other, monkeypatch):
     impatient(monkeypatch.setattr)
     process, said = other
-    experiment = experiments.submit_experiment(store, spec(2)).id
+    experiment = submission.submit_experiment(store, spec(2)).id
     wait(lambda: len(stored(store, experiment)[0]) > 1)
 
     store.write(lambda _: os.kill(process.pid, signal.SIGSTOP))  # SQLite's lock is ours then, and it sleeps without

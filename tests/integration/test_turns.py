@@ -2,14 +2,15 @@
 
 from sqlalchemy import text
 
-from schemas.schedule import ScheduleChange
-from services import execution, experiments, life_cycle
-from services.store.repository import turns
+from gaplab.schemas.schedule import ScheduleChange
+from gaplab.services.experiments import life_cycle, submission
+from gaplab.services.running import execution
+from gaplab.services.store.queries import turns
 from tests.experiments import run, toy
 
 
 def submitted(store, **changes):
-    return experiments.submit_experiment(store, toy(**changes)).id
+    return submission.submit_experiment(store, toy(**changes)).id
 
 
 def claimed(store, limit):
@@ -63,7 +64,7 @@ def test_no_more_than_max_parallel_run_at_once(store):
 
 def test_the_schedule_can_be_changed_and_is_shown_and_the_spec_is_as_it_was(store):
     first, second = submitted(store, max_parallel=1), submitted(store)
-    spec = experiments.read_experiment(store, second).spec
+    spec = submission.read_experiment(store, second).spec
 
     changed = life_cycle.schedule_experiment(store, second, ScheduleChange(priority=3))
     free = life_cycle.schedule_experiment(store, first, ScheduleChange(max_parallel=None))
@@ -76,7 +77,7 @@ def test_the_schedule_can_be_changed_and_is_shown_and_the_spec_is_as_it_was(stor
 def test_two_experiments_that_differ_only_in_their_schedule_have_one_spec(store):
     plain, hurried = submitted(store), submitted(store, priority=9, max_parallel=2)
 
-    assert experiments.read_experiment(store, plain).spec == experiments.read_experiment(store, hurried).spec
+    assert submission.read_experiment(store, plain).spec == submission.read_experiment(store, hurried).spec
 
 
 def test_what_waits_for_a_core_gives_way_to_who_has_less(store):
@@ -91,7 +92,7 @@ def test_what_waits_for_a_core_gives_way_to_who_has_less(store):
     assert not execution.complete(store, waiting[0])
     assert execution.heartbeat(store, [running]) == (running,)
     assert claimed(store, 3) == [(small, 0), (large, 1), (large, 2)]
-    assert [each.attempts for each in experiments.list_repetitions(store, large)][:4] == [1, 1, 1, 0]
+    assert [each.attempts for each in submission.list_repetitions(store, large)][:4] == [1, 1, 1, 0]
 
 
 def test_nobody_gives_way_for_what_would_be_no_fairer(store):

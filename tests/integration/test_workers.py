@@ -9,26 +9,27 @@ from threading import Event
 import pytest
 import ray
 
-from schemas.lifecycle import Ending, State
-from schemas.sensitivity import SensitivitySpec, Verdict
-from schemas.spec import ExperimentSpec
-from services import execution, experiments, sensitivity
-from services.core.errors import ClusterUnusable, StoreUnavailable
-from services.core.loop import repetition
-from services.core.optimizers.steady_state import SteadyState
-from services.core.sensitivity import Effort, check
-from services.resolution import resolve_experiment
-from services.settings import Settings
-from services.simulation import setting, subject
-from services.store.models import CheckpointRow, RepetitionRow
-from services.store.repository.steps import logs
+from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.sensitivity import SensitivitySpec, Verdict
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.errors import ClusterUnusable, StoreUnavailable
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.optimizers.steady_state import SteadyState
+from gaplab.services.core.sensitivity import Effort, check
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution, sensitivity
+from gaplab.services.settings import Settings
+from gaplab.services.specs.assembly import setting, subject
+from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.models import CheckpointRow, RepetitionRow
+from gaplab.services.store.queries.steps import logs
+from gaplab.workers import repetition as task
+from gaplab.workers import sensitivity as checking
+from gaplab.workers.checkpoints import recorded
+from gaplab.workers.cluster import cluster
+from gaplab.workers.supervisor import Supervisor
 from tests.fakes import flat
 from tests.processes import processes_of_ray
-from workers import repetition as task
-from workers import sensitivity as checking
-from workers.checkpoints import recorded
-from workers.cluster import cluster
-from workers.supervisor import Supervisor
 
 DEADLINE_S = 180
 
@@ -61,7 +62,7 @@ def long_toy():
 def run(supervisor, store, experiment, until=lambda: False):
     """Rounds of the supervisor until the experiment has ended, or something else is so."""
     deadline = time.monotonic() + DEADLINE_S
-    while not (experiments.read_experiment(store, experiment).state.ended or until()):
+    while not (submission.read_experiment(store, experiment).state.ended or until()):
         assert time.monotonic() < deadline
         supervisor.step()
 
@@ -81,16 +82,16 @@ def stored(store, experiment):
 
 @pytest.mark.parametrize("at_once", [1, 2, 4])
 def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store, at_once):
-    experiment = experiments.submit_experiment(store, toy()).id
+    experiment = submission.submit_experiment(store, toy()).id
 
     run(Supervisor(store, lambda: at_once), store, experiment)
 
-    assert experiments.read_experiment(store, experiment).state is State.COMPLETED
+    assert submission.read_experiment(store, experiment).state is State.COMPLETED
     assert stored(store, experiment) == expected(toy())
 
 
 def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store):
-    experiment = experiments.submit_experiment(sqlite_store, long_toy()).id
+    experiment = submission.submit_experiment(sqlite_store, long_toy()).id
     supervisor = Supervisor(sqlite_store, lambda: 1)
     run(supervisor, sqlite_store, experiment, until=lambda: processes_of_ray("run"))
     time.sleep(0.5)
@@ -99,7 +100,7 @@ def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store):
         os.kill(pid, signal.SIGKILL)
     run(supervisor, sqlite_store, experiment)
 
-    repetitions = experiments.list_repetitions(sqlite_store, experiment)
+    repetitions = submission.list_repetitions(sqlite_store, experiment)
     assert [each.state for each in repetitions] == [State.COMPLETED] * 2
     assert sum(each.attempts for each in repetitions) > 2
     assert stored(sqlite_store, experiment) == expected(long_toy())
@@ -114,12 +115,12 @@ def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others
         yield from task.batches(recorded(setting(claim.spec, claim.number), claim.log, ()))
 
     monkeypatch.setattr(task, "run", raising)
-    experiment = experiments.submit_experiment(sqlite_store, toy()).id
+    experiment = submission.submit_experiment(sqlite_store, toy()).id
 
     run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
 
-    read = experiments.read_experiment(sqlite_store, experiment)
-    states = [each.state for each in experiments.list_repetitions(sqlite_store, experiment)]
+    read = submission.read_experiment(sqlite_store, experiment)
+    states = [each.state for each in submission.list_repetitions(sqlite_store, experiment)]
     assert states == [State.COMPLETED, State.FAILED, State.COMPLETED]
     assert (read.state, read.progress.failed) == (State.COMPLETED, 1)
     assert read.reasons == ("ZeroDivisionError: the second one is broken",)
@@ -147,24 +148,24 @@ def delivering(left_out, attempts):
 )
 def test_a_repetition_that_its_log_refuses_is_queued_again_alone(sqlite_store, monkeypatch, left_out, reason):
     monkeypatch.setattr(task, "run", delivering(left_out, attempts=1))
-    experiment = experiments.submit_experiment(sqlite_store, toy()).id
+    experiment = submission.submit_experiment(sqlite_store, toy()).id
 
     run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
 
-    first, second = experiments.list_attempts(sqlite_store, experiment, 1)
+    first, second = submission.list_attempts(sqlite_store, experiment, 1)
     assert (first.ending, second.ending) == (Ending.LOST, Ending.COMPLETED)
     assert reason in first.reason
-    assert [each.attempts for each in experiments.list_repetitions(sqlite_store, experiment)] == [1, 2, 1]
+    assert [each.attempts for each in submission.list_repetitions(sqlite_store, experiment)] == [1, 2, 1]
     assert stored(sqlite_store, experiment) == expected(toy())
 
 
 def test_a_repetition_that_its_log_refuses_again_and_again_is_failed_alone(sqlite_store, monkeypatch):
     monkeypatch.setattr(task, "run", delivering(slice(0, 1), attempts=99))
-    experiment = experiments.submit_experiment(sqlite_store, toy()).id
+    experiment = submission.submit_experiment(sqlite_store, toy()).id
 
     run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
 
-    repetitions = experiments.list_repetitions(sqlite_store, experiment)
+    repetitions = submission.list_repetitions(sqlite_store, experiment)
     assert [each.state for each in repetitions] == [State.COMPLETED, State.FAILED, State.COMPLETED]
     assert "cannot be recorded" in repetitions[1].error
 
@@ -182,11 +183,11 @@ def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_tw
         return held
 
     monkeypatch.setattr(execution, "record_all", flaky)
-    experiment = experiments.submit_experiment(sqlite_store, toy()).id
+    experiment = submission.submit_experiment(sqlite_store, toy()).id
     supervisor = Supervisor(sqlite_store, lambda: 4)
 
     deadline = time.monotonic() + DEADLINE_S
-    while experiments.read_experiment(sqlite_store, experiment).state is not State.COMPLETED:
+    while submission.read_experiment(sqlite_store, experiment).state is not State.COMPLETED:
         assert time.monotonic() < deadline
         try:
             supervisor.step()
@@ -198,27 +199,27 @@ def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_tw
 
 
 def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store):
-    experiment = experiments.submit_experiment(sqlite_store, long_toy()).id
+    experiment = submission.submit_experiment(sqlite_store, long_toy()).id
     supervisor = Supervisor(sqlite_store, lambda: 2)
     run(
         supervisor,
         sqlite_store,
         experiment,
-        until=lambda: experiments.read_experiment(sqlite_store, experiment).progress.iterations_done,
+        until=lambda: submission.read_experiment(sqlite_store, experiment).progress.iterations_done,
     )
 
-    experiments.cancel_experiment(sqlite_store, experiment)
+    submission.cancel_experiment(sqlite_store, experiment)
     deadline = time.monotonic() + DEADLINE_S
     while processes_of_ray("run"):
         assert time.monotonic() < deadline
         supervisor.step()
 
-    assert experiments.read_experiment(sqlite_store, experiment).state is State.CANCELLED
-    assert experiments.read_experiment(sqlite_store, experiment).progress.iterations_done
+    assert submission.read_experiment(sqlite_store, experiment).state is State.CANCELLED
+    assert submission.read_experiment(sqlite_store, experiment).progress.iterations_done
 
 
 def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_store):
-    experiment = experiments.submit_experiment(sqlite_store, toy()).id
+    experiment = submission.submit_experiment(sqlite_store, toy()).id
     first, stop = Supervisor(sqlite_store, lambda: 2), Event()
     first.step()
     stop.set()
@@ -226,7 +227,7 @@ def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_sto
     first.serve(stop)
     run(Supervisor(sqlite_store, lambda: 2), sqlite_store, experiment)
 
-    assert experiments.read_experiment(sqlite_store, experiment).state is State.COMPLETED
+    assert submission.read_experiment(sqlite_store, experiment).state is State.COMPLETED
     assert stored(sqlite_store, experiment) == expected(toy())
 
 
@@ -250,7 +251,7 @@ def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(
         return claims
 
     monkeypatch.setattr(execution, "claim", watched)
-    experiment = experiments.submit_experiment(sqlite_store, long_steps()).id
+    experiment = submission.submit_experiment(sqlite_store, long_steps()).id
     supervisor = Supervisor(sqlite_store, lambda: 1, checkpoint_s=0.05)
     run(supervisor, sqlite_store, experiment, until=lambda: parts_stored(sqlite_store) > 1)
 
@@ -265,14 +266,14 @@ def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(
 
 
 def test_told_to_stop_in_the_middle_of_a_step_it_hands_over_what_the_step_has(sqlite_store):
-    experiment = experiments.submit_experiment(sqlite_store, long_steps()).id
+    experiment = submission.submit_experiment(sqlite_store, long_steps()).id
     first, stop = Supervisor(sqlite_store, lambda: 1, checkpoint_s=0.05), Event()
     run(first, sqlite_store, experiment, until=lambda: parts_stored(sqlite_store))
     stop.set()
 
     first.serve(stop)
 
-    (left,) = experiments.list_repetitions(sqlite_store, experiment)
+    (left,) = submission.list_repetitions(sqlite_store, experiment)
     assert (left.state, left.attempts) == (State.QUEUED, 0)
     run(Supervisor(sqlite_store, lambda: 1), sqlite_store, experiment)
     assert stored(sqlite_store, experiment) == expected(long_steps())
@@ -287,14 +288,14 @@ def checked(store, check, supervisor):
 
 
 def test_a_sensitivity_check_runs_beside_repetitions_and_tells_the_same_as_in_one_process(store):
-    experiment = experiments.submit_experiment(store, toy())
+    experiment = submission.submit_experiment(store, toy())
     supervisor = Supervisor(store, lambda: 1)
 
     found = checked(store, experiment.sensitivity, supervisor)
     run(supervisor, store, experiment.id)
 
     assert found.tunables == check(subject(found.spec), SteadyState(), Effort(17, 100))
-    assert experiments.read_experiment(store, experiment.id).state is State.COMPLETED
+    assert submission.read_experiment(store, experiment.id).state is State.COMPLETED
     assert stored(store, experiment.id) == expected(toy())
 
 
@@ -305,14 +306,14 @@ def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store, monkeypatch):
         raise ZeroDivisionError(msg)
 
     monkeypatch.setattr(checking, "check", raising)
-    experiment = experiments.submit_experiment(sqlite_store, toy())
+    experiment = submission.submit_experiment(sqlite_store, toy())
     supervisor = Supervisor(sqlite_store, lambda: 2)
 
     found = checked(sqlite_store, experiment.sensitivity, supervisor)
     run(supervisor, sqlite_store, experiment.id)
 
     assert (found.state, found.reason) == (State.FAILED, "ZeroDivisionError: the check is broken")
-    read = experiments.read_experiment(sqlite_store, experiment.id)
+    read = submission.read_experiment(sqlite_store, experiment.id)
     assert read.state is State.COMPLETED
     assert read.warnings[0].endswith("ZeroDivisionError: the check is broken")
 
@@ -327,7 +328,7 @@ def killed_once(spec, mark):
 
 def test_a_sensitivity_check_whose_worker_is_killed_runs_again(sqlite_store, monkeypatch, tmp_path):
     monkeypatch.setattr(checking.check, "remote", lambda spec, _: killed_once.remote(spec, str(tmp_path / "killed")))
-    check_id = experiments.submit_experiment(sqlite_store, toy()).sensitivity
+    check_id = submission.submit_experiment(sqlite_store, toy()).sensitivity
 
     found = checked(sqlite_store, check_id, Supervisor(sqlite_store, lambda: 2))
 
@@ -337,7 +338,7 @@ def test_a_sensitivity_check_whose_worker_is_killed_runs_again(sqlite_store, mon
 
 
 def test_a_supervisor_that_is_told_to_stop_hands_its_check_to_the_next(sqlite_store, monkeypatch):
-    check_id = experiments.submit_experiment(sqlite_store, toy()).sensitivity
+    check_id = submission.submit_experiment(sqlite_store, toy()).sensitivity
     first, stop = Supervisor(sqlite_store, lambda: 2), Event()
     first.step()
     states = [sensitivity.read(sqlite_store, check_id).state]

@@ -9,13 +9,14 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import migrations
-from schemas.spec import ExperimentSpec
-from services import execution, experiments
-from services.core.loop import repetition
-from services.simulation import setting
-from services.store.models import REVISION
-from services.store.session import Store
+from gaplab import migrations
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.models import REVISION
+from gaplab.services.store.session import Store
 
 FOLDER = Path(__file__).parent / "kept"
 
@@ -57,7 +58,7 @@ def _fill(url: str) -> None:
     migrations.upgrade(url)
     store = Store(url)
     for name, spec in SPECS.items():
-        experiments.submit_experiment(store, spec)
+        submission.submit_experiment(store, spec)
         for claim in execution.claim(store, "the supervisor that is gone", 2):
             steps = list(repetition(setting(claim.spec, claim.number)))
             wanted = len(steps) if name == "complete" else STEPS_HALF_WAY[claim.number]

@@ -5,13 +5,15 @@ import lzma
 import pytest
 from alembic.script import ScriptDirectory
 
-import migrations
-from schemas.lifecycle import State
-from schemas.spec import ExperimentSpec
-from services import execution, experiments, reports
-from services.core.loop import repetition
-from services.simulation import setting
-from services.store.session import Store
+from gaplab import migrations
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.experiments import submission
+from gaplab.services.results import curves
+from gaplab.services.running import execution
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.session import Store
 from tests.migrations.keep import FOLDER, SPECS, keep
 
 KEPT = sorted(FOLDER.glob("*.db.xz"))
@@ -39,35 +41,35 @@ def compute(store):
 
 def numbers(store, experiment):
     """Every number that the experiment found, but for when and by whom it was found."""
-    samples = experiments.list_samples(store, experiment).items
+    samples = submission.list_samples(store, experiment).items
     return (
         [each.model_dump(exclude={"measured_at"}) for each in samples],
-        experiments.list_simulators(store, experiment).items,
-        reports.curve(store, experiment).points,
-        [each.rollouts_done for each in experiments.list_repetitions(store, experiment)],
+        submission.list_simulators(store, experiment).items,
+        curves.curve(store, experiment).points,
+        [each.rollouts_done for each in submission.list_repetitions(store, experiment)],
     )
 
 
 def test_it_goes_on_to_the_same_end_as_a_run_that_never_stopped(store):
-    kept = {each.name: each for each in experiments.list_experiments(store).items}
+    kept = {each.name: each for each in submission.list_experiments(store).items}
     before = numbers(store, kept["complete"].id)
     assert kept["complete"].state is State.COMPLETED
     assert kept["half-way"].state is State.RUNNING
     assert set(kept) == set(SPECS)
 
     assert execution.requeue_lost(store, stale_after_s=-1) == 2
-    fresh = {name: experiments.submit_experiment(store, stored(store, each.id)).id for name, each in kept.items()}
+    fresh = {name: submission.submit_experiment(store, stored(store, each.id)).id for name, each in kept.items()}
     compute(store)
 
     assert numbers(store, kept["complete"].id) == before
     for name, again in fresh.items():
-        assert experiments.read_experiment(store, kept[name].id).state is State.COMPLETED
+        assert submission.read_experiment(store, kept[name].id).state is State.COMPLETED
         assert numbers(store, kept[name].id) == numbers(store, again)
 
 
 def stored(store, experiment):
     """The spec with nothing hidden, as the repetitions of the experiment have it."""
-    spec = experiments.read_experiment(store, experiment).spec
+    spec = submission.read_experiment(store, experiment).spec
     truth = {"static_friction": 1.0, "dynamic_friction": 0.8}
     return ExperimentSpec.model_validate(spec | {"reality": spec["reality"] | {"parameters": truth}})
 

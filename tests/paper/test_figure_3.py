@@ -5,11 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from schemas.spec import ExperimentSpec
-from services.core.loop import repetition
-from services.core.types import Probed, Tuned
-from services.resolution import resolve_experiment
-from services.simulation import setting
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.types import Probed, Tuned
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
 
 ITERATIONS, REPETITIONS = 6, 8
 TRUTH = np.array([1.0, 0.8, 0.0])

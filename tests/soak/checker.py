@@ -5,9 +5,9 @@ Each check takes the history and the evidence and gives a sentence for each viol
 
 from collections import Counter, defaultdict
 
-from schemas.lifecycle import State
-from schemas.spec import ExperimentSpec, StudySpec
-from services.resolution import resolve_experiment, resolve_study
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.specs.resolution import resolve_experiment, resolve_study
 from tests.soak.evidence import undisturbed
 
 GIVEN_UP = "lost 5 times without a step in between"

@@ -11,7 +11,7 @@ from threading import Event, Thread
 
 import httpx2
 
-from schemas.lifecycle import State
+from gaplab.schemas.lifecycle import State
 
 VERBS = {"cancel": 2, "pause": 3, "resume": 4, "stop": 1, "extend": 2}
 """Those that are used, if the service has them, and how often compared with each other."""

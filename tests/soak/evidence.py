@@ -7,13 +7,13 @@ from hashlib import sha256
 
 from sqlalchemy import select
 
-from schemas.spec import ExperimentSpec
-from services.core.loop import repetition
-from services.core.types import Measured, Probed, Step, Tuned
-from services.simulation import setting
-from services.store import mapping
-from services.store.models import ExperimentRow, RepetitionRow, SensitivityRow, StudyRow
-from services.store.repository.steps import logs
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.types import Measured, Probed, Step, Tuned
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store import mapping
+from gaplab.services.store.models import ExperimentRow, RepetitionRow, SensitivityRow, StudyRow
+from gaplab.services.store.queries.steps import logs
 from tests.soak import witness
 
 

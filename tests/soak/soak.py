@@ -8,7 +8,7 @@ from pathlib import Path
 
 import httpx2
 
-from services.store.session import Store
+from gaplab.services.store.session import Store
 from tests.soak import checker, faults
 from tests.soak.clients import Clients
 from tests.soak.evidence import checks_under_way, gather

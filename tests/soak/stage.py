@@ -17,8 +17,8 @@ from threading import Event, Thread
 
 import httpx2
 
-import migrations
-from services.core.errors import StoreUnavailable
+from gaplab import migrations
+from gaplab.services.core.errors import StoreUnavailable
 from tests.soak import witness
 
 RESTART_S = 1.0
@@ -102,7 +102,7 @@ class Stage:
         """Migrate, set the witness, start the processes, and wait until the API answers."""
         migrations.upgrade(self.database.url)
         witness.install(self.database.url)
-        for name, module in (("service", "api.cli"), ("second", "workers")):
+        for name, module in (("service", "gaplab"), ("second", "gaplab.workers")):
             log = self._folder / f"{name}.log"
             self._kept.append(Kept([sys.executable, "-m", module, "serve"], log, self._environment))
         assert until(self.answers, 120), self.logs()
@@ -151,9 +151,9 @@ class Stage:
 
 def role_of(command):
     program = command.partition(" ")[0]
-    if "-m api.cli serve" in command:
+    if "-m gaplab serve" in command:
         return "api"
-    if "-m workers serve" in command:
+    if "workers serve" in command:
         return "supervisor"
     if command.startswith("ray::"):
         return "worker"

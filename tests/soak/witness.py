@@ -7,7 +7,7 @@ from collections import namedtuple
 
 from sqlalchemy import text
 
-from services.store.session import Store
+from gaplab.services.store.session import Store
 
 Move = namedtuple("Move", "id repetition was state epoch_was epoch owner steps_was steps at")
 

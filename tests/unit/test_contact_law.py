@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from services.core.robots.quadruped import Quadruped
-from services.engines.mujoco.law import Drive, coast, drive, press, settings, spread, touch
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.engines.mujoco.law import Drive, coast, drive, press, settings, spread, touch
 
 WORLD = Quadruped().world
 STEP_S = WORLD.time_step_s

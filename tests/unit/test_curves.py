@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from services.core.curves import curve_point, curve_points
+from gaplab.services.core.curves import curve_point, curve_points
 
 RECORDED = np.array([[0.9, 1.2], [0.8, 1.4], [1.0, np.nan]])
 

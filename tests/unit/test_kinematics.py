@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from services.core.kinematics import about, body_poses, clearances_m, product, rotated
-from services.core.robots.quadruped import Quadruped
-from services.core.world import Body, Box, Joint, Motor, Sphere, World
-from services.shapes import labels, shapes_of
+from gaplab.services.core.kinematics import about, body_poses, clearances_m, product, rotated
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.world import Body, Box, Joint, Motor, Sphere, World
+from gaplab.services.replay.shapes import labels, shapes_of
 
 QUARTER = np.pi / 2
 MOTOR = Motor(0.1, 1.0)
@@ -53,7 +53,7 @@ def test_clearance_is_of_the_lowest_point():
 
 
 def test_bullet_has_the_bodies_at_the_same_places():
-    from services.engines.pybullet import PyBullet
+    from gaplab.services.engines.pybullet import PyBullet
 
     robot, engine = Quadruped(), PyBullet()
     scene = engine._scenes[robot.world]

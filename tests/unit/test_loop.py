@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.core.errors import PluginBroken
-from services.core.loop import History, next_step, recorded_fitness, repetition
-from services.core.strategies import strategies
-from services.core.strategies.base import EnsembleOptions, Strategy
-from services.core.strategies.informative import Informative
-from services.core.types import Budget, Measured, Probed, Sample, Selected, Transferred, Tuned
+from gaplab.services.core.errors import PluginBroken
+from gaplab.services.core.loop import History, next_step, recorded_fitness, repetition
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.strategies.base import EnsembleOptions, Strategy
+from gaplab.services.core.strategies.informative import Informative
+from gaplab.services.core.types import Budget, Measured, Probed, Sample, Selected, Transferred, Tuned
 from tests.fakes import CountedReality, Recorder, flat, paraboloid, small_setting
 
 PHASES = (Selected, Measured, Tuned, Transferred, Probed)

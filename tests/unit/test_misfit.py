@@ -5,8 +5,8 @@ from math import inf, nan
 import numpy as np
 import pytest
 
-from services.core.misfit import Tuning, misfit_point, remarks
-from services.core.types import Space
+from gaplab.services.core.misfit import Tuning, misfit_point, remarks
+from gaplab.services.core.types import Space
 
 SPACE = Space.box([0.0, 1.0], [1.0, 3.0])
 NAMES = ("grip", "bounce")

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from schemas.plugin import PluginRef
-from services import plugins
-from services.core import outside
-from services.core.errors import PluginBroken
-from services.core.registry import Registry
-from services.core.strategies.base import Strategy
-from services.core.tunables.base import Tunable
-from services.engines.base import Engine
+from gaplab.schemas.plugin import PluginRef
+from gaplab.services.core import external_plugins
+from gaplab.services.core.errors import PluginBroken
+from gaplab.services.core.registry import Registry
+from gaplab.services.core.strategies.base import Strategy
+from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.engines.base import Engine
+from gaplab.services.plugins import folders
 
 CAREFUL = '''
 """A strategy."""
@@ -48,15 +48,15 @@ def put(tmp_path: Path) -> Iterator[Put]:
         home.mkdir(exist_ok=True)
         for name, text in files.items():
             (home / f"{name}.py").write_text(text)
-        outside.look_in((*outside.folders(), home))
+        external_plugins.look_in((*external_plugins.folders(), home))
         return home
 
     yield write
-    outside.look_in(())
+    external_plugins.look_in(())
 
 
 def strategies() -> Registry[Strategy]:
-    return Registry("strategy", "services.core.strategies", Strategy)
+    return Registry("strategy", "gaplab.services.core.strategies", Strategy)
 
 
 def test_a_file_in_the_folder_is_a_plug_in_among_gaplabs_own(put: Put):
@@ -75,7 +75,7 @@ def test_a_file_in_the_folder_is_a_plug_in_among_gaplabs_own(put: Put):
 def test_it_belongs_to_its_kind_only(put: Put):
     put(careful=CAREFUL)
 
-    assert "careful" not in Registry("tunable", "services.core.tunables", Tunable)
+    assert "careful" not in Registry("tunable", "gaplab.services.core.tunables", Tunable)
 
 
 def test_files_import_from_each_other_and_one_with_an_underscore_is_only_for_that(put: Put):
@@ -120,24 +120,24 @@ def test_a_broken_file_is_a_sentence(put: Put, text: str, says: str):
 
 
 def test_a_folder_that_is_not_there_is_a_sentence(tmp_path: Path):
-    outside.look_in((tmp_path / "nowhere",))
+    external_plugins.look_in((tmp_path / "nowhere",))
     try:
         with pytest.raises(PluginBroken, match=r"there is no folder .*nowhere"):
             list(strategies())
     finally:
-        outside.look_in(())
+        external_plugins.look_in(())
 
 
 def test_what_is_in_the_folder_has_a_hash_and_files_that_python_keeps_have_none(put: Put):
     home = put(careful=CAREFUL)
     list(strategies())
-    before, digest = plugins.digests(), plugins.digest()
+    before, digest = folders.digests(), folders.digest()
 
     (home / "careful.py").write_text(CAREFUL + "\n# another\n")
 
     assert set(before) == {"careful.py"}
-    assert plugins.digests()["careful.py"] != before["careful.py"]
-    assert plugins.digest() != digest
+    assert folders.digests()["careful.py"] != before["careful.py"]
+    assert folders.digest() != digest
 
 
 def test_data_counts_in_a_package_and_not_beside_modules(put: Put):
@@ -147,7 +147,7 @@ def test_data_counts_in_a_package_and_not_beside_modules(put: Put):
         (home / folder / file).write_text("1.0")
     (home / "gaplab.db").write_text("a database")
 
-    assert set(plugins.digests()) == {"careful.py", "glide/__init__.py", "glide/friction.csv"}
+    assert set(folders.digests()) == {"careful.py", "glide/__init__.py", "glide/friction.csv"}
 
 
 def test_a_package_may_have_its_plug_in_in_any_of_its_files(put: Put):
@@ -158,8 +158,8 @@ def test_a_package_may_have_its_plug_in_in_any_of_its_files(put: Put):
 
     found = strategies()["careful"]
 
-    assert outside.file_of(found) == "thorough/core.py"
-    assert plugins.digest_of("thorough/core.py") == plugins.digest_of("thorough/__init__.py")
+    assert external_plugins.file_of(found) == "thorough/core.py"
+    assert folders.digest_of("thorough/core.py") == folders.digest_of("thorough/__init__.py")
 
 
 def test_the_content_of_a_package_is_all_that_is_in_it(put: Put):
@@ -167,23 +167,23 @@ def test_the_content_of_a_package_is_all_that_is_in_it(put: Put):
     package.mkdir()
     (package / "__init__.py").write_text(GLIDE)
     (package / "law.py").write_text("SPEED = 1.0")
-    before, alone = plugins.digest_of("glide/__init__.py"), plugins.digest_of("alone.py")
+    before, alone = folders.digest_of("glide/__init__.py"), folders.digest_of("alone.py")
 
     (package / "law.py").write_text("SPEED = 2.0")
 
-    assert plugins.digest_of("glide/__init__.py") != before
-    assert plugins.digest_of("alone.py") == alone == plugins.digests()["alone.py"]
+    assert folders.digest_of("glide/__init__.py") != before
+    assert folders.digest_of("alone.py") == alone == folders.digests()["alone.py"]
 
 
 def test_without_folders_there_is_nothing_to_tell():
-    assert plugins.digests() == {}
-    assert plugins.digest() == "none"
+    assert folders.digests() == {}
+    assert folders.digest() == "none"
 
 
 ELSEWHERE = """
-from services.versions import provenance, versions
-from services.catalogue import catalogue
-from services.store.repository.provenance import decisive
+from gaplab.services.running.versions import provenance, versions
+from gaplab.services.plugins.catalogue import catalogue
+from gaplab.services.store.queries.provenance import decisive
 
 found = provenance()
 print("careful" in [each.name for each in catalogue().strategies])
@@ -203,7 +203,7 @@ for strategy in ("careful", "random"):
 GLIDE = '''
 """An engine."""
 
-from services.engines.analytic import Analytic
+from gaplab.services.engines.analytic import Analytic
 
 
 class Glide(Analytic):
@@ -240,11 +240,11 @@ def test_every_process_with_the_variable_has_them_and_their_content_decides_who_
     assert before[4] == careful[4] != both[4]  # of an experiment with a strategy of gaplab's own
 
 
-@pytest.mark.parametrize("module", ["api", "workers"])
+@pytest.mark.parametrize("module", ["gaplab.api", "gaplab.workers"])
 def test_a_process_does_not_start_with_a_broken_plug_in(tmp_path: Path, module: str):
     (tmp_path / "broken.py").write_text("1 / 0")
     environment = os.environ | {"GAPLAB_PLUGINS": str(tmp_path), "GAPLAB_DATABASE_URL": "sqlite://", "GAPLAB_PORT": "1"}
-    arguments = ["serve"] if module == "workers" else []
+    arguments = ["serve"] if module == "gaplab.workers" else []
 
     done = subprocess.run(
         [sys.executable, "-m", module, *arguments], env=environment, capture_output=True, text=True, check=False

@@ -1,7 +1,7 @@
 """Which tables and columns an archive has: everything, or a reason why not."""
 
-from services.store.models import Base
-from services.store.portable import COLUMNS_LEFT_OUT, EXPORTED, LEFT_OUT, Kind, columns_of, table_of
+from gaplab.services.store.archive_columns import COLUMNS_LEFT_OUT, EXPORTED, LEFT_OUT, Kind, columns_of, table_of
+from gaplab.services.store.models import Base
 
 
 def test_every_table_is_exported_or_left_out_for_a_reason():

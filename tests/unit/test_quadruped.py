@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.core.robots import quadruped
-from services.core.robots.quadruped import Quadruped
-from services.core.world import Motion, Trajectory
+from gaplab.services.core.robots import quadruped
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.world import Motion, Trajectory
 
 ROBOT = Quadruped()
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from services.catalogue import catalogue
-from services.settings import Settings
+from gaplab.services.plugins.catalogue import catalogue
+from gaplab.services.settings import Settings
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from schemas.plugin import PluginRef
-from services.core.loop import History, next_step, repetition
-from services.core.optimizers import optimizers
-from services.core.recall import TOGETHER, Recall, pack, unpack
-from services.core.strategies import strategies
-from services.core.types import Budget
+from gaplab.schemas.plugin import PluginRef
+from gaplab.services.core.loop import History, next_step, repetition
+from gaplab.services.core.optimizers import optimizers
+from gaplab.services.core.recall import TOGETHER, Recall, pack, unpack
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.types import Budget
 from tests.fakes import Recorder, flat, paraboloid, small_setting
 
 BUDGET = Budget(controller_evaluations=24, selection_evaluations=20, simulator_evaluations=24, reuse_transfer=False)

@@ -8,9 +8,9 @@ from pymoo.algorithms.soo.nonconvex.ga import FitnessSurvival
 from pymoo.core.population import Population as PymooPopulation
 from pymoo.core.problem import Problem
 
-from services.core.optimizers.base import Population
-from services.core.optimizers.replacement import least_fit, less_fit_of_most_similar
-from services.core.types import Space
+from gaplab.services.core.optimizers.base import Population
+from gaplab.services.core.optimizers.replacement import least_fit, less_fit_of_most_similar
+from gaplab.services.core.types import Space
 
 SPACE = Space.box([0.0, 0.0], [1.0, 10.0])
 PHASE = Space.box([-1.0, 0.0], [3.0, 10.0], [True, False])

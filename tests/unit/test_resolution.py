@@ -2,12 +2,12 @@
 
 import pytest
 
-from schemas.spec import ExperimentSpec, Schedule, StudySpec
-from services.budgets import PRESETS
-from services.core.errors import InvalidSpec
-from services.core.robots.quadruped import Quadruped
-from services.engines import engines
-from services.resolution import expected_rollouts, resolve_experiment, resolve_study
+from gaplab.schemas.spec import ExperimentSpec, Schedule, StudySpec
+from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.engines import engines
+from gaplab.services.specs.presets import PRESETS
+from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment, resolve_study
 
 EMBODIED = [name for name, engine in engines.items() if engine.runs(Quadruped().world)]
 
@@ -133,7 +133,7 @@ def test_an_ensemble_larger_than_the_search_is_refused():
 
 
 def test_an_engine_that_is_not_installed_is_refused_with_its_install_line(monkeypatch):
-    from services.engines import engines
+    from gaplab.services.engines import engines
 
     monkeypatch.setattr(engines["pybullet"], "library", "a_library_that_is_not_there")
 

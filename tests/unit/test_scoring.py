@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from services.core.scoring import simulator_weights, uniqueness_penalty, weighted_deviation, weighted_mean
-from services.core.types import Sample
+from gaplab.services.core.scoring import simulator_weights, uniqueness_penalty, weighted_deviation, weighted_mean
+from gaplab.services.core.types import Sample
 
 FITNESSES = np.array([[1.0, 3.0], [2.0, 2.0]])
 WEIGHTS = np.array([0.75, 0.25])

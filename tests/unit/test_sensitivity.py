@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from schemas.sensitivity import Verdict
-from services.core.optimizers.steady_state import SteadyState
-from services.core.sensitivity import (
+from gaplab.schemas.sensitivity import Verdict
+from gaplab.services.core.optimizers.steady_state import SteadyState
+from gaplab.services.core.sensitivity import (
     Effort,
     Subject,
     check,
@@ -16,7 +16,7 @@ from services.core.sensitivity import (
     verdict,
     warning,
 )
-from services.core.types import Space
+from gaplab.services.core.types import Space
 from tests.fakes import Recorder, paraboloid
 
 EFFORT = Effort(points=17, evaluations=40)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from services.core.counted import Counted
-from services.core.robots.toy_function import ToyFunction
-from services.engines.analytic import Analytic
-from services.simulation import HiddenReality, Simulation
+from gaplab.services.core.counted import Counted
+from gaplab.services.core.robots.toy_function import ToyFunction
+from gaplab.services.engines.analytic import Analytic
+from gaplab.services.specs.assembly import HiddenReality, Simulation
 
 
 class Endless(ToyFunction):

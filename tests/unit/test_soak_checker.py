@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from schemas.spec import ExperimentSpec, StudySpec
-from services.resolution import resolve_experiment, resolve_study
+from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.specs.resolution import resolve_experiment, resolve_study
 from tests.soak.checker import violations
 from tests.soak.evidence import Evidence, Experiment, Repetition, undisturbed
 from tests.soak.history import Record

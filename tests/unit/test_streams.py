@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from services.core.streams import stream
+from gaplab.services.core.streams import stream
 
 PATHS = [
     ("simulated_fit", 0, 0, "tune"),

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
-from services.core.tuning import Misfit, draw_simulators, simulator_fitness, squared_errors, tune
-from services.core.types import Sample, Space
+from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
+from gaplab.services.core.tuning import Misfit, draw_simulators, simulator_fitness, squared_errors, tune
+from gaplab.services.core.types import Sample, Space
 from tests.fakes import TRUTH, Recorder, paraboloid
 
 SPACE = Space.box([0.0, 0.0], [1.0, 1.0])

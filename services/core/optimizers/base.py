@@ -9,9 +9,9 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.random import Generator
 
-from services.core.arrays import FloatArray, Genomes
-from services.core.registry import Plugin
-from services.core.types import Space
+from gaplab.services.core.arrays import FloatArray, Genomes
+from gaplab.services.core.registry import Plugin
+from gaplab.services.core.types import Space
 
 Evaluate: TypeAlias = Callable[[Genomes, FloatArray], FloatArray]
 """`(n, g)` genomes, `(n,)` bounds -> `(n,)`: the fitness of each, maximised; not finite where it has none.

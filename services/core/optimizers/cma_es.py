@@ -9,11 +9,11 @@ import numpy as np
 from numpy.random import Generator
 from pydantic import Field
 
-from schemas.base import Frozen
-from services.core.arrays import FloatArray, Genome, Genomes
-from services.core.optimizers.base import Optimizer, Population
-from services.core.optimizers.replacement import insert, least_fit, less_fit_of_most_similar
-from services.core.types import Space
+from gaplab.schemas.base import Frozen
+from gaplab.services.core.arrays import FloatArray, Genome, Genomes
+from gaplab.services.core.optimizers.base import Optimizer, Population
+from gaplab.services.core.optimizers.replacement import insert, least_fit, less_fit_of_most_similar
+from gaplab.services.core.types import Space
 
 CONVERGED = 1e-4
 """A search that has shrunk to this share of each gene's extent starts anew elsewhere."""

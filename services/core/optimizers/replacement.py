@@ -5,8 +5,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from services.core.arrays import FloatArray, Genome, Genomes
-from services.core.optimizers.base import Population
+from gaplab.services.core.arrays import FloatArray, Genome, Genomes
+from gaplab.services.core.optimizers.base import Population
 
 Replacement: TypeAlias = Callable[[Population], int]
 """The index of the member to drop."""

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.random import Generator
 from pydantic import Field
 
-from schemas.base import Frozen
-from services.core.arrays import FloatArray, Genome, Genomes
-from services.core.optimizers.base import Optimizer, Population
-from services.core.optimizers.replacement import (
+from gaplab.schemas.base import Frozen
+from gaplab.services.core.arrays import FloatArray, Genome, Genomes
+from gaplab.services.core.optimizers.base import Optimizer, Population
+from gaplab.services.core.optimizers.replacement import (
     Bound,
     Replacement,
     bound_of_least_fit,

@@ -3,10 +3,10 @@
 from abc import abstractmethod
 from typing import Any, ClassVar
 
-from services.core.arrays import FloatArray, Genome
-from services.core.registry import Plugin
-from services.core.types import Space
-from services.core.world import Motion, Trajectory, World
+from gaplab.services.core.arrays import FloatArray, Genome
+from gaplab.services.core.registry import Plugin
+from gaplab.services.core.types import Space
+from gaplab.services.core.world import Motion, Trajectory, World
 
 
 class Robot(Plugin):

@@ -5,11 +5,11 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from schemas.base import Frozen, Real
-from services.core.arrays import FloatArray, Genome, frozen
-from services.core.robots.base import Robot
-from services.core.types import Space
-from services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, Trajectory, Vector, World
+from gaplab.schemas.base import Frozen, Real
+from gaplab.services.core.arrays import FloatArray, Genome, frozen
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.types import Space
+from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, Trajectory, Vector, World
 
 BODY_M: Vector = (0.30, 0.20, 0.06)
 BODY_KG = 1.5

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from services.core.arrays import FloatArray, Genome, frozen
-from services.core.robots.base import Robot
-from services.core.types import Space
-from services.core.world import Material, Motion, Trajectory, World
+from gaplab.services.core.arrays import FloatArray, Genome, frozen
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.types import Space
+from gaplab.services.core.world import Material, Motion, Trajectory, World
 
 
 class ToyFunction(Robot):

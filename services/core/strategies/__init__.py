@@ -1,6 +1,6 @@
 """Strategies: one file in this folder is one strategy."""
 
-from services.core.registry import Registry
-from services.core.strategies.base import Strategy
+from gaplab.services.core.registry import Registry
+from gaplab.services.core.strategies.base import Strategy
 
 strategies: Registry[Strategy] = Registry("strategy", __name__, Strategy)

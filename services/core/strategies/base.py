@@ -7,10 +7,10 @@ from typing import Annotated, Any, ClassVar, Protocol, TypeAlias
 from numpy.random import Generator
 from pydantic import Field
 
-from schemas.base import Frozen
-from services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
-from services.core.registry import Plugin
-from services.core.types import Belief
+from gaplab.schemas.base import Frozen
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
+from gaplab.services.core.registry import Plugin
+from gaplab.services.core.types import Belief
 
 Score: TypeAlias = Callable[[Genomes, Fitnesses], FloatArray]
 """`(n, g)` genomes and their `(n, m)` fitnesses in the believed simulators -> `(n,)`, maximised."""

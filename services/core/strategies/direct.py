@@ -1,6 +1,6 @@
 """The baseline that every strategy is measured against."""
 
-from services.core.strategies.simulated_fit import SimulatedFit
+from gaplab.services.core.strategies.simulated_fit import SimulatedFit
 
 
 class Direct(SimulatedFit):

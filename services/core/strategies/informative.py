@@ -2,10 +2,10 @@
 
 from numpy.random import Generator
 
-from services.core.arrays import Genome
-from services.core.scoring import simulator_weights, weighted_deviation
-from services.core.strategies.base import EnsembleOptions, Search, Strategy
-from services.core.types import Belief
+from gaplab.services.core.arrays import Genome
+from gaplab.services.core.scoring import simulator_weights, weighted_deviation
+from gaplab.services.core.strategies.base import EnsembleOptions, Search, Strategy
+from gaplab.services.core.types import Belief
 
 
 class Informative(Strategy):

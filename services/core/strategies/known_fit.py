@@ -5,10 +5,10 @@ from typing import Annotated
 from numpy.random import Generator
 from pydantic import Field
 
-from schemas.base import Frozen
-from services.core.arrays import Genome
-from services.core.strategies.base import Search, Strategy
-from services.core.types import Belief
+from gaplab.schemas.base import Frozen
+from gaplab.services.core.arrays import Genome
+from gaplab.services.core.strategies.base import Search, Strategy
+from gaplab.services.core.types import Belief
 
 
 class KnownFitOptions(Frozen):

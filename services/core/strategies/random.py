@@ -2,9 +2,9 @@
 
 from numpy.random import Generator
 
-from services.core.arrays import Genome
-from services.core.strategies.base import Search, Strategy
-from services.core.types import Belief
+from gaplab.services.core.arrays import Genome
+from gaplab.services.core.strategies.base import Search, Strategy
+from gaplab.services.core.types import Belief
 
 
 class Random(Strategy):

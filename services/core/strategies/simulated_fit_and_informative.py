@@ -5,10 +5,10 @@ from typing import Annotated
 from numpy.random import Generator
 from pydantic import Field
 
-from services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
-from services.core.scoring import simulator_weights, weighted_deviation, weighted_mean
-from services.core.strategies.base import EnsembleOptions, Search, Strategy
-from services.core.types import Belief
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
+from gaplab.services.core.scoring import simulator_weights, weighted_deviation, weighted_mean
+from gaplab.services.core.strategies.base import EnsembleOptions, Search, Strategy
+from gaplab.services.core.types import Belief
 
 Weight = Annotated[float, Field(strict=True, ge=0, le=1e6)]
 

@@ -2,10 +2,10 @@
 
 from numpy.random import Generator
 
-from services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
-from services.core.scoring import uniqueness_penalty
-from services.core.strategies.base import Search, Strategy
-from services.core.types import Belief
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
+from gaplab.services.core.scoring import uniqueness_penalty
+from gaplab.services.core.strategies.base import Search, Strategy
+from gaplab.services.core.types import Belief
 
 
 class SimulatedFitAndUnique(Strategy):

@@ -1,6 +1,6 @@
 """Tunables: one file in this folder is one parameter of the simulator."""
 
-from services.core.registry import Registry
-from services.core.tunables.base import Tunable
+from gaplab.services.core.registry import Registry
+from gaplab.services.core.tunables.base import Tunable
 
 tunables: Registry[Tunable] = Registry("tunable", __name__, Tunable)

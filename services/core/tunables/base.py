@@ -4,8 +4,8 @@ from abc import abstractmethod
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from services.core.registry import Plugin
-from services.core.world import World
+from gaplab.services.core.registry import Plugin
+from gaplab.services.core.world import World
 
 
 class Tunable(Plugin):

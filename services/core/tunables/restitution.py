@@ -1,6 +1,6 @@
 """Restitution of robot and ground."""
 
-from services.core.tunables.base import MaterialTunable
+from gaplab.services.core.tunables.base import MaterialTunable
 
 
 class Restitution(MaterialTunable):

@@ -1,6 +1,6 @@
 """Static friction of robot and ground."""
 
-from services.core.tunables.base import MaterialTunable
+from gaplab.services.core.tunables.base import MaterialTunable
 
 
 class StaticFriction(MaterialTunable):

@@ -1,5 +1,5 @@
 """MuJoCo: the fast engine. Read `engine` first, then `scene`, `model`, and `law`, which is where the physics is."""
 
-from services.engines.mujoco.engine import MuJoCo
+from gaplab.services.engines.mujoco.engine import MuJoCo
 
 __all__ = ["MuJoCo"]

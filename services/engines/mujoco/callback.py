@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from services.engines.mujoco.law import DOFS, ROWS, STEP, SWEEPS, coast, drive, press, spread, touch
-from services.engines.mujoco.layout import layout
+from gaplab.services.engines.mujoco.law import DOFS, ROWS, STEP, SWEEPS, coast, drive, press, spread, touch
+from gaplab.services.engines.mujoco.layout import layout
 
 MANY = 1 << 20
 """Length of a view whose true length compiled code does not ask for."""

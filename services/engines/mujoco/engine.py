@@ -9,13 +9,13 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from schemas.base import Frozen
-from services.core.arrays import FloatArray
-from services.core.errors import EngineUnavailable
-from services.core.world import Material, Motion, Recording, Trajectory, World
-from services.engines.base import ALL_FIELDS, Engine
-from services.engines.mujoco.scene import Scene
-from services.engines.stepping import WarmScenes, recording
+from gaplab.schemas.base import Frozen
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.errors import EngineUnavailable
+from gaplab.services.core.world import Material, Motion, Recording, Trajectory, World
+from gaplab.services.engines.base import ALL_FIELDS, Engine
+from gaplab.services.engines.mujoco.scene import Scene
+from gaplab.services.engines.stepping import WarmScenes, recording
 
 
 class MuJoCoOptions(Frozen):

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from services.core.arrays import FloatArray
-from services.core.world import World
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.world import World
 
 SLIDES_M_S = 0.01
 """A contact that moves along the ground faster than this slides: a tenth of the speed that gravity adds in 1/100 s."""

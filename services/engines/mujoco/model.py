@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from services.core.world import Body, Box, Joint, Material, World
-from services.engines.mujoco.law import EACH, FIRST, Drive
+from gaplab.services.core.world import Body, Box, Joint, Material, World
+from gaplab.services.engines.mujoco.law import EACH, FIRST, Drive
 
 GROUND = "the ground"
 

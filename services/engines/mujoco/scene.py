@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from services.core.arrays import FloatArray
-from services.core.world import Material, Motion, World
-from services.engines.mujoco.callback import callbacks
-from services.engines.mujoco.law import settings
-from services.engines.mujoco.model import compiled, driven, drives, paint
-from services.engines.stepping import plausible
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.world import Material, Motion, World
+from gaplab.services.engines.mujoco.callback import callbacks
+from gaplab.services.engines.mujoco.law import settings
+from gaplab.services.engines.mujoco.model import compiled, driven, drives, paint
+from gaplab.services.engines.stepping import plausible
 
 ROWS = 64
 """Rollouts of one call of MuJoCo's, for each thread; more would only take memory, 0.1 MB each for the quadruped."""

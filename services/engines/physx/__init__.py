@@ -1,5 +1,5 @@
 """PhysX through SAPIEN: the paper's own engine. Read `engine` first, then `scene`, then `robot`."""
 
-from services.engines.physx.engine import PhysX
+from gaplab.services.engines.physx.engine import PhysX
 
 __all__ = ["PhysX"]

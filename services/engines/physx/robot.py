@@ -7,8 +7,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from services.core.arrays import FloatArray
-from services.core.world import Body, Box, Joint, Motor, Vector, World
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.world import Body, Box, Joint, Motor, Vector, World
 
 Handle: TypeAlias = Any
 """Something that SAPIEN made: its types cannot be named where the library must not be imported."""

@@ -4,9 +4,9 @@ from types import ModuleType
 
 import numpy as np
 
-from services.core.arrays import FloatArray
-from services.core.world import Material, World
-from services.engines.physx.robot import Handle, build_robot, set_offsets
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.world import Material, World
+from gaplab.services.engines.physx.robot import Handle, build_robot, set_offsets
 
 BOUNCE_THRESHOLD_M_S = 0.2
 """Slower impacts do not bounce; Bullet's threshold too. PhysX's own, 2 m/s, is faster than a walking robot's feet."""

@@ -1,5 +1,5 @@
 """PyBullet: the default engine. Read `engine` first, then `scene` and `stick_slip`."""
 
-from services.engines.pybullet.engine import PyBullet
+from gaplab.services.engines.pybullet.engine import PyBullet
 
 __all__ = ["PyBullet"]

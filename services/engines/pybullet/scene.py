@@ -5,8 +5,8 @@ from types import ModuleType
 
 import numpy as np
 
-from services.core.arrays import FloatArray
-from services.core.world import Body, Box, Joint, Material, World
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.world import Body, Box, Joint, Material, World
 
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
 BASE = -1

@@ -3,8 +3,8 @@
 from math import hypot
 from typing import Any
 
-from services.core.world import Material
-from services.engines.pybullet.scene import Scene
+from gaplab.services.core.world import Material
+from gaplab.services.engines.pybullet.scene import Scene
 
 SLIDES = 0.999
 """A sticking link slides when its friction reaches this share of what the static coefficient allows."""

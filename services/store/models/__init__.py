@@ -17,23 +17,23 @@ The tallies in `repetition` (steps, rollouts, seconds) are kept in the transacti
 that progress is a sum over repetitions and never reads results.
 """
 
-from services.store.models.access import IdempotencyRow as IdempotencyRow
-from services.store.models.access import TokenRow as TokenRow
-from services.store.models.attempts import AttemptRow as AttemptRow
-from services.store.models.base import REVISION as REVISION
-from services.store.models.base import SPEC_VERSION as SPEC_VERSION
-from services.store.models.base import Base as Base
-from services.store.models.base import Number as Number
-from services.store.models.checkpoints import CheckpointRow as CheckpointRow
-from services.store.models.events import EventCounterRow as EventCounterRow
-from services.store.models.events import EventRow as EventRow
-from services.store.models.experiments import ExperimentRow as ExperimentRow
-from services.store.models.experiments import RepetitionRow as RepetitionRow
-from services.store.models.experiments import StudyRow as StudyRow
-from services.store.models.provenance import ExperimentProvenanceRow as ExperimentProvenanceRow
-from services.store.models.provenance import ProvenanceRow as ProvenanceRow
-from services.store.models.provenance import SupervisorRow as SupervisorRow
-from services.store.models.results import IterationRow as IterationRow
-from services.store.models.results import MeasurementRow as MeasurementRow
-from services.store.models.results import SimulatorRow as SimulatorRow
-from services.store.models.sensitivity import SensitivityRow as SensitivityRow
+from gaplab.services.store.models.access import IdempotencyRow as IdempotencyRow
+from gaplab.services.store.models.access import TokenRow as TokenRow
+from gaplab.services.store.models.attempts import AttemptRow as AttemptRow
+from gaplab.services.store.models.base import REVISION as REVISION
+from gaplab.services.store.models.base import SPEC_VERSION as SPEC_VERSION
+from gaplab.services.store.models.base import Base as Base
+from gaplab.services.store.models.base import Number as Number
+from gaplab.services.store.models.checkpoints import CheckpointRow as CheckpointRow
+from gaplab.services.store.models.events import EventCounterRow as EventCounterRow
+from gaplab.services.store.models.events import EventRow as EventRow
+from gaplab.services.store.models.experiments import ExperimentRow as ExperimentRow
+from gaplab.services.store.models.experiments import RepetitionRow as RepetitionRow
+from gaplab.services.store.models.experiments import StudyRow as StudyRow
+from gaplab.services.store.models.provenance import ExperimentProvenanceRow as ExperimentProvenanceRow
+from gaplab.services.store.models.provenance import ProvenanceRow as ProvenanceRow
+from gaplab.services.store.models.provenance import SupervisorRow as SupervisorRow
+from gaplab.services.store.models.results import IterationRow as IterationRow
+from gaplab.services.store.models.results import MeasurementRow as MeasurementRow
+from gaplab.services.store.models.results import SimulatorRow as SimulatorRow
+from gaplab.services.store.models.sensitivity import SensitivityRow as SensitivityRow

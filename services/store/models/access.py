@@ -6,8 +6,8 @@ from typing import Any
 from sqlalchemy import Enum, Index, String
 from sqlalchemy.orm import Mapped, mapped_column
 
-from schemas.access import Role
-from services.store.models.base import Base
+from gaplab.schemas.access import Role
+from gaplab.services.store.models.base import Base
 
 
 class TokenRow(Base):

@@ -5,8 +5,8 @@ from datetime import datetime
 from sqlalchemy import ForeignKey, String, Text
 from sqlalchemy.orm import Mapped, mapped_column
 
-from schemas.lifecycle import Ending
-from services.store.models.base import Base
+from gaplab.schemas.lifecycle import Ending
+from gaplab.services.store.models.base import Base
 
 
 class AttemptRow(Base):

@@ -7,9 +7,9 @@ from typing import Any, ClassVar
 from sqlalchemy import JSON, Dialect, Double, Enum, MetaData, TypeDecorator
 from sqlalchemy.orm import DeclarativeBase
 
-from schemas.lifecycle import Ending, State
-from schemas.records import MeasurementKind
-from services.store.clock import UtcDateTime
+from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.records import MeasurementKind
+from gaplab.services.store.clock import UtcDateTime
 
 REVISION = "0008"
 """The migration that makes these tables; a database at any other revision is not ours to touch."""

@@ -3,7 +3,7 @@
 from sqlalchemy import ForeignKey
 from sqlalchemy.orm import Mapped, mapped_column
 
-from services.store.models.base import Base
+from gaplab.services.store.models.base import Base
 
 
 class CheckpointRow(Base):
@@ -12,7 +12,7 @@ class CheckpointRow(Base):
     Attributes:
         step: its place in the log of its repetition.
         part: its number within the step.
-        answers: digests and fitnesses, as `services.core.recall` packs them; nobody else reads them.
+        answers: digests and fitnesses, as `gaplab.services.core.recall` packs them; nobody else reads them.
         seconds: of work that they took.
     """
 

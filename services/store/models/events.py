@@ -6,9 +6,9 @@ from typing import Any
 from sqlalchemy import BigInteger, Index, Integer, String
 from sqlalchemy.orm import Mapped, mapped_column
 
-from schemas.events import EventKind
-from services.store.clock import now
-from services.store.models.base import Base
+from gaplab.schemas.events import EventKind
+from gaplab.services.store.clock import now
+from gaplab.services.store.models.base import Base
 
 NUMBER = BigInteger().with_variant(Integer, "sqlite")
 """In SQLite, an INTEGER primary key is the row's own number and needs no index of its own."""

@@ -13,8 +13,8 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import Mapped, mapped_column
 
-from schemas.lifecycle import State
-from services.store.models.base import SPEC_VERSION, Base
+from gaplab.schemas.lifecycle import State
+from gaplab.services.store.models.base import SPEC_VERSION, Base
 
 
 class StudyRow(Base):

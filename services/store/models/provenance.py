@@ -6,8 +6,8 @@ from typing import Any
 from sqlalchemy import ForeignKey, String
 from sqlalchemy.orm import Mapped, mapped_column
 
-from services.store.clock import now
-from services.store.models.base import Base
+from gaplab.services.store.clock import now
+from gaplab.services.store.models.base import Base
 
 
 class ProvenanceRow(Base):

@@ -10,9 +10,9 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import Mapped, mapped_column
 
-from schemas.records import MeasurementKind
-from services.store.clock import now
-from services.store.models.base import Base
+from gaplab.schemas.records import MeasurementKind
+from gaplab.services.store.clock import now
+from gaplab.services.store.models.base import Base
 
 
 class IterationRow(Base):

@@ -10,8 +10,8 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import Mapped, mapped_column
 
-from schemas.lifecycle import State
-from services.store.models.base import Base
+from gaplab.schemas.lifecycle import State
+from gaplab.services.store.models.base import Base
 
 
 class SensitivityRow(Base):

@@ -1,0 +1,97 @@
+"""How much a client may send, and how many streams it may hold open."""
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Lock
+
+from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from gaplab.api.http.problems import FRAMEWORK, problem, response
+from gaplab.services.core.errors import LimitReached
+from gaplab.services.settings import Limits, variable_of
+
+RETRY_AFTER_S = 10
+"""Streams come and go with the pages that show them."""
+
+MOST_BYTES_OF = {"/import": 64 * 2**20}
+"""Of the addresses that take more than a spec."""
+
+
+class BodyLimit:
+    """Refuses a body over what its address takes with 413: by what its header announces, and by what really arrives."""
+
+    def __init__(self, app: ASGIApp, most_bytes: int) -> None:
+        self.app = app
+        self._most = most_bytes
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request within the limit."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        most, detail = self._limit_of(scope["path"])
+        announced = Headers(scope=scope).get("content-length", "")
+        if announced.isdecimal() and int(announced[:20]) > most:
+            refusal = response(problem(*FRAMEWORK[413], detail), {"Connection": "close"})
+            await refusal(scope, receive, send)
+            return
+        await self.app(scope, _counted(receive, most, detail), send)
+
+    def _limit_of(self, path: str) -> tuple[int, str]:
+        """In bytes, and in words."""
+        if path in MOST_BYTES_OF:
+            return MOST_BYTES_OF[path], f"The body has more than {MOST_BYTES_OF[path]:,} bytes."
+        which = variable_of("body_bytes")
+        return self._most, f"The body has more than {self._most:,} bytes ({which}); a spec has a few hundred."
+
+
+def _counted(receive: Receive, most: int, detail: str) -> Receive:
+    arrived = 0
+
+    async def count() -> Message:
+        nonlocal arrived
+        message = await receive()
+        arrived += len(message.get("body", b""))
+        if arrived > most:
+            raise HTTPException(413, detail)
+        return message
+
+    return count
+
+
+class Streams:
+    """Streams that are open at this process, within limits for a token and for all.
+
+    with streams.open(caller.token):
+        ...
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._open: Counter[str | None] = Counter()
+        self._lock = Lock()
+
+    @contextmanager
+    def open(self, token: str | None) -> Iterator[None]:
+        """Hold one of this token's streams open for as long as the context lasts.
+
+        Raises:
+            LimitReached: too many are; the message names the limit.
+        """
+        with self._lock:
+            self._check("streams_per_token", self._open[token], "of this token ")
+            self._check("streams", self._open.total(), "")
+            self._open[token] += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._open[token] -= 1
+
+    def _check(self, name: str, present: int, whose: str) -> None:
+        if present >= (limit := getattr(self._limits, name)):
+            msg = f"{present} streams {whose}are open, and more than {limit} may not be ({variable_of(name)})"
+            raise LimitReached(msg, RETRY_AFTER_S)

@@ -1,0 +1,108 @@
+"""Plug-ins from outside this package: every module of some folders, imported as `gaplab_plugins.NAME`."""
+
+import sys
+from collections.abc import Iterator
+from importlib import import_module, invalidate_caches
+from pathlib import Path
+from pkgutil import iter_modules
+from types import ModuleType
+from typing import TypeGuard, TypeVar
+
+from gaplab.services.core.errors import PluginBroken
+
+PACKAGE = "gaplab_plugins"
+"""Has no file of its own. A file of a folder imports another as `from gaplab_plugins.other import …`."""
+
+P = TypeVar("P")
+
+
+def look_in(folders: tuple[Path, ...]) -> None:
+    """From now on these folders are looked in, before registries are used for the first time."""
+    for name in [each for each in sys.modules if each.partition(".")[0] == PACKAGE]:
+        del sys.modules[name]
+    package = ModuleType(PACKAGE, "Plug-ins from outside gaplab.")
+    package.__path__ = [str(each) for each in folders]
+    sys.modules[PACKAGE] = package
+    invalidate_caches()
+
+
+def folders() -> tuple[Path, ...]:
+    """Those that are looked in.
+
+    Raises:
+        PluginBroken: one is no folder.
+    """
+    found = tuple(Path(each) for each in sys.modules[PACKAGE].__path__) if PACKAGE in sys.modules else ()
+    for each in found:
+        if not each.is_dir():
+            msg = f"there is no folder {each} to find plug-ins in"
+            raise PluginBroken(msg)
+    return found
+
+
+def classes(base: type[P]) -> Iterator[type[P]]:
+    """The plug-ins of one kind.
+
+    Raises:
+        PluginBroken: a file cannot be imported, or a class of this kind lacks something.
+    """
+    for module in _modules():
+        for each in vars(module).values():
+            if _is_of(module, each) and issubclass(each, base):
+                _check(each)
+                yield each
+
+
+def file_of(plugin: type) -> str | None:
+    """The file that the class is from, relative to its folder; None for one of gaplab's own."""
+    package, _, name = plugin.__module__.partition(".")
+    if package != PACKAGE:
+        return None
+    is_package = hasattr(sys.modules[plugin.__module__], "__path__")
+    return name.replace(".", "/") + ("/__init__.py" if is_package else ".py")
+
+
+def _modules() -> list[ModuleType]:
+    """Every module of the folders, by name; those that begin with an underscore are only there for others."""
+    found: dict[str, str] = {}
+    for folder in folders():
+        for name in sorted(info.name for info in iter_modules([str(folder)])):
+            if name in found:
+                msg = f"{name}.py is in {found[name]} and in {folder}; a plug-in's file has a name of its own"
+                raise PluginBroken(msg)
+            found[name] = str(folder)
+    return [_imported(name, folder) for name, folder in found.items() if not name.startswith("_")]
+
+
+def _imported(name: str, folder: str) -> ModuleType:
+    try:
+        return import_module(f"{PACKAGE}.{name}")
+    except Exception as error:  # whatever somebody's file does
+        msg = f"{folder}/{name}.py cannot be imported: {type(error).__name__}: {error}"
+        raise PluginBroken(msg) from error
+
+
+def _is_of(module: ModuleType, found: object) -> TypeGuard[type]:
+    """Whether it is a class of this module or package, and not only there for others, as an underscore says."""
+    if not isinstance(found, type) or found.__name__.startswith("_"):
+        return False
+    return found.__module__ == module.__name__ or found.__module__.startswith(f"{module.__name__}.")
+
+
+def _check(plugin: type) -> None:
+    where = f"{plugin.__name__} in {file_of(plugin)}"
+    if missing := [name for name in dir(plugin) if _is_abstract(plugin, name)]:
+        msg = f"{where} does not define {', '.join(missing)}"
+        raise PluginBroken(msg)
+    if not isinstance(getattr(plugin, "name", None), str):
+        msg = f"{where} has no name, by which specs would call it: add name = '…'"
+        raise PluginBroken(msg)
+    try:
+        plugin.describe()  # type: ignore[attr-defined]
+    except Exception as error:
+        msg = f"{where} cannot be described: {type(error).__name__}: {error}"
+        raise PluginBroken(msg) from error
+
+
+def _is_abstract(plugin: type, name: str) -> bool:
+    return bool(getattr(getattr(plugin, name, None), "__isabstractmethod__", False))

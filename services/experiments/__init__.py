@@ -1,0 +1,1 @@
+"""Experiments and studies, as people submit, list, edit and control them."""

@@ -1,0 +1,92 @@
+"""What a study would cost: checked and resolved like one that is submitted, and not stored."""
+
+from collections import defaultdict
+from collections.abc import Mapping
+
+from gaplab.schemas.estimates import EngineCost, EstimateRead, ExperimentCost
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.engines import engines
+from gaplab.services.experiments.limits import check_extent
+from gaplab.services.settings import Limits
+from gaplab.services.specs.resolution import expected_rollouts, is_direct, resolve_study, spec_of
+from gaplab.services.store.queries import costs, supervisors
+from gaplab.services.store.session import Store
+
+LOOKED_AT = 100
+"""Experiments, the newest, whose times are what a rollout is expected to take."""
+
+SILENT_S = 60.0
+"""A supervisor that was not heard of for so long does not work."""
+
+Key = tuple[str, str]
+"""Robot and engine, with their options."""
+
+
+def estimate(store: Store, spec: StudySpec, *, limits: Limits | None = None, cores: int = 1) -> EstimateRead:
+    """What the study would take on so many cores.
+
+    Raises:
+        InvalidSpec: with everything that is wrong with it, as if it were submitted.
+        StoreUnavailable: the database cannot be used now.
+    """
+    resolved = resolve_study(spec)
+    check_extent(resolved, limits)
+    with store.reading() as session:
+        measured = _measured(costs.latest(session, LOOKED_AT))
+        working = sum(age < SILENT_S for age in supervisors.ages(session))
+    found = tuple(_experiment(each, _cost(each, measured)) for each in resolved)
+    total = sum(each.core_seconds for each in found)
+    shared = min(cores, len(resolved) * (spec.max_parallel or cores))
+    return EstimateRead(
+        experiments=found,
+        engines=tuple({cost.engine: cost for cost in (_cost(each, measured) for each in resolved)}.values()),
+        rollouts=sum(each.rollouts for each in found),
+        core_seconds=total,
+        cores=shared,
+        seconds=total / shared,
+        supervisors=working,
+    )
+
+
+def _measured(found: tuple[tuple[dict[str, object], float, int], ...]) -> dict[Key, float]:
+    """Seconds a rollout; of what was computed by two engines only the simulator's counts, which has nearly all."""
+    seconds: dict[Key, float] = defaultdict(float)
+    rollouts: dict[Key, int] = defaultdict(int)
+    for stored, took, count in found:
+        key = _key(spec_of(stored))
+        seconds[key] += took
+        rollouts[key] += count
+    return {key: seconds[key] / count for key, count in rollouts.items() if count and seconds[key]}
+
+
+def _key(spec: ExperimentSpec) -> Key:
+    return spec.robot.model_dump_json(), _engine(spec).model_dump_json()
+
+
+def _engine(spec: ExperimentSpec) -> PluginRef:
+    """The engine that computes it."""
+    engine = spec.reality.engine if is_direct(spec) else spec.engine
+    assert engine is not None  # the spec is resolved
+    return engine
+
+
+def _cost(spec: ExperimentSpec, measured: Mapping[Key, float]) -> EngineCost:
+    engine = _engine(spec)
+    known = measured.get(_key(spec))
+    usual = engines[engine.name].usual_rollout_s
+    return EngineCost(engine=engine.name, seconds_per_rollout=known or usual, measured=known is not None)
+
+
+def _experiment(spec: ExperimentSpec, cost: EngineCost) -> ExperimentCost:
+    repetitions = spec.repetitions or 0
+    rollouts = expected_rollouts(spec) * repetitions
+    return ExperimentCost(
+        name=spec.name or spec.strategy.name,
+        strategy=spec.strategy.name,
+        engine=cost.engine,
+        repetitions=repetitions,
+        iterations=0 if is_direct(spec) else spec.iterations or 0,
+        rollouts=rollouts,
+        core_seconds=rollouts * cost.seconds_per_rollout,
+    )

@@ -1,0 +1,214 @@
+"""Curves: recorded fitness against what it cost, the paper's Fig. 4 for any experiments."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from gaplab.schemas.curves import Curve, CurvePoint
+from gaplab.services.figures.marks import Axis, Figure, Level, Line, Mark, Panel, Table
+from gaplab.services.figures.style import INK, Style, style_of
+from gaplab.services.figures.words import counted, drawable, heading, number, told_apart, with_unit
+
+Band = Literal["interval", "sd"]
+
+BANDS: dict[Band, str] = {
+    "interval": "95\N{NO-BREAK SPACE}% interval of the mean",
+    "sd": "one standard deviation",
+}
+
+EVALUATIONS = "Number of real-world evaluations"
+
+FEW = 5  # repetitions; Student's t widens the interval of fewer to 1.6 SD and more, of two to 9 SD
+
+
+@dataclass(frozen=True)
+class Abscissa:
+    """What a curve is drawn against, in place of the number of real-world evaluations.
+
+    Attributes:
+        label: of the axis.
+        note: what it is, for the caption.
+        at: by experiment and number of real-world evaluations; what is not there is not drawn.
+    """
+
+    label: str
+    note: str
+    at: Mapping[tuple[str, int], float]
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """A curve with its name in the legend, and the points that have a mean and a place: the mean and its x."""
+
+    name: str
+    curve: Curve
+    points: tuple[tuple[float, float, CurvePoint], ...]
+
+
+def curves_figure(
+    curves: Sequence[Curve],
+    *,
+    title: str = "",
+    band: Band | None = None,
+    against: Abscissa | None = None,
+    each: bool = False,
+) -> Figure:
+    """The recorded fitness of experiments against their number of real-world evaluations, or what that cost.
+
+    A point without a mean (no repetition got there yet), or with one too large to be reckoned with, is left out; a band
+    needs two repetitions.
+
+    Args:
+        curves: in the order of the legend.
+        title: above the figure; nothing if empty.
+        band: around the lines; left out: the interval, or the SD if there are too few repetitions for an interval to
+            be narrower than the figure. The direct baseline has always its SD, as in the paper.
+        against: the horizontal axis; left out: the number of real-world evaluations.
+        each: whether every repetition has a thin line behind the mean.
+    """
+    curves = [_drawable(one) for one in curves]
+    band = band or _telling_band(curves)
+    names = told_apart([(one.name, one.experiment) for one in curves])
+    placed = [_placed(name, one, against) for name, one in zip(names, curves, strict=True)]
+    lines = [one for one in placed if not one.curve.direct]
+    levels = [one for one in placed if one.curve.direct and one.points]
+    marks: list[Mark] = [_mean(one, band, style_of(at)) for at, one in enumerate(lines)]
+    marks += [_repetitions(one, against, style_of(at)) for at, one in enumerate(lines) if each and one.points]
+    marks += [_level(one, at) for at, one in enumerate(levels)]
+    span = max([1.0, *(x for one in lines for x, _, _ in one.points)])
+    x = Axis(against.label if against else EVALUATIONS, (-0.02 * span, 1.02 * span), whole=against is None)
+    y = Axis(with_unit("Fitness in reality", {one.unit for one in curves}), _limits(marks))
+    return Figure(
+        name="curves",
+        title=heading(title),
+        panels=(Panel(tuple(marks), x, y),),
+        caption=_caption(lines, levels, BANDS[band], against, each=each),
+        alt=_alt(lines, levels, x, y),
+        table=_table(placed),
+    )
+
+
+def _drawable(curve: Curve) -> Curve:
+    """The curve without what is too large to be reckoned with."""
+    return curve.model_copy(update={"points": tuple(map(_drawable_point, curve.points))})
+
+
+def _drawable_point(point: CurvePoint) -> CurvePoint:
+    known = {name: drawable(getattr(point, name)) for name in ("mean", "sd", "lower", "upper")}
+    return point.model_copy(update={**known, "values": tuple(map(drawable, point.values))})
+
+
+def _placed(name: str, curve: Curve, against: Abscissa | None) -> _Placed:
+    found = [(_place(curve, point, against), point.mean, point) for point in curve.points]
+    return _Placed(
+        name, curve, tuple((x, mean, point) for x, mean, point in found if x is not None and mean is not None)
+    )
+
+
+def _place(curve: Curve, point: CurvePoint, against: Abscissa | None) -> float | None:
+    if against is None or curve.direct:
+        return point.evaluations
+    return against.at.get((curve.experiment, point.evaluations))
+
+
+def _telling_band(curves: Sequence[Curve]) -> Band:
+    counts = [point.n for one in curves if not one.direct for point in one.points if point.n]
+    return "interval" if min(counts, default=FEW) >= FEW else "sd"
+
+
+def _mean(one: _Placed, band: Band, style: Style) -> Line:
+    ends = [_ends(point, band) for _, _, point in one.points]
+    return Line(
+        one.name,
+        tuple(x for x, _, _ in one.points),
+        tuple(mean for _, mean, _ in one.points),
+        style,
+        lower=tuple(lower for lower, _ in ends),
+        upper=tuple(upper for _, upper in ends),
+        hover=tuple(_written(point, n="n = ") for _, _, point in one.points),
+    )
+
+
+def _repetitions(one: _Placed, against: Abscissa | None, style: Style) -> Line:
+    """Every repetition's line as one mark, interrupted between them."""
+    places = [_place(one.curve, point, against) for point in one.curve.points]
+    repetitions = range(max(len(point.values) for point in one.curve.points))
+    x, y = [], []
+    for repetition in repetitions:
+        values = [point.values[repetition] if repetition < len(point.values) else None for point in one.curve.points]
+        x += [*places, None]
+        y += [*(value if place is not None else None for place, value in zip(places, values, strict=True)), None]
+    return Line(one.name, tuple(x), tuple(y), style, faint=True)
+
+
+def _level(one: _Placed, position: int) -> Level:
+    ((_, mean, point), *_) = one.points
+    return Level(one.name, mean, Style(INK, style_of(position + 1).dash, "circle"), *_ends(point, "sd"))
+
+
+def _has_band(point: CurvePoint) -> bool:
+    return point.sd is not None
+
+
+def _ends(point: CurvePoint, band: Band) -> tuple[float | None, float | None]:
+    if band == "interval":
+        return point.lower, point.upper
+    if point.mean is None or point.sd is None:
+        return None, None
+    return point.mean - point.sd, point.mean + point.sd
+
+
+def _limits(marks: Sequence[Mark]) -> tuple[float, float]:
+    """Room for all means, and for as much of what is around them as the means themselves take."""
+    lines = [mark for mark in marks if isinstance(mark, Line)]
+    levels = [mark for mark in marks if isinstance(mark, Level)]
+    means = [y for mark in lines if not mark.faint for y in mark.y if y is not None] + [each.value for each in levels]
+    around = [y for mark in lines for ys in (mark.y, mark.lower, mark.upper) for y in ys if y is not None]
+    around += [end for each in levels for end in (each.value, each.lower, each.upper) if end is not None]
+    if not means:
+        return 0.0, 1.0
+    room = max(max(means) - min(means), 0.1 * abs(max(means)), 1e-9)
+    lowest, highest = max(min(means) - room, min(around)), min(max(means) + room, max(around))
+    margin = 0.05 * max(highest - lowest, room)
+    return lowest - margin, highest + margin
+
+
+def _caption(
+    lines: Sequence[_Placed], levels: Sequence[_Placed], band: str, against: Abscissa | None, *, each: bool
+) -> str:
+    """What a caption must say: n, the bands, the thin lines, the axis, the baseline."""
+    counts = [point.n for one in lines for _, _, point in one.points]
+    bands = f"; bands: {band}" if any(_has_band(point) for one in lines for _, _, point in one.points) else ""
+    parts = [f"Mean over {counted(counts, 'repetition')}{bands}."] if counts else []
+    parts += ["Thin lines: single repetitions."] if counts and each else []
+    parts += [against.note] if against else []
+    parts += [f"{one.name}: evolved in reality itself, {_level_in_words(one)}." for one in levels]
+    return " ".join(parts)
+
+
+def _level_in_words(one: _Placed) -> str:
+    ((_, mean, point), *_) = one.points
+    spread = f" ± {point.sd:.2f} SD" if point.sd is not None else ""
+    return f"{mean:.2f}{spread} (n = {point.n})".replace(" ", "\N{NO-BREAK SPACE}")
+
+
+def _alt(lines: Sequence[_Placed], levels: Sequence[_Placed], x: Axis, y: Axis) -> str:
+    told = [
+        f"{one.name} goes from {number(one.points[0][1])} to {number(one.points[-1][1])}" for one in lines if one.points
+    ]
+    told += [f"{one.name} is at {number(one.points[0][1])}" for one in levels]
+    return f"{y.label} against {x.label[0].lower()}{x.label[1:]}: {'; '.join(told) or 'no results yet'}."
+
+
+def _table(placed: Sequence[_Placed]) -> Table:
+    counts = sorted({point.evaluations for one in placed for _, _, point in one.points})
+    rows = [(one.name, {point.evaluations: _written(point) for _, _, point in one.points}) for one in placed]
+    return Table(
+        ("Mean ± SD (n) after so many evaluations", *map(str, counts)),
+        tuple((name, *(cells.get(count, "") for count in counts)) for name, cells in rows),
+    )
+
+
+def _written(point: CurvePoint, n: str = "") -> str:
+    spread = f" ± {point.sd:.3f}" if point.sd is not None else ""
+    return f"{point.mean:.3f}{spread} ({n}{point.n})"

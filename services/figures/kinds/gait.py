@@ -1,0 +1,116 @@
+"""The gait of a controller: which foot is on the ground when, how high the base is, and how fast it goes."""
+
+from collections.abc import Sequence
+
+from gaplab.schemas.replays import Interval, Replay, ReplayWorld
+from gaplab.services.figures.marks import Axis, Bars, Figure, Level, Line, Mark, Panel, Table
+from gaplab.services.figures.style import INK, Style, style_of
+from gaplab.services.figures.words import heading, limits, number
+
+COUNTED = Style(INK, "dotted", "circle")
+
+Named = tuple[str, ReplayWorld]
+
+
+def gait_figure(replay: Replay, *, title: str | None = None) -> Figure:
+    """Footfalls, height and speed over time, in simulation and in reality.
+
+    Args:
+        replay: whose worlds moved; those whose physics failed are left out.
+        title: above the figure; left out: what it is of.
+    """
+    there = [("In simulation", replay.simulation), ("In reality", replay.reality)]
+    worlds = [(name, world) for name, world in there if world is not None and world.heights_m]
+    whose = "sample" if replay.kind == "sample" else "transferred controller"
+    own = f"The {whose} of iteration {replay.iteration}, repetition {replay.repetition}"
+    time = Axis("Time (s)", (0.0, replay.times_s[-1]))
+    return Figure(
+        name="gait",
+        title=heading(own if title is None else title),
+        panels=(
+            _footfall(replay, worlds, time),
+            _over_time("Height of base (m)", replay, [(name, world.heights_m) for name, world in worlds], time),
+            _over_time("Speed (m/s)", replay, [(name, world.speeds_m_s) for name, world in worlds], time),
+        ),
+        caption=_caption(replay, worlds),
+        alt=f"{own}. {_told(replay, worlds)}",
+        share_x=True,
+        table=_table(replay, worlds),
+        nothing="the physics failed",
+    )
+
+
+def _footfall(replay: Replay, worlds: Sequence[Named], time: Axis) -> Panel:
+    """The first foot above, and of each foot the first world above."""
+    rows = len(replay.feet)
+    marks: list[Mark] = []
+    for place, (name, world) in enumerate(worlds):
+        shift = 0.2 - 0.4 * place if len(worlds) > 1 else 0.0
+        bars = [
+            (begin, end, rows - 1 - foot + shift) for foot, spans in enumerate(world.contacts) for begin, end in spans
+        ]
+        marks.append(Bars(name, tuple(bars), style_of(place), 0.36))
+    ticks = tuple((float(rows - 1 - foot), name) for foot, name in enumerate(replay.feet))
+    return Panel(tuple(marks), time, Axis("On the ground", (-0.6, max(rows, 1) - 0.4), ticks=ticks), height=0.9)
+
+
+def _over_time(label: str, replay: Replay, series: Sequence[tuple[str, Sequence[float]]], time: Axis) -> Panel:
+    lines = [
+        Line(name, replay.times_s, tuple(values), style_of(place), markers=False)
+        for place, (name, values) in enumerate(series)
+    ]
+    marks: tuple[Mark, ...] = (*lines, *_counted(replay)) if lines else ()
+    return Panel(marks, time, Axis(label, limits(each for _, values in series for each in values)))
+
+
+def _counted(replay: Replay) -> tuple[Level, ...]:
+    begin = replay.counted_s[0]
+    return (Level("Counted from here", begin, COUNTED, upright=True),) if 0 < begin < replay.times_s[-1] else ()
+
+
+def _share(spans: Sequence[Interval], whole_s: float) -> float:
+    return sum(end - begin for begin, end in spans) / whole_s if whole_s else 0.0
+
+
+def _caption(replay: Replay, worlds: Sequence[Named]) -> str:
+    reached = [f"{name.lower()} {number(world.fitness)} {replay.unit}" for name, world in worlds]
+    parts = [f"Fitness {' and '.join(reached)}."] if reached else []
+    return " ".join(
+        [
+            *parts,
+            "Bars: the foot is less than 2 mm above the ground.",
+            "Speed: over ground, towards where the movement ends, over 0.2 s.",
+        ]
+    )
+
+
+def _told(replay: Replay, worlds: Sequence[Named]) -> str:
+    parts = [
+        f"{name} it reaches {number(world.fitness)} {replay.unit}, and its feet are on the ground for "
+        + ", ".join(
+            f"{100 * _share(spans, replay.times_s[-1]):.0f} % ({foot})"
+            for foot, spans in zip(replay.feet, world.contacts, strict=True)
+        )
+        + " of the time."
+        for name, world in worlds
+    ]
+    return " ".join(parts) or "The physics failed in both worlds."
+
+
+def _table(replay: Replay, worlds: Sequence[Named]) -> Table:
+    """How long and how often each foot is down, and the means."""
+    rows = [
+        (
+            f"{foot}: share on the ground, and how often",
+            *(
+                f"{100 * _share(world.contacts[at], replay.times_s[-1]):.0f} %, {len(world.contacts[at])} ×"
+                for _, world in worlds
+            ),
+        )
+        for at, foot in enumerate(replay.feet)
+    ]
+    means = [("Mean height of base (m)", [world.heights_m for _, world in worlds])]
+    means.append(("Mean speed (m/s)", [world.speeds_m_s for _, world in worlds]))
+    rows += [(label, *(number(sum(each) / len(each)) for each in values)) for label, values in means]
+    rows.append((f"Fitness ({replay.unit})", *(number(world.fitness) for _, world in worlds)))
+    return Table(("", *(name for name, _ in worlds)), tuple(rows))

@@ -1,0 +1,169 @@
+"""Where tuning went: the best simulators in the space of the tunables."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+from gaplab.services.figures.marks import Axis, Figure, Level, Mark, Panel, Points, Table
+from gaplab.services.figures.style import INK, Style
+from gaplab.services.figures.words import counted, heading, limits, number, spoken, with_unit
+
+IN_PAIRS = 3
+"""Of more tunables there are too many pairs to look at: each has a panel of its own, against iterations."""
+
+MOST = 5_000
+"""Points in a panel; of more, only the first repetitions are drawn."""
+
+REALITY = "Reality"
+STAR = Style(INK, "dashed", "star")
+DOT = Style(INK, "solid", "circle")
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A tunable: what it is called, its unit, and its bounds."""
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """The best simulator of one iteration of one repetition.
+
+    Attributes:
+        parameters: in the order of the dimensions.
+    """
+
+    repetition: int
+    iteration: int
+    parameters: tuple[float, ...]
+
+
+def simulators_figure(
+    tuned: Sequence[Tuned],
+    dimensions: Sequence[Dimension],
+    *,
+    truth: Mapping[str, float] | None,
+    title: str = "",
+    columns: int = 3,
+) -> Figure:
+    """The best simulators after each iteration, from light to dark, and where reality is if that may be known.
+
+    Two or three tunables are drawn pair by pair; one alone, or more, each against iterations.
+
+    Args:
+        tuned: by iteration; each has the order of the dimensions.
+        dimensions: the tunables.
+        truth: reality's parameters by name, as far as they are known; None as long as they are hidden.
+        title: above the figure.
+        columns: panels in a row, at most.
+    """
+    shown = _first_repetitions(sorted(tuned, key=lambda each: (each.iteration, each.repetition)))
+    if 1 < len(dimensions) <= IN_PAIRS:
+        panels = [_pair(shown, dimensions, pair, truth or {}) for pair in combinations(range(len(dimensions)), 2)]
+    else:
+        panels = [_alone(shown, dimensions, at, truth or {}) for at in range(len(dimensions))]
+    return Figure(
+        name="simulators",
+        title=heading(title),
+        panels=tuple(panels) if shown else tuple(_emptied(each) for each in panels),
+        caption=_caption(tuned, shown, truth),
+        alt=_alt(shown, dimensions, truth or {}),
+        columns=min(columns, len(panels)),
+        table=_table(shown, dimensions, truth or {}),
+    )
+
+
+def _pair(
+    shown: Sequence[Tuned], dimensions: Sequence[Dimension], pair: tuple[int, int], truth: Mapping[str, float]
+) -> Panel:
+    one, other = pair
+    x, y = dimensions[one], dimensions[other]
+    points = _points(shown, [each.parameters[one] for each in shown], [each.parameters[other] for each in shown])
+    reality: list[Mark] = []
+    if x.name in truth and y.name in truth:
+        reality.append(Points(REALITY, (truth[x.name],), (truth[y.name],), STAR, size=2.4))
+    elif x.name in truth:
+        reality.append(Level(REALITY, truth[x.name], STAR, upright=True))
+    elif y.name in truth:
+        reality.append(Level(REALITY, truth[y.name], STAR))
+    return Panel((*reality, points), _axis(x, truth), _axis(y, truth), square=True)
+
+
+def _alone(shown: Sequence[Tuned], dimensions: Sequence[Dimension], at: int, truth: Mapping[str, float]) -> Panel:
+    dimension = dimensions[at]
+    along = [float(each.iteration) for each in shown]
+    points = _points(shown, along, [each.parameters[at] for each in shown])
+    reality = [Level(REALITY, truth[dimension.name], STAR)] if dimension.name in truth else []
+    last = max([1.0, *along])
+    frame = Axis("Iteration", (-0.04 * last, 1.04 * last), whole=True)
+    return Panel((*reality, points), frame, _axis(dimension, truth))
+
+
+def _points(shown: Sequence[Tuned], x: Sequence[float], y: Sequence[float]) -> Points:
+    return Points(
+        "Best simulator of a repetition",
+        tuple(x),
+        tuple(y),
+        DOT,
+        shades=tuple(each.iteration for each in shown),
+        shades_label="Iteration",
+        hover=tuple(f"repetition {each.repetition}, iteration {each.iteration}" for each in shown),
+    )
+
+
+def _emptied(panel: Panel) -> Panel:
+    """The panel without reality's place, which alone tells nothing."""
+    return Panel((), panel.x, panel.y, square=panel.square)
+
+
+def _axis(dimension: Dimension, truth: Mapping[str, float]) -> Axis:
+    """From bound to bound, and as far as reality, where it is known."""
+    label = with_unit(spoken(dimension.name), {dimension.unit})
+    return Axis(label, limits([dimension.lower, dimension.upper, truth.get(dimension.name)], margin=0.06))
+
+
+def _first_repetitions(tuned: Sequence[Tuned]) -> list[Tuned]:
+    iterations = len({each.iteration for each in tuned})
+    repetitions = sorted({each.repetition for each in tuned})[: max(1, MOST // max(1, iterations))]
+    kept = frozenset(repetitions)
+    return [each for each in tuned if each.repetition in kept]
+
+
+def _caption(tuned: Sequence[Tuned], shown: Sequence[Tuned], truth: Mapping[str, float] | None) -> str:
+    if not shown:
+        return ""
+    repetitions, all_ = (len({each.repetition for each in found}) for found in (shown, tuned))
+    of = f" of {all_}" if all_ > repetitions else ""
+    parts = [
+        f"The best simulator after each iteration of {counted([repetitions], 'repetition')}{of}, within the bounds of "
+        "tuning; those of iteration 0 are random."
+    ]
+    if truth is None:
+        parts.append("Reality is shown once its experiments have ended.")
+    return " ".join(parts)
+
+
+def _alt(shown: Sequence[Tuned], dimensions: Sequence[Dimension], truth: Mapping[str, float]) -> str:
+    if not shown:
+        return "Tuned simulators in the space of the tunables: no results yet."
+    last = [each for each in shown if each.iteration == shown[-1].iteration]
+    told = [
+        f"{spoken(dimension.name).lower()} {_range([each.parameters[at] for each in last])}"
+        + (f" where reality has {number(truth[dimension.name])}" if dimension.name in truth else "")
+        for at, dimension in enumerate(dimensions)
+    ]
+    return f"Tuned simulators in the space of the tunables, after iteration {shown[-1].iteration}: {'; '.join(told)}."
+
+
+def _range(values: Sequence[float]) -> str:
+    return f"from {number(min(values), 2)} to {number(max(values), 2)}"
+
+
+def _table(shown: Sequence[Tuned], dimensions: Sequence[Dimension], truth: Mapping[str, float]) -> Table:
+    rows = [(str(each.iteration), str(each.repetition), *map(number, each.parameters)) for each in shown]
+    reality = [(REALITY, "", *(number(truth.get(each.name)) for each in dimensions))] if truth else []
+    return Table(("Iteration", "Repetition", *(spoken(each.name) for each in dimensions)), (*reality, *rows))

@@ -1,0 +1,120 @@
+"""The toy, the paper's Fig. 3: the true function, its approximations, the samples, and the transfer."""
+
+from collections.abc import Sequence
+
+from gaplab.schemas.toys import Toy
+from gaplab.services.figures.marks import Arrow, Axis, Figure, Line, Mark, Panel, Points, Table
+from gaplab.services.figures.style import COLORS, INK, Style
+from gaplab.services.figures.words import heading, number, spoken, with_unit
+
+REALITY = Style(INK, "dashed", "circle")
+SIMULATION = Style(COLORS[0], "solid", "circle")
+SAMPLES = Style(COLORS[1], "solid", "circle")
+TRANSFER = Style(COLORS[2], "solid", "star")
+
+SHORTEST = 0.03
+"""An arrow that is a smaller share of the figure would hide what it points from."""
+
+
+def toy_figure(toys: Sequence[Toy], *, title: str | None = None) -> Figure:
+    """A panel for each of these iterations of one repetition, as in the paper.
+
+    Args:
+        toys: one or more, all of one repetition.
+        title: above the figure; left out: what it is of.
+    """
+    several = len(toys) > 1
+    first = toys[0]
+    own = f"{spoken(first.name)}, repetition {first.repetition}{'' if several else f', iteration {first.iteration}'}"
+    return Figure(
+        name="toy",
+        title=heading(own if title is None else title),
+        panels=tuple(_panel(each, titled=several) for each in toys),
+        caption=_caption(toys),
+        alt="The fitness of each gene, in reality and in simulation. " + " ".join(map(_told, toys)),
+        columns=2 if several else 1,
+        table=_table(toys),
+        nothing="not computed yet",
+    )
+
+
+def _panel(toy: Toy, *, titled: bool) -> Panel:
+    marks: list[Mark] = []
+    if toy.truth is not None:
+        marks.append(Line("Reality", toy.genes, toy.truth, REALITY, markers=False))
+    for rank, each in enumerate(toy.approximations):
+        marks.append(Line("Simulation", toy.genes, each, SIMULATION, markers=False, faint=rank > 0))
+    marks += [*_samples(toy), *_transfer(toy)]
+    low, high = toy.limits
+    room = 0.1 * (high - low) or 0.1
+    return Panel(
+        tuple(marks),
+        Axis("Gene", (toy.genes[0], toy.genes[-1])),
+        Axis(with_unit("Fitness", [toy.unit]), (low - room, high + room)),
+        title=f"Iteration {toy.iteration}" if titled else "",
+    )
+
+
+def _samples(toy: Toy) -> list[Mark]:
+    found = [each for each in toy.samples if each.fitness is not None]
+    if not found:
+        return []
+    told = tuple(f"Sample of iteration {each.iteration}" for each in found)
+    places = tuple(each.gene for each in found), tuple(each.fitness for each in found)
+    return [Points("Samples", *places, SAMPLES, hover=told)]
+
+
+def _transfer(toy: Toy) -> list[Mark]:
+    """The arrow goes from what simulation says of the transferred gene to what reality does."""
+    if toy.transfer is None:
+        return []
+    gene, simulated, real = toy.transfer.gene, toy.transfer.simulated, toy.transfer.real
+    marks: list[Mark] = []
+    visible = SHORTEST * (toy.limits[1] - toy.limits[0])
+    if simulated is not None and real is not None and abs(simulated - real) > visible:
+        marks.append(Arrow((gene, simulated), (gene, real), TRANSFER))
+    if simulated is not None:
+        marks.append(Points("Transferred: fittest in simulation", (gene,), (simulated,), TRANSFER, size=1.4))
+    if real is not None and simulated is None:
+        marks.append(Points("Fittest in reality", (gene,), (real,), TRANSFER, size=1.4))
+    return marks
+
+
+def _caption(toys: Sequence[Toy]) -> str:
+    parts = [
+        "Solid: the best simulator"
+        + ("; thin: the others." if any(len(each.approximations) > 1 for each in toys) else ".")
+    ]
+    if not any(each.approximations for each in toys):
+        parts = []
+    hidden = "Reality's function is shown once the experiment has ended."
+    parts += ["Dashed: reality." if toys[0].truth is not None else hidden]
+    parts += ["The arrow goes from what simulation says of the transferred controller to what reality says."]
+    return " ".join([*parts, *(map(_told, toys) if len(toys) == 1 else ())])
+
+
+def _told(toy: Toy) -> str:
+    parts = [f"after {len(toy.samples)} sample{'' if len(toy.samples) == 1 else 's'}"]
+    if toy.squared_error is not None:
+        parts.append(f"the best simulator's squared error is {number(toy.squared_error)}")
+    if toy.transfer is not None:
+        gene, simulated, real = map(number, (toy.transfer.gene, toy.transfer.simulated, toy.transfer.real))
+        worth = f"{simulated or 'nothing'} in simulation and {real or 'nothing'} in reality"
+        parts.append(f"the transferred gene {gene} reaches {worth}")
+    return f"Iteration {toy.iteration}: {', '.join(parts)}."
+
+
+def _table(toys: Sequence[Toy]) -> Table:
+    rows = [
+        (
+            str(each.iteration),
+            str(len(each.samples)),
+            number(each.squared_error),
+            number(each.transfer.gene if each.transfer else None),
+            number(each.transfer.simulated if each.transfer else None),
+            number(each.transfer.real if each.transfer else None),
+        )
+        for each in toys
+    ]
+    head = ("Iteration", "Samples", "Squared error", "Transferred gene", "Fitness in simulation", "Fitness in reality")
+    return Table(head, tuple(rows))

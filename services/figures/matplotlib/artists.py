@@ -1,0 +1,158 @@
+"""Marks on matplotlib's axes."""
+
+from typing import TYPE_CHECKING, Any
+
+from gaplab.services.figures.marks import Arrow, Bars, Diagonal, Label, Level, Line, Mark, Number, Panel, Points
+from gaplab.services.figures.matplotlib.text_size import shown
+from gaplab.services.figures.style import INK, SHADES, Style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+DASHES: dict[str, Any] = {
+    "solid": "-",
+    "dashed": (0, (4, 1.6)),
+    "dotted": (0, (1, 1.4)),
+    "dashdot": (0, (5, 1.4, 1, 1.4)),
+    "long": (0, (8, 2)),
+    "longdot": (0, (7, 1.4, 1, 1.4, 1, 1.4)),
+}
+MARKERS = {
+    "circle": "o",
+    "square": "s",
+    "triangle": "^",
+    "diamond": "D",
+    "inverted": "v",
+    "cross": "X",
+    "star": "*",
+}
+
+NAN = float("nan")
+
+
+def paint(panel: Panel, axes: "Axes", shades: tuple[float, float]) -> None:
+    """Draw the marks of a panel, the first lines above later ones.
+
+    Args:
+        panel: has the marks.
+        axes: with their limits set.
+        shades: the numbers that are drawn lightest and darkest.
+    """
+    for order, mark in enumerate(panel.marks):
+        _paint(mark, axes, 10 - 0.01 * order, shades)
+
+
+def _paint(mark: Mark, axes: "Axes", order: float, shades: tuple[float, float]) -> None:
+    if isinstance(mark, Line):
+        _line(mark, axes, order)
+    elif isinstance(mark, Points):
+        _points(mark, axes, order + 5, shades)
+    elif isinstance(mark, Level):
+        _level(mark, axes)
+    elif isinstance(mark, Diagonal):
+        axes.axline((0, 0), slope=1, **_thin(mark.name, mark.style))
+    elif isinstance(mark, Bars):
+        _bars(mark, axes)
+    elif isinstance(mark, Arrow):
+        _arrow(mark, axes)
+    else:
+        _label(mark, axes)
+
+
+def legend_name(name: str) -> str:
+    """The name in the legend, which leaves out what begins with an underscore."""
+    return f" {name}" if name.startswith("_") else name or "_nothing"
+
+
+def _line(line: Line, axes: "Axes", order: float) -> None:
+    look = line.style
+    x, y = _floats(line.x), _floats(line.y)
+    drawn: dict[str, Any] = {"color": look.color, "drawstyle": "steps-post" if line.steps else "default"}
+    if line.faint:
+        axes.plot(x, y, **drawn, linewidth=0.4, alpha=0.3, zorder=1.5)
+        return
+    if line.markers:
+        drawn |= {"marker": MARKERS[look.marker], "markersize": 3.6, "markeredgecolor": "white", "markeredgewidth": 0.4}
+    axes.plot(
+        x,
+        y,
+        **drawn,
+        linestyle=DASHES[look.dash],
+        linewidth=1.2,
+        label=legend_name(line.name),
+        zorder=order,
+    )
+    if any(each is not None for each in line.lower):
+        lower, upper = _ends(line.lower, line.y), _ends(line.upper, line.y)
+        step: Any = {"step": "post"} if line.steps else {}
+        axes.fill_between(x, lower, upper, color=look.color, alpha=0.13, linewidth=0, zorder=1, **step)
+
+
+def _points(points: Points, axes: "Axes", order: float, shades: tuple[float, float]) -> None:
+    from matplotlib.colors import LinearSegmentedColormap
+
+    look = points.style
+    drawn: dict[str, Any] = {"marker": MARKERS[look.marker], "s": 16 * points.size**2, "zorder": order}
+    if points.shades:
+        colors = LinearSegmentedColormap.from_list("shades", SHADES)
+        drawn |= {"c": points.shades, "cmap": colors, "vmin": shades[0], "vmax": shades[1]}
+        drawn |= {"edgecolors": "white", "linewidths": 0.3}
+    elif points.hollow:
+        drawn |= {"facecolors": "none", "edgecolors": look.color, "linewidths": 0.9}
+    else:
+        drawn |= {"color": look.color, "edgecolors": "white", "linewidths": 0.3 * points.size}
+    axes.scatter(_floats(points.x), _floats(points.y), label=legend_name(points.name), **drawn)
+
+
+def _level(level: Level, axes: "Axes") -> None:
+    line, area = (axes.axvline, axes.axvspan) if level.upright else (axes.axhline, axes.axhspan)
+    line(level.value, **_thin(level.name, level.style))
+    if level.lower is not None and level.upper is not None:
+        alpha = 0.07 if level.style.ink else 0.13
+        area(level.lower, level.upper, color=level.style.color, alpha=alpha, linewidth=0, zorder=1)
+
+
+def _bars(bars: Bars, axes: "Axes") -> None:
+    begins = [begin for begin, _, _ in bars.intervals]
+    axes.barh(
+        [y for _, _, y in bars.intervals],
+        [end - begin for begin, end, _ in bars.intervals],
+        left=begins,
+        height=bars.thickness,
+        color=bars.style.color,
+        linewidth=0,
+        label=legend_name(bars.name),
+        zorder=3,
+    )
+
+
+def _arrow(arrow: Arrow, axes: "Axes") -> None:
+    look = {"arrowstyle": "-|>", "color": arrow.style.color, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", xy=arrow.end, xytext=arrow.start, arrowprops=look, zorder=20)
+
+
+def _label(label: Label, axes: "Axes") -> None:
+    away = (4, 0) if label.beside else (0, 3)
+    place: Any = {"ha": "left", "va": "center"} if label.beside else {"ha": "center", "va": "bottom"}
+    axes.annotate(
+        shown(label.text), (label.x, label.y), away, textcoords="offset points", color=INK, zorder=20, **place
+    )
+
+
+def _thin(name: str, look: Style) -> dict[str, Any]:
+    return {
+        "color": look.color,
+        "linestyle": DASHES[look.dash],
+        "linewidth": 0.9,
+        "label": legend_name(name),
+        "zorder": 2,
+    }
+
+
+def _floats(values: tuple[Number, ...]) -> list[float]:
+    return [NAN if each is None else each for each in values]
+
+
+def _ends(ends: tuple[Number, ...], values: tuple[Number, ...]) -> list[float]:
+    """The ends of the band; where there is none, it has no width."""
+    return _floats(tuple(value if end is None else end for end, value in zip(ends, values, strict=True)))

@@ -1,0 +1,23 @@
+"""Everything that this service can be asked to run."""
+
+from dataclasses import asdict
+
+from gaplab.schemas.plugin import BudgetRead, Catalogue
+from gaplab.services.core.optimizers import optimizers
+from gaplab.services.core.robots import robots
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.tunables import tunables
+from gaplab.services.engines import engines
+from gaplab.services.specs.presets import PRESETS
+
+
+def catalogue() -> Catalogue:
+    """Every plug-in of every kind, by name."""
+    return Catalogue(
+        strategies=strategies.describe(),
+        robots=robots.describe(),
+        engines=engines.describe(),
+        tunables=tunables.describe(),
+        optimizers=optimizers.describe(),
+        budgets=tuple(BudgetRead(name=name, **asdict(preset)) for name, preset in PRESETS.items()),
+    )

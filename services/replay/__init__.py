@@ -1,0 +1,1 @@
+"""Rollouts computed on request: replays and predictions."""

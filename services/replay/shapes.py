@@ -1,0 +1,63 @@
+"""What a World looks like: its bodies, what reaches from a joint to a shape that is away from it, and the ground."""
+
+import numpy as np
+
+from gaplab.schemas.replays import Orientation, Position, Shape
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.world import Body, Box, World
+
+SLENDER = 0.4
+"""Radius of what reaches from a joint to a shape, in that of the shape."""
+
+
+def feet_of(world: World) -> tuple[int, ...]:
+    """The places of the bodies that are made to touch the ground: all that collide but the base."""
+    return tuple(place for place, body in enumerate(world.bodies) if place and body.collides)
+
+
+def labels(world: World) -> tuple[str, ...]:
+    """The feet's names without what they have in common: `front_left_shin` among shins is the front left."""
+    parts = [world.bodies[place].name.split("_") for place in feet_of(world)]
+    while len(parts) > 1 and min(map(len, parts)) > 1 and len({each[-1] for each in parts}) == 1:
+        parts = [each[:-1] for each in parts]
+    return tuple(" ".join(each) for each in parts)
+
+
+def shapes_of(world: World) -> tuple[Shape, ...]:
+    """All that can be seen of a world."""
+    ground = Shape(body=None, kind="plane", size_m=(), role="ground")
+    return (ground, *(shape for place in range(len(world.bodies)) for shape in _shapes(world, place)))
+
+
+def _shapes(world: World, place: int) -> tuple[Shape, ...]:
+    body = world.bodies[place]
+    box = isinstance(body.shape, Box)
+    own = Shape(
+        body=place,
+        kind="box" if box else "sphere",
+        size_m=body.shape.size_m if isinstance(body.shape, Box) else (body.shape.radius_m,),
+        position_m=body.center_m,
+        role="trunk" if place == 0 else "foot" if body.collides else "limb",
+    )
+    away = np.array(body.center_m)
+    if place == 0 or np.linalg.norm(away) <= 1.001 * _reach(body):
+        return (own,)
+    return (_strut(place, away, SLENDER * _reach(body)), own)
+
+
+def _reach(body: Body) -> float:
+    return max(body.shape.size_m) / 2 if isinstance(body.shape, Box) else body.shape.radius_m
+
+
+def _strut(place: int, away: FloatArray, radius_m: float) -> Shape:
+    middle: Position = tuple((away / 2).tolist())
+    size = (radius_m, float(np.linalg.norm(away)))
+    return Shape(body=place, kind="capsule", size_m=size, position_m=middle, orientation=_from_z(away), role="limb")
+
+
+def _from_z(away: FloatArray) -> Orientation:
+    """The shortest turn that brings the z axis onto the line of a vector, whichever way it points."""
+    x, y, z = (away if away[2] >= 0 else -away) / np.linalg.norm(away)
+    turn = np.array([-y, x, 0.0, 1.0 + z])
+    turn = turn / np.linalg.norm(turn) + 0.0
+    return (float(turn[0]), float(turn[1]), float(turn[2]), float(turn[3]))

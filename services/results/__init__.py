@@ -1,0 +1,1 @@
+"""What stored results show: curves, misfit, tuned simulators, costs."""

@@ -1,0 +1,138 @@
+"""Curves and comparisons, read from the store; the mathematics is the core's."""
+
+import csv
+import io
+from collections.abc import Sequence
+
+import numpy as np
+
+from gaplab.schemas.curves import Comparison, Curve
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.curves import curve_points
+from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.core.statistics import compare_all
+from gaplab.services.specs.resolution import is_direct, spec_of, unit
+from gaplab.services.store.models import ExperimentRow
+from gaplab.services.store.queries import experiments, results
+from gaplab.services.store.session import Session, Store
+
+COLUMNS = ("experiment", "name", "strategy", "repetition", "evaluations", "fitness")
+
+
+def curve(store: Store, experiment_id: str) -> Curve:
+    """The curve of one experiment, as far as it has got.
+
+    Raises:
+        NotFound: no such experiment.
+    """
+    return curves(store, [experiment_id])[0]
+
+
+def curves(store: Store, experiment_ids: Sequence[str]) -> tuple[Curve, ...]:
+    """The curves of these experiments, in their order.
+
+    Raises:
+        NotFound: no such experiment as one of them.
+    """
+    with store.reading() as session:
+        return curves_of(session, experiment_ids)
+
+
+def curves_of(session: Session, experiment_ids: Sequence[str]) -> tuple[Curve, ...]:
+    """The same, of the moment that the session reads.
+
+    Raises:
+        NotFound: no such experiment as one of them.
+    """
+    rows, values = _recorded(session, experiment_ids)
+    return tuple(_curve(row, values[row.id]) for row in rows)
+
+
+def study_curves(store: Store, study_id: str) -> tuple[Curve, ...]:
+    """The curves of a study's experiments, in its order.
+
+    Raises:
+        NotFound: no such study.
+    """
+    with store.reading() as session:
+        experiments.get_study(session, study_id)
+        ids = [row.id for row in experiments.experiments_of(session, [study_id])]
+    return curves(store, ids)
+
+
+def compare(
+    store: Store,
+    experiment_ids: Sequence[str],
+    *,
+    from_evaluations: int | None = None,
+    to_evaluations: int | None = None,
+) -> tuple[Comparison, ...]:
+    """Every pair of these experiments, on the recorded fitness at a range of counts of real-world evaluations, pooled.
+
+    The direct baseline's one value counts at any range.
+
+    Args:
+        store: that has them.
+        experiment_ids: two or more, each once.
+        from_evaluations: the first count; left out: 1.
+        to_evaluations: the last count; left out: the last that any of them has.
+
+    Raises:
+        NotFound: no such experiment as one of them.
+        InvalidSpec: fewer than two experiments, one twice, or a range that is empty or negative.
+    """
+    if len(set(experiment_ids)) < max(2, len(experiment_ids)):
+        message = f"a comparison needs two or more experiments, each once, not {len(experiment_ids)}"
+        raise InvalidSpec([Violation("experiment", list(experiment_ids), message)])
+    with store.reading() as session:
+        rows, values = _recorded(session, experiment_ids)
+    last = max(1, *(row.iterations - 1 for row in rows))
+    first = 1 if from_evaluations is None else from_evaluations
+    final = last if to_evaluations is None else to_evaluations
+    if not 0 <= first <= final:
+        message = f"the range of real-world evaluations goes up from 0 or more, not from {first} to {final}"
+        raise InvalidSpec([Violation("from_evaluations", first, message, f"0 to {final}")])
+    direct = frozenset(row.id for row in rows if _is_direct(row))
+    return compare_all(values, direct, first, final)
+
+
+def curves_csv(curves: Sequence[Curve]) -> str:
+    """The values of the curves as CSV: one line for each repetition at each number of real-world evaluations."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows(
+        (each.experiment, each.name, each.strategy, repetition, point.evaluations, value)
+        for each in curves
+        for point in each.points
+        for repetition, value in enumerate(point.values)
+        if value is not None
+    )
+    return text.getvalue()
+
+
+def _recorded(session: Session, ids: Sequence[str]) -> tuple[tuple[ExperimentRow, ...], dict[str, FloatArray]]:
+    """The experiments, and the recorded fitness of each: `(repetitions, iterations + 1)`, nan where it is not there."""
+    rows = experiments.get_experiments(session, ids)
+    found = results.recorded(session, ids)
+    values = {row.id: np.full((row.spec["repetitions"], row.iterations), np.nan) for row in rows}
+    for experiment, repetition, iteration, fitness in found:
+        values[experiment][repetition, iteration] = fitness
+    return rows, values
+
+
+def _curve(row: ExperimentRow, values: FloatArray) -> Curve:
+    spec = spec_of(row.spec)
+    return Curve(
+        experiment=row.id,
+        name=row.name,
+        strategy=row.strategy,
+        state=row.state,
+        unit=unit(spec),
+        direct=is_direct(spec),
+        points=curve_points(values),
+    )
+
+
+def _is_direct(row: ExperimentRow) -> bool:
+    return is_direct(spec_of(row.spec))

@@ -1,0 +1,1 @@
+"""Repetitions and sensitivity checks, as supervisors run them."""

@@ -1,0 +1,193 @@
+"""Assembly: robot, world, tunables and engine become a Simulate; a hidden world becomes a Reality."""
+
+from collections.abc import Iterable, Sequence
+from functools import cache, lru_cache, partial
+
+import numpy as np
+
+from gaplab.schemas.plugin import PluginRef, TunableRef
+from gaplab.schemas.sensitivity import Checked
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters
+from gaplab.services.core.errors import gather
+from gaplab.services.core.loop import Setting
+from gaplab.services.core.optimizers import optimizers
+from gaplab.services.core.ports import Simulate
+from gaplab.services.core.robots import robots
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.sensitivity import Subject
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.core.types import Budget, Space
+from gaplab.services.core.world import Recording, World
+from gaplab.services.engines import engines
+from gaplab.services.engines.base import Engine
+
+WORLDS_KEPT = 4096
+
+
+class Simulation:
+    """A Simulate: rollouts of one robot on one engine, in worlds edited by tunables."""
+
+    def __init__(self, robot: Robot, engine: Engine, edits: Sequence[Tunable]) -> None:
+        self._robot = robot
+        self._engine = engine
+        self._edits = tuple(edits)
+        self._world = lru_cache(maxsize=WORLDS_KEPT)(self._edited)
+
+    def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
+        """`(n, g)` genomes × `(m, p)` parameters -> `(n, m)` fitnesses; nan where the physics failed.
+
+        A fitness that is infinite is no physics either, whatever a robot makes of it.
+        """
+        worlds = [self._world(tuple(row)) for row in parameters.tolist()]
+        motions = [self._robot.motion(genome) for genome in genomes]
+        fitnesses = self._robot.fitness(self._engine.rollouts(worlds, motions))
+        return np.where(np.isfinite(fitnesses), fitnesses, np.nan)
+
+    def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:
+        """The rollout of one genome in one simulator, looked at at these times besides, and the world it was in."""
+        world = self._world(tuple(parameters.tolist()))
+        return world, self._engine.record(world, self._robot.motion(genome), times_s)
+
+    def _edited(self, values: tuple[float, ...]) -> World:
+        world = self._robot.world
+        for tunable, value in zip(self._edits, values, strict=True):
+            world = tunable.edit(world, value)
+        return world
+
+
+class HiddenReality:
+    """A Reality that is a simulation with hidden parameters.
+
+    Args:
+        simulate: the engine and robot of reality.
+        parameters: `(p,)`, the truth.
+    """
+
+    def __init__(self, simulate: Simulate, parameters: FloatArray) -> None:
+        self._simulate = simulate
+        self._parameters = parameters[None, :]
+
+    def __call__(self, genome: Genome) -> float:
+        """The fitness of the genome `(g,)` in reality; nan if the physics failed."""
+        return float(self._simulate(genome[None, :], self._parameters)[0, 0])
+
+
+class EvolutionInReality:
+    """A Simulate whose every simulator is reality: what the direct baseline evolves in."""
+
+    def __init__(self, simulate: Simulate, parameters: FloatArray) -> None:
+        self._simulate = simulate
+        self._parameters = parameters[None, :]
+
+    def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
+        """`(n, g)` genomes × `(m, p)` parameters that do not matter -> `(n, m)` fitnesses in reality."""
+        return np.repeat(self._simulate(genomes, self._parameters), len(parameters), axis=1)
+
+
+def setting(spec: ExperimentSpec, repetition: int) -> Setting:
+    """Everything that one repetition of a resolved spec depends on.
+
+    Args:
+        spec: as `gaplab.services.specs.resolution` completes it.
+        repetition: its number, from 0.
+    """
+    robot = robots.create(spec.robot)
+    strategy = strategies.create(spec.strategy)
+    edits = edits_of(ref.name for ref in spec.tunables)
+    truth, real = reality_of(spec, robot)
+    engine = engine_of(spec.engine)
+    simulate: Simulate = Simulation(robot, engine, edits)
+    if strategy.in_reality:
+        simulate = EvolutionInReality(real, truth)
+    return Setting(
+        simulate=simulate,
+        reality=HiddenReality(real, truth),
+        strategy=strategy,
+        optimizer=optimizers.create(spec.optimizer),
+        genomes=robot.space,
+        parameters=parameters_of(spec.tunables),
+        known=robot.known,
+        budget=budget(spec),
+        iterations=0 if strategy.in_reality else spec.iterations or 0,
+        seed=spec.seed,
+        repetition=repetition,
+        batch=lambda: engine.batch,
+    )
+
+
+def subject(checked: Checked) -> Subject:
+    """What a sensitivity check simulates."""
+    robot = robots.create(checked.robot)
+    edits = edits_of(ref.name for ref in checked.tunables)
+    return Subject(
+        simulate=Simulation(robot, engine_of(checked.engine), edits),
+        genomes=robot.space,
+        known=robot.known,
+        parameters=parameters_of(checked.tunables),
+        names=tuple(ref.name for ref in checked.tunables),
+    )
+
+
+def reality_of(spec: ExperimentSpec, robot: Robot) -> tuple[FloatArray, Simulation]:
+    """The hidden parameters of a resolved spec, and the simulation that they belong in."""
+    edits = edits_of(spec.reality.parameters)
+    truth = np.array(list(spec.reality.parameters.values()))
+    return truth, Simulation(robot, engine_of(spec.reality.engine), edits)
+
+
+def edits_of(names: Iterable[str]) -> list[Tunable]:
+    """The tunables of these names.
+
+    Raises:
+        InvalidSpec: one is not installed here.
+    """
+    return [tunables.create(PluginRef(name=name), "/tunables") for name in names]
+
+
+def refuse_missing(spec: ExperimentSpec, *, reality: bool = False) -> None:
+    """Do nothing if what a stored spec simulates with, and reality if it is asked for, is installed here.
+
+    Raises:
+        InvalidSpec: something is not; a plug-in's file may be gone.
+    """
+    needed = [(engines, spec.engine, "/engine"), (engines, spec.reality.engine if reality else None, "/reality/engine")]
+    names = [*(ref.name for ref in spec.tunables), *(spec.reality.parameters if reality else ())]
+    gather(
+        lambda: robots.check(spec.robot, "/robot"),
+        *(partial(registry.check, ref, pointer) for registry, ref, pointer in needed if ref is not None),
+        lambda: edits_of(names),
+    )
+
+
+def engine_of(ref: PluginRef | None) -> Engine:
+    """The engine of a resolved spec: one instance in this process for equal options, warm from use to use."""
+    if ref is None:
+        msg = "the spec is not resolved: it names no engine"
+        raise ValueError(msg)
+    return _warm_engine(ref.model_dump_json())
+
+
+@cache
+def _warm_engine(ref: str) -> Engine:
+    return engines.create(PluginRef.model_validate_json(ref))
+
+
+def budget(spec: ExperimentSpec) -> Budget:
+    """The numbers of a resolved budget."""
+    numbers = spec.budget.model_dump(exclude={"preset"}, exclude_none=True)
+    return Budget(**numbers)
+
+
+def parameters_of(refs: Sequence[TunableRef]) -> Space:
+    """The space of simulators that resolved tunables span."""
+    return Space.box([_bound(ref.lower) for ref in refs], [_bound(ref.upper) for ref in refs])
+
+
+def _bound(value: float | None) -> float:
+    if value is None:
+        msg = "the spec is not resolved: a tunable has no bounds"
+        raise ValueError(msg)
+    return value

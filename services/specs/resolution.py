@@ -1,0 +1,247 @@
+"""From what a user wrote to what is run: every default filled in, every impossibility refused, all of them at once."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from gaplab.schemas.plugin import PluginRef, TunableRef
+from gaplab.schemas.sensitivity import Checked, SensitivitySpec
+from gaplab.schemas.spec import BudgetSpec, ExperimentSpec, RealitySpec, Settings, StudySpec
+from gaplab.services.core.errors import InvalidSpec, Violation, gather, unknown_name
+from gaplab.services.core.optimizers import optimizers
+from gaplab.services.core.optimizers.base import Optimizer
+from gaplab.services.core.registry import Registry
+from gaplab.services.core.robots import robots
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.strategies.base import Strategy
+from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.engines import engines
+from gaplab.services.engines.base import Engine
+from gaplab.services.specs.presets import PRESETS
+
+
+def resolve_experiment(spec: ExperimentSpec) -> ExperimentSpec:
+    """The spec with nothing left out: what is stored and run. Resolving it again changes nothing.
+
+    Raises:
+        InvalidSpec: with every violation, each with its pointer into the spec.
+    """
+    robot, strategy, optimizer = gather(
+        lambda: robots.create(spec.robot, "/robot"),
+        lambda: strategies.create(spec.strategy, "/strategy"),
+        lambda: optimizers.create(spec.optimizer, "/optimizer"),
+    )
+    own = spec.engine or PluginRef(name=robot.engine)
+    real = spec.reality.engine or own
+    engine, reality_engine = gather(
+        lambda: _engine(own, robot, "/engine"),
+        lambda: _engine(real, robot, "/reality/engine" if spec.reality.engine else "/engine"),
+    )
+    budget = _budget(spec)
+    violations = [
+        *_tunable_violations(spec, engine),
+        *_reality_violations(spec, reality_engine),
+        *_budget_violations(budget, strategy, optimizer),
+    ]
+    if violations:
+        raise InvalidSpec(violations)
+    preset = PRESETS[budget.preset]
+    return spec.model_copy(
+        update={
+            "name": spec.name or _label(strategy),
+            "iterations": spec.iterations or preset.iterations,
+            "repetitions": spec.repetitions or preset.repetitions,
+            "robot": _completed(robots, spec.robot),
+            "strategy": _completed(strategies, spec.strategy),
+            "optimizer": _completed(optimizers, spec.optimizer),
+            "engine": _completed(engines, own),
+            "tunables": tuple(_with_bounds(ref) for ref in spec.tunables),
+            "reality": RealitySpec(engine=_completed(engines, real), parameters=_truth(spec, robot, reality_engine)),
+            "budget": budget,
+        }
+    )
+
+
+def resolve_study(spec: StudySpec) -> tuple[ExperimentSpec, ...]:
+    """The resolved spec of each experiment of a study, in the order of its strategies.
+
+    Raises:
+        InvalidSpec: with every violation, each with its pointer into the study's spec, once.
+    """
+    shared = {name: getattr(spec, name) for name in StudySpec.model_fields if name in ExperimentSpec.model_fields}
+    resolved: list[ExperimentSpec] = []
+    violations: dict[tuple[str, str], Violation] = {}
+    for index, strategy in enumerate(spec.strategies):
+        experiment = ExperimentSpec(**{**shared, "name": None}, strategy=strategy)
+        if spec.direct_repetitions is not None and is_direct(experiment):
+            experiment = experiment.model_copy(update={"repetitions": spec.direct_repetitions})
+        try:
+            resolved.append(resolve_experiment(experiment))
+        except InvalidSpec as error:
+            found = (each.moved("/strategy", f"/strategies/{index}") for each in error.violations)
+            violations.update({(each.pointer, each.message): each for each in found})
+    if violations:
+        raise InvalidSpec(violations.values())
+    return tuple(resolved)
+
+
+def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
+    """What a sensitivity check looks at, with nothing left out.
+
+    Raises:
+        InvalidSpec: with every violation, as an experiment with these settings would have.
+    """
+    shared = {name: getattr(spec, name) for name in Settings.model_fields}
+    resolved = resolve_experiment(ExperimentSpec(**shared, strategy=PluginRef(name="random")))
+    effort = {"points": spec.points, "evaluations": spec.evaluations}
+    return Checked.model_validate({name: getattr(resolved, name) for name in ("robot", "engine", "tunables")} | effort)
+
+
+def spec_of(stored: Mapping[str, Any]) -> ExperimentSpec:
+    """The spec that is stored, to be read and not to be run: what is not known of its reality is left out."""
+    reality = stored["reality"]
+    known = {name: value for name, value in reality["parameters"].items() if value is not None}
+    return ExperimentSpec.model_validate({**stored, "reality": {**reality, "parameters": known}})
+
+
+def is_direct(spec: ExperimentSpec) -> bool:
+    """Whether the experiment is the direct baseline: evolution in reality itself."""
+    return spec.strategy.name in strategies and strategies[spec.strategy.name].in_reality
+
+
+def unit(spec: ExperimentSpec | Checked) -> str:
+    """The unit of fitness; "" if the robot's file is gone, so that nobody knows."""
+    return robots[spec.robot.name].unit if spec.robot.name in robots else ""
+
+
+def expected_rollouts(spec: ExperimentSpec) -> int:
+    """The rollouts in simulation of one repetition of a resolved spec; real-world evaluations do not count.
+
+    The direct baseline's evaluations would be real ones; they count, for they are its whole cost.
+    """
+    strategy = strategies.create(spec.strategy)
+    controller, selection, simulator = _evaluations(spec.budget)
+    if strategy.in_reality:
+        return controller
+    iterations = spec.iterations or 0
+    selecting = iterations * selection * strategy.ensemble if strategy.searches else 0
+    tuning = simulator * iterations * (iterations + 1) // 2
+    return controller * (iterations + 1) + selecting + tuning
+
+
+def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
+    """The engine, checked to be installed and to run the robot."""
+    engine, _ = engines.check(ref, pointer)
+    able = [name for name, each in engines.items() if each.runs(robot.world)]
+    if not engine.runs(robot.world):
+        message = f"{ref.name} cannot run the {robot.name}; {' and '.join(able)} can"
+        raise InvalidSpec([Violation(pointer, ref.name, message, able)])
+    if not engine.available():
+        installed = [name for name in able if engines[name].available()]
+        raise InvalidSpec([Violation(pointer, ref.name, f"not installed: {engine.install}", installed)])
+    return engine
+
+
+def _completed(registry: Registry[Any], ref: PluginRef) -> PluginRef:
+    """The reference with every option written out."""
+    _, options = registry.check(ref)
+    return PluginRef(name=ref.name, options=options.model_dump(mode="json"))
+
+
+def _label(strategy: Strategy) -> str:
+    """The strategy's name, with those of its options that are not the defaults."""
+    defaults = type(strategy).Options().model_dump(mode="json")
+    chosen = strategy.options.model_dump(mode="json")
+    changed = [f"{name} {value}" for name, value in chosen.items() if value != defaults[name]]
+    return f"{strategy.name} ({', '.join(changed)})"[:200] if changed else strategy.name
+
+
+def _with_bounds(ref: TunableRef) -> TunableRef:
+    tunable = tunables[ref.name]
+    lower = tunable.lower if ref.lower is None else ref.lower
+    return TunableRef(name=ref.name, lower=lower, upper=tunable.upper if ref.upper is None else ref.upper)
+
+
+def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str, float]:
+    """Reality's parameters: those given, and the robot's own for what is tuned and reality's engine honours."""
+    nominal = {
+        ref.name: tunables[ref.name]().read(robot.world)
+        for ref in spec.tunables
+        if tunables[ref.name].field in engine.honours
+    }
+    return {**nominal, **spec.reality.parameters}
+
+
+def _tunable_violations(spec: ExperimentSpec, engine: type[Engine]) -> Iterator[Violation]:
+    counts = Counter(ref.name for ref in spec.tunables)
+    for index, ref in enumerate(spec.tunables):
+        pointer = f"/tunables/{index}"
+        if ref.name not in tunables:
+            yield unknown_name(pointer, "tunable", ref.name, list(tunables))
+            continue
+        yield from _honour_violations(ref.name, engine, pointer)
+        yield from _bound_violations(ref, pointer)
+        if counts[ref.name] > 1:
+            yield Violation(pointer, ref.name, f"{ref.name} is named {counts[ref.name]} times; once is permitted")
+
+
+def _bound_violations(ref: TunableRef, pointer: str) -> Iterator[Violation]:
+    completed, tunable = _with_bounds(ref), tunables[ref.name]
+    for side in ("lower", "upper"):
+        if (given := getattr(ref, side)) is not None:
+            yield from _range_violations(tunable, given, f"{pointer}/{side}")
+    if completed.lower is not None and completed.upper is not None and completed.lower >= completed.upper:
+        message = f"lower must be below upper, not {completed.lower:g} and {completed.upper:g}"
+        yield Violation(pointer, [completed.lower, completed.upper], message)
+
+
+def _range_violations(tunable: type[Tunable], value: float, pointer: str) -> Iterator[Violation]:
+    if not tunable.least <= value <= tunable.greatest:
+        permitted = f"{tunable.least:g} to {tunable.greatest:g}"
+        yield Violation(pointer, value, f"{tunable.name} is {permitted}, not {value:g}", permitted)
+
+
+def _honour_violations(name: str, engine: type[Engine], pointer: str) -> Iterator[Violation]:
+    field = tunables[name].field
+    if field not in engine.honours:
+        able = [each.name for each in engines.values() if field in each.honours]
+        message = f"{engine.name} does not honour {name}; {' and '.join(able) or 'no engine'} does"
+        yield Violation(pointer, name, message, able)
+
+
+def _reality_violations(spec: ExperimentSpec, engine: type[Engine]) -> Iterator[Violation]:
+    for name, value in spec.reality.parameters.items():
+        pointer = f"/reality/parameters/{name}"
+        if name not in tunables:
+            yield unknown_name(pointer, "tunable", name, list(tunables))
+            continue
+        yield from _honour_violations(name, engine, pointer)
+        yield from _range_violations(tunables[name], value, pointer)
+
+
+def _budget(spec: ExperimentSpec) -> BudgetSpec:
+    """The budget with every number written out."""
+    preset = PRESETS[spec.budget.preset]
+    names = (name for name in BudgetSpec.model_fields if name not in {"preset", "reuse_transfer"})
+    return spec.budget.model_copy(update={name: getattr(spec.budget, name) or getattr(preset, name) for name in names})
+
+
+def _evaluations(budget: BudgetSpec) -> tuple[int, int, int]:
+    return budget.controller_evaluations or 0, budget.selection_evaluations or 0, budget.simulator_evaluations or 0
+
+
+def _budget_violations(budget: BudgetSpec, strategy: Strategy, optimizer: Optimizer) -> Iterator[Violation]:
+    controller, selection, simulator = _evaluations(budget)
+    least = optimizer.least_evaluations
+    tuning = optimizer.diverse(strategy.ensemble).least_evaluations if strategy.ensemble > 1 else least
+    needed = {"controller_evaluations": (controller, least)}
+    if strategy.searches and not strategy.in_reality:
+        needed["selection_evaluations"] = (selection, least)
+    if not strategy.in_reality:
+        needed["simulator_evaluations"] = (simulator, tuning)
+    for name, (given, minimum) in needed.items():
+        if given < minimum:
+            message = f"{given} evaluations do not fill the population of {minimum} that the search starts with"
+            yield Violation(f"/budget/{name}", given, message, f"at least {minimum}")

@@ -1,0 +1,55 @@
+"""The one place where a database's troubles become `StoreUnavailable`; what is a mistake of ours passes through."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from sqlalchemy.exc import DatabaseError, DBAPIError, InterfaceError, OperationalError
+from sqlalchemy.exc import TimeoutError as PoolExhausted
+
+from gaplab.services.core.errors import StoreUnavailable
+
+_CLASHES = {"40001", "40P01"}
+"""Postgres gave up one of two transactions for the other: serialization failure, deadlock."""
+
+_NO_SCHEMA = {"42P01", "42703"}
+"""Postgres knows no such table, or no such column."""
+
+WRONG_SCHEMA = "the database has not the schema of this version: run `python -m migrations`"
+
+
+@contextmanager
+def named() -> Iterator[None]:
+    """Within it, that the database cannot be used is said in one sentence, without its password.
+
+    Raises:
+        StoreUnavailable: unreachable, locked for too long, no database at all, or one with another schema.
+    """
+    try:
+        yield
+    except PoolExhausted as error:
+        msg = "all connections to the database are in use"
+        raise StoreUnavailable(msg) from error
+    except DBAPIError as error:
+        if _lacks_schema(error):
+            raise StoreUnavailable(WRONG_SCHEMA) from error
+        if isinstance(error, OperationalError | InterfaceError) or type(error) is DatabaseError:
+            msg = f"the database cannot be used now: {_first_line(error)}"
+            raise StoreUnavailable(msg) from error
+        raise
+
+
+def is_clash(error: DBAPIError) -> bool:
+    """Whether the transaction was given up for another, and may well succeed if it is run anew."""
+    return _sqlstate(error) in _CLASHES
+
+
+def _lacks_schema(error: DBAPIError) -> bool:
+    return _sqlstate(error) in _NO_SCHEMA or str(error.orig).startswith(("no such table", "no such column"))
+
+
+def _sqlstate(error: DBAPIError) -> str | None:
+    return getattr(error.orig, "sqlstate", None)
+
+
+def _first_line(error: DBAPIError) -> str:
+    return (str(error.orig).splitlines() or [type(error.orig).__name__])[0]

@@ -1,0 +1,80 @@
+"""Attempts: a row for each lease of a repetition, written in the transaction that moves the lease."""
+
+from collections.abc import Sequence
+
+from sqlalchemy import func, insert, select, update
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.records import AttemptRead
+from gaplab.services.core.errors import NotFound
+from gaplab.services.store.clock import now
+from gaplab.services.store.models import AttemptRow, RepetitionRow
+from gaplab.services.store.queries.events import note
+
+_TOLD = {
+    Ending.COMPLETED: EventKind.REPETITION_COMPLETED,
+    Ending.PAUSED: EventKind.REPETITION_PAUSED,
+    Ending.STOPPED: EventKind.REPETITION_STOPPED,
+    Ending.CANCELLED: EventKind.REPETITION_CANCELLED,
+    Ending.HANDED_BACK: EventKind.REPETITION_HANDED_BACK,
+    Ending.LOST: EventKind.REPETITION_LOST,
+    Ending.FAILED: EventKind.REPETITION_FAILED,
+}
+
+
+def begin(session: Session, repetitions: Sequence[int]) -> None:
+    """These repetitions were claimed: their owner's attempt begins."""
+    row = RepetitionRow
+    claimed = select(row.id, row.epoch, row.owner, now()).where(row.id.in_(repetitions))
+    session.execute(insert(AttemptRow).from_select(["repetition_id", "epoch", "owner", "started_at"], claimed))
+
+
+def end(session: Session, repetitions: Sequence[int], ending: Ending, reason: str | None = None) -> None:
+    """The attempts at these repetitions that go on are over, which is an event of each."""
+    row, repetition = AttemptRow, RepetitionRow
+    ended = session.scalars(
+        update(row)
+        .where(row.repetition_id.in_(repetitions), row.ended_at.is_(None))
+        .values(ended_at=now(), ending=ending, reason=reason)
+        .returning(row.repetition_id)
+    ).all()
+    found = select(repetition).where(repetition.id.in_(ended)).order_by(repetition.id)
+    for each in session.scalars(found, execution_options={"populate_existing": True}):
+        failed = each.state is State.FAILED
+        why = each.error if failed else reason
+        kind = EventKind.REPETITION_FAILED if failed else _TOLD[ending]
+        note(session, kind, each.experiment_id, each.number, **({"reason": why} if why else {}))
+
+
+def latest(session: Session, experiment: str) -> dict[int, int]:
+    """The number of the latest attempt at each repetition of an experiment that has had one."""
+    row, repetition = AttemptRow, RepetitionRow
+    of_it = select(row.repetition_id, func.max(row.epoch)).join(repetition, repetition.id == row.repetition_id)
+    found = of_it.where(repetition.experiment_id == experiment).group_by(row.repetition_id)
+    return dict(session.execute(found).all())
+
+
+def attempts_of(session: Session, experiment: str, number: int) -> tuple[AttemptRead, ...]:
+    """The attempts at a repetition of an experiment, by number.
+
+    Raises:
+        NotFound: the experiment has no such repetition.
+    """
+    repetition = select(RepetitionRow.id).filter_by(experiment_id=experiment, number=number)
+    if (id_ := session.scalar(repetition)) is None:
+        msg = f"experiment {experiment!r} has no repetition {number}"
+        raise NotFound(msg)
+    row = AttemptRow
+    return tuple(
+        AttemptRead(
+            number=each.epoch,
+            owner=each.owner,
+            started_at=each.started_at,
+            ended_at=each.ended_at,
+            ending=each.ending,
+            reason=each.reason,
+        )
+        for each in session.scalars(select(row).where(row.repetition_id == id_).order_by(row.epoch))
+    )

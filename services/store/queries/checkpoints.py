@@ -1,0 +1,70 @@
+"""Checkpoints of the steps under way: stored in parts, read with a claim, and forgotten when the step is recorded."""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+
+from sqlalchemy import bindparam, delete, insert, select, update
+from sqlalchemy.orm import Session
+
+from gaplab.services.core.errors import Conflict
+from gaplab.services.store.clock import now
+from gaplab.services.store.lease import Checkpoint, Claim
+from gaplab.services.store.models import CheckpointRow, RepetitionRow
+
+
+def fresh(checkpoints: Sequence[Checkpoint], step: int, parts: int) -> list[Checkpoint]:
+    """Those of the step that are not stored yet; of steps that are over, none.
+
+    Args:
+        checkpoints: as delivered, in order.
+        step: the place in the log of the one that is under way.
+        parts: of it that are stored.
+
+    Raises:
+        Conflict: parts, or steps, before a delivered one are missing.
+    """
+    found: list[Checkpoint] = []
+    for each in checkpoints:
+        following = parts + len(found)
+        if each.step > step or (each.step == step and each.part > following):
+            msg = f"part {each.part} of step {each.step} cannot be stored: next is part {following} of step {step}"
+            raise Conflict(msg)
+        if each.step == step and each.part == following:
+            found.append(each)
+    return found
+
+
+def write(session: Session, parts: Mapping[Claim, Sequence[Checkpoint]]) -> None:
+    """Add these parts to the steps under way; their repetitions are locked, and the claims hold."""
+    rows = [
+        {"repetition_id": claim.repetition_id} | {name: getattr(each, name) for name in Checkpoint.__dataclass_fields__}
+        for claim, checkpoints in parts.items()
+        for each in checkpoints
+    ]
+    if not rows:
+        return
+    session.execute(insert(CheckpointRow), rows)
+    counts = [
+        {"of_id": claim.repetition_id, "count": checkpoints[-1].part + 1}
+        for claim, checkpoints in parts.items()
+        if checkpoints
+    ]
+    row = RepetitionRow
+    counted = {"checkpoints": bindparam("count"), "losses": 0, "heartbeat_at": now()}
+    session.connection().execute(update(row).where(row.id == bindparam("of_id")).values(counted), counts)
+
+
+def forget(session: Session, repetitions: Sequence[int]) -> None:
+    """The steps that were under way are recorded, or will never be."""
+    if repetitions:
+        session.execute(delete(CheckpointRow).where(CheckpointRow.repetition_id.in_(repetitions)))
+
+
+def stored(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Checkpoint, ...]]:
+    """What there is of the step under way of each of these repetitions."""
+    row = CheckpointRow
+    found = session.scalars(select(row).where(row.repetition_id.in_(repetitions)).order_by(row.step, row.part))
+    gathered: dict[int, list[Checkpoint]] = defaultdict(list)
+    for each in found:
+        gathered[each.repetition_id].append(Checkpoint(each.step, each.part, each.answers, each.seconds))
+    return {each: tuple(gathered[each]) for each in repetitions}

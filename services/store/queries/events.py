@@ -1,0 +1,134 @@
+"""Events: noted while a transaction does what they tell of, numbered and written as the last thing before its commit.
+
+Numbers come from one row, which is locked from then on until the commit: a number is visible only with all smaller
+ones, and a transaction that is rolled back takes none. Nothing is locked after that row: nobody waits in a circle.
+"""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, cast
+
+from sqlalchemy import ColumnElement, Table, bindparam, insert, select, text, update
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.events import EventKind, EventRead
+from gaplab.services.core.types import Measured, Probed, Selected, Step, Transferred, Tuned
+from gaplab.services.store.clock import now
+from gaplab.services.store.lease import Claim, TimedStep
+from gaplab.services.store.mapping import finite
+from gaplab.services.store.models import EventCounterRow, EventRow, ExperimentRow
+
+_NOTED = "events"
+
+_COUNT = (
+    update(EventCounterRow)
+    .values(latest=EventCounterRow.latest + bindparam("more"))
+    .returning(EventCounterRow.latest)
+    .execution_options(synchronize_session=False)
+)
+_INSERT = insert(cast("Table", EventRow.__table__)).values(at=now())
+
+_INSERT_ON_POSTGRES = text(
+    "INSERT INTO event (number, experiment_id, repetition, kind, body, at) "
+    "SELECT :before + place, experiment_id, repetition, kind, CAST(body AS json), clock_timestamp() "
+    "FROM unnest(CAST(:experiments AS text[]), CAST(:repetitions AS integer[]), CAST(:kinds AS text[]), "
+    "CAST(:bodies AS text[])) WITH ORDINALITY AS noted (experiment_id, repetition, kind, body, place)"
+)
+"""A row each, as the other database gets them, costs five times as much there: thousands of steps a second do count."""
+
+
+def note(session: Session, kind: EventKind, experiment: str, repetition: int | None = None, /, **body: Any) -> None:  # noqa: ANN401
+    """It is an event once the session's transaction is committed, and never was if it is not.
+
+    Args:
+        session: of a transaction that writes.
+        kind: what happened.
+        experiment: to which.
+        repetition: to which of its repetitions.
+        body: a few values that JSON has; never reality's parameters.
+    """
+    values = {"kind": kind.value, "experiment_id": experiment, "repetition": repetition, "body": body}
+    session.info.setdefault(_NOTED, []).append(values)
+
+
+def note_steps(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]) -> None:
+    """An event for each of these steps."""
+    for claim, steps in deliveries.items():
+        for each in steps:
+            kind, body = _told(each.step)
+            note(session, kind, claim.experiment_id, claim.number, iteration=each.step.iteration, **body)
+
+
+def write(session: Session) -> None:
+    """Number and store what was noted; for the store, right before it commits."""
+    if not (noted := session.info.pop(_NOTED, None)):
+        return
+    session.flush()
+    latest = session.execute(_COUNT, {"more": len(noted)}).scalar_one()
+    before, connection = latest - len(noted), session.connection()
+    if connection.dialect.name == "postgresql":
+        connection.execute(_INSERT_ON_POSTGRES, {"before": before} | _columns(noted))
+    else:
+        rows = [{"number": number, **each} for number, each in enumerate(noted, start=before + 1)]
+        connection.execute(_INSERT, rows)
+
+
+def latest(session: Session) -> int:
+    """The number of the latest event; 0 if there is none."""
+    return session.execute(select(EventCounterRow.latest)).scalar_one()
+
+
+def after(
+    session: Session,
+    number: int,
+    *,
+    limit: int,
+    experiment: str | None = None,
+    study: str | None = None,
+    kinds: Iterable[EventKind] = (),
+) -> tuple[EventRead, ...]:
+    """Up to `limit` events that follow that number, in their order."""
+    row, wanted = EventRow, list(kinds)
+    query = select(row.number, row.kind, row.experiment_id, ExperimentRow.study_id, row.repetition, row.body, row.at)
+    conditions: list[ColumnElement[bool]] = [row.number > number]
+    if experiment is not None:
+        conditions.append(row.experiment_id == experiment)
+    if study is not None:
+        conditions.append(ExperimentRow.study_id == study)
+    if wanted:
+        conditions.append(row.kind.in_(wanted))
+    found = session.execute(
+        query.outerjoin(ExperimentRow, ExperimentRow.id == row.experiment_id)
+        .where(*conditions)
+        .order_by(row.number)
+        .limit(limit)
+    )
+    return tuple(
+        EventRead(number=place, kind=EventKind(kind), experiment=of, study=within, repetition=which, body=body, at=at)
+        for place, kind, of, within, which, body, at in found
+    )
+
+
+def _columns(noted: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    return {
+        "experiments": [each["experiment_id"] for each in noted],
+        "repetitions": [each["repetition"] for each in noted],
+        "kinds": [each["kind"] for each in noted],
+        "bodies": [json.dumps(each["body"]) for each in noted],
+    }
+
+
+def _told(step: Step) -> tuple[EventKind, dict[str, Any]]:
+    """What an event says of a step: what it came to, and no vector."""
+    match step:
+        case Selected():
+            return EventKind.SELECTED, {}
+        case Measured():
+            return EventKind.MEASURED, {"fitness": finite(step.sample.fitness)}
+        case Tuned():
+            best = finite(step.simulators[0].squared_error) if step.simulators else None
+            return EventKind.TUNED, {"simulators": len(step.simulators), "squared_error": best}
+        case Transferred():
+            return EventKind.TRANSFERRED, {"simulated_fitness": finite(step.fitness)}
+        case Probed():
+            return EventKind.PROBED, {"fitness": finite(step.fitness), "recorded_fitness": finite(step.recorded)}

@@ -1,0 +1,184 @@
+"""Experiments and studies: inserted, found, listed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from secrets import choice
+from typing import TypeVar
+
+from sqlalchemy import event, insert, select
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.lifecycle import OPEN
+from gaplab.schemas.spec import ExperimentSpec, Schedule
+from gaplab.services.core.errors import NotFound, StoreUnavailable
+from gaplab.services.store.clock import now
+from gaplab.services.store.models import SPEC_VERSION, ExperimentRow, RepetitionRow, StudyRow
+from gaplab.services.store.queries.events import note
+
+_LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much one repetition is.
+
+    Attributes:
+        iterations: number 0 included.
+        rollouts: as expected.
+    """
+
+    iterations: int
+    rollouts: int
+
+
+def new_id() -> str:
+    """A short random name, without letters that look alike.
+
+    There are 31 to the tenth of them, 8e14: among a million, the next one is taken with a probability of 1e-9. Then the
+    database refuses it, as an IntegrityError, and nothing of what it was for is stored.
+    """
+    return "".join(choice(_LETTERS) for _ in range(10))
+
+
+def insert_study(session: Session, name: str) -> StudyRow:
+    """A study without experiments yet."""
+    study = StudyRow(id=new_id(), name=_plain(name), created_at=_moment(session))
+    session.add(study)
+    session.flush()
+    return study
+
+
+def insert_experiment(
+    session: Session,
+    spec: ExperimentSpec,
+    extent: Extent,
+    *,
+    study: StudyRow | None = None,
+    position: int = 0,
+    token: str | None = None,
+) -> ExperimentRow:
+    """An experiment with its repetitions, all QUEUED.
+
+    Args:
+        session: of a transaction that writes.
+        spec: resolved.
+        extent: of each of its repetitions.
+        study: that it belongs to.
+        position: within the study.
+        token: id of the token that submitted it.
+    """
+    experiment = ExperimentRow(
+        id=new_id(),
+        study_id=study.id if study else None,
+        position=position,
+        name=_plain(spec.name or spec.strategy.name),
+        strategy=spec.strategy.name,
+        spec=spec.model_dump(mode="json", exclude=set(Schedule.model_fields)),
+        iterations=extent.iterations,
+        rollouts=extent.rollouts,
+        precedence=-spec.priority,
+        max_parallel=spec.max_parallel,
+        token_id=token,
+        created_at=study.created_at if study else _moment(session),
+    )
+    session.add(experiment)
+    session.flush()
+    insert_repetitions(session, experiment.id, range(spec.repetitions or 0))
+    note(session, EventKind.SUBMITTED, experiment.id, name=experiment.name, repetitions=spec.repetitions)
+    return experiment
+
+
+def insert_repetitions(session: Session, experiment_id: str, numbers: range) -> None:
+    """Repetitions of these numbers, QUEUED."""
+    rows = [{"experiment_id": experiment_id, "number": each} for each in numbers]
+    if rows:
+        session.execute(insert(RepetitionRow), rows)
+
+
+def get_experiment(session: Session, experiment_id: str) -> ExperimentRow:
+    """The experiment of that id.
+
+    Raises:
+        NotFound: there is none.
+    """
+    if (found := session.get(ExperimentRow, _plain(experiment_id))) is None:
+        msg = f"there is no experiment {experiment_id!r}"
+        raise NotFound(msg)
+    return found
+
+
+def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow, ...]:
+    """The experiments of these ids, in their order.
+
+    Raises:
+        NotFound: there is none of one of them.
+    """
+    named = ExperimentRow.id.in_([_plain(each) for each in ids])
+    found = {row.id: row for row in session.scalars(select(ExperimentRow).where(named))}
+    if missing := [each for each in ids if each not in found]:
+        msg = f"there is no experiment {', '.join(map(repr, missing))}"
+        raise NotFound(msg)
+    return tuple(found[each] for each in ids)
+
+
+def get_study(session: Session, study_id: str) -> StudyRow:
+    """The study of that id.
+
+    Raises:
+        NotFound: there is none.
+    """
+    if (found := session.get(StudyRow, _plain(study_id))) is None:
+        msg = f"there is no study {study_id!r}"
+        raise NotFound(msg)
+    return found
+
+
+def experiments_of(session: Session, studies: Sequence[str]) -> tuple[ExperimentRow, ...]:
+    """The experiments of these studies, in the order in which each study has them."""
+    row = ExperimentRow
+    return tuple(session.scalars(select(row).where(row.study_id.in_(studies)).order_by(row.study_id, row.position)))
+
+
+def open_studies(session: Session, studies: Sequence[str]) -> frozenset[str]:
+    """Those of these studies in which an experiment has not ended."""
+    row = ExperimentRow
+    found = session.scalars(select(row.study_id).where(row.study_id.in_(studies), row.state.in_(OPEN)).distinct())
+    return frozenset(each for each in found if each is not None)
+
+
+def repetitions_of(session: Session, experiment_id: str) -> tuple[RepetitionRow, ...]:
+    """The repetitions of an experiment, by number."""
+    row = RepetitionRow
+    return tuple(session.scalars(select(row).where(row.experiment_id == experiment_id).order_by(row.number)))
+
+
+def lock(session: Session, experiments: Sequence[str]) -> None:
+    """Keep other transactions from moving these experiments between states until this one ends.
+
+    Whoever moves repetitions of an experiment between states locks the experiment first, in the order of ids.
+    """
+    row = ExperimentRow
+    session.execute(select(row.id).where(row.id.in_(experiments)).order_by(row.id).with_for_update())
+
+
+@event.listens_for(ExperimentRow, "load")
+def _refuse_newer(row: ExperimentRow, _: object) -> None:
+    """A spec of a later version may mean something else than what it seems to: it is not read at all."""
+    if row.spec_version > SPEC_VERSION:
+        msg = f"the spec of experiment {row.id!r} is of version {row.spec_version}, and this gaplab reads up to "
+        msg += f"{SPEC_VERSION}: use a later gaplab with this database"
+        raise StoreUnavailable(msg)
+
+
+T = TypeVar("T", str, str | None)
+
+
+def _plain(text: T) -> T:
+    """The text without the NULs that Postgres refuses: to look for, a name like any other that is not there."""
+    return text.replace("\0", "\N{REPLACEMENT CHARACTER}") if text else text
+
+
+def _moment(session: Session) -> datetime:
+    return session.execute(select(now())).scalar_one()

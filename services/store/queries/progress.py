@@ -1,0 +1,119 @@
+"""How far experiments are: one sum over repetitions each, whatever the number of their results."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+from sqlalchemy import ColumnElement, case, func, select
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.records import Progress
+from gaplab.services.store.models import ExperimentRow, RepetitionRow
+
+_OPEN = (State.QUEUED, State.RUNNING)
+
+
+@dataclass(frozen=True)
+class Tally:
+    """What repetitions add up to; of a study, the sum of its experiments'.
+
+    Attributes:
+        running: those with a step stored; a claimed one that has none may still wait for a core.
+        rollouts_left: of the repetitions that have not ended.
+        seconds: of work in the rollouts that are done.
+    """
+
+    repetitions: int = 0
+    completed: int = 0
+    failed: int = 0
+    running: int = 0
+    open: int = 0
+    iterations: int = 0
+    iterations_done: int = 0
+    rollouts: int = 0
+    rollouts_done: int = 0
+    rollouts_failed: int = 0
+    rollouts_saved: int = 0
+    rollouts_left: int = 0
+    seconds: float = 0.0
+
+    def __add__(self, other: "Tally") -> "Tally":
+        return Tally(*(mine + theirs for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True)))
+
+    @property
+    def seconds_left(self) -> float | None:
+        """What is left at the pace so far by those that run now; None while that is unknown."""
+        if not self.open:
+            return 0.0
+        behind = self.rollouts_done + self.rollouts_saved
+        if not (self.running and behind and self.seconds):
+            return None
+        return self.rollouts_left * self.seconds / behind / self.running
+
+    def progress(self) -> Progress:
+        """As it is shown."""
+        return Progress(
+            repetitions=self.repetitions,
+            completed=self.completed,
+            failed=self.failed,
+            iterations=self.iterations,
+            iterations_done=self.iterations_done,
+            rollouts=self.rollouts,
+            rollouts_done=self.rollouts_done,
+            rollouts_failed=self.rollouts_failed,
+            rollouts_saved=self.rollouts_saved,
+            seconds_left=self.seconds_left,
+        )
+
+
+def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
+    """The tally of each experiment."""
+    row = RepetitionRow
+    left = ExperimentRow.rollouts - row.rollouts_done - row.rollouts_saved
+    found = session.execute(
+        select(
+            row.experiment_id,
+            func.count(),
+            _count(row.state == State.COMPLETED),
+            _count(row.state == State.FAILED),
+            _count((row.state == State.RUNNING) & (row.steps > 0)),
+            _count(row.state.in_(_OPEN)),
+            func.sum(ExperimentRow.iterations),
+            func.sum(row.iterations_done),
+            func.sum(ExperimentRow.rollouts),
+            func.sum(row.rollouts_done),
+            func.sum(row.rollouts_failed),
+            func.sum(row.rollouts_saved),
+            func.sum(case(((left > 0) & row.state.in_(_OPEN), left), else_=0)),
+            func.sum(row.seconds),
+        )
+        .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
+        .where(row.experiment_id.in_(experiments))
+        .group_by(row.experiment_id)
+    )
+    return {experiment: _tally(*counts, seconds=float(seconds)) for experiment, *counts, seconds in found}
+
+
+def reasons(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Why repetitions of each experiment failed, each reason once, by the first repetition that it befell."""
+    row = RepetitionRow
+    found = session.execute(
+        select(row.experiment_id, row.error)
+        .where(row.experiment_id.in_(experiments), row.state == State.FAILED, row.error.is_not(None))
+        .group_by(row.experiment_id, row.error)
+        .order_by(row.experiment_id, func.min(row.number))
+    )
+    gathered: dict[str, tuple[str, ...]] = {}
+    for experiment, reason in found:
+        gathered[experiment] = (*gathered.get(experiment, ()), str(reason))
+    return gathered
+
+
+def _tally(*counts: int, seconds: float) -> Tally:
+    """In the order of the fields; Postgres sums whole numbers to decimals."""
+    names = (each.name for each in fields(Tally))
+    return Tally(seconds=seconds, **{name: int(count) for name, count in zip(names, counts, strict=False)})
+
+
+def _count(condition: ColumnElement[bool]) -> ColumnElement[int]:
+    return func.sum(case((condition, 1), else_=0))

@@ -1,0 +1,96 @@
+"""What replays and predictions start from: controllers, the simulators around them, and what reality said."""
+
+from dataclasses import dataclass
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session, aliased
+
+from gaplab.schemas.records import MeasurementKind
+from gaplab.services.store.models import IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
+
+
+@dataclass(frozen=True)
+class SampleBetween:
+    """A sample, and the parameters of the best simulators before it was measured and after tuning on it.
+
+    Attributes:
+        fitness: in reality; None if the measurement failed.
+    """
+
+    repetition: int
+    iteration: int
+    genome: list[float]
+    fitness: float | None
+    before: list[float]
+    after: list[float]
+
+
+def samples_between(session: Session, experiment: str) -> tuple[SampleBetween, ...]:
+    """The samples of an experiment that simulators were tuned on, by repetition and iteration."""
+    row, before, after = MeasurementRow, aliased(SimulatorRow), aliased(SimulatorRow)
+    query = (
+        select(RepetitionRow.number, row.iteration, row.genome, row.fitness, before.parameters, after.parameters)
+        .join(RepetitionRow, RepetitionRow.id == row.repetition_id)
+        .join(
+            before,
+            (before.repetition_id == row.repetition_id) & (before.iteration == row.iteration - 1) & (before.rank == 0),
+        )
+        .join(
+            after, (after.repetition_id == row.repetition_id) & (after.iteration == row.iteration) & (after.rank == 0)
+        )
+        .where(RepetitionRow.experiment_id == experiment, row.kind == MeasurementKind.SAMPLE)
+        .order_by(RepetitionRow.number, row.iteration)
+    )
+    return tuple(SampleBetween(*each) for each in session.execute(query))
+
+
+@dataclass(frozen=True)
+class Controlled:
+    """A controller that reality was asked about.
+
+    Attributes:
+        real: its fitness there; None if the measurement failed.
+        simulated: its fitness in the simulator that it was evolved in, of a transferred one; None otherwise, or if the
+            physics failed.
+    """
+
+    genome: list[float]
+    real: float | None
+    simulated: float | None
+
+
+def measured_controller(
+    session: Session, experiment: str, repetition: int, iteration: int, kind: MeasurementKind
+) -> Controlled | None:
+    """The sample or the transferred controller of an iteration; None if reality has not answered yet."""
+    row, measured = IterationRow, MeasurementRow
+    query = (
+        select(measured.genome, measured.fitness, row.simulated_fitness)
+        .join(RepetitionRow, RepetitionRow.id == measured.repetition_id)
+        .join(row, (row.repetition_id == measured.repetition_id) & (row.number == measured.iteration))
+        .where(
+            RepetitionRow.experiment_id == experiment,
+            RepetitionRow.number == repetition,
+            measured.iteration == iteration,
+            measured.kind == kind,
+        )
+    )
+    found = session.execute(query).first()
+    if found is None:
+        return None
+    genome, real, simulated = found
+    return Controlled(genome, real, simulated if kind is MeasurementKind.PROBE else None)
+
+
+def tuned_parameters(session: Session, experiment: str, repetition: int, iteration: int) -> list[list[float]]:
+    """The parameters of the simulators of an iteration, the best first; none if they are not tuned yet."""
+    row = SimulatorRow
+    query = (
+        select(row.parameters)
+        .join(RepetitionRow, RepetitionRow.id == row.repetition_id)
+        .where(
+            RepetitionRow.experiment_id == experiment, RepetitionRow.number == repetition, row.iteration == iteration
+        )
+        .order_by(row.rank)
+    )
+    return list(session.scalars(query))

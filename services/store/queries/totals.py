@@ -1,0 +1,50 @@
+"""What the whole database holds, from tallies alone: for whoever watches the service."""
+
+from dataclasses import dataclass
+
+from sqlalchemy import case, func, select
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.lifecycle import State
+from gaplab.services.store.models import ExperimentRow, RepetitionRow
+from gaplab.services.store.queries.supervisors import ages
+
+
+@dataclass(frozen=True)
+class Totals:
+    """All experiments taken together.
+
+    Attributes:
+        experiments: by state.
+        repetitions: by state.
+        rollouts_queued: that repetitions which have not ended still need.
+        rollouts_done: recorded so far.
+        steps: recorded so far.
+        supervisor_ages_s: since each supervisor was last heard of.
+    """
+
+    experiments: dict[State, int]
+    repetitions: dict[State, int]
+    rollouts_queued: int
+    rollouts_done: int
+    steps: int
+    supervisor_ages_s: tuple[float, ...]
+
+
+def totals(session: Session) -> Totals:
+    """One sum over repetitions, by state."""
+    row = RepetitionRow
+    by_state = select(ExperimentRow.state, func.count()).group_by(ExperimentRow.state)
+    left = ExperimentRow.rollouts - row.rollouts_done - row.rollouts_saved
+    sums = (func.count(), func.sum(case((left > 0, left), else_=0)), func.sum(row.rollouts_done), func.sum(row.steps))
+    found = session.execute(
+        select(row.state, *sums).join(ExperimentRow, ExperimentRow.id == row.experiment_id).group_by(row.state)
+    ).all()
+    return Totals(
+        experiments=dict(session.execute(by_state).all()),
+        repetitions={state: count for state, count, *_ in found},
+        rollouts_queued=sum(int(queued) for state, _, queued, _, _ in found if not state.ended),
+        rollouts_done=sum(int(done) for *_, done, _ in found),
+        steps=sum(int(steps) for *_, steps in found),
+        supervisor_ages_s=ages(session),
+    )

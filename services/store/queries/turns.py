@@ -1,0 +1,90 @@
+"""Whose turn it is: by priority, then fair between experiments, then the oldest.
+
+Fair means: whoever has the fewest repetitions running, those counted that were claimed and wait for a core.
+"""
+
+from collections.abc import Sequence
+from heapq import heapify, heappop, heapreplace
+
+from sqlalchemy import ColumnElement, Select, func, select
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.lifecycle import State
+from gaplab.services.store.models import ExperimentRow, RepetitionRow
+from gaplab.services.store.queries.experiments import lock
+
+_ROW = ExperimentRow
+_ORDER = (_ROW.precedence, _ROW.running, _ROW.created_at, _ROW.position, _ROW.id)
+
+
+def next_repetitions(session: Session, limit: int, permitted: ColumnElement[bool]) -> tuple[int, ...]:
+    """Up to `limit` queued repetitions, in the order of turns, of permitted experiments; locked from now on."""
+    experiments = session.scalars(next_experiments(limit).where(permitted)).all()
+    if not experiments:
+        return ()
+    lock(session, experiments)
+    turns = _turns(session, experiments, limit, permitted)
+    waiting = {each: iter(_queued(session, each, turns.count(each))) for each in set(turns)}
+    return tuple(next(waiting[each]) for each in turns)
+
+
+def next_experiments(limit: int) -> Select[str]:
+    """The experiments that have the next turns, off an index; none beyond the first `limit` can have one of them."""
+    return select(_ROW.id).where(_ROW.claimable.is_(True)).order_by(*_ORDER).limit(limit)
+
+
+def ahead(session: Session, experiments: Sequence[str], permitted: ColumnElement[bool]) -> frozenset[str]:
+    """Those of these experiments of which one claimed repetition less, and one more of another, would be fairer.
+
+    The other one is permitted to whoever has claimed them.
+    """
+    waits = _ROW.claimable.is_(True) & permitted
+    first = select(_ROW.precedence, _ROW.running).where(waits).order_by(*_ORDER).limit(1)
+    if (waiting := session.execute(first).first()) is None:
+        return frozenset()
+    held = select(_ROW.id, _ROW.precedence, _ROW.running).where(_ROW.id.in_(experiments))
+    return frozenset(
+        experiment
+        for experiment, precedence, running in session.execute(held)
+        if (waiting.precedence, waiting.running + 1) < (precedence, running)
+    )
+
+
+def _turns(session: Session, experiments: Sequence[str], limit: int, permitted: ColumnElement[bool]) -> list[str]:
+    """The experiment whose turn it is, again and again; each has one more running after its turn.
+
+    Only now, when they are locked, is it sure which are claimable and permitted: another may have claimed first.
+    """
+    row = RepetitionRow
+    queued = (
+        select(row.experiment_id, func.count().label("queued"))
+        .where(row.experiment_id.in_(experiments), row.state == State.QUEUED)
+        .group_by(row.experiment_id)
+        .subquery()
+    )
+    found = session.execute(
+        select(_ROW.id, _ROW.precedence, _ROW.running, _ROW.max_parallel, queued.c.queued)
+        .join(queued, queued.c.experiment_id == _ROW.id)
+        .where(_ROW.claimable.is_(True), permitted)
+        .order_by(_ROW.created_at, _ROW.position, _ROW.id)
+    ).all()
+    heap = [
+        (precedence, running, age, min(waiting, waiting if most is None else most - running))
+        for age, (_, precedence, running, most, waiting) in enumerate(found)
+    ]
+    heapify(heap)
+    turns: list[str] = []
+    while heap and len(turns) < limit:
+        precedence, running, age, room = heap[0]
+        turns.append(found[age].id)
+        if room > 1:
+            heapreplace(heap, (precedence, running + 1, age, room - 1))
+        else:
+            heappop(heap)
+    return turns
+
+
+def _queued(session: Session, experiment: str, limit: int) -> Sequence[int]:
+    row = RepetitionRow
+    queued = select(row.id).where(row.experiment_id == experiment, row.state == State.QUEUED)
+    return session.scalars(queued.order_by(row.number).limit(limit)).all()
