@@ -11,6 +11,7 @@ from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.schedule import ExtensionSpec, ScheduleChange
 from gaplab.services.experiments import lifecycle
+from gaplab.services.experiments.extension import extend_experiment as extend_to
 
 router = APIRouter()
 
@@ -93,7 +94,7 @@ def extend_experiment(
     What is there stands, and the whole equals an experiment that was submitted with these totals. With the totals that
     it has, one that was stopped is brought to its end.
     """
-    return extend_totals(store, id, extension, admitted)
+    return extend_to(store, id, extension, admitted)
 
 
 @router.patch(
