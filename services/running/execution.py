@@ -193,13 +193,8 @@ def _record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -
     leaving = {claim.id for claim in after if after[claim] > before[claim]}
     if leaving:
         row = RepetitionRow
-        whole = (
-            select(ExperimentRow.iterations)
-            .where(ExperimentRow.id == row.experiment_id)
-            .correlate(row)
-            .scalar_subquery()
-        )
-        done = row.id.in_(leaving) & (row.iterations_done >= total)
+        iterations = select(ExperimentRow.iterations).where(ExperimentRow.id == row.experiment_id).correlate(row)
+        done = row.id.in_(leaving) & (row.iterations_done >= iterations.scalar_subquery())
         _LEASES.end(session, done, State.COMPLETED, Ending.COMPLETED, owner=None)
         _LEASES.end(session, row.id.in_(leaving), State.QUEUED, Ending.HANDED_BACK, owner=None)
     return tuple(claim for claim in held if claim.id not in leaving)
