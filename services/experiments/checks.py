@@ -22,11 +22,11 @@ from gaplab.services.experiments.states import move
 from gaplab.services.plugins.external import external_plugins
 from gaplab.services.specs.resolution import resolve_sensitivity, unit
 from gaplab.services.store.clock import moment
-from gaplab.services.store.mapping import checked
 from gaplab.services.store.models import ExperimentRow, SensitivityRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.session import Store, snapshot
 from gaplab.services.store.statements import insert_new, storable
+from gaplab.services.store.stored_specs import checked
 
 
 @dataclass(frozen=True)

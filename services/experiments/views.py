@@ -9,11 +9,11 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead, RepetitionRead, StudyRead
 from gaplab.services.experiments.checks import CheckSummary, summaries
 from gaplab.services.experiments.hiding import hidden
-from gaplab.services.store.mapping import without_truth
 from gaplab.services.store.models import ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries.experiments import experiments_of
 from gaplab.services.store.queries.progress import Tally, reasons, tallies
 from gaplab.services.store.queries.results import best_recorded
+from gaplab.services.store.stored_specs import without_truth
 
 
 def view_experiments(

@@ -31,6 +31,7 @@ from gaplab.services.store.lease import TimedStep as TimedStep
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import attempts, checkpoints, steps
 from gaplab.services.store.queries.experiments import lock
+from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 
 _REQUESTED_ENDINGS = {State.PAUSING: Ending.PAUSED, State.STOPPING: Ending.STOPPED}
@@ -177,9 +178,9 @@ def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
         .where(row.id.in_(ids))
     ).all()
     specs = {experiment: ExperimentSpec.model_validate(spec) for _, _, experiment, _, spec in rows}
-    logs, parts = steps.logs(session, ids), checkpoints.stored(session, ids)
+    past, parts = logs(session, ids), checkpoints.stored(session, ids)
     claims = {
-        id_: Claim(id_, epoch, experiment, number, specs[experiment], logs[id_], parts[id_])
+        id_: Claim(id_, epoch, experiment, number, specs[experiment], past[id_], parts[id_])
         for id_, epoch, experiment, number, _ in rows
     }
     return tuple(claims[id_] for id_ in ids)

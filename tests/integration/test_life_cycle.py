@@ -13,7 +13,7 @@ from gaplab.services.running import execution
 from gaplab.services.running.execution import TimedStep
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import RepetitionRow
-from gaplab.services.store.queries.steps import logs
+from gaplab.services.store.queries.logs import logs
 from tests.experiments import run, same, some_log, toy
 
 

@@ -25,7 +25,7 @@ from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import AttemptRow, ExperimentRow, RepetitionRow
-from gaplab.services.store.queries.steps import logs
+from gaplab.services.store.queries.logs import logs
 from tests.fakes import flat
 
 MOST_ITERATIONS, MOST_REPETITIONS = 2, 3

@@ -21,7 +21,7 @@ from gaplab.services.experiments import submission
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.store.models import CheckpointRow, RepetitionRow, SensitivityRow
-from gaplab.services.store.queries.steps import logs
+from gaplab.services.store.queries.logs import logs
 from gaplab.workers import sensitivity as checking
 from gaplab.workers import supervisor
 from gaplab.workers.checkpoints import recorded

@@ -21,7 +21,7 @@ from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import RepetitionRow
-from gaplab.services.store.queries.steps import logs
+from gaplab.services.store.queries.logs import logs
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
 from tests.fakes import flat

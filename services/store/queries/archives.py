@@ -12,10 +12,10 @@ from sqlalchemy.orm import Session
 
 from gaplab.services.store.archive_columns import COLUMNS_LEFT_OUT, EXPERIMENT, REPETITION, columns_of, table_of
 from gaplab.services.store.clock import now
-from gaplab.services.store.mapping import without_truth
 from gaplab.services.store.models import ExperimentProvenanceRow, ExperimentRow, ProvenanceRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries import provenance
 from gaplab.services.store.queries.experiments import new_id
+from gaplab.services.store.stored_specs import without_truth
 
 __all__ = ["Refused", "free", "insert_rows", "moment", "rows"]
 
