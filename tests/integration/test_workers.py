@@ -23,7 +23,7 @@ from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import CheckpointRow, RepetitionRow
 from gaplab.services.store.queries.logs import logs
-from gaplab.workers import repetition as task
+from gaplab.workers import repetitions as task
 from gaplab.workers import sensitivity as checking
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.cluster import cluster
