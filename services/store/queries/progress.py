@@ -52,18 +52,7 @@ class Tally:
 
     def progress(self) -> Progress:
         """As it is shown."""
-        return Progress(
-            repetitions=self.repetitions,
-            completed=self.completed,
-            failed=self.failed,
-            iterations=self.iterations,
-            iterations_done=self.iterations_done,
-            rollouts=self.rollouts,
-            rollouts_done=self.rollouts_done,
-            rollouts_failed=self.rollouts_failed,
-            rollouts_saved=self.rollouts_saved,
-            seconds_left=self.seconds_left,
-        )
+        return Progress.model_validate(self, from_attributes=True)
 
 
 def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
