@@ -35,7 +35,7 @@ _EXPORTED: dict[int | str, dict[str, Any]] = {
     response_class=Response,
     responses={**_EXPORTED, **documented(404)},
 )
-def export_experiment(id: Id, store: StoreDep) -> Response:  # noqa: A002 - the address says {id}
+def export_experiment(id: Id, store: StoreDep) -> Response:
     """Everything of an experiment at one moment; reality's parameters are null until they may be shown."""
     return _sent(archives.export_experiment(store, id))
 
@@ -46,7 +46,7 @@ def export_experiment(id: Id, store: StoreDep) -> Response:  # noqa: A002 - the 
     response_class=Response,
     responses={**_EXPORTED, **documented(404)},
 )
-def export_study(id: Id, store: StoreDep) -> Response:  # noqa: A002 - the address says {id}
+def export_study(id: Id, store: StoreDep) -> Response:
     """Everything of a study and of its experiments at one moment."""
     return _sent(archives.export_study(store, id))
 

@@ -50,7 +50,7 @@ class ComparisonQuery(Parameters):
     responses={200: examples.shown(examples.CURVE, "Over its repetitions", csv=examples.CSV), **documented(404)},
 )
 def read_curve(
-    id: Id,  # noqa: A002 - the address says {id}
+    id: Id,
     store: StoreDep,
     query: Annotated[CurveQuery, Query()],
 ) -> Curve | Response:
@@ -69,7 +69,7 @@ def read_curve(
     },
 )
 def read_study_curves(
-    id: Id,  # noqa: A002 - the address says {id}
+    id: Id,
     store: StoreDep,
     query: Annotated[CurveQuery, Query()],
 ) -> tuple[Curve, ...] | Response:
@@ -106,10 +106,10 @@ def compare_experiments(store: StoreDep, query: Annotated[ComparisonQuery, Query
         raise InvalidSpec(renamed) from error
 
 
-def _wanted(curves: tuple[Curve, ...], query: CurveQuery) -> tuple[Curve, ...] | Response:
-    return _csv(curves) if query.format == "csv" else tuple(curves)
+def _wanted(found: tuple[Curve, ...], query: CurveQuery) -> tuple[Curve, ...] | Response:
+    return _csv(found) if query.format == "csv" else tuple(found)
 
 
-def _csv(curves: tuple[Curve, ...]) -> Response:
+def _csv(found: tuple[Curve, ...]) -> Response:
     disposition = {"Content-Disposition": 'attachment; filename="gaplab-curves.csv"'}
-    return Response(curves.curves_csv(curves), media_type="text/csv", headers=disposition)
+    return Response(curves.curves_csv(found), media_type="text/csv", headers=disposition)

@@ -104,7 +104,7 @@ def list_experiments(store: StoreDep, which: Annotated[ExperimentFilter, Query()
     },
 )
 def read_experiment(
-    id: Id,  # noqa: A002 - the address says {id}
+    id: Id,
     store: StoreDep,
     caller: CallerDep,
     request: Request,
@@ -125,7 +125,7 @@ def read_experiment(
     },
 )
 def edit_experiment(
-    id: Id,  # noqa: A002 - the address says {id}
+    id: Id,
     edit: Annotated[Edit, Body(openapi_examples=examples.EDITS)],
     store: StoreDep,
     request: Request,
@@ -145,7 +145,7 @@ def edit_experiment(
         **documented(404),
     },
 )
-def list_repetitions(id: Id, store: StoreDep) -> tuple[RepetitionRead, ...]:  # noqa: A002 - the address says {id}
+def list_repetitions(id: Id, store: StoreDep) -> tuple[RepetitionRead, ...]:
     """Every repetition with its state, and why it failed if it did."""
     return tuple(submission.list_repetitions(store, id))
 
@@ -159,7 +159,7 @@ def list_repetitions(id: Id, store: StoreDep) -> tuple[RepetitionRead, ...]:  # 
     },
 )
 def list_samples(
-    id: Id,  # noqa: A002 - the address says {id}
+    id: Id,
     store: StoreDep,
     which: Annotated[SampleFilter, Query()],
 ) -> Page[SampleRead]:
@@ -176,7 +176,7 @@ def list_samples(
     },
 )
 def list_simulators(
-    id: Id,  # noqa: A002 - the address says {id}
+    id: Id,
     store: StoreDep,
     which: Annotated[SimulatorFilter, Query()],
 ) -> Page[SimulatorRead]:
@@ -189,7 +189,7 @@ def list_simulators(
     summary="Read an experiment's misfit",
     responses={200: examples.shown(examples.MISFIT, "By iteration, over repetitions"), **documented(404)},
 )
-def read_misfit(id: Id, store: StoreDep) -> MisfitRead:  # noqa: A002 - the address says {id}
+def read_misfit(id: Id, store: StoreDep) -> MisfitRead:
     """The error that remains after tuning, how far repetitions agree, and coefficients that are stuck at a bound."""
     return misfit(store, id)
 
@@ -200,7 +200,7 @@ def read_misfit(id: Id, store: StoreDep) -> MisfitRead:  # noqa: A002 - the addr
     responses={200: examples.shown([examples.ATTEMPT], "In their order"), **documented(404, 422)},
 )
 def list_attempts(
-    id: Id,  # noqa: A002 - the address says {id}
+    id: Id,
     number: Annotated[int, Path(ge=0, le=1_000_000)],
     store: StoreDep,
 ) -> tuple[AttemptRead, ...]:

@@ -147,10 +147,10 @@ def _explained(store: Store, query: ExperimentDrawing, figure: Figure) -> Figure
 
 
 def _curves(store: Store, query: CurvesDrawing) -> Figure:
-    studies = [submission.read_study(store, each) for each in query.study]
-    curves = [curve for each in studies for curve in curves.study_curves(store, each.id)]
-    curves += curves.curves(store, query.experiment) if query.experiment else ()
-    curves = list({each.experiment: each for each in curves}.values())  # one that is asked for twice is one line
-    title = query.title if query.title is not None else ", ".join(each.name for each in studies)
-    against = None if query.x == "evaluations" else abscissa(store, curves, query.x, cost_s=query.cost_s)
-    return curves_figure(curves, title=title, band=query.band, against=against, each=query.each)
+    studies = [submission.read_study(store, id) for id in query.study]
+    drawn = [curve for study in studies for curve in curves.study_curves(store, study.id)]
+    drawn += curves.curves(store, query.experiment) if query.experiment else ()
+    drawn = list({curve.experiment: curve for curve in drawn}.values())  # one that is asked for twice is one line
+    title = query.title if query.title is not None else ", ".join(study.name for study in studies)
+    against = None if query.x == "evaluations" else abscissa(store, drawn, query.x, cost_s=query.cost_s)
+    return curves_figure(drawn, title=title, band=query.band, against=against, each=query.each)

@@ -34,7 +34,7 @@ def _study(state: State, description: str) -> dict[str, object]:
     summary="Pause an experiment",
     responses={200: _experiment(State.PAUSING, "Pausing, or paused if nothing ran"), **documented(404, 409)},
 )
-def pause_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
+def pause_experiment(id: Id, store: StoreDep) -> ExperimentRead:
     """Let running repetitions finish their step and give their core back, and start no other, until it is resumed."""
     return life_cycle.ask_experiment(store, id, Verb.PAUSE)
 
@@ -45,7 +45,7 @@ def pause_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 -
     summary="Resume an experiment",
     responses={200: _experiment(State.QUEUED, "It goes on from where it was"), **documented(404, 409)},
 )
-def resume_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
+def resume_experiment(id: Id, store: StoreDep) -> ExperimentRead:
     """Go on with an experiment that was paused, with the numbers that it would have had anyway."""
     return life_cycle.ask_experiment(store, id, Verb.RESUME)
 
@@ -56,7 +56,7 @@ def resume_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 
     summary="Stop an experiment",
     responses={200: _experiment(State.STOPPING, "Stopping, or ended if nothing ran"), **documented(404, 409)},
 )
-def stop_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
+def stop_experiment(id: Id, store: StoreDep) -> ExperimentRead:
     """Let running repetitions finish their step, then complete the experiment with what is there.
 
     One of which no repetition has a point of the curve ends as CANCELLED.
@@ -70,7 +70,7 @@ def stop_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - 
     summary="Cancel an experiment",
     responses={200: _experiment(State.CANCELLED, "Called off; what is stored stays"), **documented(404, 409)},
 )
-def cancel_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
+def cancel_experiment(id: Id, store: StoreDep) -> ExperimentRead:
     """Call an experiment off at once; what is stored stays. One that has ended cannot be."""
     return life_cycle.ask_experiment(store, id, Verb.CANCEL)
 
@@ -83,7 +83,7 @@ def cancel_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 
     responses={202: _experiment(State.QUEUED, "It is queued again"), **documented(404, 409, 413, 415, 422, 429)},
 )
 def extend_experiment(
-    id: Id,  # noqa: A002 - the address says {id}
+    id: Id,
     extension: Annotated[ExtensionSpec, Body(openapi_examples=_EXTENSIONS)],
     store: StoreDep,
     admitted: LimitedDep,
@@ -103,7 +103,7 @@ def extend_experiment(
     responses={200: _experiment(State.QUEUED, "With its new schedule"), **documented(404, 413, 415, 422)},
 )
 def schedule_experiment(
-    id: Id,  # noqa: A002 - the address says {id}
+    id: Id,
     change: Annotated[ScheduleChange, Body(openapi_examples=_SCHEDULES)],
     store: StoreDep,
 ) -> ExperimentRead:
@@ -117,7 +117,7 @@ def schedule_experiment(
     summary="Pause a study",
     responses={200: _study(State.PAUSING, "Pausing, or paused if nothing ran"), **documented(404, 409)},
 )
-def pause_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the address says {id}
+def pause_study(id: Id, store: StoreDep) -> StudyRead:
     """Pause every experiment of the study that permits it."""
     return life_cycle.ask_study(store, id, Verb.PAUSE)
 
@@ -128,7 +128,7 @@ def pause_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the addre
     summary="Resume a study",
     responses={200: _study(State.QUEUED, "It goes on from where it was"), **documented(404, 409)},
 )
-def resume_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the address says {id}
+def resume_study(id: Id, store: StoreDep) -> StudyRead:
     """Resume every experiment of the study that is paused."""
     return life_cycle.ask_study(store, id, Verb.RESUME)
 
@@ -139,7 +139,7 @@ def resume_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the addr
     summary="Stop a study",
     responses={200: _study(State.STOPPING, "Stopping, or ended if nothing ran"), **documented(404, 409)},
 )
-def stop_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the address says {id}
+def stop_study(id: Id, store: StoreDep) -> StudyRead:
     """Stop every experiment of the study that has not ended, and keep what is there."""
     return life_cycle.ask_study(store, id, Verb.STOP)
 
@@ -150,6 +150,6 @@ def stop_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the addres
     summary="Cancel a study",
     responses={200: _study(State.CANCELLED, "Called off; what is stored stays"), **documented(404, 409)},
 )
-def cancel_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the address says {id}
+def cancel_study(id: Id, store: StoreDep) -> StudyRead:
     """Call off every experiment of the study that has not ended."""
     return life_cycle.ask_study(store, id, Verb.CANCEL)

@@ -17,7 +17,7 @@ router = APIRouter(prefix="/experiments", tags=["experiments"])
     summary="Read an experiment's provenance",
     responses={200: examples.shown(event_examples.PROVENANCE, "In the order of their beginnings"), **documented(404)},
 )
-def read_provenance(id: Id, store: StoreDep) -> ProvenanceRead:  # noqa: A002 - the address says {id}
+def read_provenance(id: Id, store: StoreDep) -> ProvenanceRead:
     """The versions of gaplab, Python, engines and libraries, the commit and the machine, as supervisors claimed it."""
     return provenance.read(store, id)
 
@@ -27,7 +27,7 @@ def read_provenance(id: Id, store: StoreDep) -> ProvenanceRead:  # noqa: A002 - 
     summary="Go on under other versions",
     responses={200: examples.shown(examples.EXPERIMENT, "The next supervisor goes on with it"), **documented(404, 409)},
 )
-def accept_versions(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
+def accept_versions(id: Id, store: StoreDep) -> ExperimentRead:
     """Let an experiment go on under other engines or plug-ins than it was begun with: those of the next supervisor.
 
     Its numbers need not be those that the first versions would have given, and which were used is recorded.

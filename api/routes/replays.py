@@ -40,7 +40,7 @@ class ReplayQuery(Parameters):
     },
 )
 def read_replay(
-    id: Id,  # noqa: A002 - the address says {id}
+    id: Id,
     store: StoreDep,
     physics: PhysicsDep,
     which: Annotated[ReplayQuery, Query()],
@@ -61,7 +61,7 @@ def read_replay(
         **documented(404, 422, 429),
     },
 )
-def read_predictions(id: Id, store: StoreDep, physics: PhysicsDep) -> Predictions:  # noqa: A002 - the address says {id}
+def read_predictions(id: Id, store: StoreDep, physics: PhysicsDep) -> Predictions:
     """The fitness of each sample in the best simulator before it was measured, and after tuning on it.
 
     About two seconds are computed for each question; ask again while some are pending.

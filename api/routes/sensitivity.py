@@ -47,6 +47,6 @@ def submit_sensitivity(
         **documented(404),
     },
 )
-def read_sensitivity(id: Id, store: StoreDep) -> SensitivityRead:  # noqa: A002 - the address says {id}
+def read_sensitivity(id: Id, store: StoreDep) -> SensitivityRead:
     """The check, with the profile of each tunable once it is COMPLETED."""
     return sensitivity.read(store, id)

@@ -73,7 +73,7 @@ def list_studies(store: StoreDep, which: Annotated[StudyFilter, Query()]) -> Pag
     },
 )
 def read_study(
-    id: Id,  # noqa: A002 - the address says {id}
+    id: Id,
     store: StoreDep,
     caller: CallerDep,
     request: Request,
@@ -94,7 +94,7 @@ def read_study(
     },
 )
 def edit_study(
-    id: Id,  # noqa: A002 - the address says {id}
+    id: Id,
     edit: Annotated[Edit, Body(openapi_examples=examples.EDITS)],
     store: StoreDep,
     request: Request,
