@@ -12,7 +12,6 @@ from itertools import count
 
 import httpx2
 import pytest
-import uvicorn
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
@@ -286,7 +285,7 @@ def served(store: Store, port: int = 0) -> Iterator[tuple[str, Feed]]:
     """A service in a thread, ended as the real one is."""
     app = create_app(store)
     listener = listen("127.0.0.1", port)
-    server = Server(uvicorn.Config(app, log_level="critical"))
+    server = Server(app)
     thread = threading.Thread(target=server.run, args=([listener],))
     thread.start()
     try:
