@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Id
 
 FORMAT = 1
 """Of the archives that are written now, and the latest that is read."""
@@ -35,10 +35,12 @@ class Manifest(Frozen):
 class ImportRead(Frozen):
     """What an import stored."""
 
-    study: str | None = Field(default=None, description="id of the study, if the archive is of one")
-    experiments: tuple[str, ...] = Field(description="their ids here, in the order of the study")
+    study: Id | None = Field(default=None, description="id of the study, if the archive is of one")
+    experiments: tuple[Id, ...] = Field(description="their ids here, in the order of the study")
     renamed: dict[str, str] = Field(
-        default_factory=dict, description="ids that were taken here, each with the one that it has now"
+        default_factory=dict,
+        description="ids that were taken here, each with the one that it has now",
+        examples=[{"kx3t9vbm2q": "01f2e3d4c5"}],
     )
     called_off: tuple[str, ...] = Field(
         default=(), description="ids of those that had not ended: they are CANCELLED here, and nothing of them is run"

@@ -4,13 +4,12 @@ Events are numbered from 1 without holes, in the order in which they came to be 
 seen, or can read, every smaller one. None tells anything of reality that is hidden.
 """
 
-from datetime import datetime
 from enum import StrEnum
 from typing import Any
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Id, Moment
 
 
 class EventKind(StrEnum):
@@ -50,11 +49,14 @@ class EventRead(Frozen):
 
     number: int = Field(description="of all events, from 1 and without holes; resume after it")
     kind: EventKind
-    experiment: str
-    study: str | None = None
+    experiment: Id
+    study: Id | None = None
     repetition: int | None = Field(default=None, description="its number; null where it is the experiment's")
-    body: dict[str, Any] = Field(description="a few values that tell more: iteration, fitness, reason")
-    at: datetime
+    body: dict[str, Any] = Field(
+        description="a few values that tell more: iteration, fitness, reason",
+        examples=[{"iteration": 1, "fitness": 1.31}],
+    )
+    at: Moment
 
 
 class EventPage(Frozen):

@@ -2,27 +2,27 @@
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Id, Statistic, TunableName, Unit
 
 
 class Spread(Frozen):
     """A number over repetitions; null where too few have it."""
 
     n: int
-    mean: float | None
-    sd: float | None = Field(description="sample standard deviation")
-    least: float | None
-    greatest: float | None
+    mean: Statistic
+    sd: Statistic = Field(description="sample standard deviation")
+    least: Statistic
+    greatest: Statistic
 
 
 class TunedSpread(Spread):
     """The value that tuning gave a tunable."""
 
-    name: str
-    lower: float = Field(description="its bound")
-    upper: float
-    at_lower: float | None = Field(description="share of repetitions within 1 % of the bounds' distance of it")
-    at_upper: float | None
+    name: TunableName
+    lower: float = Field(description="its bound", examples=[0.0])
+    upper: float = Field(examples=[0.6])
+    at_lower: Statistic = Field(description="share of repetitions within 1 % of the bounds' distance of it")
+    at_upper: Statistic
 
 
 class MisfitPoint(Frozen):
@@ -41,7 +41,9 @@ class MisfitPoint(Frozen):
 class MisfitRead(Frozen):
     """The misfit of an experiment, by iteration; the direct baseline tunes nothing, and has none."""
 
-    experiment: str
-    unit: str = Field(description="of fitness, and so of error and gap")
+    experiment: Id
+    unit: Unit = Field(description="of fitness, and so of error and gap")
     points: tuple[MisfitPoint, ...]
-    remarks: tuple[str, ...] = Field(description="the latest iteration in sentences")
+    remarks: tuple[str, ...] = Field(
+        description="the latest iteration in sentences", examples=[("restitution is at its lower bound, 0",)]
+    )

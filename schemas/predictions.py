@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Id, Statistic, Unit
 
 
 class Prediction(Frozen):
@@ -10,9 +10,9 @@ class Prediction(Frozen):
 
     repetition: int
     iteration: int = Field(description="in which it was measured, from 1")
-    simulated_before: float | None = Field(description="in the simulator that was the best before it was measured")
-    simulated_after: float | None = Field(description="in the best of those that were tuned on it and all before it")
-    fitness: float | None = Field(description="as reality measured it; null: the measurement failed")
+    simulated_before: Statistic = Field(description="in the simulator that was the best before it was measured")
+    simulated_after: Statistic = Field(description="in the best of those that were tuned on it and all before it")
+    fitness: Statistic = Field(description="as reality measured it; null: the measurement failed")
 
 
 class Predictions(Frozen):
@@ -21,8 +21,8 @@ class Predictions(Frozen):
     Computing goes on with each question: ask again while some are pending. Those that are left out never are.
     """
 
-    experiment: str
-    unit: str
+    experiment: Id
+    unit: Unit
     items: tuple[Prediction, ...]
     pending: int = Field(description="samples that are not computed yet")
     left_out: int = Field(

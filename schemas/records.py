@@ -3,13 +3,12 @@
 Times are UTC. A fitness of null is a physics failure or a failed measurement; JSON has no nan.
 """
 
-from datetime import datetime
 from enum import StrEnum
 from typing import Any, Generic, TypeVar
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Id, Moment, PluginName, Statistic
 from gaplab.schemas.lifecycle import Ending, State
 
 T = TypeVar("T")
@@ -19,62 +18,66 @@ class Page(Frozen, Generic[T]):
     """A part of a list."""
 
     items: tuple[T, ...]
-    next: str | None = Field(default=None, description="pass it as `cursor` for what follows; null at the end")
+    next: str | None = Field(
+        default=None, description="pass it as `cursor` for what follows; null at the end", examples=["WyIyMDEyIl0"]
+    )
 
 
 class Progress(Frozen):
     """How far it is, and what is left."""
 
-    repetitions: int
-    completed: int
+    repetitions: int = Field(examples=[40])
+    completed: int = Field(examples=[12])
     failed: int
-    iterations: int = Field(description="of all repetitions, number 0 included")
-    iterations_done: int
+    iterations: int = Field(description="of all repetitions, number 0 included", examples=[440])
+    iterations_done: int = Field(examples=[150])
     rollouts: int = Field(description="budgeted in all; at the end, done plus saved, unless it was stopped")
-    rollouts_done: int
+    rollouts_done: int = Field(examples=[4_363_000])
     rollouts_failed: int = Field(description="physics failures (nan) among those done; they never win")
     rollouts_saved: int = Field(description="budgeted, but sure to change nothing, so not simulated")
-    seconds_left: float | None = Field(default=None, description="null while unknown, 0 at the end")
+    seconds_left: float | None = Field(default=None, description="null while unknown, 0 at the end", examples=[3120.0])
 
 
 class ExperimentRead(Frozen):
     """An experiment with its resolved spec; reality's parameters are null until it has ended."""
 
-    id: str
-    study: str | None = None
-    name: str
-    notes: str | None = Field(default=None, description="of people, about it")
+    id: Id
+    study: Id | None = None
+    name: PluginName
+    notes: str | None = Field(default=None, description="of people, about it", examples=["the bounds were too wide"])
     edits: int = Field(default=0, description="how often its name or notes were changed")
-    strategy: str
+    strategy: PluginName
     state: State
-    spec: dict[str, Any]
+    spec: dict[str, Any] = Field(
+        examples=[{"strategy": {"name": "simulated_fit"}, "iterations": 10, "repetitions": 40}]
+    )
     priority: int = Field(default=0, description="the higher is computed first")
     max_parallel: int | None = Field(default=None, description="repetitions that run at once; null: any number")
     progress: Progress
-    best_fitness: float | None = Field(
+    best_fitness: Statistic = Field(
         default=None, description="the best recorded fitness of a repetition so far, on average over repetitions"
     )
     reasons: tuple[str, ...] = Field(default=(), description="why repetitions failed, each reason once")
-    sensitivity: str | None = Field(default=None, description="id of the check of what its tunables do to fitness")
+    sensitivity: Id | None = Field(default=None, description="id of the check of what its tunables do to fitness")
     warnings: tuple[str, ...] = Field(
         default=(), description="what that check found amiss, and versions that keep it from going on"
     )
-    created_at: datetime
-    started_at: datetime | None = None
-    ended_at: datetime | None = None
+    created_at: Moment
+    started_at: Moment | None = None
+    ended_at: Moment | None = None
 
 
 class StudyRead(Frozen):
     """A study; its state is that of its experiments taken together."""
 
-    id: str
-    name: str
-    notes: str | None = Field(default=None, description="of people, about it")
+    id: Id
+    name: PluginName
+    notes: str | None = Field(default=None, description="of people, about it", examples=["the bounds were too wide"])
     edits: int = Field(default=0, description="how often its name or notes were changed")
     state: State
     experiments: tuple[ExperimentRead, ...]
     progress: Progress
-    created_at: datetime
+    created_at: Moment
 
 
 class RepetitionRead(Frozen):
@@ -85,20 +88,22 @@ class RepetitionRead(Frozen):
     iterations_done: int
     rollouts_done: int
     attempts: int
-    error: str | None = None
-    started_at: datetime | None = None
-    ended_at: datetime | None = None
+    error: str | None = Field(default=None, examples=["the engine pybullet is not installed"])
+    started_at: Moment | None = None
+    ended_at: Moment | None = None
 
 
 class AttemptRead(Frozen):
     """One lease of a repetition: who had it, from when to when, and how it ended."""
 
     number: int = Field(description="from 1; the epoch that every write of this attempt carried")
-    owner: str = Field(description="the supervisor")
-    started_at: datetime
-    ended_at: datetime | None = Field(default=None, description="null: it runs, or waits for its core")
+    owner: str = Field(description="the supervisor", examples=["lab-3:4711:9f2c61d0"])
+    started_at: Moment
+    ended_at: Moment | None = Field(default=None, description="null: it runs, or waits for its core")
     ending: Ending | None = None
-    reason: str | None = Field(default=None, description="why it failed or was lost")
+    reason: str | None = Field(
+        default=None, description="why it failed or was lost", examples=["no heartbeat for 30 s"]
+    )
 
 
 class MeasurementKind(StrEnum):
@@ -114,10 +119,10 @@ class SampleRead(Frozen):
     repetition: int
     iteration: int
     kind: MeasurementKind
-    genome: tuple[float, ...]
-    fitness: float | None
-    measured_by: str
-    measured_at: datetime
+    genome: tuple[float, ...] = Field(examples=[(0.12, 0.55, 0.83, 0.31)])
+    fitness: Statistic
+    measured_by: str = Field(examples=["pybullet"])
+    measured_at: Moment
 
 
 class SimulatorRead(Frozen):
@@ -126,5 +131,5 @@ class SimulatorRead(Frozen):
     repetition: int
     iteration: int
     rank: int
-    parameters: dict[str, float]
-    squared_error: float | None = Field(description="over the samples so far; null where its physics failed on one")
+    parameters: dict[str, float] = Field(examples=[{"static_friction": 1.04, "restitution": 0.02}])
+    squared_error: Statistic = Field(description="over the samples so far; null where its physics failed on one")

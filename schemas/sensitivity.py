@@ -1,12 +1,11 @@
 """The sensitivity check: what each tunable does to fitness, before anything is tuned."""
 
-from datetime import datetime
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from gaplab.schemas.base import Count, Frozen
+from gaplab.schemas.base import Count, Examples, Frozen, Id, Moment, Statistic, TunableName, Unit
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.spec import Settings
@@ -26,6 +25,14 @@ class Verdict(StrEnum):
 class SensitivitySpec(Settings):
     """The settings of an experiment; of them, robot, engine and tunables are what is checked."""
 
+    EXAMPLES: ClassVar[Examples] = {
+        "the least": {"summary": "The quadruped and the paper's three coefficients; about 800 rollouts", "value": {}},
+        "finer": {
+            "summary": "One coefficient between your own bounds, at more values",
+            "value": {"tunables": [{"name": "restitution", "lower": 0.0, "upper": 0.3}], "points": 33},
+        },
+    }
+
     points: Annotated[Count, Field(ge=5, le=1_001)] = Field(
         default=POINTS, description="values of each tunable; eight controllers are simulated at each"
     )
@@ -37,9 +44,9 @@ class SensitivitySpec(Settings):
 class Checked(Frozen):
     """What is checked, with nothing left out."""
 
-    robot: PluginRef
-    engine: PluginRef
-    tunables: tuple[TunableRef, ...]
+    robot: PluginRef = Field(examples=["quadruped"])
+    engine: PluginRef = Field(examples=["pybullet"])
+    tunables: tuple[TunableRef, ...] = Field(examples=[("restitution",)])
     points: int = POINTS
     evaluations: int = EVALUATIONS
 
@@ -47,35 +54,38 @@ class Checked(Frozen):
 class Sensitivity(Frozen):
     """What one tunable does to fitness over its bounds, the others in the middle of theirs."""
 
-    name: str
-    effect: float | None = Field(
+    name: TunableName
+    effect: Statistic = Field(
         description="standard deviation of fitness along the profile, in its unit; null where physics failed too often"
     )
-    relative_effect: float | None = Field(
+    relative_effect: Statistic = Field(
         description="the effect over the standard deviation of fitness between controllers"
     )
-    roughness: float | None = Field(
+    roughness: Statistic = Field(
         description="the part of the effect that jumps from value to value, over the effect: 0 smooth, 1 noise"
     )
     failures: int = Field(description="rollouts along the profile whose physics failed (nan)")
     verdict: Verdict
-    values: tuple[float, ...] = Field(description="of the tunable")
+    values: tuple[float, ...] = Field(description="of the tunable", examples=[(0.0, 0.3, 0.6)])
     fitness: tuple[tuple[float | None, ...], ...] = Field(
-        description="a row for each controller, at each value: the known one, random ones, evolved ones"
+        description="a row for each controller, at each value: the known one, random ones, evolved ones",
+        examples=[((0.31, 0.33, 0.28), (0.11, 0.12, 0.09))],
     )
 
 
 class SensitivityRead(Frozen):
     """A sensitivity check; its id is that of what is checked, so that the same is checked once."""
 
-    id: str
+    id: Id
     state: State
     spec: Checked
     rollouts: int = Field(description="that the check takes at most")
-    unit: str = Field(description="of fitness")
+    unit: Unit = Field(description="of fitness")
     tunables: tuple[Sensitivity, ...] = Field(default=(), description="once it is COMPLETED")
     warnings: tuple[str, ...] = ()
-    reason: str | None = Field(default=None, description="why it failed, or was last queued again")
-    created_at: datetime
-    started_at: datetime | None = None
-    ended_at: datetime | None = None
+    reason: str | None = Field(
+        default=None, description="why it failed, or was last queued again", examples=["no heartbeat for 30 s"]
+    )
+    created_at: Moment
+    started_at: Moment | None = None
+    ended_at: Moment | None = None

@@ -4,11 +4,11 @@ Whatever is left out of a submitted spec has a default, and the defaults are the
 type with nothing left out: that is what is stored, so that a later change of a default changes no stored experiment.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from gaplab.schemas.base import Count, Frozen, Label, Priority, Real, Seed
+from gaplab.schemas.base import Count, Examples, Frozen, Label, Priority, Real, Seed
 from gaplab.schemas.plugin import PluginRef, TunableRef
 
 BudgetName = Literal["smoke", "desk", "paper"]
@@ -84,6 +84,30 @@ class Schedule(Frozen):
 class ExperimentSpec(Settings, Schedule):
     """One strategy under one setting, repeated."""
 
+    EXAMPLES: ClassVar[Examples] = {
+        "the least": {
+            "summary": "One strategy at the paper's protocol; every default is the paper's",
+            "value": {"strategy": "simulated_fit", "iterations": 10, "repetitions": 40},
+        },
+        "quick": {
+            "summary": "Seconds: the toy function of the paper's Fig. 3",
+            "value": {"strategy": "simulated_fit_and_informative", "robot": "toy_function", "budget": "smoke"},
+        },
+        "in detail": {
+            "summary": "Your own options, bounds, reality and budget",
+            "value": {
+                "name": "half the weight on information",
+                "strategy": {"name": "simulated_fit_and_informative", "options": {"informative_weight": 0.5}},
+                "iterations": 5,
+                "repetitions": 20,
+                "tunables": ["static_friction", {"name": "dynamic_friction", "lower": 0.2, "upper": 1.2}],
+                "reality": {"parameters": {"static_friction": 0.9, "dynamic_friction": 0.6}},
+                "budget": {"preset": "desk", "simulator_evaluations": 800},
+                "seed": 2012,
+            },
+        },
+    }
+
     name: Label | None = None
     strategy: PluginRef
 
@@ -94,6 +118,17 @@ class StudySpec(Settings, Schedule):
     `direct` is the baseline, evolution in reality itself; the paper repeats it 100 times where it repeats the
     strategies 40 times.
     """
+
+    EXAMPLES: ClassVar[Examples] = {
+        "Fig. 4": {
+            "summary": "The paper's whole Fig. 4: six strategies and the direct baseline; 1 500 core-hours",
+            "value": {"name": "Fig. 4", "direct_repetitions": 100},
+        },
+        "quick": {
+            "summary": "The same on the toy function; seconds",
+            "value": {"name": "toy", "robot": "toy_function", "budget": "smoke"},
+        },
+    }
 
     name: Label | None = None
     strategies: tuple[PluginRef, ...] = Field(

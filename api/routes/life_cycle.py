@@ -1,155 +1,114 @@
-"""What is asked of experiments and studies: pause, resume, stop, cancel, extend, another turn."""
+"""The life cycle of experiments and studies: pause, resume, stop, cancel, extend, and change the schedule."""
 
 from typing import Annotated
 
 from fastapi import APIRouter, Body
 
-from gaplab.api.http import examples
 from gaplab.api.http.dependencies import Id, LimitedDep, StoreDep
 from gaplab.api.http.problems import documented
-from gaplab.schemas.lifecycle import State, Verb
+from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.schedule import ExtensionSpec, ScheduleChange
 from gaplab.services.experiments import life_cycle
 
-router = APIRouter()
+_experiment = APIRouter(prefix="/experiments/{id}", tags=["experiments"])
+_study = APIRouter(prefix="/studies/{id}", tags=["studies"])
 
-_EXTENSIONS = {
-    "both": {"summary": "20 iterations and 60 repetitions, in all", "value": {"iterations": 20, "repetitions": 60}}
-}
-_SCHEDULES = {"urgent": {"summary": "Before all others, on two cores", "value": {"priority": 10, "max_parallel": 2}}}
-
-
-def _experiment(state: State, description: str) -> dict[str, object]:
-    return examples.shown(examples.EXPERIMENT.model_copy(update={"state": state}), description)
+_PAUSED = "PAUSING, or PAUSED if no repetition is running"
+_RESUMED = "RUNNING or QUEUED; it continues where it was"
+_STOPPED = "STOPPING, or ended if no repetition is running"
+_CANCELLED = "CANCELLED; what is stored is kept"
 
 
-def _study(state: State, description: str) -> dict[str, object]:
-    return examples.shown(examples.STUDY.model_copy(update={"state": state}), description)
-
-
-@router.post(
-    "/experiments/{id}/pause",
-    tags=["experiments"],
-    summary="Pause an experiment",
-    responses={200: _experiment(State.PAUSING, "Pausing, or paused if nothing ran"), **documented(404, 409)},
-)
+@_experiment.post("/pause", summary="Pause an experiment", response_description=_PAUSED, responses=documented(404, 409))
 def pause_experiment(id: Id, store: StoreDep) -> ExperimentRead:
-    """Let running repetitions finish their step and give their core back, and start no other, until it is resumed."""
+    """Let running repetitions finish their step and free their cores, and start none until the experiment resumes."""
     return life_cycle.ask_experiment(store, id, Verb.PAUSE)
 
 
-@router.post(
-    "/experiments/{id}/resume",
-    tags=["experiments"],
-    summary="Resume an experiment",
-    responses={200: _experiment(State.QUEUED, "It goes on from where it was"), **documented(404, 409)},
+@_experiment.post(
+    "/resume", summary="Resume an experiment", response_description=_RESUMED, responses=documented(404, 409)
 )
 def resume_experiment(id: Id, store: StoreDep) -> ExperimentRead:
-    """Go on with an experiment that was paused, with the numbers that it would have had anyway."""
+    """Continue a paused experiment; the pause changes none of its numbers."""
     return life_cycle.ask_experiment(store, id, Verb.RESUME)
 
 
-@router.post(
-    "/experiments/{id}/stop",
-    tags=["experiments"],
-    summary="Stop an experiment",
-    responses={200: _experiment(State.STOPPING, "Stopping, or ended if nothing ran"), **documented(404, 409)},
-)
+@_experiment.post("/stop", summary="Stop an experiment", response_description=_STOPPED, responses=documented(404, 409))
 def stop_experiment(id: Id, store: StoreDep) -> ExperimentRead:
-    """Let running repetitions finish their step, then complete the experiment with what is there.
+    """Let running repetitions finish their step, then complete the experiment with the results so far.
 
-    One of which no repetition has a point of the curve ends as CANCELLED.
+    An experiment without a single point of its curve ends as CANCELLED.
     """
     return life_cycle.ask_experiment(store, id, Verb.STOP)
 
 
-@router.post(
-    "/experiments/{id}/cancel",
-    tags=["experiments"],
-    summary="Cancel an experiment",
-    responses={200: _experiment(State.CANCELLED, "Called off; what is stored stays"), **documented(404, 409)},
+@_experiment.post(
+    "/cancel", summary="Cancel an experiment", response_description=_CANCELLED, responses=documented(404, 409)
 )
 def cancel_experiment(id: Id, store: StoreDep) -> ExperimentRead:
-    """Call an experiment off at once; what is stored stays. One that has ended cannot be."""
+    """Cancel an experiment at once; what is stored is kept. An experiment that has ended cannot be cancelled."""
     return life_cycle.ask_experiment(store, id, Verb.CANCEL)
 
 
-@router.post(
-    "/experiments/{id}/extend",
+@_experiment.post(
+    "/extend",
     status_code=202,
-    tags=["experiments"],
     summary="Extend an experiment",
-    responses={202: _experiment(State.QUEUED, "It is queued again"), **documented(404, 409, 413, 415, 422, 429)},
+    response_description="QUEUED again",
+    responses=documented(404, 409, 413, 415, 422, 429),
 )
 def extend_experiment(
     id: Id,
-    extension: Annotated[ExtensionSpec, Body(openapi_examples=_EXTENSIONS)],
+    extension: Annotated[ExtensionSpec, Body(openapi_examples=ExtensionSpec.EXAMPLES)],
     store: StoreDep,
     admitted: LimitedDep,
 ) -> ExperimentRead:
-    """Add iterations or repetitions to a completed experiment: totals, not what is added.
+    """Set new totals of iterations or repetitions for a completed experiment.
 
-    What is there stands, and the whole equals an experiment that was submitted with these totals. With the totals that
-    it has, one that was stopped is brought to its end.
+    Existing results stay, and the whole equals an experiment that was submitted with these totals. A stopped experiment
+    that is given its own totals is completed.
     """
     return life_cycle.extend_experiment(store, id, extension, admitted)
 
 
-@router.patch(
-    "/experiments/{id}/schedule",
-    tags=["experiments"],
-    summary="Change an experiment's turn",
-    responses={200: _experiment(State.QUEUED, "With its new schedule"), **documented(404, 413, 415, 422)},
+@_experiment.patch(
+    "/schedule",
+    summary="Change an experiment's schedule",
+    response_description="With its new schedule",
+    responses=documented(404, 413, 415, 422),
 )
 def schedule_experiment(
-    id: Id,
-    change: Annotated[ScheduleChange, Body(openapi_examples=_SCHEDULES)],
-    store: StoreDep,
+    id: Id, change: Annotated[ScheduleChange, Body(openapi_examples=ScheduleChange.EXAMPLES)], store: StoreDep
 ) -> ExperimentRead:
-    """Change the priority, or how many repetitions run at once. It changes no number, and stops nothing that runs."""
+    """Change its priority, or how many repetitions run at once. This changes no result and stops no repetition."""
     return life_cycle.schedule_experiment(store, id, change)
 
 
-@router.post(
-    "/studies/{id}/pause",
-    tags=["studies"],
-    summary="Pause a study",
-    responses={200: _study(State.PAUSING, "Pausing, or paused if nothing ran"), **documented(404, 409)},
-)
+@_study.post("/pause", summary="Pause a study", response_description=_PAUSED, responses=documented(404, 409))
 def pause_study(id: Id, store: StoreDep) -> StudyRead:
-    """Pause every experiment of the study that permits it."""
+    """Pause every experiment of the study that can be paused."""
     return life_cycle.ask_study(store, id, Verb.PAUSE)
 
 
-@router.post(
-    "/studies/{id}/resume",
-    tags=["studies"],
-    summary="Resume a study",
-    responses={200: _study(State.QUEUED, "It goes on from where it was"), **documented(404, 409)},
-)
+@_study.post("/resume", summary="Resume a study", response_description=_RESUMED, responses=documented(404, 409))
 def resume_study(id: Id, store: StoreDep) -> StudyRead:
-    """Resume every experiment of the study that is paused."""
+    """Resume every paused experiment of the study."""
     return life_cycle.ask_study(store, id, Verb.RESUME)
 
 
-@router.post(
-    "/studies/{id}/stop",
-    tags=["studies"],
-    summary="Stop a study",
-    responses={200: _study(State.STOPPING, "Stopping, or ended if nothing ran"), **documented(404, 409)},
-)
+@_study.post("/stop", summary="Stop a study", response_description=_STOPPED, responses=documented(404, 409))
 def stop_study(id: Id, store: StoreDep) -> StudyRead:
-    """Stop every experiment of the study that has not ended, and keep what is there."""
+    """Stop every experiment of the study that has not ended, and keep the results so far."""
     return life_cycle.ask_study(store, id, Verb.STOP)
 
 
-@router.post(
-    "/studies/{id}/cancel",
-    tags=["studies"],
-    summary="Cancel a study",
-    responses={200: _study(State.CANCELLED, "Called off; what is stored stays"), **documented(404, 409)},
-)
+@_study.post("/cancel", summary="Cancel a study", response_description=_CANCELLED, responses=documented(404, 409))
 def cancel_study(id: Id, store: StoreDep) -> StudyRead:
-    """Call off every experiment of the study that has not ended."""
+    """Cancel every experiment of the study that has not ended."""
     return life_cycle.ask_study(store, id, Verb.CANCEL)
+
+
+router = APIRouter()
+router.include_router(_experiment)
+router.include_router(_study)

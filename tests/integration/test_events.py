@@ -17,7 +17,7 @@ from fastapi.testclient import TestClient
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client, ServiceError
 from gaplab.api.http import event_feed as feeding
-from gaplab.api.http.event_feed import Feed
+from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.process.server import Server, listen
 from gaplab.schemas.events import EventKind, EventPage, EventRead
 from gaplab.schemas.lifecycle import Verb
@@ -281,7 +281,7 @@ def test_supervisors_that_record_claim_and_end_at_once_do_not_wait_for_each_othe
 
 
 @contextmanager
-def served(store: Store, port: int = 0) -> Iterator[tuple[str, Feed]]:
+def served(store: Store, port: int = 0) -> Iterator[tuple[str, EventFeed]]:
     """A service in a thread, ended as the real one is."""
     app = create_app(store)
     listener = listen("127.0.0.1", port)
@@ -383,7 +383,7 @@ def test_all_streams_together_ask_the_database_once_a_look(sqlite_store, monkeyp
         submission.submit_experiment(sqlite_store, toy())
         second = [take(each, 1)[0].number for each in streams]
 
-    assert looks <= seconds / feeding.EVERY_S + 2  # eight streams that each ask would be eight times as many
+    assert looks <= seconds / feeding.POLL_S + 2  # eight streams that each ask would be eight times as many
     assert second == [2] * 8
 
 
@@ -398,7 +398,7 @@ def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(sqlite_store, mo
         return page(*asked, **named)
 
     async def follow() -> list[int]:
-        feed = Feed(sqlite_store, every_s=0.01)
+        feed = EventFeed(sqlite_store, every_s=0.01)
         stalled, resumed = feed.follow(0, Which()), feed.follow(0, Which())
         first = await anext(stalled)
         failing.append(True)
