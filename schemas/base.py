@@ -1,4 +1,4 @@
-"""The base of every schema, and the types they share; examples are what `/docs` shows."""
+"""The base of every schema, and the bounded numbers they share."""
 
 from datetime import datetime
 from typing import Annotated, Any
@@ -15,19 +15,19 @@ class Frozen(BaseModel):
 
 
 Count = Annotated[int, Field(strict=True, ge=1, le=10_000_000)]
-"""A whole number of at least one; a string or a boolean is no number."""
+"""A whole number of at least one; strings and booleans are refused."""
 
 Real = Annotated[float, Field(strict=True)]
-"""A finite number; a string or a boolean is no number."""
+"""A finite number; strings and booleans are refused."""
 
 Seed = Annotated[int, Field(strict=True, ge=0, lt=SEED_LIMIT)]
-"""A seed of 64 bits."""
+"""A seed: a whole number of 64 bits."""
 
 Priority = Annotated[int, Field(strict=True, ge=-10, le=10)]
-"""What is computed first: the higher; a whole number."""
+"""A priority: a whole number; higher is computed first."""
 
 Label = Annotated[str, Field(min_length=1, max_length=200)]
-"""A name that people give to their studies and experiments."""
+"""A name that a person gives to a study or an experiment."""
 
 Id = Annotated[str, Field(examples=["01f2e3d4c5b6"])]
 """The id of a study, an experiment or a sensitivity check."""
@@ -38,8 +38,8 @@ Moment = Annotated[datetime, Field(examples=["2012-11-05T09:00:00Z"])]
 Unit = Annotated[str, Field(examples=["m/s"])]
 """A unit of fitness."""
 
-PluginName = Annotated[str, Field(examples=["simulated_fit"])]
-"""The name of a strategy, or of an experiment that has none of its own."""
+Name = Annotated[str, Field(examples=["simulated_fit"])]
+"""The name of a strategy, or of an experiment, which by default is that of its strategy."""
 
 RobotName = Annotated[str, Field(examples=["quadruped"])]
 EngineName = Annotated[str, Field(examples=["pybullet"])]

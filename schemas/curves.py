@@ -2,34 +2,34 @@
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Id, PluginName, Statistic, Unit
+from gaplab.schemas.base import Frozen, Id, Name, Statistic, Unit
 from gaplab.schemas.lifecycle import State
 
 
 class CurvePoint(Frozen):
-    """The recorded fitness after so many real-world evaluations, over the repetitions that got there.
+    """Recorded fitness at one number of real-world evaluations, over the repetitions that have reached it.
 
-    A statistic is null where too few repetitions are there to have one.
+    A statistic is null if it has too few repetitions.
     """
 
     evaluations: int
     n: int
     mean: Statistic
     sd: Statistic = Field(description="sample standard deviation")
-    lower: Statistic = Field(description="of the 95 % interval of the mean, by Student's t")
-    upper: Statistic
-    values: tuple[Statistic, ...] = Field(description="by repetition; null: not there yet, or failed")
+    lower: Statistic = Field(description="lower end of the 95 % interval of the mean, by Student's t")
+    upper: Statistic = Field(description="upper end of that interval")
+    values: tuple[Statistic, ...] = Field(description="fitness by repetition; null: not reached yet, or failed")
 
 
 class Curve(Frozen):
     """The curve of one experiment.
 
-    The direct baseline has one point, at 0: it has no samples, its controllers evolve in reality itself.
+    The direct baseline has a single point, at 0: it has no samples, because its controllers evolve in reality itself.
     """
 
     experiment: Id
-    name: PluginName
-    strategy: PluginName
+    name: Name
+    strategy: Name
     state: State
     unit: Unit
     direct: bool = False
@@ -37,20 +37,20 @@ class Curve(Frozen):
 
 
 class Test(Frozen):
-    """One test between two groups."""
+    """One statistical test between two groups."""
 
     __test__ = False
 
     statistic: Statistic
-    p: Statistic = Field(description="two-sided; null where it is undefined")
-    p_holm: Statistic = Field(default=None, description="after Holm's correction over the family")
+    p: Statistic = Field(description="two-sided p-value; null if undefined")
+    p_holm: Statistic = Field(default=None, description="p-value with Holm's correction over all pairs")
     degrees_of_freedom: Statistic = None
 
 
 class Comparison(Frozen):
-    """Two experiments compared on the recorded fitness at a range of counts of real-world evaluations, pooled.
+    """Two experiments, compared by recorded fitness pooled over a range of numbers of real-world evaluations.
 
-    `first` minus `second` throughout.
+    Differences are `first` minus `second`.
     """
 
     first: Id
@@ -59,8 +59,8 @@ class Comparison(Frozen):
     to_evaluations: int
     n_first: int
     n_second: int
-    difference: Statistic = Field(description="of the means")
-    effect_size: Statistic = Field(description="Cohen's d: the difference over the pooled standard deviation")
-    student: Test = Field(description="the paper's test")
+    difference: Statistic = Field(description="difference of the means")
+    effect_size: Statistic = Field(description="Cohen's d: the difference divided by the pooled standard deviation")
+    student: Test = Field(description="Student's t-test, which the paper uses")
     welch: Test
     mann_whitney: Test

@@ -1,4 +1,4 @@
-"""Figures as data: what a browser or a notebook draws with Plotly."""
+"""Figures as data that a browser or a notebook draws with Plotly."""
 
 from typing import Any
 
@@ -8,16 +8,16 @@ from gaplab.schemas.base import Frozen
 
 
 class Chart(Frozen):
-    """What `Plotly.newPlot` and `plotly.graph_objects.Figure` take."""
+    """Arguments of `Plotly.newPlot` and `plotly.graph_objects.Figure`."""
 
     data: tuple[dict[str, Any], ...] = Field(examples=[({"type": "scatter", "x": (0, 1), "y": (0.9, 1.2)},)])
     layout: dict[str, Any] = Field(
-        description="without template, font and colours of its own, which the page sets", examples=[{}]
+        description="layout without template, font and colours: the page sets those", examples=[{}]
     )
 
 
 class TableRead(Frozen):
-    """The numbers of a figure in words."""
+    """The numbers of a figure, as text."""
 
     head: tuple[str, ...] = Field(examples=[("Curve", "Mean")])
     rows: tuple[tuple[str, ...], ...] = Field(examples=[(("Simulated fit", "1.2"),)])
@@ -29,11 +29,11 @@ class FigureRead(Frozen):
     figure: Chart
     title: str = Field(examples=["Fig. 4"])
     caption: str = Field(
-        description="how many repetitions there are, and what the bands are", examples=["Mean over 40 repetitions."]
+        description="number of repetitions and meaning of the bands", examples=["Mean over 40 repetitions."]
     )
     alt: str = Field(
-        description="what it shows in a sentence, for those who cannot see it",
+        description="one sentence that describes the figure, for screen readers",
         examples=["Simulated fit rises from 0.9 to 1.2."],
     )
-    empty: bool = Field(description="there is nothing to draw yet")
-    table: TableRead | None = Field(default=None, description="its numbers")
+    empty: bool = Field(description="true while there is nothing to draw")
+    table: TableRead | None = Field(default=None, description="the numbers of the figure")

@@ -1,6 +1,6 @@
-"""What the service shows of its studies, experiments, repetitions, samples and simulators.
+"""Studies, experiments, repetitions, samples and simulators, as the API returns them.
 
-Times are UTC. A fitness of null is a physics failure or a failed measurement; JSON has no nan.
+Times are UTC. A fitness of null means failed physics or a failed measurement; JSON has no nan.
 """
 
 from enum import StrEnum
@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen, Id, Moment, PluginName, Statistic
+from gaplab.schemas.base import Frozen, Id, Moment, Name, Statistic
 from gaplab.schemas.lifecycle import Ending, State
 
 T = TypeVar("T")
@@ -19,48 +19,52 @@ class Page(Frozen, Generic[T]):
 
     items: tuple[T, ...]
     next: str | None = Field(
-        default=None, description="pass it as `cursor` for what follows; null at the end", examples=["WyIyMDEyIl0"]
+        default=None, description="pass it as `cursor` for the next page; null on the last", examples=["WyIyMDEyIl0"]
     )
 
 
 class Progress(Frozen):
-    """How far it is, and what is left."""
+    """Completed and remaining work."""
 
     repetitions: int = Field(examples=[40])
     completed: int = Field(examples=[12])
     failed: int
-    iterations: int = Field(description="of all repetitions, number 0 included", examples=[440])
+    iterations: int = Field(description="iterations of all repetitions, including number 0", examples=[440])
     iterations_done: int = Field(examples=[150])
-    rollouts: int = Field(description="budgeted in all; at the end, done plus saved, unless it was stopped")
+    rollouts: int = Field(description="budgeted rollouts; at the end, done plus saved, unless stopped")
     rollouts_done: int = Field(examples=[4_363_000])
-    rollouts_failed: int = Field(description="physics failures (nan) among those done; they never win")
-    rollouts_saved: int = Field(description="budgeted, but sure to change nothing, so not simulated")
-    seconds_left: float | None = Field(default=None, description="null while unknown, 0 at the end", examples=[3120.0])
+    rollouts_failed: int = Field(description="rollouts done whose physics failed (nan); they never win")
+    rollouts_saved: int = Field(
+        description="budgeted rollouts that were not simulated, because they cannot change a number"
+    )
+    seconds_left: float | None = Field(
+        default=None, description="expected remaining time; null while unknown, 0 at the end", examples=[3120.0]
+    )
 
 
 class ExperimentRead(Frozen):
-    """An experiment with its resolved spec; reality's parameters are null until it has ended."""
+    """An experiment with its resolved spec. Reality's parameters are null until it and its study have ended."""
 
     id: Id
     study: Id | None = None
-    name: PluginName
-    notes: str | None = Field(default=None, description="of people, about it", examples=["the bounds were too wide"])
-    edits: int = Field(default=0, description="how often its name or notes were changed")
-    strategy: PluginName
+    name: Name
+    notes: str | None = Field(default=None, description="free text by people", examples=["the bounds were too wide"])
+    edits: int = Field(default=0, description="number of changes to the name or notes")
+    strategy: Name
     state: State
     spec: dict[str, Any] = Field(
         examples=[{"strategy": {"name": "simulated_fit"}, "iterations": 10, "repetitions": 40}]
     )
-    priority: int = Field(default=0, description="the higher is computed first")
-    max_parallel: int | None = Field(default=None, description="repetitions that run at once; null: any number")
+    priority: int = Field(default=0, description="higher is computed first")
+    max_parallel: int | None = Field(default=None, description="largest number of repetitions at once; null: no limit")
     progress: Progress
     best_fitness: Statistic = Field(
-        default=None, description="the best recorded fitness of a repetition so far, on average over repetitions"
+        default=None, description="best recorded fitness of each repetition so far, averaged over repetitions"
     )
-    reasons: tuple[str, ...] = Field(default=(), description="why repetitions failed, each reason once")
-    sensitivity: Id | None = Field(default=None, description="id of the check of what its tunables do to fitness")
+    reasons: tuple[str, ...] = Field(default=(), description="distinct reasons of failed repetitions")
+    sensitivity: Id | None = Field(default=None, description="id of the sensitivity check")
     warnings: tuple[str, ...] = Field(
-        default=(), description="what that check found amiss, and versions that keep it from going on"
+        default=(), description="findings of the sensitivity check, and versions that prevent continuing"
     )
     created_at: Moment
     started_at: Moment | None = None
@@ -68,12 +72,12 @@ class ExperimentRead(Frozen):
 
 
 class StudyRead(Frozen):
-    """A study; its state is that of its experiments taken together."""
+    """A study; its state combines those of its experiments."""
 
     id: Id
-    name: PluginName
-    notes: str | None = Field(default=None, description="of people, about it", examples=["the bounds were too wide"])
-    edits: int = Field(default=0, description="how often its name or notes were changed")
+    name: Name
+    notes: str | None = Field(default=None, description="free text by people", examples=["the bounds were too wide"])
+    edits: int = Field(default=0, description="number of changes to the name or notes")
     state: State
     experiments: tuple[ExperimentRead, ...]
     progress: Progress
@@ -81,7 +85,7 @@ class StudyRead(Frozen):
 
 
 class RepetitionRead(Frozen):
-    """One run of the whole algorithm with one stream of random numbers."""
+    """One run of the whole algorithm with its own random numbers."""
 
     number: int
     state: State
@@ -94,20 +98,20 @@ class RepetitionRead(Frozen):
 
 
 class AttemptRead(Frozen):
-    """One lease of a repetition: who had it, from when to when, and how it ended."""
+    """One attempt at a repetition: its supervisor, times and ending."""
 
-    number: int = Field(description="from 1; the epoch that every write of this attempt carried")
-    owner: str = Field(description="the supervisor", examples=["lab-3:4711:9f2c61d0"])
+    number: int = Field(description="from 1; every write of the attempt carries it as the epoch of its lease")
+    owner: str = Field(description="supervisor of the attempt", examples=["lab-3:4711:9f2c61d0"])
     started_at: Moment
-    ended_at: Moment | None = Field(default=None, description="null: it runs, or waits for its core")
+    ended_at: Moment | None = Field(default=None, description="null while it runs or waits for a core")
     ending: Ending | None = None
     reason: str | None = Field(
-        default=None, description="why it failed or was lost", examples=["no heartbeat for 30 s"]
+        default=None, description="reason of failure or loss", examples=["no heartbeat for 30 s"]
     )
 
 
 class MeasurementKind(StrEnum):
-    """What a real-world evaluation is for: samples are learned from and counted, probes are only looked at."""
+    """Purpose of a real-world evaluation: samples are learned from and counted, probes are only recorded."""
 
     SAMPLE = "sample"
     PROBE = "probe"
@@ -132,4 +136,4 @@ class SimulatorRead(Frozen):
     iteration: int
     rank: int
     parameters: dict[str, float] = Field(examples=[{"static_friction": 1.04, "restitution": 0.02}])
-    squared_error: Statistic = Field(description="over the samples so far; null where its physics failed on one")
+    squared_error: Statistic = Field(description="sum over the samples so far; null if the physics failed on one")

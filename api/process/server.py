@@ -79,7 +79,7 @@ class Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """End the streams and the replay process, finish the requests under way, and close."""
         self._app.state.feed.close()
-        self._app.state.physics.close()
+        self._app.state.rollout_process.close()
         await super().shutdown(sockets)
 
 

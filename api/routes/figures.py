@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, FastAPI, Query, Request, Response
 from pydantic import Field, model_validator
 
-from gaplab.api.http.dependencies import Id, PhysicsDep, StoreDep
+from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import Drawing, answer, responses
 from gaplab.schemas.figures import FigureRead
 from gaplab.services.core.errors import NotFound
@@ -108,12 +108,14 @@ def draw_simulators(store: StoreDep, query: Annotated[SimulatorsDrawing, Query()
     response_model=FigureRead,
     responses=responses(404, 422, 429),
 )
-def draw_predictions(store: StoreDep, physics: PhysicsDep, query: Annotated[ExperimentDrawing, Query()]) -> Response:
+def draw_predictions(
+    store: StoreDep, process: RolloutProcessDep, query: Annotated[ExperimentDrawing, Query()]
+) -> Response:
     """Draw the simulated fitness of an experiment's samples, before and after tuning on them, against reality.
 
     Each request computes for about two seconds; repeat it while some samples are pending, as the caption says.
     """
-    found = predictions(store, physics, query.experiment)
+    found = predictions(store, process, query.experiment)
     counts = {"pending": found.pending, "left_out": found.left_out}
     figure = predictions_figure(found.items, unit=found.unit, **counts, title=_title(store, query))
     return answer(_explained(store, query, figure), query)

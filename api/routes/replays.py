@@ -5,11 +5,12 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
-from gaplab.api.http.dependencies import Id, Parameters, PhysicsDep, StoreDep
+from gaplab.api.http.dependencies import Id, Parameters, RolloutProcessDep, StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.predictions import Predictions
 from gaplab.schemas.replays import ControllerKind, Replay
 from gaplab.services.replay import predictions, replays
+from gaplab.services.replay.rollout import ReplayChoice
 
 router = APIRouter(prefix="/experiments", tags=["replays"])
 
@@ -38,13 +39,15 @@ class ReplayQuery(Parameters):
     response_description="Shapes, and their motion in simulation and in reality",
     responses=documented(404, 409, 422, 429),
 )
-def read_replay(id: Id, store: StoreDep, physics: PhysicsDep, query: Annotated[ReplayQuery, Query()]) -> Response:
+def read_replay(
+    id: Id, store: StoreDep, process: RolloutProcessDep, query: Annotated[ReplayQuery, Query()]
+) -> Response:
     """Compute the motion of a sample or a transferred controller in its simulator and in reality, from the same start.
 
     Reality is shown for controllers that were measured there, because their motion does not reveal its parameters.
     Before they are measured, the answer is 409.
     """
-    replay = replays.replay_json(store, physics, id, replays.Wanted(**query.model_dump()))
+    replay = replays.replay_json(store, process, id, ReplayChoice(**query.model_dump()))
     return Response(replay, media_type="application/json")
 
 
@@ -54,9 +57,9 @@ def read_replay(id: Id, store: StoreDep, physics: PhysicsDep, query: Annotated[R
     response_description="By repetition and iteration",
     responses=documented(404, 422, 429),
 )
-def read_predictions(id: Id, store: StoreDep, physics: PhysicsDep) -> Predictions:
+def read_predictions(id: Id, store: StoreDep, process: RolloutProcessDep) -> Predictions:
     """Return the fitness of each sample in the best simulator before its measurement, and after tuning on it.
 
     Each request computes for about two seconds; repeat it while some samples are pending.
     """
-    return predictions.predictions(store, physics, id)
+    return predictions.predictions(store, process, id)
