@@ -46,6 +46,11 @@ class ExperimentRead(Frozen):
     notes: str | None = Field(default=None, description="of people, about it")
     edits: int = Field(default=0, description="how often its name or notes were changed")
     strategy: str
+    direct: bool = Field(
+        default=False,
+        description="true for the direct baseline: controllers evolve in reality itself, without simulators and samples, "
+        "so iteration 0 is the only one",
+    )
     state: State
     spec: dict[str, Any]
     priority: int = Field(default=0, description="the higher is computed first")
