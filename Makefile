@@ -2,6 +2,7 @@
 
 PYTHON ?= python3.11
 BIN := .venv/bin
+DENO := DENO_DIR=.venv/deno DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 CHROMIUM := $(GAPLAB_CHROMIUM) $(shell which chromium chromium-browser google-chrome google-chrome-stable 2>/dev/null)
 
 help:  ## this list
@@ -20,6 +21,8 @@ lint: .venv/installed-dev  ## style, types, dependencies and the arrows between 
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(DENO) lint --quiet
+	$(DENO) check --quiet api/dashboard
 	$(BIN)/python -m pip check --disable-pip-version-check
 	$(BIN)/python -m pytest tests/unit/test_architecture.py tests/unit/test_dependencies.py
 

@@ -118,7 +118,7 @@ def test_files_of_the_page_are_short_and_say_what_they_are(path: Path):
 
     if path.suffix in {".js", ".css"}:
         assert len(text.splitlines()) <= 250
-        assert text.startswith("/*")
+        assert text.startswith("// @ts-check\n/**" if path.suffix == ".js" else "/*")
     assert "http://" not in text.replace("http://www.w3.org/", "")
     assert "https://" not in text
 
