@@ -106,10 +106,10 @@ def compare_experiments(store: StoreDep, query: Annotated[ComparisonQuery, Query
         raise InvalidSpec(renamed) from error
 
 
-def _wanted(shown: tuple[Curve, ...], query: CurveQuery) -> tuple[Curve, ...] | Response:
-    return _csv(shown) if query.format == "csv" else shown
+def _wanted(found: tuple[Curve, ...], query: CurveQuery) -> tuple[Curve, ...] | Response:
+    return _csv(found) if query.format == "csv" else found
 
 
-def _csv(shown: tuple[Curve, ...]) -> Response:
+def _csv(found: tuple[Curve, ...]) -> Response:
     disposition = {"Content-Disposition": 'attachment; filename="gaplab-curves.csv"'}
-    return Response(curves.curves_csv(shown), media_type="text/csv", headers=disposition)
+    return Response(curves.curves_csv(found), media_type="text/csv", headers=disposition)
