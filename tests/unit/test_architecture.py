@@ -118,3 +118,9 @@ def test_a_module_stays_under_250_lines_and_a_function_under_40(path):
 @pytest.mark.parametrize("path", MODULES, ids=str)
 def test_every_module_says_what_it_is(path):
     assert ast.get_docstring(ast.parse((ROOT / path).read_text()))
+
+
+def test_benchmarks_use_what_tests_provide_and_no_test_uses_a_benchmark() -> None:
+    tests = sorted(path.relative_to(ROOT) for path in (ROOT / "tests").rglob("*.py"))
+
+    assert not [str(path) for path in tests if any(name.partition(".")[0] == "benchmarks" for name in imports(path))]
