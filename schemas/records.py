@@ -51,6 +51,11 @@ class ExperimentRead(Frozen):
     notes: str | None = Field(default=None, description="free text by people", examples=["the bounds were too wide"])
     edits: int = Field(default=0, description="number of changes to the name or notes")
     strategy: Name
+    direct: bool = Field(
+        default=False,
+        description="true for the direct baseline: controllers evolve in reality itself, without simulators and "
+        "samples, so iteration 0 is the only one",
+    )
     state: State
     spec: dict[str, Any] = Field(
         examples=[{"strategy": {"name": "simulated_fit"}, "iterations": 10, "repetitions": 40}]

@@ -11,7 +11,7 @@ from anyio.to_thread import run_sync
 from gaplab.schemas.events import EventPage, EventRead
 from gaplab.services import events
 from gaplab.services.core.errors import StoreUnavailable
-from gaplab.services.events import Which
+from gaplab.services.events import WantedEvents
 from gaplab.services.store.session import Store
 
 POLL_S = 0.25
@@ -48,7 +48,7 @@ class EventFeed:
         """The number of open streams."""
         return self._open
 
-    async def follow(self, after: int, which: Which) -> AsyncIterator[EventRead]:
+    async def follow(self, after: int, which: WantedEvents) -> AsyncIterator[EventRead]:
         """Yield the selected events after that number, in order and each once, until the feed is closed."""
         with self._counted():
             while not (self._closed or self._reader is None or self._reader.done()):
@@ -93,7 +93,7 @@ class EventFeed:
             return None
         return tuple(event for event in self._recent if event.number > number)
 
-    async def _page(self, after: int, which: Which) -> EventPage:
+    async def _page(self, after: int, which: WantedEvents) -> EventPage:
         """Return the next events for a stream that is behind; none while the database does not answer."""
         try:
             return await run_sync(lambda: events.page(self._store, after, which, limit=PAGE))
@@ -121,7 +121,7 @@ class EventFeed:
             self._head = await run_sync(lambda: events.latest(self._store))
             self._wake()
         head = self._head
-        page = await run_sync(lambda: events.page(self._store, head, Which(), limit=PAGE))
+        page = await run_sync(lambda: events.page(self._store, head, WantedEvents(), limit=PAGE))
         if page.items:
             self._recent.extend(page.items)
             self._head = page.items[-1].number

@@ -16,7 +16,7 @@ from gaplab.api.http.limits import Streams
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.events import EventKind, EventPage
 from gaplab.services import events
-from gaplab.services.events import Which
+from gaplab.services.events import WantedEvents
 
 router = APIRouter(prefix="/events", tags=["events"])
 
@@ -36,9 +36,9 @@ class EventFilter(Parameters):
     kind: list[EventKind] = Field(default=[], max_length=50, description="only events of these kinds; repeat for more")
     after: After = 0
 
-    def which(self) -> Which:
+    def which(self) -> WantedEvents:
         """Return the filter for the service."""
-        return Which(experiment=self.experiment, study=self.study, kinds=frozenset(self.kind))
+        return WantedEvents(experiment=self.experiment, study=self.study, kinds=frozenset(self.kind))
 
 
 class EventPaging(EventFilter):
@@ -68,7 +68,7 @@ def _count_stream(streams: StreamsDep, caller: CallerDep) -> Iterator[None]:
         yield
 
 
-def _checked(store: StoreDep, query: Annotated[EventFilter, Query()]) -> Which:
+def _checked(store: StoreDep, query: Annotated[EventFilter, Query()]) -> WantedEvents:
     """Check the filter before the stream begins, while a problem can still be answered."""
     events.check(store, query.which())
     return query.which()
@@ -84,7 +84,7 @@ def _checked(store: StoreDep, query: Annotated[EventFilter, Query()]) -> Which:
 )
 async def stream_events(
     query: Annotated[EventFilter, Query()],
-    which: Annotated[Which, Depends(_checked)],
+    which: Annotated[WantedEvents, Depends(_checked)],
     feed: FeedDep,
     last_event_id: Annotated[After | None, Header(description="like `after`, which it overrides")] = None,
 ) -> AsyncIterator[ServerSentEvent]:

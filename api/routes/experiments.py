@@ -22,7 +22,7 @@ from gaplab.schemas.records import (
 )
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.experiments import editing, submission
-from gaplab.services.experiments.listing import Which
+from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.results.misfit import misfit
 
 router = APIRouter(prefix="/experiments", tags=["experiments"])
@@ -93,8 +93,8 @@ def submit_experiment(
 )
 def list_experiments(store: StoreDep, query: Annotated[ExperimentFilter, Query()]) -> Page[ExperimentRead]:
     """List experiments, by default the newest first. A cursor is valid only for the list that returned it."""
-    which = Which(**query.model_dump(exclude={"limit", "cursor"}))
-    return submission.list_experiments(store, which, limit=query.limit, cursor=query.cursor)
+    wanted = ListFilter(**query.model_dump(exclude={"limit", "cursor"}))
+    return submission.list_experiments(store, wanted, limit=query.limit, cursor=query.cursor)
 
 
 @router.get(

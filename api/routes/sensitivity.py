@@ -8,7 +8,7 @@ from gaplab.api.http import links
 from gaplab.api.http.dependencies import AdmissionDep, Id, StoreDep, created
 from gaplab.api.http.problems import documented
 from gaplab.schemas.sensitivity import SensitivityRead, SensitivitySpec
-from gaplab.services.running import sensitivity
+from gaplab.services.experiments import checks
 
 router = APIRouter(prefix="/sensitivity", tags=["sensitivity"])
 
@@ -32,7 +32,7 @@ def submit_sensitivity(
     It depends on robot, engine and tunables alone, and the same check is computed once. Every submitted experiment
     queues its check.
     """
-    done = sensitivity.admit(store, spec, admitted)
+    done = checks.admit(store, spec, admitted)
     return created(done, response, request.app.url_path_for("read_sensitivity", id=done.answer.id))
 
 
@@ -44,4 +44,4 @@ def submit_sensitivity(
 )
 def read_sensitivity(id: Id, store: StoreDep) -> SensitivityRead:
     """Return the check, with the profile of each tunable once it is COMPLETED."""
-    return sensitivity.read(store, id)
+    return checks.read(store, id)

@@ -13,7 +13,7 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import Page, StudyRead
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.experiments import editing, submission
-from gaplab.services.experiments.listing import Which
+from gaplab.services.experiments.listing import ListFilter
 
 router = APIRouter(prefix="/studies", tags=["studies"])
 
@@ -53,8 +53,8 @@ def submit_study(
 @router.get("", summary="List the studies", response_description="The newest first", responses=documented(422))
 def list_studies(store: StoreDep, query: Annotated[StudyFilter, Query()]) -> Page[StudyRead]:
     """List studies, by default the newest first. A cursor is valid only for the list that returned it."""
-    which = Which(**query.model_dump(exclude={"limit", "cursor"}))
-    return submission.list_studies(store, which, limit=query.limit, cursor=query.cursor)
+    wanted = ListFilter(**query.model_dump(exclude={"limit", "cursor"}))
+    return submission.list_studies(store, wanted, limit=query.limit, cursor=query.cursor)
 
 
 @router.get(
