@@ -95,6 +95,7 @@ def _experiment(
         notes=row.notes,
         edits=row.edits,
         strategy=row.strategy,
+        direct=row.iterations == 1,  # other strategies have at least one iteration after number 0
         state=row.state,
         spec=without_truth(row.spec) if secret else row.spec,
         priority=-row.precedence,
