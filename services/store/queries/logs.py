@@ -1,4 +1,4 @@
-"""Logs of repetitions, read: the steps equal those that were recorded, number by number."""
+"""Logs of repetitions, read: the steps equal the recorded ones to the last bit."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
@@ -18,7 +18,7 @@ R = TypeVar("R", IterationRow, MeasurementRow, SimulatorRow)
 
 
 def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, ...]]:
-    """The log of each of these repetitions."""
+    """Return the log of each of these repetitions."""
     iterations = _rows(session, repetitions, IterationRow, IterationRow.number)
     measurements = _rows(session, repetitions, MeasurementRow, MeasurementRow.iteration)
     simulators = _rows(session, repetitions, SimulatorRow, SimulatorRow.iteration, SimulatorRow.rank)
@@ -26,7 +26,7 @@ def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, 
 
 
 def is_whole(session: Session, repetition: RepetitionRow) -> bool:
-    """Whether the rows of the repetition tell of as many steps and iterations as it counts, in order, without holes."""
+    """Return whether a repetition's rows are the steps and iterations that it counts, in order, without holes."""
     (log,) = logs(session, [repetition.id]).values()
     done = sum(isinstance(each, Probed) for each in log)
     return done == repetition.iterations_done and [position(each) for each in log] == list(range(repetition.steps))
@@ -43,7 +43,7 @@ def _rows(session: Session, repetitions: Sequence[int], table: type[R], *order: 
 def _log(
     iterations: Iterable[IterationRow], measurements: Iterable[MeasurementRow], simulators: Iterable[SimulatorRow]
 ) -> tuple[Step, ...]:
-    """The steps that one repetition's rows tell of.
+    """Return the steps of one repetition's rows.
 
     Args:
         iterations: by number.

@@ -1,4 +1,4 @@
-"""How far experiments are: one sum over repetitions each, whatever the number of their results."""
+"""Progress of experiments: one sum over repetitions each, whatever the number of their results."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -15,10 +15,10 @@ _OPEN = (State.QUEUED, State.RUNNING)
 
 @dataclass(frozen=True)
 class Tally:
-    """What repetitions add up to; of a study, the sum of its experiments'.
+    """Sums over repetitions; of a study, the sum over its experiments.
 
     Attributes:
-        running: those with a step stored; a claimed one that has none may still wait for a core.
+        running: claimed repetitions with a stored step; one without may still wait for a core.
         rollouts_left: of the repetitions that have not ended.
         seconds: of work in the rollouts that are done.
     """
@@ -42,7 +42,7 @@ class Tally:
 
     @property
     def seconds_left(self) -> float | None:
-        """What is left at the pace so far by those that run now; None while that is unknown."""
+        """Expected time to the end at the present pace of the running repetitions; None while it is unknown."""
         if not self.open:
             return 0.0
         behind = self.rollouts_done + self.rollouts_saved
@@ -51,12 +51,12 @@ class Tally:
         return self.rollouts_left * self.seconds / behind / self.running
 
     def progress(self) -> Progress:
-        """As it is shown."""
+        """Return the part that is shown."""
         return Progress.model_validate(self, from_attributes=True)
 
 
 def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
-    """The tally of each experiment."""
+    """Return the tally of each experiment."""
     row = RepetitionRow
     left = ExperimentRow.rollouts - row.rollouts_done - row.rollouts_saved
     found = session.execute(
@@ -84,7 +84,7 @@ def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
 
 
 def reasons(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Why repetitions of each experiment failed, each reason once, by the first repetition that it befell."""
+    """Return why repetitions failed, by experiment: each reason once, ordered by its first repetition."""
     row = RepetitionRow
     found = session.execute(
         select(row.experiment_id, row.error)
@@ -99,7 +99,7 @@ def reasons(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str
 
 
 def _tally(*counts: int, seconds: float) -> Tally:
-    """In the order of the fields; Postgres sums whole numbers to decimals."""
+    """Return the tally of counts in the order of its fields; Postgres sums whole numbers to decimals."""
     names = (each.name for each in fields(Tally))
     return Tally(seconds=seconds, **{name: int(count) for name, count in zip(names, counts, strict=False)})
 
