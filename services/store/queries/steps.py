@@ -92,15 +92,6 @@ def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, 
     return {each: mapping.log(iterations[each], measurements[each], simulators[each]) for each in repetitions}
 
 
-def is_whole(session: Session, repetition: RepetitionRow) -> bool:
-    """Whether the rows of the repetition tell of as many steps and iterations as it counts, in order, without holes."""
-    (log,) = logs(session, [repetition.id]).values()
-    done = sum(isinstance(each, Probed) for each in log)
-    return done == repetition.iterations_done and [mapping.position(each) for each in log] == list(
-        range(repetition.steps)
-    )
-
-
 def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, tuple[int, int]]:
     """How many steps the log of each claim that holds has, and checkpoints of the next; locked for the transaction."""
     by_key = {(each.repetition_id, each.epoch): each for each in claims}
