@@ -16,12 +16,12 @@ from gaplab.services.figures.kinds.curves import Band, curves_figure
 from gaplab.services.figures.kinds.predictions import predictions_figure
 from gaplab.services.figures.kinds.simulators import simulators_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
-from gaplab.services.figures.marks import Figure
+from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import TITLE, spoken
 from gaplab.services.replay.predictions import predictions
 from gaplab.services.results import curves
-from gaplab.services.results.curve_costs import abscissa
-from gaplab.services.results.tuned_simulators import tunings
+from gaplab.services.results.curve_costs import cost_axis
+from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.specs.resolution import is_direct, spec_of
 from gaplab.services.store.session import Store
 
@@ -89,7 +89,7 @@ def draw_curves(store: StoreDep, query: Annotated[CurvesDrawing, Query()]) -> Re
 @router.get("/squared-error", summary="Draw the squared error", response_model=FigureRead, responses=responses())
 def draw_squared_error(store: StoreDep, query: Annotated[ErrorDrawing, Query()]) -> Response:
     """The squared error of an experiment's best tuned simulator, by iteration: median and quartiles of repetitions."""
-    found = tunings(store, query.experiment)
+    found = tuned_simulators(store, query.experiment)
     figure = squared_error_figure(found.errors, unit=found.unit, title=_title(store, query), each=query.each)
     return answer(_explained(store, query, figure), query)
 
@@ -97,7 +97,7 @@ def draw_squared_error(store: StoreDep, query: Annotated[ErrorDrawing, Query()])
 @router.get("/simulators", summary="Draw tuned simulators", response_model=FigureRead, responses=responses())
 def draw_simulators(store: StoreDep, query: Annotated[SimulatorsDrawing, Query()]) -> Response:
     """An experiment's best simulators in the space of its tunables; with reality once all of its study have ended."""
-    found, title = tunings(store, query.experiment), _title(store, query)
+    found, title = tuned_simulators(store, query.experiment), _title(store, query)
     narrow = query.format not in {"html", "json"} and query.width < NARROW_IN
     columns = query.columns or (2 if narrow else 3)
     figure = simulators_figure(found.simulators, found.dimensions, truth=found.truth, title=title, columns=columns)
@@ -141,18 +141,18 @@ def _title(store: Store, query: ExperimentDrawing) -> str:
     return spoken(submission.read_experiment(store, query.experiment).name, TITLE)
 
 
-def _explained(store: Store, query: ExperimentDrawing, figure: Figure) -> Figure:
+def _explained(store: Store, query: ExperimentDrawing, figure: FigureDefinition) -> FigureDefinition:
     """The figure, which says so if it will always be empty."""
     if not figure.empty or not is_direct(spec_of(submission.read_experiment(store, query.experiment).spec)):
         return figure
     return replace(figure, nothing=DIRECT, alt=f"Nothing: {DIRECT}.")
 
 
-def _curves(store: Store, query: CurvesDrawing) -> Figure:
+def _curves(store: Store, query: CurvesDrawing) -> FigureDefinition:
     studies = [submission.read_study(store, each) for each in query.study]
     found = [curve for study in studies for curve in curves.study_curves(store, study.id)]
     found += curves.curves(store, query.experiment) if query.experiment else ()
     found = list({curve.experiment: curve for curve in found}.values())  # an experiment that is named twice is one line
     title = query.title if query.title is not None else ", ".join(each.name for each in studies)
-    against = None if query.x == "evaluations" else abscissa(store, found, query.x, cost_s=query.cost_s)
+    against = None if query.x == "evaluations" else cost_axis(store, found, query.x, cost_s=query.cost_s)
     return curves_figure(found, title=title, band=query.band, against=against, each=query.each)

@@ -14,7 +14,7 @@ from gaplab.services.figures.kinds.gait import gait_figure
 from gaplab.services.figures.kinds.toy import toy_figure
 from gaplab.services.replay.replays import replay
 from gaplab.services.replay.rollout import ReplayChoice
-from gaplab.services.results.toy import toys
+from gaplab.services.results.toy import toy_iterations
 
 router = APIRouter(prefix="/figures", tags=["figures"])
 
@@ -53,5 +53,5 @@ def draw_toy(store: StoreDep, query: Annotated[ToyDrawing, Query()]) -> Response
 
     The true function is drawn once the experiment has ended, and with it all others of its study.
     """
-    found = toys(store, query.experiment, query.repetition, query.iteration)
+    found = toy_iterations(store, query.experiment, query.repetition, query.iteration)
     return answer(toy_figure(found, title=query.title), query)

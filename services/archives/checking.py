@@ -73,11 +73,16 @@ def checked(table: str, file: Path, count: int) -> Iterator[Row]:
             try:
                 found = model.model_validate(row)
             except ValidationError as error:
-                first = error.errors(include_url=False, include_input=False)[0]
-                _refuse(f"{place}, {'/'.join(map(str, first['loc']))[:100]}:", first["msg"])
+                _refuse(f"{place},", first_error(error))
             yield {name: getattr(found, name) for name in columns}
     if number != count:
         _refuse(table, f"has {number} rows; the manifest states {count}")
+
+
+def first_error(error: ValidationError) -> str:
+    """Return the place and the message of the first error, without the value."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    return f"{'/'.join(map(str, first['loc']))[:100]}: {first['msg']}"
 
 
 def _lines(lines: IO[str], table: str) -> Iterator[str]:

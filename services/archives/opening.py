@@ -20,7 +20,7 @@ from zlib import error as ZlibError  # noqa: N812 - it is an error
 from pydantic import ValidationError
 
 from gaplab.schemas.archives import FORMAT, Manifest, Member
-from gaplab.services.archives.checking import Row, checked
+from gaplab.services.archives.checking import Row, checked, first_error
 from gaplab.services.archives.columns import EXPORTED
 from gaplab.services.archives.members import CURVES, MANIFEST, member_of
 from gaplab.services.core.errors import InvalidArchive
@@ -112,7 +112,7 @@ def _manifest(archive: ZipFile, members: dict[str, ZipInfo]) -> Manifest:
     try:
         manifest = Manifest.model_validate(json.loads(text))
     except (ValidationError, ValueError, RecursionError) as error:
-        msg = f"{MANIFEST} is invalid: {_first(error)}"
+        msg = f"{MANIFEST} is invalid: {first_error(error) if isinstance(error, ValidationError) else 'it is not JSON'}"
         raise InvalidArchive(msg) from error
     if manifest.format > FORMAT:
         msg = f"its format is {manifest.format}; this version of gaplab reads up to {FORMAT}"
@@ -121,13 +121,6 @@ def _manifest(archive: ZipFile, members: dict[str, ZipInfo]) -> Manifest:
         msg = f"{', '.join(sorted(missing)[:5])!r} is in the manifest or in the archive, but not in both"
         raise InvalidArchive(msg)
     return manifest
-
-
-def _first(error: Exception) -> str:
-    if isinstance(error, ValidationError):
-        found = error.errors(include_url=False, include_input=False)[0]
-        return f"{'/'.join(map(str, found['loc']))[:100]}: {found['msg']}"
-    return "it is not JSON"
 
 
 def _unpack(archive: ZipFile, info: ZipInfo, promised: Member, target: Path) -> Path:

@@ -23,7 +23,7 @@ class ToyTransfer(Frozen):
     real: float | None = Field(description="null: not looked at yet, or failed")
 
 
-class Toy(Frozen):
+class ToyIteration(Frozen):
     """One iteration of one repetition."""
 
     experiment: str
