@@ -4,9 +4,9 @@ from collections.abc import Iterable
 
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.core.types import Probed
-from gaplab.services.store import mapping
 from gaplab.services.store.models import RepetitionRow
-from gaplab.services.store.queries import attempts, experiments, steps
+from gaplab.services.store.queries import attempts, experiments, logs
+from gaplab.services.store.queries.step_rows import position
 from gaplab.services.store.session import Session
 
 
@@ -34,8 +34,8 @@ def check_logs(session: Session, ids: Iterable[str]) -> None:
 def _is_whole(session: Session, row: RepetitionRow) -> bool:
     """Return whether the log has all steps and iterations that the repetition counts, in order."""
     try:
-        (log,) = steps.logs(session, [row.id]).values()
+        (log,) = logs.logs(session, [row.id]).values()
     except (ValueError, TypeError, AssertionError):  # steps check themselves
         return False
     done = sum(isinstance(step, Probed) for step in log)
-    return done == row.iterations_done and [mapping.position(step) for step in log] == list(range(row.steps))
+    return done == row.iterations_done and [position(step) for step in log] == list(range(row.steps))

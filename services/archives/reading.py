@@ -21,11 +21,11 @@ from gaplab.services.archives.consistency import check_row, checked_experiments
 from gaplab.services.archives.logs import check_logs
 from gaplab.services.archives.opening import OpenedArchive, open_archive
 from gaplab.services.core.errors import Conflict, InvalidArchive
+from gaplab.services.experiments.states import settle
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import archives
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import new_id
-from gaplab.services.store.queries.settling import settle
 from gaplab.services.store.session import Session, Store
 
 AT_ONCE = 4

@@ -16,10 +16,12 @@ from gaplab.schemas.archives import FORMAT, Manifest, Member
 from gaplab.schemas.curves import Curve
 from gaplab.services.archives.columns import EXPORTED, columns_of
 from gaplab.services.archives.members import CURVES, MANIFEST, Row, member_of, write
+from gaplab.services.experiments import hiding
 from gaplab.services.results import curves
 from gaplab.services.store.models import REVISION, ExperimentRow
-from gaplab.services.store.queries import archives, experiments, reads
+from gaplab.services.store.queries import archives, experiments
 from gaplab.services.store.session import Session, Store
+from gaplab.services.store.stored_specs import without_truth
 
 _MOMENT = (1980, 1, 1, 0, 0, 0)
 """Date of every member, the earliest of the zip format, so that the same content gives the same bytes."""
@@ -70,7 +72,7 @@ def _export(
     session: Session, kind: Literal["study", "experiment"], id_: str, owners: Sequence[ExperimentRow]
 ) -> Archive:
     ids, study = [row.id for row in owners], id_ if kind == "study" else None
-    hidden = reads.hidden(session, owners)
+    hidden = hiding.hidden(session, owners)
     file = TemporaryFile()  # noqa: SIM115 - the sender closes it
     try:
         members: dict[str, Member] = {}
@@ -100,7 +102,7 @@ def _rows(
     owners = [study] if study and table == "study" else [] if table == "study" else experiments
     for row in archives.read_rows(session, table, [column.name for column in columns_of(table)], owners):
         if table == "experiment":
-            row |= {"study_id": study} | ({"spec": reads.without_truth(row["spec"])} if row["id"] in hidden else {})
+            row |= {"study_id": study} | ({"spec": without_truth(row["spec"])} if row["id"] in hidden else {})
         yield row
 
 

@@ -12,10 +12,11 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
+from gaplab.services.experiments import hiding
 from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, reality_of
 from gaplab.services.specs.resolution import is_direct, spec_of
 from gaplab.services.store.models import ExperimentRow
-from gaplab.services.store.queries import experiments, reads, replays, results
+from gaplab.services.store.queries import experiments, replays, results
 from gaplab.services.store.queries.replays import MeasuredController
 from gaplab.services.store.session import Session, Store
 
@@ -76,7 +77,7 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
         row=row,
         spec=spec,
         robot=robot,
-        shown=row.id not in reads.hidden(session, [row]) and None not in row.spec["reality"]["parameters"].values(),
+        shown=row.id not in hiding.hidden(session, [row]) and None not in row.spec["reality"]["parameters"].values(),
         measured=measured,
         simulators=simulators,
         transferred={
