@@ -7,7 +7,7 @@ from pydantic import BaseModel
 
 from gaplab.schemas.curves import Comparison, Curve, CurvePoint, Test
 from gaplab.schemas.lifecycle import Ending, State
-from gaplab.schemas.misfit import MisfitPoint, MisfitRead, Spread, TunedSpread
+from gaplab.schemas.misfit import Distribution, MisfitPoint, MisfitRead, TunableDistribution
 from gaplab.schemas.records import (
     AttemptRead,
     ExperimentRead,
@@ -186,10 +186,10 @@ MISFIT = MisfitRead(
     points=(
         MisfitPoint(
             iteration=5,
-            error=Spread(n=8, mean=0.021, sd=0.008, least=0.004, greatest=0.034),
-            gap=Spread(n=8, mean=0.06, sd=0.03, least=0.01, greatest=0.12),
+            error=Distribution(n=8, mean=0.021, sd=0.008, least=0.004, greatest=0.034),
+            gap=Distribution(n=8, mean=0.06, sd=0.03, least=0.01, greatest=0.12),
             tunables=(
-                TunedSpread(
+                TunableDistribution(
                     name="restitution",
                     lower=0.0,
                     upper=0.6,

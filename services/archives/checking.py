@@ -132,5 +132,4 @@ def _type(column: Column) -> Any:  # noqa: ANN401 - a type, as pydantic takes it
 
 
 def _refuse(place: str, what: str) -> NoReturn:
-    msg = f"{place} {what}"
-    raise InvalidArchive(msg)
+    raise InvalidArchive(f"{place} {what}")

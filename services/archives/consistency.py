@@ -32,17 +32,14 @@ def checked_experiments(opened: OpenedArchive) -> dict[str, Row]:
     manifest, experiments = opened.manifest, dict[str, Row]()
     for row in opened.rows("experiment"):
         if len(experiments) == MOST_EXPERIMENTS:
-            msg = f"it has more than {MOST_EXPERIMENTS} experiments"
-            raise InvalidArchive(msg)
+            raise InvalidArchive(f"it has more than {MOST_EXPERIMENTS} experiments")
         experiments[row["id"]] = row | {"spec": _checked_spec(row)}
     study = manifest.id if manifest.kind == "study" else None
     studies = [row["id"] for row in opened.rows("study")]
     if studies != ([study] if study else []) or {row.get("study_id") for row in experiments.values()} - {study}:
-        msg = f"its study or experiments are not those of the {manifest.kind} {manifest.id!r}"
-        raise InvalidArchive(msg)
+        raise InvalidArchive(f"its study or experiments are not those of the {manifest.kind} {manifest.id!r}")
     if study is None and list(experiments) != [manifest.id]:
-        msg = f"its experiment is not {manifest.id!r}"
-        raise InvalidArchive(msg)
+        raise InvalidArchive(f"its experiment is not {manifest.id!r}")
     return experiments
 
 
@@ -66,33 +63,28 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
         or iteration >= owner["iterations"]
         or (table == "simulator" and len(row["parameters"]) != len(owner["spec"]["tunables"]))
     ):
-        msg = f"a row of {table} does not fit its experiment: {str(row)[:200]}"
-        raise InvalidArchive(msg)
+        raise InvalidArchive(f"a row of {table} does not fit its experiment: {str(row)[:200]}")
 
 
 def _check_provenance(row: Row) -> None:
     try:
         facts = Provenance.model_validate(row["facts"])
     except ValidationError as error:
-        msg = f"the facts of provenance {row['id']!r} are invalid"
-        raise InvalidArchive(msg) from error
+        raise InvalidArchive(f"the facts of provenance {row['id']!r} are invalid") from error
     if provenance.id_of(facts) != row["id"]:
-        msg = f"the facts of provenance {row['id']!r} belong to another id"
-        raise InvalidArchive(msg)
+        raise InvalidArchive(f"the facts of provenance {row['id']!r} belong to another id")
 
 
 def _checked_spec(row: Row) -> Row:
     """Return the spec as it is stored: with the fields that were given, and unknown parameters of reality as null."""
     place, given = f"the spec of experiment {row['id']!r}", row["spec"]
     if row.get("spec_version", SPEC_VERSION) > SPEC_VERSION:
-        msg = f"{place} has version {row['spec_version']}; this gaplab reads up to {SPEC_VERSION}"
-        raise InvalidArchive(msg)
+        raise InvalidArchive(f"{place} has version {row['spec_version']}; this gaplab reads up to {SPEC_VERSION}")
     try:
         spec = spec_of(given)
         truth = dict.fromkeys(given["reality"]["parameters"])
     except (ValidationError, KeyError, TypeError, AttributeError) as error:
-        msg = f"{place} is not a spec"
-        raise InvalidArchive(msg) from error
+        raise InvalidArchive(f"{place} is not a spec") from error
     names = [each.name for each in spec.tunables]
     wrong = [*(name for name in _RESOLVED if given.get(name) is None), *_unresolved(spec)]
     wrong += [name for name in (*truth, *names) if name not in tunables]

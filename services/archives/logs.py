@@ -19,16 +19,14 @@ def check_logs(session: Session, ids: Iterable[str]) -> None:
     for experiment in experiments.get_experiments(session, list(ids)):
         rows, expected = experiments.repetitions_of(session, experiment.id), experiment.spec["repetitions"]
         if [row.number for row in rows] != list(range(expected)):
-            msg = f"experiment {experiment.id!r} has {len(rows)} of its {expected} repetitions"
-            raise InvalidArchive(msg)
+            raise InvalidArchive(f"experiment {experiment.id!r} has {len(rows)} of its {expected} repetitions")
         latest = attempts.latest(session, experiment.id)
         for row in rows:
             if not _is_whole(session, row):
                 msg = f"the rows of repetition {row.number} of {experiment.id!r} are not a log of {row.steps} steps"
                 raise InvalidArchive(msg)
             if latest.get(row.id, 0) > row.epoch:
-                msg = f"repetition {row.number} of {experiment.id!r} has more attempts than leases"
-                raise InvalidArchive(msg)
+                raise InvalidArchive(f"repetition {row.number} of {experiment.id!r} has more attempts than leases")
 
 
 def _is_whole(session: Session, row: RepetitionRow) -> bool:

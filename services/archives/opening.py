@@ -71,13 +71,11 @@ def open_archive(file: IO[bytes], folder: Path) -> OpenedArchive:
                 if name != MANIFEST
             }
     except (BadZipFile, ZlibError, EOFError, NotImplementedError, RuntimeError, ValueError, OverflowError) as error:
-        msg = f"it is not a readable zip: {type(error).__name__}"
-        raise InvalidArchive(msg) from error
+        raise InvalidArchive(f"it is not a readable zip: {type(error).__name__}") from error
     except OSError as error:
         if error.errno != EINVAL:  # a place before the file's beginning
             raise
-        msg = "it is not a readable zip: its directory points outside of it"
-        raise InvalidArchive(msg) from error
+        raise InvalidArchive("it is not a readable zip: its directory points outside of it") from error
     _read_parquet([file for name, file in files.items() if name.endswith(".parquet")])
     tables = {table: _lines_of(files[member_of(table)]) for table in EXPORTED if member_of(table) in files}
     return OpenedArchive(manifest, tables)
@@ -88,25 +86,20 @@ def _members(archive: ZipFile) -> dict[str, ZipInfo]:
     found: dict[str, ZipInfo] = {}
     for info in archive.infolist():
         if info.filename not in known:
-            msg = f"a member is called {info.filename[:64]!r}; permitted: {', '.join(sorted(known))}"
-            raise InvalidArchive(msg)
+            raise InvalidArchive(f"a member is called {info.filename[:64]!r}; permitted: {', '.join(sorted(known))}")
         if info.filename in found:
-            msg = f"{info.filename} is there twice"
-            raise InvalidArchive(msg)
+            raise InvalidArchive(f"{info.filename} is there twice")
         if info.compress_type not in {ZIP_STORED, ZIP_DEFLATED} or info.flag_bits & 1:
-            msg = f"{info.filename} is encrypted, or compressed by another method than deflate"
-            raise InvalidArchive(msg)
+            raise InvalidArchive(f"{info.filename} is encrypted, or compressed by another method than deflate")
         found[info.filename] = info
     if (size := sum(each.file_size for each in found.values())) > MOST_BYTES:
-        msg = f"unpacked it has {size:,} bytes; {MOST_BYTES:,} are permitted"
-        raise InvalidArchive(msg)
+        raise InvalidArchive(f"unpacked it has {size:,} bytes; {MOST_BYTES:,} are permitted")
     return found
 
 
 def _manifest(archive: ZipFile, members: dict[str, ZipInfo]) -> Manifest:
     if MANIFEST not in members or members[MANIFEST].file_size > MOST_BYTES_OF_MANIFEST:
-        msg = f"it has no {MANIFEST}, or one that is too long: it is not an archive of gaplab"
-        raise InvalidArchive(msg)
+        raise InvalidArchive(f"it has no {MANIFEST}, or one that is too long: it is not an archive of gaplab")
     with archive.open(members[MANIFEST]) as opened:
         text = opened.read(MOST_BYTES_OF_MANIFEST + 1)
     try:
@@ -115,8 +108,7 @@ def _manifest(archive: ZipFile, members: dict[str, ZipInfo]) -> Manifest:
         msg = f"{MANIFEST} is invalid: {first_error(error) if isinstance(error, ValidationError) else 'it is not JSON'}"
         raise InvalidArchive(msg) from error
     if manifest.format > FORMAT:
-        msg = f"its format is {manifest.format}; this version of gaplab reads up to {FORMAT}"
-        raise InvalidArchive(msg)
+        raise InvalidArchive(f"its format is {manifest.format}; this version of gaplab reads up to {FORMAT}")
     if missing := set(manifest.members) ^ (set(members) - {MANIFEST}):
         msg = f"{', '.join(sorted(missing)[:5])!r} is in the manifest or in the archive, but not in both"
         raise InvalidArchive(msg)
@@ -131,8 +123,7 @@ def _unpack(archive: ZipFile, info: ZipInfo, promised: Member, target: Path) -> 
             hashed.update(chunk)
             file.write(chunk)
     if size != promised.bytes or hashed.hexdigest() != promised.sha256:
-        msg = f"{info.filename} differs from the manifest: it was damaged or changed"
-        raise InvalidArchive(msg)
+        raise InvalidArchive(f"{info.filename} differs from the manifest: it was damaged or changed")
     return target
 
 
@@ -143,8 +134,7 @@ def _read_parquet(files: Sequence[Path]) -> None:
     ended = subprocess.run(command, stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL, check=False)  # noqa: S603 - ours
     if ended.returncode != 0:
         which = files[ended.returncode - 1].name if 0 < ended.returncode <= len(files) else "a member"
-        msg = f"{which} is not readable Parquet, or has values that an archive cannot have"
-        raise InvalidArchive(msg)
+        raise InvalidArchive(f"{which} is not readable Parquet, or has values that an archive cannot have")
 
 
 def _lines_of(file: Path) -> Path:

@@ -63,8 +63,7 @@ def import_archive(store: Store, file: IO[bytes]) -> ImportRead:
         Conflict: too many archives are being imported at the moment.
     """
     if not _SLOTS.acquire(blocking=False):
-        msg = f"{AT_ONCE} archives are being imported already; try again when they are done"
-        raise Conflict(msg)
+        raise Conflict(f"{AT_ONCE} archives are being imported already; try again when they are done")
     try:
         with TemporaryDirectory(prefix="gaplab-import-") as folder:
             opened = open_archive(file, Path(folder))

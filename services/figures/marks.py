@@ -163,8 +163,7 @@ class Axis:
     def __post_init__(self) -> None:
         _check(self.label, (self.limits,))
         if not self.limits[0] < self.limits[1] or (self.log and self.limits[0] <= 0):
-            msg = f"the limits of an axis must ascend, from above 0 if it is logarithmic, not {self.limits}"
-            raise ValueError(msg)
+            raise ValueError(f"the limits of an axis must ascend, from above 0 if it is logarithmic, not {self.limits}")
 
 
 @dataclass(frozen=True)
@@ -259,9 +258,7 @@ def _check(name: str, parts: Sequence[Sequence[Number]], optional: Sequence[Sequ
     """
     lengths = {len(part) for part in (*parts, *filter(None, optional))}
     if len(lengths) > 1:
-        msg = f"the parts of {name!r} have {sorted(lengths)} values; they must have equally many"
-        raise ValueError(msg)
+        raise ValueError(f"the parts of {name!r} have {sorted(lengths)} values; they must have equally many")
     for value in (each for part in (*parts, *optional) for each in part if isinstance(each, int | float)):
         if not isfinite(value):
-            msg = f"{name!r} has the value {value}; a missing value must be None"
-            raise ValueError(msg)
+            raise ValueError(f"{name!r} has the value {value}; a missing value must be None")

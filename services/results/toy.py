@@ -90,8 +90,7 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
 def _refuse_outside(what: str, numbers: Iterable[int], end: int) -> None:
     for number in numbers:
         if not 0 <= number < end:
-            msg = f"the experiment has no {what} {number}; permitted: from 0 to {end - 1}"
-            raise NotFound(msg)
+            raise NotFound(f"the experiment has no {what} {number}; permitted: from 0 to {end - 1}")
 
 
 def _truth(found: _Stored, genes: FloatArray) -> FloatArray | None:
@@ -128,6 +127,7 @@ def _toy(
     limits: tuple[float, float],
 ) -> ToyIteration:
     simulators = [each for each in found.simulators if each.iteration == iteration]
+    transfer = found.transferred[iteration]
     samples = [each for each in found.measured if each.kind is MeasurementKind.SAMPLE and each.iteration <= iteration]
     return ToyIteration(
         experiment=found.row.id,
@@ -142,15 +142,9 @@ def _toy(
         samples=tuple(
             ToySample(iteration=each.iteration, gene=each.genome[0], fitness=each.fitness) for each in samples
         ),
-        transfer=_transfer(found.transferred[iteration]),
+        transfer=transfer and ToyTransfer(gene=transfer.genome[0], simulated=transfer.simulated, real=transfer.real),
         limits=limits,
     )
-
-
-def _transfer(controlled: MeasuredController | None) -> ToyTransfer | None:
-    if controlled is None:
-        return None
-    return ToyTransfer(gene=controlled.genome[0], simulated=controlled.simulated, real=controlled.real)
 
 
 def _values(function: FloatArray) -> Values:

@@ -1,7 +1,6 @@
 """Predictions: the fitness of samples in simulation against their fitness in reality."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import dist, sqrt
 
 from gaplab.schemas.predictions import Prediction
@@ -10,16 +9,6 @@ from gaplab.services.figures.style import INK, Style, style_of
 from gaplab.services.figures.words import drawable, heading, limits, number, number_of, printable, with_unit
 
 BEFORE, AFTER = "Before tuning on it", "After tuning on it"
-
-
-@dataclass(frozen=True)
-class _Whole:
-    """A sample with its fitness in the simulators before and after tuning on it, and in reality."""
-
-    sample: Prediction
-    before: float
-    after: float
-    real: float
 
 
 Pair = tuple[float, float]
@@ -41,9 +30,13 @@ def predictions_figure(
         left_out: samples of later repetitions that will not be computed.
         title: above the figure.
     """
-    whole = _whole(items)
-    drawn = {BEFORE: [(each.before, each.real) for each in whole], AFTER: [(each.after, each.real) for each in whole]}
-    told = tuple(f"repetition {each.sample.repetition}, iteration {each.sample.iteration}" for each in whole)
+    told, drawn = [], {BEFORE: list[Pair](), AFTER: list[Pair]()}
+    for each in items:
+        before, after, real = map(drawable, (each.simulated_before, each.simulated_after, each.fitness))
+        if before is not None and after is not None and real is not None:
+            told.append(f"repetition {each.repetition}, iteration {each.iteration}")
+            drawn[BEFORE].append((before, real))
+            drawn[AFTER].append((after, real))
     values = [value for pairs in drawn.values() for both in pairs for value in both]
     ends = limits(values)
     marks = (
@@ -68,18 +61,9 @@ def predictions_figure(
     )
 
 
-def _whole(items: Sequence[Prediction]) -> list[_Whole]:
-    found = []
-    for each in items:
-        before, after, real = map(drawable, (each.simulated_before, each.simulated_after, each.fitness))
-        if before is not None and after is not None and real is not None:
-            found.append(_Whole(each, before, after, real))
-    return found
-
-
-def _points(name: str, pairs: Sequence[Pair], told: tuple[str, ...], style: Style, *, hollow: bool) -> Points:
+def _points(name: str, pairs: Sequence[Pair], told: Sequence[str], style: Style, *, hollow: bool) -> Points:
     simulated, real = tuple(each for each, _ in pairs), tuple(each for _, each in pairs)
-    return Points(name, real, simulated, style, hover=told, hollow=hollow)
+    return Points(name, real, simulated, style, hover=tuple(told), hollow=hollow)
 
 
 def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], unit: str, pending: int, left_out: int) -> str:
@@ -120,11 +104,8 @@ def _table(items: Sequence[Prediction]) -> Table:
         ("Repetition", "Iteration", "Before", "After", "In reality"),
         tuple(
             (
-                str(each.repetition),
-                str(each.iteration),
-                number(each.simulated_before),
-                number(each.simulated_after),
-                number(each.fitness),
+                *map(str, (each.repetition, each.iteration)),
+                *map(number, (each.simulated_before, each.simulated_after, each.fitness)),
             )
             for each in items
         ),

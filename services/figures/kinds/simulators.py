@@ -1,7 +1,7 @@
 """Tuned simulators: the best of each iteration, in the space of the tunables."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 from gaplab.services.figures.marks import Axis, FigureDefinition, Level, Mark, Panel, Points, Table
@@ -66,10 +66,12 @@ def simulators_figure(
         panels = [_pair(shown, dimensions, pair, truth or {}) for pair in combinations(range(len(dimensions)), 2)]
     else:
         panels = [_alone(shown, dimensions, at, truth or {}) for at in range(len(dimensions))]
+    if not shown:
+        panels = [replace(panel, marks=()) for panel in panels]  # reality alone is no result
     return FigureDefinition(
         name="simulators",
         title=heading(title),
-        panels=tuple(panels) if shown else tuple(_emptied(each) for each in panels),
+        panels=tuple(panels),
         caption=_caption(tuned, shown, truth),
         alt=_alt(shown, dimensions, truth or {}),
         columns=min(columns, len(panels)),
@@ -117,11 +119,6 @@ def _points(shown: Sequence[SimulatorPoint], x: Sequence[float], y: Sequence[flo
     )
 
 
-def _emptied(panel: Panel) -> Panel:
-    """Return the panel without marks: reality alone is no result."""
-    return Panel((), panel.x, panel.y, square=panel.square)
-
-
 def _axis(dimension: Dimension, truth: Mapping[str, float]) -> Axis:
     """Return an axis between the bounds, extended to the value of reality if that is known."""
     label = with_unit(spoken(dimension.name), {dimension.unit})
@@ -130,8 +127,7 @@ def _axis(dimension: Dimension, truth: Mapping[str, float]) -> Axis:
 
 def _first_repetitions(tuned: Sequence[SimulatorPoint]) -> list[SimulatorPoint]:
     iterations = len({each.iteration for each in tuned})
-    repetitions = sorted({each.repetition for each in tuned})[: max(1, MOST // max(1, iterations))]
-    kept = frozenset(repetitions)
+    kept = frozenset(sorted({each.repetition for each in tuned})[: max(1, MOST // max(1, iterations))])
     return [each for each in tuned if each.repetition in kept]
 
 
