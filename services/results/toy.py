@@ -62,7 +62,7 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
     row = experiments.get_experiment(session, experiment_id)
     spec = spec_of(row.spec)
     robot = robots.create(spec.robot)
-    if robot.world.bodies or robot.space.size != 1:
+    if not robot.is_function:
         message = f"the robot {spec.robot.name!r} is not a function of one gene, so there is no curve to draw"
         raise InvalidSpec([Violation("experiment", row.id, message, "an experiment with the robot 'toy_function'")])
     _refuse_outside("repetition", [repetition], row.spec["repetitions"])

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.filling import fill
 from gaplab.schemas.lifecycle import OPEN
 from gaplab.services.archives import import_archive
 from gaplab.services.experiments.listing import ListFilter
@@ -21,6 +20,7 @@ from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import Chromium
 from tests.e2e.service import Service
+from tests.filling import fill
 
 STUDY = Path(__file__).parents[2] / "docs" / "studies" / "mujoco-in-mujoco.zip"
 

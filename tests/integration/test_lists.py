@@ -5,7 +5,6 @@ from contextlib import contextmanager
 import pytest
 from sqlalchemy import event
 
-from benchmarks.filling import IN_A_STUDY, experiment_id, fill, study_id
 from gaplab.schemas.lifecycle import State
 from gaplab.services.archives import export_study, import_archive
 from gaplab.services.experiments import listing, submission
@@ -14,6 +13,7 @@ from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.store.models import Base
 from tests.experiments import toy
+from tests.filling import IN_A_STUDY, experiment_id, fill, study_id
 
 READS = {
     "experiments": lambda store: listing.list_experiments(store, limit=5),

@@ -11,7 +11,6 @@ from typing import ClassVar
 import pytest
 from ray.exceptions import RayTaskError, WorkerCrashedError
 
-from benchmarks.without_ray import OPEN, SPEC, Here, HereRepetitions, HereRun, Stop
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import StoreUnavailable
@@ -27,6 +26,7 @@ from gaplab.workers import sensitivity as checking
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.repetitions import batches
 from tests.fakes import flat
+from tests.without_ray import OPEN, SPEC, Here, HereRepetitions, HereRun, Stop
 
 MODULES = {"execution": execution, "sensitivity": sensitivity}
 

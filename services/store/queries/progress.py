@@ -7,7 +7,6 @@ from sqlalchemy import ColumnElement, case, func, select
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.records import Progress
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 
 _OPEN = (State.QUEUED, State.RUNNING)
@@ -39,20 +38,6 @@ class Tally:
 
     def __add__(self, other: "Tally") -> "Tally":
         return Tally(*(mine + theirs for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True)))
-
-    @property
-    def seconds_left(self) -> float | None:
-        """Time left if the repetitions that run continue at the present pace; None if unknown."""
-        if not self.open:
-            return 0.0
-        behind = self.rollouts_done + self.rollouts_saved
-        if not (self.running and behind and self.seconds):
-            return None
-        return self.rollouts_left * self.seconds / behind / self.running
-
-    def progress(self) -> Progress:
-        """Return the part that is shown."""
-        return Progress(**{name: getattr(self, name) for name in Progress.model_fields})
 
 
 def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import fsum
 from typing import Any
 
 from sqlalchemy import Select, case, func, select, tuple_
@@ -108,8 +107,8 @@ def recorded(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str
     return session.execute(of_experiments(row, experiments, *columns).where(row.recorded_fitness.is_not(None))).all()
 
 
-def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, float]:
-    """Return the mean over repetitions of the best recorded fitness so far, by experiment."""
+def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, list[float]]:
+    """Return the best recorded fitness of each repetition so far, by experiment."""
     of_one = (
         select(func.max(IterationRow.recorded_fitness))
         .where(IterationRow.repetition_id == RepetitionRow.id)
@@ -120,15 +119,7 @@ def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, flo
     for experiment, best in session.execute(query):
         if best is not None:
             found.setdefault(experiment, []).append(best)
-    return {experiment: _mean(each) for experiment, each in found.items()}
-
-
-def _mean(values: Sequence[float]) -> float:
-    """Return the exact mean: independent of the order, and finite even if the sum overflows."""
-    try:
-        return fsum(values) / len(values)
-    except OverflowError:
-        return fsum(each / len(values) for each in values)
+    return found
 
 
 @dataclass(frozen=True)
