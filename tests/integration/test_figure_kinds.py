@@ -7,7 +7,7 @@ import pytest
 
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred
-from gaplab.services.core.types import SimulatorPoint as TunedStep
+from gaplab.services.core.types import Tuned as TunedStep
 from gaplab.services.experiments import submission
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.predictions import AFTER, BEFORE, predictions_figure
