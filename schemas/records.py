@@ -52,8 +52,8 @@ class ExperimentRead(Frozen):
     strategy: str
     direct: bool = Field(
         default=False,
-        description="true for the direct baseline: controllers evolve in reality itself, without simulators and samples, "
-        "so iteration 0 is the only one",
+        description="true for the direct baseline: controllers evolve in reality itself, without simulators and "
+        "samples, so iteration 0 is the only one",
     )
     state: State
     spec: dict[str, Any]
