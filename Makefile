@@ -13,7 +13,7 @@ demo: .venv/installed  ## tune a toy and a quadruped with every strategy, and se
 serve: .venv/installed  ## the service on http://127.0.0.1:8000, with its workers
 	$(BIN)/gaplab serve
 
-test: .venv/browser  ## all tests, on SQLite and on a real Postgres, the page's in a real Chromium
+test: .venv/prepared  ## all tests, on SQLite and on a real Postgres, the page's in a real Chromium
 	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 lint: .venv/installed-dev  ## style, types, dependencies and the arrows between the layers
@@ -48,8 +48,8 @@ clean:  ## remove the environment and what tools cached; results stay
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
 	touch $@
 
-.venv/browser: .venv/installed-dev
-	$(BIN)/python -m tests.e2e.install_browser
+.venv/prepared: .venv/installed-dev
+	$(BIN)/python -m tests.e2e.prepare_machine
 	touch $@
 
 .PHONY: help demo serve test lint bench docs soak clean

@@ -6,7 +6,6 @@ tests/unit/test_docs.py fails while the files in the repository differ from what
 import inspect
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -99,16 +98,11 @@ def python() -> Iterator[str]:
 def settings() -> Iterator[str]:
     """Every variable of the environment."""
     yield "The environment is read once, when a process starts.\n"
-    rows = [
-        (f"`GAPLAB_{each.name.upper()}`", _attribute(Settings, each.name), _default(each.default))
-        for each in fields(Settings)
-    ]
+    rows = [(f"`GAPLAB_{name.upper()}`", _attribute(Settings, name), _default(value)) for name, value in Settings()]
     own = "folders with plug-ins of your own, like `PATH`: [how](../how-to/strategy.md)"
     yield from _table(("variable", "meaning", "left out"), [*rows, (f"`{VARIABLE}`", own, "none")])
     yield "## Limits\n\nWhat is said of a token holds as well for all who need none, taken together.\n"
-    limits = [
-        (f"`{variable_of(each.name)}`", _attribute(Limits, each.name), f"{each.default:,}") for each in fields(Limits)
-    ]
+    limits = [(f"`{variable_of(name)}`", _attribute(Limits, name), f"{most:,}") for name, most in Limits()]
     yield from _table(("variable", "at most", "left out"), limits)
 
 

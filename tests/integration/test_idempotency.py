@@ -17,7 +17,7 @@ from gaplab.schemas.access import Role
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.access import create_token
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.experiments import limits, submission
+from gaplab.services.experiments import idempotency, submission
 from gaplab.services.experiments.limits import Admission
 from gaplab.services.store.models import ExperimentRow, IdempotencyRow, RepetitionRow
 from gaplab.services.store.session import Store
@@ -121,7 +121,7 @@ def test_key_and_work_are_committed_together_or_not_at_all(store: Store, monkeyp
 
     spec = ExperimentSpec.model_validate(TOY)
     with monkeypatch.context() as patch:
-        patch.setattr("gaplab.services.experiments.limits.idempotency.keep", fail)
+        patch.setattr("gaplab.services.experiments.idempotency.update", fail)
         with pytest.raises(InvalidSpec):
             submission.admit_experiment(store, spec, Admission(key="k"))
 
@@ -134,7 +134,7 @@ def test_a_key_is_forgotten_after_a_week(store: Store, api: TestClient):
     with store.transaction() as session:
         moment = session.scalar(select(IdempotencyRow.created_at))
         assert moment
-        session.execute(update(IdempotencyRow).values(created_at=moment - limits.KEYS_LIVE - timedelta(minutes=1)))
+        session.execute(update(IdempotencyRow).values(created_at=moment - idempotency.KEYS_LIVE - timedelta(minutes=1)))
 
     again = api.post("/experiments", json=TOY, headers={"Idempotency-Key": "k"})
 

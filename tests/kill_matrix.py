@@ -1,6 +1,6 @@
 """Kill matrix: the process that computes and stores is killed at every named point, and another one goes on.
 
-`python -m benchmarks.kill_matrix` prints points × databases with how many kills of each ended in the results of an
+`python -m tests.kill_matrix` prints points × databases with how many kills of each ended in the results of an
 uninterrupted run: the same rows to the last bit, no sample twice, none lost. The supervisor, the repetitions and the
 store are the real ones; only Ray is left out, so that repetitions run within the process that is killed.
 """
@@ -21,16 +21,16 @@ from rich.table import Table
 from sqlalchemy import select
 from sqlalchemy.engine.default import DefaultDialect
 
-from benchmarks.databases import Databases
-from benchmarks.supervisor import postgres
-from benchmarks.without_ray import SPEC, work
 from gaplab.services.core import loop
 from gaplab.services.running import execution
 from gaplab.services.store.models import CheckpointRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
 from gaplab.services.store.queries import checkpoints, steps
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import Recorder
-from gaplab.workers.supervisor import Supervisor
+from gaplab.workers.repetitions import Repetitions
+from tests.kept_databases import Databases
+from tests.postgres import running
+from tests.without_ray import SPEC, work
 
 CHANCE = {"owner", "epoch", "attempts", "losses", "error", "seconds"}
 CHANCE |= {"heartbeat_at", "started_at", "ended_at", "measured_at"}
@@ -46,7 +46,7 @@ def around(owner: object, name: str) -> Wrap:
     def wrap(before: Callable[[], None], after: Callable[[], None]) -> None:
         function = getattr(owner, name)
 
-        def wrapped(*arguments: Any, **named: Any) -> Any:  # noqa: ANN401 - of any function
+        def wrapped(*arguments: Any, **named: Any) -> Any:
             before()
             result = function(*arguments, **named)
             after()
@@ -64,9 +64,9 @@ POINTS: dict[str, Wrap] = {
     "checkpoint is written": around(checkpoints, "write"),
     "steps are written": around(steps, "record"),
     "commit": around(DefaultDialect, "do_commit"),
-    "acknowledgement": around(Supervisor, "_store_received"),
+    "acknowledgement": around(Repetitions, "store_received"),
     "heartbeat": around(execution, "heartbeat"),
-    "completion": around(execution, "complete_all"),
+    "completion": around(execution, "complete"),
     "hand back": around(execution, "hand_back"),
     "requeue of what was lost": around(execution, "requeue_lost"),
 }
@@ -184,7 +184,7 @@ def main() -> int:
         found = {}
         for name in (arguments.only,) if arguments.only else ("SQLite", "Postgres"):
             on_postgres = name == "Postgres"
-            server = (arguments.postgres or stack.enter_context(postgres(folder))) if on_postgres else None
+            server = (arguments.postgres or stack.enter_context(running(folder))) if on_postgres else None
             databases = Databases(folder, server, SPEC)
             found[name] = rows(databases, arguments.kills)
             databases.close()

@@ -3,14 +3,15 @@
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from functools import cache
+from math import isfinite
 from typing import Any, cast
 
 from sqlalchemy import Connection, Table, Update, bindparam, insert, select, tuple_, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.records import MeasurementKind
-from gaplab.services.core.types import Measured, Probed, Step, Tuned
-from gaplab.services.store import mapping
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.types import Cost, Measured, Probed, Selected, Step, Transferred, Tuned
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Claim, TimedStep
 from gaplab.services.store.models import IterationRow, MeasurementRow, SimulatorRow
@@ -19,12 +20,14 @@ _ITERATION, _MEASUREMENT, _SIMULATOR = (
     cast("Table", each.__table__) for each in (IterationRow, MeasurementRow, SimulatorRow)
 )
 
+_ORDER: tuple[type[Step], ...] = (Selected, Measured, Tuned, Transferred, Probed)
+
 Row = dict[str, Any]
 Key = tuple[int, int]
 """A repetition's id and the number of one of its iterations."""
 
 
-class Batch:
+class StepRows:
     """Collects what steps say; `write` adds it to the log of their repetitions.
 
     Each step may be added once, and only if it is the next one: the batch trusts its caller that this was checked.
@@ -39,18 +42,18 @@ class Batch:
 
     def add(self, claim: Claim, timed: TimedStep) -> None:
         """One step of the claim's repetition."""
-        step, key = timed.step, (claim.repetition_id, timed.step.iteration)
+        step, key = timed.step, (claim.id, timed.step.iteration)
         columns = self._columns[key]
-        columns.update(mapping.iteration_columns(step))
+        columns.update(iteration_columns(step))
         columns["seconds"] += timed.seconds
-        if mapping.opens_iteration(step):
+        if _opens_iteration(step):
             self._opened.add(key)
         if isinstance(step, Probed):
             self._ended.add(key)
         if isinstance(step, Tuned):
-            self._simulators += [_named(key) | each for each in mapping.simulator_columns(step)]
+            self._simulators += [_named(key) | each for each in simulator_columns(step)]
         if isinstance(step, Measured | Probed):
-            self._measurements[key, _kind(step)] = mapping.measurement_columns(step, _measured_by(claim))
+            self._measurements[key, _kind(step)] = measurement_columns(step, _measured_by(claim))
 
     def write(self, session: Session) -> None:
         """Everything that was added, in the session's transaction."""
@@ -86,6 +89,62 @@ class Batch:
             _named(key) | {"kind": kind, "genome": known.get(key)} | columns
             for (key, kind), columns in self._measurements.items()
         ]
+
+
+def position(step: Step) -> int:
+    """The step's place in the log of its repetition, from 0; iteration 0 has no Selected and no Measured."""
+    return len(_ORDER) * step.iteration + _ORDER.index(type(step)) - _ORDER.index(Tuned)
+
+
+def vector(values: FloatArray) -> list[float]:
+    """A JSON array; its numbers read back exactly."""
+    return [float(each) for each in values]
+
+
+def finite(value: float) -> float | None:
+    """NULL for nan and the infinities."""
+    return float(value) if isfinite(value) else None
+
+
+def iteration_columns(step: Step) -> dict[str, Any]:
+    """The columns of its iteration that the step fills."""
+    match step:
+        case Selected():
+            return {"selected_genome": vector(step.genome), **_phase("selection", step.cost)}
+        case Tuned():
+            return _phase("tuning", step.cost)
+        case Transferred():
+            found = {"transferred_genome": vector(step.genome), "simulated_fitness": finite(step.fitness)}
+            return found | _phase("transfer", step.cost)
+        case Probed():
+            return {"recorded_fitness": finite(step.recorded)}
+        case Measured():
+            return {}
+
+
+def simulator_columns(step: Tuned) -> list[dict[str, Any]]:
+    """One row for each simulator of the step."""
+    return [
+        {"rank": rank, "parameters": vector(each.parameters), "squared_error": finite(each.squared_error)}
+        for rank, each in enumerate(step.simulators)
+    ]
+
+
+def measurement_columns(step: Measured | Probed, measured_by: str) -> dict[str, Any]:
+    """One row; a probe's genome is the one that was transferred, which its step does not repeat."""
+    if isinstance(step, Probed):
+        return {"fitness": finite(step.fitness), "measured_by": measured_by}
+    genome, fitness = vector(step.sample.genome), finite(step.sample.fitness)
+    return {"genome": genome, "fitness": fitness, "measured_by": measured_by}
+
+
+def _opens_iteration(step: Step) -> bool:
+    """Whether the step is the first of its iteration."""
+    return isinstance(step, Selected) or (isinstance(step, Tuned) and step.iteration == 0)
+
+
+def _phase(name: str, cost: Cost) -> dict[str, int]:
+    return {f"{name}_{count}": int(getattr(cost, count)) for count in ("rollouts", "failures", "saved")}
 
 
 def _named(key: Key, number: str = "iteration") -> Row:

@@ -1,6 +1,6 @@
-"""Whose turn it is: by priority, then fair between experiments, then the oldest.
+"""Turns: by priority, then by the fewest claimed repetitions, then by age.
 
-Fair means: whoever has the fewest repetitions running, those counted that were claimed and wait for a core.
+Claimed repetitions that still wait for a core count as running.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ _ORDER = (_ROW.precedence, _ROW.running, _ROW.created_at, _ROW.position, _ROW.id
 
 
 def next_repetitions(session: Session, limit: int, permitted: ColumnElement[bool]) -> tuple[int, ...]:
-    """Up to `limit` queued repetitions, in the order of turns, of permitted experiments; locked from now on."""
+    """Lock the experiments whose turn it is, and return up to `limit` of their queued repetitions in order."""
     experiments = session.scalars(next_experiments(limit).where(permitted)).all()
     if not experiments:
         return ()
@@ -29,15 +29,12 @@ def next_repetitions(session: Session, limit: int, permitted: ColumnElement[bool
 
 
 def next_experiments(limit: int) -> Select[str]:
-    """The experiments that have the next turns, off an index; none beyond the first `limit` can have one of them."""
+    """Select the experiments with the next turns off an index; no later one can have one of the `limit` turns."""
     return select(_ROW.id).where(_ROW.claimable.is_(True)).order_by(*_ORDER).limit(limit)
 
 
 def ahead(session: Session, experiments: Sequence[str], permitted: ColumnElement[bool]) -> frozenset[str]:
-    """Those of these experiments of which one claimed repetition less, and one more of another, would be fairer.
-
-    The other one is permitted to whoever has claimed them.
-    """
+    """Return the experiments that should give one claimed repetition up for another, permitted experiment's."""
     waits = _ROW.claimable.is_(True) & permitted
     first = select(_ROW.precedence, _ROW.running).where(waits).order_by(*_ORDER).limit(1)
     if (waiting := session.execute(first).first()) is None:
@@ -51,9 +48,9 @@ def ahead(session: Session, experiments: Sequence[str], permitted: ColumnElement
 
 
 def _turns(session: Session, experiments: Sequence[str], limit: int, permitted: ColumnElement[bool]) -> list[str]:
-    """The experiment whose turn it is, again and again; each has one more running after its turn.
+    """Return the experiment of each turn; an experiment has one more running after each of its turns.
 
-    Only now, when they are locked, is it sure which are claimable and permitted: another may have claimed first.
+    What is claimable and permitted is read again now that the experiments are locked.
     """
     row = RepetitionRow
     queued = (
@@ -62,7 +59,7 @@ def _turns(session: Session, experiments: Sequence[str], limit: int, permitted: 
         .group_by(row.experiment_id)
         .subquery()
     )
-    found = session.execute(
+    candidates = session.execute(
         select(_ROW.id, _ROW.precedence, _ROW.running, _ROW.max_parallel, queued.c.queued)
         .join(queued, queued.c.experiment_id == _ROW.id)
         .where(_ROW.claimable.is_(True), permitted)
@@ -70,13 +67,13 @@ def _turns(session: Session, experiments: Sequence[str], limit: int, permitted: 
     ).all()
     heap = [
         (precedence, running, age, min(waiting, waiting if most is None else most - running))
-        for age, (_, precedence, running, most, waiting) in enumerate(found)
+        for age, (_, precedence, running, most, waiting) in enumerate(candidates)
     ]
     heapify(heap)
     turns: list[str] = []
     while heap and len(turns) < limit:
         precedence, running, age, room = heap[0]
-        turns.append(found[age].id)
+        turns.append(candidates[age].id)
         if room > 1:
             heapreplace(heap, (precedence, running + 1, age, room - 1))
         else:

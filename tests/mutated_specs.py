@@ -1,4 +1,4 @@
-"""`python -m benchmarks.mutated_specs`: specs with random mistakes; each is taken or refused, and each within a second.
+"""`python -m tests.mutated_specs`: specs with random mistakes; each is taken or refused, and each within a second.
 
 A mutation puts a value where it does not belong, removes one, or adds one; among the values are the names of files,
 classes and addresses. Exits with 1 if one was answered otherwise, or too late.
