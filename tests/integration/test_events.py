@@ -16,7 +16,8 @@ import uvicorn
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
-from gaplab.api.clients.client import Client, ServiceError
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.errors import ServiceError
 from gaplab.api.http import event_feed as feeding
 from gaplab.api.http.event_feed import Feed
 from gaplab.api.process.server import Server, listen

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from gaplab.api.clients.pace import Pace, span
+from gaplab.api.clients.progress.pace import Pace, span
 from gaplab.api.http import examples
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead
