@@ -23,7 +23,7 @@ from gaplab.api.clients.progress.text import counts
 from gaplab.api.commands import demo_size, tables
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.findings import findings
-from gaplab.api.process.local_service import own_service
+from gaplab.api.process.local_service import start_service
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import StudyRead
 
@@ -49,7 +49,7 @@ def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
     started_at = time.monotonic()
     database, log = f"sqlite:///{folder / 'gaplab.db'}", folder / "service.log"
     try:
-        with _interruptible(), own_service(database, log) as client:
+        with _interruptible(), start_service(database, log) as client:
             _print(f"Service: {client.url}, database {database}, log {log}", console)
             for name, spec in specs.items():
                 _run_study(name, spec, client, folder, console)

@@ -1,6 +1,5 @@
 """Commands that run the service."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,7 +22,7 @@ def serve(
     from gaplab.api.process.service import serve as run
 
     given: dict[str, Any] = {name: value for name, value in {"host": host, "port": port}.items() if value is not None}
-    run(replace(Settings.from_environment(), **given), workers=workers)
+    run(Settings.from_environment().model_copy(update=given), workers=workers)
 
 
 @app.command()

@@ -9,7 +9,7 @@ from rich.table import Table
 from gaplab.api.clients.progress.text import colored, percent
 from gaplab.api.clients.records import Record
 from gaplab.schemas.curves import Curve, CurvePoint
-from gaplab.schemas.misfit import MisfitRead, TunedSpread
+from gaplab.schemas.misfit import MisfitRead, TunableDistribution
 from gaplab.schemas.plugin import Catalogue, PluginRead
 from gaplab.schemas.records import Progress, RepetitionRead, StudyRead
 from gaplab.schemas.sensitivity import SensitivityRead
@@ -156,7 +156,7 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
     return made
 
 
-def _bounds(found: TunedSpread) -> str:
+def _bounds(found: TunableDistribution) -> str:
     sides = ((found.lower, found.at_lower), (found.upper, found.at_upper))
     return ", ".join(f"{100 * share:.0f} % at {bound:g}" for bound, share in sides if share) or "-"
 

@@ -35,7 +35,7 @@ class InProcess(httpx2.BaseTransport):
     def __init__(self, store: Store) -> None:
         app = create_app(store)
         self._client = TestClient(app, raise_server_exceptions=False)
-        self.close = app.state.physics.close
+        self.close = app.state.rollout_process.close
         self.asked: list[str] = []
         self.lost = 0
         self.busy = 0
