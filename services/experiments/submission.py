@@ -11,7 +11,7 @@ from gaplab.services.experiments.limits import FREELY, Admission, check_extent, 
 from gaplab.services.experiments.views import view_experiments, view_studies
 from gaplab.services.specs.resolution import expected_rollouts, is_direct, resolve_experiment, resolve_study
 from gaplab.services.store.queries.experiments import Extent, insert_experiment, insert_study
-from gaplab.services.store.session import Session, Store, snapshot
+from gaplab.services.store.session import Session, Store
 
 
 def submit_experiment(store: Store, spec: ExperimentSpec) -> ExperimentRead:

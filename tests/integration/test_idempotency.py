@@ -11,7 +11,6 @@ from fastapi.testclient import TestClient
 from sqlalchemy import func, select, update
 
 from gaplab.api.app import create_app
-from gaplab.api.clients import connection
 from gaplab.api.clients.client import Client
 from gaplab.schemas.access import Role
 from gaplab.schemas.spec import ExperimentSpec
@@ -142,8 +141,7 @@ def test_a_key_is_forgotten_after_a_week(store: Store, api: TestClient):
     assert count(store, IdempotencyRow) == 1
 
 
-def test_a_client_whose_answer_is_lost_asks_again_and_creates_one(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(connection, "PAUSES_S", (0.0, 0.0))
+def test_a_client_whose_answer_is_lost_asks_again_and_creates_one(sqlite_store: Store):
     inner = TestClient(create_app(sqlite_store))._transport  # what carries requests into the app itself
 
     class Losing(httpx2.BaseTransport):
@@ -156,7 +154,7 @@ def test_a_client_whose_answer_is_lost_asks_again_and_creates_one(sqlite_store: 
                 raise httpx2.ReadError("the connection was reset")
             return answer
 
-    with Client("http://testserver", transport=Losing()) as client:
+    with Client("http://testserver", transport=Losing(), pauses_s=(0.0, 0.0)) as client:
         made = client.submit(TOY)
 
     assert [each.id for each in listing.list_experiments(sqlite_store).items] == [made.id]

@@ -1,4 +1,4 @@
-"""Logs of repetitions, read: the steps equal the recorded ones to the last bit."""
+"""Logs of repetitions, read: the steps equal those that were recorded, number by number."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
@@ -11,25 +11,17 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
-from gaplab.services.store.models import IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
-from gaplab.services.store.queries.step_rows import position
+from gaplab.services.store.models import IterationRow, MeasurementRow, SimulatorRow
 
 R = TypeVar("R", IterationRow, MeasurementRow, SimulatorRow)
 
 
 def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, ...]]:
-    """Return the log of each of these repetitions."""
+    """The log of each of these repetitions."""
     iterations = _rows(session, repetitions, IterationRow, IterationRow.number)
     measurements = _rows(session, repetitions, MeasurementRow, MeasurementRow.iteration)
     simulators = _rows(session, repetitions, SimulatorRow, SimulatorRow.iteration, SimulatorRow.rank)
     return {each: _log(iterations[each], measurements[each], simulators[each]) for each in repetitions}
-
-
-def is_whole(session: Session, repetition: RepetitionRow) -> bool:
-    """Return whether a repetition's rows are the steps and iterations that it counts, in order, without holes."""
-    (log,) = logs(session, [repetition.id]).values()
-    done = sum(isinstance(each, Probed) for each in log)
-    return done == repetition.iterations_done and [position(each) for each in log] == list(range(repetition.steps))
 
 
 def _rows(session: Session, repetitions: Sequence[int], table: type[R], *order: Any) -> dict[int, list[R]]:  # noqa: ANN401  # columns
@@ -43,7 +35,7 @@ def _rows(session: Session, repetitions: Sequence[int], table: type[R], *order: 
 def _log(
     iterations: Iterable[IterationRow], measurements: Iterable[MeasurementRow], simulators: Iterable[SimulatorRow]
 ) -> tuple[Step, ...]:
-    """Return the steps of one repetition's rows.
+    """The steps that one repetition's rows tell of.
 
     Args:
         iterations: by number.
