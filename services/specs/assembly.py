@@ -114,7 +114,7 @@ def setting(spec: ExperimentSpec, repetition: int) -> Setting:
         iterations=0 if strategy.in_reality else spec.iterations or 0,
         seed=spec.seed,
         repetition=repetition,
-        batch=lambda: engine.batch,
+        batch_size=lambda: engine.batch,
     )
 
 
