@@ -1,4 +1,4 @@
-"""The vocabulary on the wire: frozen data with types and bounds, and no behaviour.
+"""The data of the API: frozen values with types and bounds, without behaviour.
 
-Read `spec` first: it is what a user submits.
+Read `spec` first: it is what users submit.
 """

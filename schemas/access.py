@@ -1,4 +1,4 @@
-"""Who may do what: tokens and their roles."""
+"""Tokens and their roles."""
 
 from datetime import datetime
 from enum import StrEnum
@@ -7,25 +7,25 @@ from gaplab.schemas.base import Frozen
 
 
 class Role(StrEnum):
-    """What a token permits; each role permits what those before it do."""
+    """What a token permits; each role includes the roles before it."""
 
     READER = "reader"
-    """Looks at everything but what is hidden."""
+    """May read everything that is not hidden."""
 
     RUNNER = "runner"
-    """Submits, cancels and changes as well."""
+    """May also submit, edit and control experiments."""
 
     ADMIN = "admin"
-    """May see the hidden reality of an experiment that has not ended."""
+    """May also see the hidden reality of an experiment that has not ended."""
 
     def permits(self, other: "Role") -> bool:
-        """Whether it permits what the other does."""
+        """Return whether this role includes the other."""
         order = tuple(Role)
         return order.index(self) >= order.index(other)
 
 
 class TokenRead(Frozen):
-    """A token as it is listed, without its secret."""
+    """A listed token, without its secret."""
 
     id: str
     name: str

@@ -1,4 +1,4 @@
-"""Archives: what one says about itself, and what an import answers."""
+"""Archives: their manifest, and the result of an import."""
 
 from typing import Annotated, Literal
 
@@ -7,7 +7,7 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen
 
 FORMAT = 1
-"""Of the archives that are written now, and the latest that is read."""
+"""Version of the archive format: exports write it, and imports read it and all before it."""
 
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Extent = Annotated[int, Field(strict=True, ge=0)]
@@ -22,24 +22,26 @@ class Member(Frozen):
 
 
 class Manifest(Frozen):
-    """`manifest.json`: what wrote the archive, and what is in it."""
+    """`manifest.json`: origin and contents of an archive."""
 
     format: Annotated[int, Field(strict=True, ge=1)]
-    gaplab: str = Field(max_length=100, description="the version that wrote it")
-    revision: str = Field(max_length=32, description="of the database that it was written from")
+    gaplab: str = Field(max_length=100, description="version of gaplab that wrote the archive")
+    revision: str = Field(max_length=32, description="revision of the database that the archive was written from")
     kind: Literal["study", "experiment"]
     id: str = Field(max_length=32)
     members: dict[str, Member]
 
 
 class ImportRead(Frozen):
-    """What an import stored."""
+    """The result of an import."""
 
-    study: str | None = Field(default=None, description="id of the study, if the archive is of one")
-    experiments: tuple[str, ...] = Field(description="their ids here, in the order of the study")
+    study: str | None = Field(default=None, description="id of the study; null for the archive of a single experiment")
+    experiments: tuple[str, ...] = Field(
+        description="ids of the experiments in this service, in the order of the study"
+    )
     renamed: dict[str, str] = Field(
-        default_factory=dict, description="ids that were taken here, each with the one that it has now"
+        default_factory=dict, description="new ids, by those in the archive that were taken in this service"
     )
     called_off: tuple[str, ...] = Field(
-        default=(), description="ids of those that had not ended: they are CANCELLED here, and nothing of them is run"
+        default=(), description="ids of experiments that had not ended: they are CANCELLED here, and never run"
     )

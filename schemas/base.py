@@ -14,16 +14,16 @@ class Frozen(BaseModel):
 
 
 Count = Annotated[int, Field(strict=True, ge=1, le=10_000_000)]
-"""A whole number of at least one; a string or a boolean is no number."""
+"""A whole number of at least one; strings and booleans are refused."""
 
 Real = Annotated[float, Field(strict=True)]
-"""A finite number; a string or a boolean is no number."""
+"""A finite number; strings and booleans are refused."""
 
 Seed = Annotated[int, Field(strict=True, ge=0, lt=SEED_LIMIT)]
-"""A seed of 64 bits."""
+"""A seed: a whole number of 64 bits."""
 
 Priority = Annotated[int, Field(strict=True, ge=-10, le=10)]
-"""What is computed first: the higher; a whole number."""
+"""A priority: a whole number; higher is computed first."""
 
 Label = Annotated[str, Field(min_length=1, max_length=200)]
-"""A name that people give to their studies and experiments."""
+"""A name that a person gives to a study or an experiment."""

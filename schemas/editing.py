@@ -1,4 +1,4 @@
-"""What people may change about a study or an experiment after it was submitted."""
+"""Changes to a submitted study or experiment."""
 
 from typing import Annotated
 
@@ -8,19 +8,19 @@ from gaplab.schemas.base import Frozen, Label
 
 
 class Edit(Frozen):
-    """A new name, new notes, or both; what is left out stays."""
+    """A new name, new notes, or both; a missing field stays unchanged."""
 
     name: Label | None = Field(default=None, description="a new name")
     notes: Annotated[str, Field(max_length=10_000)] | None = Field(
-        default=None, description="new notes; null takes them away"
+        default=None, description="new notes; null removes them"
     )
 
     @model_validator(mode="after")
     def _something_changes(self) -> "Edit":
         if not self.model_fields_set:
-            msg = "give a name, notes, or both"
+            msg = "nothing to change: give a name, notes, or both"
             raise ValueError(msg)
         if "name" in self.model_fields_set and self.name is None:
-            msg = "a name can be changed, not taken away"
+            msg = "the name is null, but must be text: a name can be changed, not removed"
             raise ValueError(msg)
         return self

@@ -1,4 +1,4 @@
-"""What a spec would cost, told before anything of it is stored."""
+"""The cost of a spec, estimated before submission."""
 
 from pydantic import Field
 
@@ -6,32 +6,38 @@ from gaplab.schemas.base import Frozen
 
 
 class EngineCost(Frozen):
-    """What one rollout of the robot takes in an engine."""
+    """Cost of one rollout of the robot in an engine."""
 
     engine: str
-    seconds_per_rollout: float = Field(description="of one core")
-    measured: bool = Field(description="by this service, on such experiments before; else the engine's usual")
+    seconds_per_rollout: float = Field(description="seconds of one core")
+    measured: bool = Field(
+        description="true: measured by this service on earlier experiments; false: usual for the engine"
+    )
 
 
 class ExperimentCost(Frozen):
-    """What one experiment of the study would take."""
+    """Cost of one experiment of the study."""
 
     name: str
     strategy: str
-    engine: str = Field(description="that computes it; for the direct baseline, reality's")
+    engine: str = Field(description="engine of the simulators; for the direct baseline, the engine of reality")
     repetitions: int
-    iterations: int = Field(description="real-world evaluations of a repetition; of the direct baseline, its points: 0")
-    rollouts: int = Field(description="of all its repetitions, at most; what is sure to change nothing is saved")
+    iterations: int = Field(description="real-world evaluations of a repetition; 0 for the direct baseline")
+    rollouts: int = Field(
+        description="upper bound over all repetitions; rollouts that cannot change a number are saved"
+    )
     core_seconds: float
 
 
 class EstimateRead(Frozen):
-    """What a study would take: rollouts, and the time of this service's cores."""
+    """Cost of a study: rollouts, and time on the cores of this service."""
 
     experiments: tuple[ExperimentCost, ...]
     engines: tuple[EngineCost, ...]
     rollouts: int
     core_seconds: float
-    cores: int = Field(description="that would share it: `GAPLAB_WORKERS`, or those of the machine that answers")
-    seconds: float = Field(description="expected until it has ended, if nothing else is waiting")
-    supervisors: int = Field(description="that work on this database now; with none, nothing starts")
+    cores: int = Field(
+        description="cores that would share the work: `GAPLAB_WORKERS`, or all cores of the API's machine"
+    )
+    seconds: float = Field(description="expected duration if nothing else is waiting")
+    supervisors: int = Field(description="supervisors that run now; with 0, nothing starts")

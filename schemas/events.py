@@ -1,7 +1,7 @@
-"""What happens to experiments, one event after another.
+"""Events: the changes of experiments.
 
-Events are numbered from 1 without holes, in the order in which they came to be stored: whoever has seen a number has
-seen, or can read, every smaller one. None tells anything of reality that is hidden.
+Events are numbered from 1 without gaps, in commit order: when a number is visible, all smaller ones are. No event
+reveals anything hidden about reality.
 """
 
 from datetime import datetime
@@ -14,7 +14,10 @@ from gaplab.schemas.base import Frozen
 
 
 class EventKind(StrEnum):
-    """What can happen. Those of a repetition have its number; those of a step have the iteration in their body."""
+    """Kinds of events.
+
+    Events of a repetition have its number; events of a step have the iteration in their body.
+    """
 
     SUBMITTED = "submitted"
     IMPORTED = "imported"
@@ -46,20 +49,22 @@ class EventKind(StrEnum):
 
 
 class EventRead(Frozen):
-    """One thing that happened."""
+    """One event."""
 
-    number: int = Field(description="of all events, from 1 and without holes; resume after it")
+    number: int = Field(description="number of the event, from 1 without gaps; a reader resumes after it")
     kind: EventKind
     experiment: str
     study: str | None = None
-    repetition: int | None = Field(default=None, description="its number; null where it is the experiment's")
-    body: dict[str, Any] = Field(description="a few values that tell more: iteration, fitness, reason")
+    repetition: int | None = Field(
+        default=None, description="number of the repetition; null for an event of the experiment"
+    )
+    body: dict[str, Any] = Field(description="details, such as iteration, fitness or reason")
     at: datetime
 
 
 class EventPage(Frozen):
-    """Some events, and where those that follow begin."""
+    """Some events, and the number to continue after."""
 
     items: tuple[EventRead, ...]
-    last: int = Field(description="pass it as `after` for what follows: every event up to it was looked at")
-    latest: int = Field(description="number of the latest event there was")
+    last: int = Field(description="pass it as `after` to continue: events up to this number were searched")
+    latest: int = Field(description="number of the latest event")

@@ -1,4 +1,4 @@
-"""Figures as data: what a browser or a notebook draws with Plotly."""
+"""Figures as data that a browser or a notebook draws with Plotly."""
 
 from typing import Any
 
@@ -8,14 +8,14 @@ from gaplab.schemas.base import Frozen
 
 
 class Chart(Frozen):
-    """What `Plotly.newPlot` and `plotly.graph_objects.Figure` take."""
+    """Arguments of `Plotly.newPlot` and `plotly.graph_objects.Figure`."""
 
     data: tuple[dict[str, Any], ...]
-    layout: dict[str, Any] = Field(description="without template, font and colours of its own, which the page sets")
+    layout: dict[str, Any] = Field(description="layout without template, font and colours: the page sets those")
 
 
 class TableRead(Frozen):
-    """The numbers of a figure in words."""
+    """The numbers of a figure, as text."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -26,7 +26,7 @@ class FigureRead(Frozen):
 
     figure: Chart
     title: str
-    caption: str = Field(description="how many repetitions there are, and what the bands are")
-    alt: str = Field(description="what it shows in a sentence, for those who cannot see it")
-    empty: bool = Field(description="there is nothing to draw yet")
-    table: TableRead | None = Field(default=None, description="its numbers")
+    caption: str = Field(description="number of repetitions and meaning of the bands")
+    alt: str = Field(description="one sentence that describes the figure, for screen readers")
+    empty: bool = Field(description="true while there is nothing to draw")
+    table: TableRead | None = Field(default=None, description="the numbers of the figure")

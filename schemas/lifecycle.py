@@ -1,38 +1,37 @@
-"""The states of an experiment and of a repetition, which move to which, and who moves them.
+"""The states of experiments and repetitions, the permitted moves, and the verbs that cause them.
 
 An experiment:
 
-                  claimed          asked           its steps are over
-    QUEUED ───────────────> RUNNING ─────> PAUSING ────────────> PAUSED      pause; resume leads back
+                  claimed          pause           steps ended
+    QUEUED ───────────────> RUNNING ─────> PAUSING ────────────> PAUSED      resume leads back
        │                      │ │             │                    │
        │                      │ └─────────────┴──> STOPPING <──────┘         stop
        │                      │                       │
-       │                      ├──> COMPLETED <────────┤   at least one repetition is, none is left to run
-       │                      ├──> FAILED    <────────┤   none completed, at least one failed
-       └──────────────────────┴──> CANCELLED <────────┘   called off, from any state but an end; or stopped with nothing
+       │                      ├──> COMPLETED <────────┤   a repetition completed, none is left
+       │                      ├──> FAILED    <────────┤   none completed, a repetition failed
+       └──────────────────────┴──> CANCELLED <────────┘   cancelled; or stopped without any result
 
-    pause    each running repetition finishes its step, stores it, and gives its core back; nothing is claimed. PAUSING
-             until the last has; one that never ran, or whose repetitions all wait, is PAUSED at once.
-    resume   from PAUSING or PAUSED: RUNNING if a repetition still runs, else QUEUED.
-    stop     the same, for good. A repetition that has a point of the curve is COMPLETED with what is there, one that
-             has none is CANCELLED; so an experiment that is stopped before its first point ends as CANCELLED, never
-             as COMPLETED with nothing.
-    cancel   at once: the steps under way are thrown away.
-    extend   from COMPLETED: QUEUED again, with more iterations or repetitions; the numbers that are there stand.
+    pause    Each running repetition finishes its step, stores it and frees its core; no repetition is claimed. The
+             experiment is PAUSING until the last has finished. Without running repetitions it is PAUSED at once.
+    resume   From PAUSING or PAUSED, to RUNNING if a repetition still runs, else to QUEUED.
+    stop     Like pause, but final. A repetition with a point of the curve is COMPLETED with its results so far; the
+             others are CANCELLED. An experiment stopped before its first point is therefore CANCELLED.
+    cancel   Immediate: results of the current steps are discarded.
+    extend   From COMPLETED, to QUEUED with more iterations or repetitions; existing numbers stay.
 
-A repetition is QUEUED, RUNNING, or at an end. From RUNNING it goes back to QUEUED when it was paused or handed back, or
-when its worker was lost: lost is not failed. Its place is its log, from which it goes on. `extend` queues COMPLETED and
-CANCELLED ones again; a FAILED one stays, for it would fail again.
+A repetition is QUEUED, RUNNING or ended. It returns from RUNNING to QUEUED when it is paused or handed back, or when
+its worker is lost, which is not a failure. It resumes from its log. `extend` queues COMPLETED and CANCELLED repetitions
+again; a FAILED one stays, because it would fail again.
 
-A verb whose state is not among `PERMITTED` is refused, also the repetition of one that was obeyed: who pauses twice is
-told that it is PAUSED. A verb on a study goes to all of its experiments that permit it.
+A verb whose state is not in `PERMITTED` is refused even if redundant: pausing twice is a conflict. A verb on a study
+applies to all of its experiments that permit it.
 """
 
 from enum import StrEnum
 
 
 class State(StrEnum):
-    """Where an experiment, a study or a repetition stands."""
+    """State of an experiment, a study or a repetition."""
 
     QUEUED = "QUEUED"
     RUNNING = "RUNNING"
@@ -45,16 +44,16 @@ class State(StrEnum):
 
     @property
     def ended(self) -> bool:
-        """Whether nothing more is computed, unless it is extended."""
+        """Return whether computing has ended; `extend` may restart it."""
         return self in ENDS
 
     def may_become(self, other: "State") -> bool:
-        """Whether the table allows the move."""
+        """Return whether `MOVES` permits the move to the other state."""
         return other in MOVES[self]
 
 
 class Verb(StrEnum):
-    """What a person may ask of an experiment."""
+    """Requests that change the state of an experiment."""
 
     PAUSE = "pause"
     RESUME = "resume"
@@ -77,11 +76,11 @@ class Ending(StrEnum):
 
 ENDS = frozenset({State.COMPLETED, State.FAILED, State.CANCELLED})
 
-OPEN = tuple(each for each in State if each not in ENDS)
-"""Those that are no ends."""
+OPEN = tuple(state for state in State if state not in ENDS)
+"""States that have not ended."""
 
 ASKED = (State.PAUSING, State.STOPPING)
-"""Running repetitions of such an experiment end with the step that is under way."""
+"""States in which running repetitions end with their current step."""
 
 PERMITTED: dict[Verb, tuple[State, ...]] = {
     Verb.PAUSE: (State.QUEUED, State.RUNNING),
@@ -101,4 +100,4 @@ MOVES: dict[State, frozenset[State]] = {
     State.FAILED: frozenset(),
     State.CANCELLED: frozenset({State.QUEUED}),
 }
-"""Of experiments and repetitions alike; from CANCELLED only a repetition moves, whose experiment is extended."""
+"""Permitted moves of experiments and repetitions. Only repetitions leave CANCELLED, when `extend` queues them again."""

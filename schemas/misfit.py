@@ -1,4 +1,4 @@
-"""Misfit: how far tuned simulators are from reality, and from each other when tuning is repeated."""
+"""Misfit: distance of tuned simulators from reality, and from each other over repetitions."""
 
 from pydantic import Field
 
@@ -6,7 +6,7 @@ from gaplab.schemas.base import Frozen
 
 
 class Spread(Frozen):
-    """A number over repetitions; null where too few have it."""
+    """Statistics of a number over repetitions; null if too few repetitions have it."""
 
     n: int
     mean: float | None
@@ -16,32 +16,30 @@ class Spread(Frozen):
 
 
 class TunedSpread(Spread):
-    """The value that tuning gave a tunable."""
+    """Statistics of the tuned value of one tunable."""
 
     name: str
-    lower: float = Field(description="its bound")
-    upper: float
-    at_lower: float | None = Field(description="share of repetitions within 1 % of the bounds' distance of it")
-    at_upper: float | None
+    lower: float = Field(description="lower bound of tuning")
+    upper: float = Field(description="upper bound of tuning")
+    at_lower: float | None = Field(description="share of repetitions at the lower bound, within 1 % of the range")
+    at_upper: float | None = Field(description="share of repetitions at the upper bound, within 1 % of the range")
 
 
 class MisfitPoint(Frozen):
-    """The best simulators after so many iterations; those of iteration 0 are random."""
+    """The best simulators of one iteration; those of iteration 0 are random."""
 
     iteration: int
-    error: Spread = Field(
-        description="root mean square, over the samples it was tuned on, of simulated minus real fitness"
-    )
+    error: Spread = Field(description="root mean square of simulated minus real fitness, over the samples tuned on")
     gap: Spread = Field(
-        description="size of what fitness the controller evolved in it has there minus in reality: not tuned on"
+        description="absolute difference between simulated and real fitness of the transferred controller"
     )
     tunables: tuple[TunedSpread, ...]
 
 
 class MisfitRead(Frozen):
-    """The misfit of an experiment, by iteration; the direct baseline tunes nothing, and has none."""
+    """Misfit of an experiment, by iteration. The direct baseline tunes nothing, so it has none."""
 
     experiment: str
-    unit: str = Field(description="of fitness, and so of error and gap")
+    unit: str = Field(description="unit of fitness, error and gap")
     points: tuple[MisfitPoint, ...]
-    remarks: tuple[str, ...] = Field(description="the latest iteration in sentences")
+    remarks: tuple[str, ...] = Field(description="sentences about the latest iteration")

@@ -1,4 +1,4 @@
-"""How a spec names a plug-in, and how the catalogue shows one."""
+"""Plug-ins: references in a spec, and entries of the catalogue."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from gaplab.schemas.base import Frozen, Real
 
 
 class Named(Frozen):
-    """Something a spec names: `"x"` is short for `{"name": "x"}`."""
+    """A reference by name: `"x"` is short for `{"name": "x"}`."""
 
     name: str = Field(min_length=1, max_length=100)
 
@@ -21,39 +21,39 @@ class Named(Frozen):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Show both spellings, the bare name and the object."""
+        """Return a JSON Schema with both spellings, the bare name and the object."""
         return {"anyOf": [{"type": "string"}, handler.resolve_ref_schema(handler(core))]}
 
 
 class PluginRef(Named):
-    """A plug-in by name, with those of its options that differ from their defaults."""
+    """A plug-in by name, with the options that differ from their defaults."""
 
     options: dict[str, Any] = Field(default_factory=dict)
 
 
 class TunableRef(Named):
-    """A simulator parameter to tune, by name, with its bounds; a bound left out is the tunable's own."""
+    """A simulator parameter to tune, with its bounds; a missing bound is the tunable's default."""
 
     lower: Real | None = None
     upper: Real | None = None
 
 
 class PluginRead(Frozen):
-    """A plug-in as the catalogue lists it."""
+    """A plug-in in the catalogue."""
 
     name: str
     summary: str
     source: str
     options: dict[str, Any] = Field(description="JSON Schema of the plug-in's options, with defaults")
     available: bool = True
-    note: str | None = Field(default=None, description="how to install it, if it is not available")
+    note: str | None = Field(default=None, description="how to install the plug-in if it is not available")
     details: dict[str, Any] = Field(
         default_factory=dict, description="bounds and unit of a tunable, engines of a robot"
     )
 
 
 class BudgetRead(Frozen):
-    """A named budget: what a spec has that leaves these numbers out."""
+    """A named budget: the numbers that a spec gets if it leaves them out."""
 
     name: str
     iterations: int
@@ -64,7 +64,7 @@ class BudgetRead(Frozen):
 
 
 class Catalogue(Frozen):
-    """Every plug-in that this service has, and the named budgets."""
+    """All plug-ins of this service, and the named budgets."""
 
     strategies: tuple[PluginRead, ...]
     robots: tuple[PluginRead, ...]

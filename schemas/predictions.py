@@ -1,4 +1,4 @@
-"""What simulators said of controllers before and after reality had its say."""
+"""Predictions: simulated fitness of samples, before and after tuning on them."""
 
 from pydantic import Field
 
@@ -6,25 +6,28 @@ from gaplab.schemas.base import Frozen
 
 
 class Prediction(Frozen):
-    """The fitness of one sample in the simulators around it; null where the physics failed."""
+    """Fitness of one sample in the simulators before and after it; null where the physics failed."""
 
     repetition: int
-    iteration: int = Field(description="in which it was measured, from 1")
-    simulated_before: float | None = Field(description="in the simulator that was the best before it was measured")
-    simulated_after: float | None = Field(description="in the best of those that were tuned on it and all before it")
-    fitness: float | None = Field(description="as reality measured it; null: the measurement failed")
+    iteration: int = Field(description="iteration in which the sample was measured, from 1")
+    simulated_before: float | None = Field(description="fitness in the best simulator before the measurement")
+    simulated_after: float | None = Field(
+        description="fitness in the best simulator tuned on this sample and all before it"
+    )
+    fitness: float | None = Field(description="fitness in reality; null: the measurement failed")
 
 
 class Predictions(Frozen):
-    """The predictions of an experiment, by repetition and iteration, as far as they are computed.
+    """Predictions of an experiment by repetition and iteration, as far as they are computed.
 
-    Computing goes on with each question: ask again while some are pending. Those that are left out never are.
+    Each request computes more: repeat it while some are pending.
     """
 
     experiment: str
     unit: str
     items: tuple[Prediction, ...]
-    pending: int = Field(description="samples that are not computed yet")
+    pending: int = Field(description="number of samples whose predictions are not computed yet")
     left_out: int = Field(
-        default=0, description="samples of the last repetitions, for which there is no room: they are never computed"
+        default=0,
+        description="number of samples of the last repetitions that are never predicted, because the memory is limited",
     )

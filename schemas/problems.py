@@ -1,4 +1,4 @@
-"""Errors on the wire: RFC 9457 problem details."""
+"""Errors of the API: problem details after RFC 9457."""
 
 from typing import Any
 
@@ -8,17 +8,17 @@ from gaplab.schemas.base import Frozen
 
 
 class SpecError(Frozen):
-    """One thing wrong with what was sent."""
+    """One error in a request."""
 
     pointer: str = Field(description="JSON pointer into the body, or the name of a query or path parameter")
-    value: Any = Field(default=None, description="as it was sent")
+    value: Any = Field(default=None, description="the offending value, as sent")
     message: str
     permitted: tuple[str, ...] | str | None = None
     nearest: str | None = None
 
 
 class Problem(Frozen):
-    """Why a request was not served; sent as `application/problem+json`."""
+    """The reason why a request failed, sent as `application/problem+json`."""
 
     type: str
     title: str

@@ -1,4 +1,4 @@
-"""Under what an experiment was computed."""
+"""Provenance: the software and machines that computed an experiment."""
 
 from datetime import datetime
 
@@ -8,42 +8,42 @@ from gaplab.schemas.base import Frozen
 
 
 class Provenance(Frozen):
-    """The software and the machine of a supervisor, whose nodes have the same."""
+    """Software and machine of a supervisor; all its nodes have the same software."""
 
     gaplab: str
-    code: str = Field(description="changes with any line of the code that numbers depend on")
-    commit: str | None = Field(default=None, description="of git, if the code is checked out")
-    dirty: bool | None = Field(default=None, description="whether the checked-out code was changed since that commit")
+    code: str = Field(description="hash of the code that numbers depend on")
+    commit: str | None = Field(default=None, description="git commit, if the code runs from a clone")
+    dirty: bool | None = Field(default=None, description="whether the clone has changes since that commit")
     python: str
     libraries: dict[str, str]
-    engines: dict[str, str] = Field(description="by engine, its library and the version of it")
+    engines: dict[str, str] = Field(description="library of each engine, with its version")
     architecture: str
     processor: str
     system: str
     spec_version: int
     plugins: dict[str, str] = Field(
-        default={}, description="modules from outside gaplab and what is in packages, each with a hash of its content"
+        default={}, description="files of external plug-in folders, including data in packages, each with its hash"
     )
-    outside: dict[str, str] = Field(
-        default={}, description="by kind and name, the file of each of these plug-ins, with its hash"
-    )
+    outside: dict[str, str] = Field(default={}, description="file and hash of each external plug-in, by kind and name")
 
 
 class ProvenanceUse(Frozen):
-    """That repetitions of an experiment were claimed under this, the first of them at that moment."""
+    """One provenance under which repetitions of an experiment were claimed, and when first."""
 
     id: str
     since: datetime
-    repetitions: int = Field(description="those whose latest claim was under it")
+    repetitions: int = Field(description="number of repetitions whose latest claim was under this provenance")
     provenance: Provenance
 
 
 class ProvenanceRead(Frozen):
-    """Under what an experiment was computed: nothing as long as it has not begun."""
+    """Everything that computed an experiment; empty until it starts."""
 
     computed_with: str | None = Field(
         default=None,
-        description="engines, machine, version of the spec, own plug-ins; a supervisor with others leaves it alone",
+        description="decisive versions: engines, architecture, spec, external plug-ins; others cannot continue it",
     )
-    refused_by: str | None = Field(default=None, description="what a supervisor has that has left it alone")
+    refused_by: str | None = Field(
+        default=None, description="versions of a supervisor that did not claim the experiment because they differ"
+    )
     uses: tuple[ProvenanceUse, ...] = ()

@@ -1,6 +1,6 @@
-"""What the service shows of its studies, experiments, repetitions, samples and simulators.
+"""Studies, experiments, repetitions, samples and simulators, as the API returns them.
 
-Times are UTC. A fitness of null is a physics failure or a failed measurement; JSON has no nan.
+Times are UTC. A fitness of null means failed physics or a failed measurement; JSON has no nan.
 """
 
 from datetime import datetime
@@ -19,45 +19,49 @@ class Page(Frozen, Generic[T]):
     """A part of a list."""
 
     items: tuple[T, ...]
-    next: str | None = Field(default=None, description="pass it as `cursor` for what follows; null at the end")
+    next: str | None = Field(default=None, description="pass it as `cursor` for the next page; null on the last")
 
 
 class Progress(Frozen):
-    """How far it is, and what is left."""
+    """Completed and remaining work."""
 
     repetitions: int
     completed: int
     failed: int
-    iterations: int = Field(description="of all repetitions, number 0 included")
+    iterations: int = Field(description="iterations of all repetitions, including number 0")
     iterations_done: int
-    rollouts: int = Field(description="budgeted in all; at the end, done plus saved, unless it was stopped")
+    rollouts: int = Field(description="budgeted rollouts; at the end, done plus saved, unless stopped")
     rollouts_done: int
-    rollouts_failed: int = Field(description="physics failures (nan) among those done; they never win")
-    rollouts_saved: int = Field(description="budgeted, but sure to change nothing, so not simulated")
-    seconds_left: float | None = Field(default=None, description="null while unknown, 0 at the end")
+    rollouts_failed: int = Field(description="rollouts done whose physics failed (nan); they never win")
+    rollouts_saved: int = Field(
+        description="budgeted rollouts that were not simulated, because they cannot change a number"
+    )
+    seconds_left: float | None = Field(
+        default=None, description="expected remaining time; null while unknown, 0 at the end"
+    )
 
 
 class ExperimentRead(Frozen):
-    """An experiment with its resolved spec; reality's parameters are null until it has ended."""
+    """An experiment with its resolved spec. Reality's parameters are null until it and its study have ended."""
 
     id: str
     study: str | None = None
     name: str
-    notes: str | None = Field(default=None, description="of people, about it")
-    edits: int = Field(default=0, description="how often its name or notes were changed")
+    notes: str | None = Field(default=None, description="free text by people")
+    edits: int = Field(default=0, description="number of changes to the name or notes")
     strategy: str
     state: State
     spec: dict[str, Any]
-    priority: int = Field(default=0, description="the higher is computed first")
-    max_parallel: int | None = Field(default=None, description="repetitions that run at once; null: any number")
+    priority: int = Field(default=0, description="higher is computed first")
+    max_parallel: int | None = Field(default=None, description="largest number of repetitions at once; null: no limit")
     progress: Progress
     best_fitness: float | None = Field(
-        default=None, description="the best recorded fitness of a repetition so far, on average over repetitions"
+        default=None, description="best recorded fitness of each repetition so far, averaged over repetitions"
     )
-    reasons: tuple[str, ...] = Field(default=(), description="why repetitions failed, each reason once")
-    sensitivity: str | None = Field(default=None, description="id of the check of what its tunables do to fitness")
+    reasons: tuple[str, ...] = Field(default=(), description="distinct reasons of failed repetitions")
+    sensitivity: str | None = Field(default=None, description="id of the sensitivity check")
     warnings: tuple[str, ...] = Field(
-        default=(), description="what that check found amiss, and versions that keep it from going on"
+        default=(), description="findings of the sensitivity check, and versions that prevent continuing"
     )
     created_at: datetime
     started_at: datetime | None = None
@@ -65,12 +69,12 @@ class ExperimentRead(Frozen):
 
 
 class StudyRead(Frozen):
-    """A study; its state is that of its experiments taken together."""
+    """A study; its state combines those of its experiments."""
 
     id: str
     name: str
-    notes: str | None = Field(default=None, description="of people, about it")
-    edits: int = Field(default=0, description="how often its name or notes were changed")
+    notes: str | None = Field(default=None, description="free text by people")
+    edits: int = Field(default=0, description="number of changes to the name or notes")
     state: State
     experiments: tuple[ExperimentRead, ...]
     progress: Progress
@@ -78,7 +82,7 @@ class StudyRead(Frozen):
 
 
 class RepetitionRead(Frozen):
-    """One run of the whole algorithm with one stream of random numbers."""
+    """One run of the whole algorithm with its own random numbers."""
 
     number: int
     state: State
@@ -91,18 +95,18 @@ class RepetitionRead(Frozen):
 
 
 class AttemptRead(Frozen):
-    """One lease of a repetition: who had it, from when to when, and how it ended."""
+    """One attempt at a repetition: its supervisor, times and ending."""
 
-    number: int = Field(description="from 1; the epoch that every write of this attempt carried")
-    owner: str = Field(description="the supervisor")
+    number: int = Field(description="from 1; every write of the attempt carries it as the epoch of its lease")
+    owner: str = Field(description="supervisor of the attempt")
     started_at: datetime
-    ended_at: datetime | None = Field(default=None, description="null: it runs, or waits for its core")
+    ended_at: datetime | None = Field(default=None, description="null while it runs or waits for a core")
     ending: Ending | None = None
-    reason: str | None = Field(default=None, description="why it failed or was lost")
+    reason: str | None = Field(default=None, description="reason of failure or loss")
 
 
 class MeasurementKind(StrEnum):
-    """What a real-world evaluation is for: samples are learned from and counted, probes are only looked at."""
+    """Purpose of a real-world evaluation: samples are learned from and counted, probes are only recorded."""
 
     SAMPLE = "sample"
     PROBE = "probe"
@@ -127,4 +131,4 @@ class SimulatorRead(Frozen):
     iteration: int
     rank: int
     parameters: dict[str, float]
-    squared_error: float | None = Field(description="over the samples so far; null where its physics failed on one")
+    squared_error: float | None = Field(description="sum over the samples so far; null if the physics failed on one")

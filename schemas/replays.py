@@ -1,4 +1,4 @@
-"""A controller's motion as it can be drawn: shapes, where they are over time, and what touches the ground."""
+"""Replays: the motion of a controller as shapes, positions over time and contacts with the ground."""
 
 from enum import StrEnum
 from typing import Literal
@@ -13,7 +13,7 @@ Interval = tuple[float, float]
 
 
 class ControllerKind(StrEnum):
-    """Whence a controller comes: selected to be a sample, or evolved in the best simulator and transferred."""
+    """Origin of a controller: selected as a sample, or evolved in the best simulator and transferred."""
 
     SAMPLE = "sample"
     TRANSFER = "transfer"
@@ -22,38 +22,36 @@ class ControllerKind(StrEnum):
 class Shape(Frozen):
     """A part of the robot, or the ground, in the frame of the body that carries it.
 
-    Sizes in metres: of a box its three edges; of a sphere its radius; of a capsule, which lies along its own z, its
-    radius and the distance between the centres of its ends; of a plane, whose normal is its own z, nothing.
+    Sizes are in metres. A box has its three edges. A sphere has its radius. A capsule along z has its radius and the
+    distance between the centres of its ends. A plane, with normal z, has none.
     """
 
     kind: Literal["box", "sphere", "capsule", "plane"]
     size_m: tuple[float, ...]
-    position_m: Position = Field(default=(0.0, 0.0, 0.0), description="of its centre")
-    orientation: Orientation = Field(default=(0.0, 0.0, 0.0, 1.0), description="a quaternion x, y, z, w")
-    role: Literal["trunk", "limb", "foot", "ground"] = Field(description="by which it is coloured")
-    body: int | None = Field(default=None, description="place of the body in `bodies`; null: it does not move")
+    position_m: Position = Field(default=(0.0, 0.0, 0.0), description="position of the centre")
+    orientation: Orientation = Field(default=(0.0, 0.0, 0.0, 1.0), description="quaternion x, y, z, w")
+    role: Literal["trunk", "limb", "foot", "ground"] = Field(description="role, which determines the colour")
+    body: int | None = Field(default=None, description="index of the body in `bodies`; null: fixed")
 
 
 class ReplayWorld(Frozen):
-    """The motion in one world. Of a motion whose physics failed there is nothing, and its fitness is null."""
+    """The motion in one world. If the physics failed, it is empty and its fitness is null."""
 
     engine: str
     shapes: tuple[Shape, ...]
-    fitness: float | None = Field(description="of this replay")
-    recorded: float | None = Field(description="of the same as it was stored; null: it was not computed, or failed")
-    positions_m: tuple[tuple[float, ...], ...] = Field(
-        default=(), description="by frame: x, y, z of each body's frame in turn"
-    )
+    fitness: float | None = Field(description="fitness in this replay")
+    recorded: float | None = Field(description="stored fitness of the same controller; null: not computed, or failed")
+    positions_m: tuple[tuple[float, ...], ...] = Field(default=(), description="by frame: x, y, z of each body in turn")
     orientations: tuple[tuple[float, ...], ...] = Field(
         default=(), description="by frame: x, y, z, w of each body in turn"
     )
-    heights_m: tuple[float, ...] = Field(default=(), description="by frame, of the base")
+    heights_m: tuple[float, ...] = Field(default=(), description="height of the base, by frame")
     speeds_m_s: tuple[float, ...] = Field(
         default=(),
-        description="by frame, of the base, towards where it is at the end, over 0.2 s around the frame",
+        description="speed of the base towards its final position, by frame, averaged over 0.2 s",
     )
     contacts: tuple[tuple[Interval, ...], ...] = Field(
-        default=(), description="by foot: from when to when, in s, it was less than 2 mm above the ground"
+        default=(), description="by foot: intervals in s during which it is less than 2 mm above the ground"
     )
 
 
@@ -64,12 +62,12 @@ class Replay(Frozen):
     repetition: int
     iteration: int
     kind: ControllerKind
-    simulator: int | None = Field(description="iteration whose best simulator it is in; null: there is none")
+    simulator: int | None = Field(description="iteration of the simulator, its best; null: no simulator")
     robot: str
-    unit: str = Field(description="of fitness")
-    bodies: tuple[str, ...] = Field(description="the base first")
-    feet: tuple[str, ...] = Field(description="the bodies, but for the base, that collide with the ground")
-    times_s: tuple[float, ...] = Field(description="of the frames; of a long motion, its first 20 s")
-    counted_s: Interval = Field(description="from when to when the movement counts for the fitness")
+    unit: str = Field(description="unit of fitness")
+    bodies: tuple[str, ...] = Field(description="names of the bodies, the base first")
+    feet: tuple[str, ...] = Field(description="bodies other than the base that collide with the ground")
+    times_s: tuple[float, ...] = Field(description="times of the frames, up to 20 s")
+    counted_s: Interval = Field(description="interval in which movement counts for fitness")
     simulation: ReplayWorld | None = Field(description="null: the controller evolved in reality itself")
-    reality: ReplayWorld | None = Field(description="null: reality's parameters are not known here")
+    reality: ReplayWorld | None = Field(description="null: reality's parameters are unknown here")

@@ -1,4 +1,4 @@
-"""What may be changed of an experiment after it was submitted: its extent, once it has ended, and its turn."""
+"""Changes to a submitted experiment: its extent, once it has completed, and its schedule."""
 
 from typing import Annotated
 
@@ -8,16 +8,18 @@ from gaplab.schemas.base import Count, Frozen, Priority
 
 
 class ExtensionSpec(Frozen):
-    """How large an experiment is to become: totals, not what is added. What is left out stays as it is."""
+    """New size of an experiment, as totals. A missing field stays unchanged."""
 
     iterations: Annotated[Count, Field(le=1_000)] | None = Field(
-        default=None, description="real-world evaluations of each repetition, in all; number 0 does not count"
+        default=None, description="total real-world evaluations of each repetition; iteration 0 does not count"
     )
-    repetitions: Annotated[Count, Field(le=10_000)] | None = Field(default=None, description="in all")
+    repetitions: Annotated[Count, Field(le=10_000)] | None = Field(
+        default=None, description="total number of repetitions"
+    )
 
 
 class ScheduleChange(Frozen):
-    """Another turn for an experiment; what is left out stays as it is, and a `max_parallel` of null is no limit."""
+    """A new schedule for an experiment. A missing field stays unchanged; a `max_parallel` of null is no limit."""
 
     priority: Priority = 0
     max_parallel: Annotated[Count, Field(le=10_000)] | None = None

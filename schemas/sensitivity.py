@@ -1,4 +1,4 @@
-"""The sensitivity check: what each tunable does to fitness, before anything is tuned."""
+"""The sensitivity check: the effect of each tunable on fitness, before tuning."""
 
 from datetime import datetime
 from enum import StrEnum
@@ -9,13 +9,13 @@ from pydantic import Field
 from gaplab.schemas.base import Count, Frozen
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.plugin import PluginRef, TunableRef
-from gaplab.schemas.spec import Settings
+from gaplab.schemas.spec import SharedSettings
 
 POINTS, EVALUATIONS = 17, 100
 
 
 class Verdict(StrEnum):
-    """What a check says of a tunable; `unknown` where physics failed too often to say."""
+    """Verdict on a tunable; `unknown` if the physics failed too often."""
 
     NOTHING = "nothing"
     ROUGH = "rough"
@@ -23,19 +23,19 @@ class Verdict(StrEnum):
     UNKNOWN = "unknown"
 
 
-class SensitivitySpec(Settings):
-    """The settings of an experiment; of them, robot, engine and tunables are what is checked."""
+class SensitivitySpec(SharedSettings):
+    """The settings of an experiment. The check uses its robot, engine and tunables."""
 
     points: Annotated[Count, Field(ge=5, le=1_001)] = Field(
-        default=POINTS, description="values of each tunable; eight controllers are simulated at each"
+        default=POINTS, description="number of values of each tunable; eight controllers are simulated at each"
     )
     evaluations: Annotated[Count, Field(ge=20, le=100_000)] = Field(
-        default=EVALUATIONS, description="of the short evolution of each of four of these controllers"
+        default=EVALUATIONS, description="evaluations of the short evolution of four of these controllers"
     )
 
 
 class Checked(Frozen):
-    """What is checked, with nothing left out."""
+    """The complete subject of a check."""
 
     robot: PluginRef
     engine: PluginRef
@@ -45,37 +45,37 @@ class Checked(Frozen):
 
 
 class Sensitivity(Frozen):
-    """What one tunable does to fitness over its bounds, the others in the middle of theirs."""
+    """Effect of one tunable on fitness between its bounds, with the others in the middle of theirs."""
 
     name: str
     effect: float | None = Field(
-        description="standard deviation of fitness along the profile, in its unit; null where physics failed too often"
+        description="standard deviation of fitness along the profile; null if the physics failed too often"
     )
     relative_effect: float | None = Field(
-        description="the effect over the standard deviation of fitness between controllers"
+        description="effect divided by the standard deviation of fitness between controllers"
     )
     roughness: float | None = Field(
-        description="the part of the effect that jumps from value to value, over the effect: 0 smooth, 1 noise"
+        description="share of the effect that is noise between neighbouring values: 0 smooth, 1 noise"
     )
-    failures: int = Field(description="rollouts along the profile whose physics failed (nan)")
+    failures: int = Field(description="number of rollouts along the profile whose physics failed (nan)")
     verdict: Verdict
-    values: tuple[float, ...] = Field(description="of the tunable")
+    values: tuple[float, ...] = Field(description="checked values of the tunable")
     fitness: tuple[tuple[float | None, ...], ...] = Field(
-        description="a row for each controller, at each value: the known one, random ones, evolved ones"
+        description="fitness at each value, one row per controller: hand-designed, random, evolved"
     )
 
 
 class SensitivityRead(Frozen):
-    """A sensitivity check; its id is that of what is checked, so that the same is checked once."""
+    """A sensitivity check. Its id is a hash of its subject, so equal subjects are checked once."""
 
     id: str
     state: State
     spec: Checked
-    rollouts: int = Field(description="that the check takes at most")
-    unit: str = Field(description="of fitness")
-    tunables: tuple[Sensitivity, ...] = Field(default=(), description="once it is COMPLETED")
+    rollouts: int = Field(description="upper bound on the rollouts of the check")
+    unit: str = Field(description="unit of fitness")
+    tunables: tuple[Sensitivity, ...] = Field(default=(), description="results, once the check is COMPLETED")
     warnings: tuple[str, ...] = ()
-    reason: str | None = Field(default=None, description="why it failed, or was last queued again")
+    reason: str | None = Field(default=None, description="reason of failure, or of the last return to the queue")
     created_at: datetime
     started_at: datetime | None = None
     ended_at: datetime | None = None

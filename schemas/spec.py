@@ -1,7 +1,7 @@
-"""What a user submits: an experiment, or a study of several to be compared.
+"""Specs, which users submit: an experiment, or a study of several experiments.
 
-Whatever is left out of a submitted spec has a default, and the defaults are the paper's. A *resolved* spec is the same
-type with nothing left out: that is what is stored, so that a later change of a default changes no stored experiment.
+Every missing field has a default, and the defaults are the paper's. A *resolved* spec has every field. It is what the
+service stores, so a later change of a default changes no stored experiment.
 """
 
 from typing import Annotated, Literal
@@ -15,22 +15,24 @@ BudgetName = Literal["smoke", "desk", "paper"]
 
 
 class BudgetSpec(Frozen):
-    """How much is computed; a number left out is the preset's.
+    """Number of evaluations; a missing number is the preset's.
 
-    `evaluations` count fitness evaluations of one search. A selection in an ensemble of m simulators costs m rollouts
-    an evaluation; a tuning on k samples costs k.
+    `evaluations` are fitness evaluations of one search. In a selection with an ensemble of m simulators, an evaluation
+    costs m rollouts; in a tuning on k samples, k rollouts.
     """
 
     preset: BudgetName = "paper"
     controller_evaluations: Count | None = Field(
-        default=None, description="of the search for the transferred controller"
+        default=None, description="evaluations of the search for the transferred controller"
     )
-    selection_evaluations: Count | None = Field(default=None, description="of the search for the next sample")
-    simulator_evaluations: Count | None = Field(default=None, description="of the search for a simulator")
+    selection_evaluations: Count | None = Field(
+        default=None, description="evaluations of the search for the next sample"
+    )
+    simulator_evaluations: Count | None = Field(default=None, description="evaluations of the search for a simulator")
     reuse_transfer: bool = Field(
         default=True,
         strict=True,
-        description="`simulated_fit` tries the controller that was just transferred, instead of searching again: "
+        description="true: `simulated_fit` tries the controller that was just transferred instead of searching again: "
         "the best of `controller_evaluations`, where other strategies select from `selection_evaluations`",
     )
 
@@ -41,23 +43,29 @@ class BudgetSpec(Frozen):
 
 
 class RealitySpec(Frozen):
-    """The reality that the algorithm may ask but not see: an engine and its hidden parameters.
+    """Reality: an engine and hidden parameters, which the algorithm may evaluate but not read.
 
-    An engine left out is the experiment's own; a parameter left out is the robot's own, which is the paper's reality
-    (static friction 1.0, dynamic friction 0.8, restitution 0.0).
+    A missing engine is that of the simulators. A missing parameter is the robot's; for the quadruped, these are the
+    paper's (static friction 1.0, dynamic friction 0.8, restitution 0.0).
     """
 
     engine: PluginRef | None = None
     parameters: dict[str, Real] = Field(default_factory=dict)
 
 
-class Settings(Frozen):
-    """What the experiments of a study have in common."""
+class SharedSettings(Frozen):
+    """Settings that all experiments of a study share."""
 
-    iterations: Annotated[Count, Field(le=1_000)] | None = Field(default=None, description="the paper: 10")
-    repetitions: Annotated[Count, Field(le=10_000)] | None = Field(default=None, description="the paper: 40")
+    iterations: Annotated[Count, Field(le=1_000)] | None = Field(
+        default=None, description="real-world evaluations of each repetition; the paper: 10"
+    )
+    repetitions: Annotated[Count, Field(le=10_000)] | None = Field(
+        default=None, description="repetitions of each experiment; the paper: 40"
+    )
     robot: PluginRef = PluginRef(name="quadruped")
-    engine: PluginRef | None = Field(default=None, description="left out: the robot's own; PyBullet for the quadruped")
+    engine: PluginRef | None = Field(
+        default=None, description="engine of the simulators; default: the robot's, PyBullet for the quadruped"
+    )
     optimizer: PluginRef = PluginRef(name="steady_state")
     tunables: tuple[TunableRef, ...] = Field(
         default=(
@@ -73,26 +81,25 @@ class Settings(Frozen):
 
 
 class Schedule(Frozen):
-    """How soon an experiment has its turn. It changes no number, so it is not stored with what makes the results."""
+    """Schedule of an experiment. It changes no number, so it is not part of the stored spec."""
 
-    priority: Priority = Field(default=0, description="the higher is computed first")
+    priority: Priority = Field(default=0, description="higher is computed first")
     max_parallel: Annotated[Count, Field(le=10_000)] | None = Field(
-        default=None, description="repetitions of an experiment that run at once; null: as many as have a core"
+        default=None, description="largest number of repetitions of an experiment at once; null: no limit"
     )
 
 
-class ExperimentSpec(Settings, Schedule):
-    """One strategy under one setting, repeated."""
+class ExperimentSpec(SharedSettings, Schedule):
+    """One strategy with one setting, repeated."""
 
     name: Label | None = None
     strategy: PluginRef
 
 
-class StudySpec(Settings, Schedule):
-    """Experiments to be compared: one for each strategy, all else equal; the schedule is that of each of them.
+class StudySpec(SharedSettings, Schedule):
+    """Experiments to compare: one for each strategy, all else equal. The schedule applies to each of them.
 
-    `direct` is the baseline, evolution in reality itself; the paper repeats it 100 times where it repeats the
-    strategies 40 times.
+    `direct` is the baseline, evolution in reality itself. The paper has 100 repetitions of it, and 40 of each strategy.
     """
 
     name: Label | None = None
@@ -110,5 +117,5 @@ class StudySpec(Settings, Schedule):
         max_length=100,
     )
     direct_repetitions: Annotated[Count, Field(le=10_000)] | None = Field(
-        default=None, description="left out: as many as the strategies have"
+        default=None, description="repetitions of `direct`; default: as many as of the strategies"
     )

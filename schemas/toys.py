@@ -1,4 +1,4 @@
-"""What the paper's Fig. 3 shows: a function of one gene, its approximations, and what was tried of it."""
+"""The paper's Fig. 3: a function of one gene, its approximations, and the samples."""
 
 from pydantic import Field
 
@@ -8,7 +8,7 @@ Values = tuple[float | None, ...]
 
 
 class ToySample(Frozen):
-    """A gene that was tried in reality."""
+    """A gene that was measured in reality."""
 
     iteration: int
     gene: float
@@ -16,25 +16,27 @@ class ToySample(Frozen):
 
 
 class ToyTransfer(Frozen):
-    """The fittest gene in the best simulator, and what it is worth."""
+    """The fittest gene in the best simulator, with its fitness in simulation and reality."""
 
     gene: float
     simulated: float | None
-    real: float | None = Field(description="null: not looked at yet, or failed")
+    real: float | None = Field(description="null: not measured yet, or failed")
 
 
 class Toy(Frozen):
-    """One iteration of one repetition."""
+    """The toy function in one iteration of one repetition."""
 
     experiment: str
     name: str
     repetition: int
     iteration: int
-    unit: str = Field(description="of fitness")
-    genes: tuple[float, ...] = Field(description="at which the functions are given")
-    truth: Values | None = Field(description="reality; null as long as it may not be shown")
-    approximations: tuple[Values, ...] = Field(description="the simulators of the iteration, the best first")
-    squared_error: float | None = Field(description="of the best over the samples; null: there is none")
-    samples: tuple[ToySample, ...] = Field(description="up to the iteration")
+    unit: str = Field(description="unit of fitness")
+    genes: tuple[float, ...] = Field(description="genes at which the functions are evaluated")
+    truth: Values | None = Field(description="the true function; null while it is hidden")
+    approximations: tuple[Values, ...] = Field(description="the simulators of the iteration, best first")
+    squared_error: float | None = Field(description="squared error of the best simulator over the samples; null: none")
+    samples: tuple[ToySample, ...] = Field(description="samples up to this iteration")
     transfer: ToyTransfer | None
-    limits: tuple[float, float] = Field(description="of all fitnesses of the repetition: what a figure of any shows")
+    limits: tuple[float, float] = Field(
+        description="range of all fitnesses of the repetition, for the axis of a figure"
+    )

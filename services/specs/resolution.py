@@ -6,7 +6,7 @@ from typing import Any
 
 from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.sensitivity import Checked, SensitivitySpec
-from gaplab.schemas.spec import BudgetSpec, ExperimentSpec, RealitySpec, Settings, StudySpec
+from gaplab.schemas.spec import BudgetSpec, ExperimentSpec, RealitySpec, SharedSettings, StudySpec
 from gaplab.services.core.errors import InvalidSpec, Violation, gather, unknown_name
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.optimizers.base import Optimizer
@@ -93,7 +93,7 @@ def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
     Raises:
         InvalidSpec: with every violation, as an experiment with these settings would have.
     """
-    shared = {name: getattr(spec, name) for name in Settings.model_fields}
+    shared = {name: getattr(spec, name) for name in SharedSettings.model_fields}
     resolved = resolve_experiment(ExperimentSpec(**shared, strategy=PluginRef(name="random")))
     effort = {"points": spec.points, "evaluations": spec.evaluations}
     return Checked.model_validate({name: getattr(resolved, name) for name in ("robot", "engine", "tunables")} | effort)
