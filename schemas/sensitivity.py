@@ -8,7 +8,8 @@ from pydantic import Field
 
 from gaplab.schemas.base import Count, Frozen
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.plugin import PluginRef, TunableRef
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.resolved import ResolvedTunable
 from gaplab.schemas.spec import SharedSettings
 
 POINTS, EVALUATIONS = 17, 100
@@ -39,7 +40,7 @@ class Checked(Frozen):
 
     robot: PluginRef
     engine: PluginRef
-    tunables: tuple[TunableRef, ...]
+    tunables: tuple[ResolvedTunable, ...]
     points: int = POINTS
     evaluations: int = EVALUATIONS
 

@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
 from gaplab.services.core.ports import Simulate
 from gaplab.workers.helpers import LOOK_S, Handle, Helpers
@@ -30,7 +30,7 @@ class Pool:
         versions: that another node must have.
     """
 
-    def __init__(self, spec: ExperimentSpec, here: Simulate, per_call: int, versions: Versions | None = None) -> None:
+    def __init__(self, spec: ResolvedSpec, here: Simulate, per_call: int, versions: Versions | None = None) -> None:
         self._simulate = here
         self._per_call = per_call
         self._rollout_s = 0.0

@@ -18,7 +18,7 @@ from gaplab.schemas.archives import ImportRead, Manifest
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.provenance import Provenance
-from gaplab.schemas.spec import ExperimentSpec, Schedule
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.archives.checking import checked
 from gaplab.services.archives.logs import check_logs
 from gaplab.services.archives.opening import open_archive
@@ -38,7 +38,6 @@ Row = dict[str, Any]
 
 MOST_EXPERIMENTS = 1_000
 
-_RESOLVED = sorted(set(ExperimentSpec.model_fields) - set(Schedule.model_fields))
 """What the spec of an experiment has, once it is resolved."""
 
 AT_ONCE = 4
@@ -126,15 +125,18 @@ def _checked_spec(row: Row) -> Row:
     try:
         spec = spec_of(row["spec"])
         truth = dict.fromkeys(row["spec"]["reality"]["parameters"])
-    except (ValidationError, KeyError, TypeError, AttributeError) as error:
+    except ValidationError as error:
+        fields = sorted({"/".join(map(str, found["loc"])) for found in error.errors()})
+        msg = f"{place} is not resolved; missing or invalid: {', '.join(fields)[:200]}"
+        raise InvalidArchive(msg) from error
+    except (KeyError, TypeError, AttributeError) as error:
         msg = f"{place} is no spec"
         raise InvalidArchive(msg) from error
-    left_out = [*(name for name in _RESOLVED if row["spec"].get(name) is None), *_left_out(spec)]
     unknown = [name for name in (*truth, *(each.name for each in spec.tunables)) if name not in tunables]
     unknown += [spec.robot.name] if spec.robot.name not in robots else []
     twice = len({each.name for each in spec.tunables}) < len(spec.tunables)
-    if left_out or unknown or twice or spec.strategy.name != row["strategy"]:
-        msg = f"{place} is not resolved, or names what is not installed here: {', '.join([*left_out, *unknown])[:200]}"
+    if unknown or twice or spec.strategy.name != row["strategy"]:
+        msg = f"{place} is not resolved, or names what is not installed here: {', '.join(unknown)[:200]}"
         raise InvalidArchive(msg)
     if row["iterations"] not in _iterations(spec):
         msg = f"{place} does not fit its experiment, which says that a repetition has {row['iterations']:,} iterations"
@@ -142,27 +144,14 @@ def _checked_spec(row: Row) -> Row:
     return _whole(spec, truth, row["spec"])
 
 
-def _left_out(spec: ExperimentSpec) -> list[str]:
-    """What has nothing to do with what is installed here, and what no resolved spec lacks: nobody may go on without."""
-    return [
-        *(f"budget/{name}" for name, value in spec.budget if value is None),
-        *(
-            f"bounds of {each.name}"
-            for each in spec.tunables
-            if each.lower is None or each.upper is None or each.lower >= each.upper
-        ),
-        *(["reality/engine"] if spec.reality.engine is None else []),
-    ]
-
-
-def _iterations(spec: ExperimentSpec) -> set[int]:
+def _iterations(spec: ResolvedSpec) -> set[int]:
     """How many a repetition may have; of a strategy that is not installed here, nobody knows whether it iterates."""
     if spec.strategy.name in strategies:
-        return {1 if is_direct(spec) else (spec.iterations or 0) + 1}
-    return {1, (spec.iterations or 0) + 1}
+        return {1 if is_direct(spec) else spec.iterations + 1}
+    return {1, spec.iterations + 1}
 
 
-def _whole(spec: ExperimentSpec, truth: Row, given: Row) -> Row:
+def _whole(spec: ResolvedSpec, truth: Row, given: Row) -> Row:
     """As it is stored, with what was given and no more; what is not known of its reality is null."""
     stored = {name: value for name, value in spec.model_dump(mode="json").items() if name in given}
     return stored | {"reality": stored["reality"] | {"parameters": truth | stored["reality"]["parameters"]}}

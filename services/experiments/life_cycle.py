@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.schedule import ExtensionSpec, ScheduleChange
-from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
 from gaplab.services.experiments.submission import extent_of
@@ -55,7 +55,7 @@ def extend_experiment(
     """
 
     def work(session: Session) -> ExperimentRead:
-        def larger(spec: ExperimentSpec) -> tuple[ExperimentSpec, Extent]:
+        def larger(spec: ResolvedSpec) -> tuple[ResolvedSpec, Extent]:
             found = _larger(spec, extension)
             check_extent([found], admitted.limits)
             there = tallies(session, [experiment_id])[experiment_id]
@@ -79,13 +79,13 @@ def schedule_experiment(store: Store, experiment_id: str, change: ScheduleChange
     )
 
 
-def _larger(spec: ExperimentSpec, extension: ExtensionSpec) -> ExperimentSpec:
+def _larger(spec: ResolvedSpec, extension: ExtensionSpec) -> ResolvedSpec:
     if violations := list(_violations(spec, extension)):
         raise InvalidSpec(violations)
     return spec.model_copy(update=extension.model_dump(exclude_none=True))
 
 
-def _violations(spec: ExperimentSpec, extension: ExtensionSpec) -> Iterator[Violation]:
+def _violations(spec: ResolvedSpec, extension: ExtensionSpec) -> Iterator[Violation]:
     wanted = extension.model_dump(exclude_none=True)
     if not wanted:
         yield Violation(

@@ -8,7 +8,7 @@ from hashlib import sha256
 from typing import Generic, TypeVar
 
 from gaplab.schemas.base import Frozen
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import InvalidSpec, KeyReused, LimitReached, Violation
 from gaplab.services.settings import Limits, variable_of
 from gaplab.services.specs.resolution import expected_rollouts
@@ -88,7 +88,7 @@ def once(store: Store, admitted: Admission, asked: Frozen, kind: type[R], work: 
     return store.write(transaction)
 
 
-def check_extent(specs: Sequence[ExperimentSpec], limits: Limits | None) -> None:
+def check_extent(specs: Sequence[ResolvedSpec], limits: Limits | None) -> None:
     """Do nothing if one submission may ask for so much.
 
     Raises:
@@ -96,8 +96,8 @@ def check_extent(specs: Sequence[ExperimentSpec], limits: Limits | None) -> None
     """
     if limits is None:
         return
-    iterations = max(each.iterations or 0 for each in specs)
-    repetitions = sum(each.repetitions or 0 for each in specs)
+    iterations = max(each.iterations for each in specs)
+    repetitions = sum(each.repetitions for each in specs)
     asked = {"iterations": iterations, "repetitions": repetitions}
     violations = [
         Violation(f"/{name}", value, _too_much(name, value, getattr(limits, name)), f"at most {getattr(limits, name)}")
@@ -108,7 +108,7 @@ def check_extent(specs: Sequence[ExperimentSpec], limits: Limits | None) -> None
         raise InvalidSpec(violations)
 
 
-def check_load(session: Session, specs: Sequence[ExperimentSpec], admitted: Admission, *, done: int = 0) -> None:
+def check_load(session: Session, specs: Sequence[ResolvedSpec], admitted: Admission, *, done: int = 0) -> None:
     """Do nothing if there is room for these, in the transaction that inserts them; `done` of their rollouts are over.
 
     Raises:
@@ -119,7 +119,7 @@ def check_load(session: Session, specs: Sequence[ExperimentSpec], admitted: Admi
     admission.one_at_a_time(session)
     under_way = admission.load(session)
     own = under_way.get(admitted.token, Load(0, 0))
-    rollouts = max(0, sum(expected_rollouts(each) * (each.repetitions or 0) for each in specs) - done)
+    rollouts = max(0, sum(expected_rollouts(each) * each.repetitions for each in specs) - done)
     _check("experiments_per_token", own.experiments, len(specs), limits)
     _check("rollouts_per_token", own.rollouts, rollouts, limits)
     _check("experiments", sum(each.experiments for each in under_way.values()), len(specs), limits)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.toys import Toy, ToySample, ToyTransfer, Values
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
@@ -29,7 +29,7 @@ class _Stored:
     """What is stored of one repetition; `transferred` is of the iterations that are wanted."""
 
     row: ExperimentRow
-    spec: ExperimentSpec
+    spec: ResolvedSpec
     robot: Robot
     shown: bool
     measured: tuple[SampleRead, ...]

@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.tunables import tunables
 from gaplab.services.figures.kinds.simulators import Dimension, Tuned
 from gaplab.services.specs.assembly import parameters_of
@@ -56,7 +56,7 @@ def tunings(store: Store, experiment_id: str) -> Tunings:
     )
 
 
-def _dimensions(spec: ExperimentSpec) -> tuple[Dimension, ...]:
+def _dimensions(spec: ResolvedSpec) -> tuple[Dimension, ...]:
     space = parameters_of(spec.tunables)
     bounds = zip(spec.tunables, space.lower.tolist(), space.upper.tolist(), strict=True)
     return tuple(Dimension(ref.name, _unit(ref.name), lower, upper) for ref, lower, upper in bounds)

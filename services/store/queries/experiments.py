@@ -11,7 +11,8 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import OPEN
-from gaplab.schemas.spec import ExperimentSpec, Schedule
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.spec import Schedule
 from gaplab.services.core.errors import NotFound, StoreUnavailable
 from gaplab.services.store.clock import now
 from gaplab.services.store.models import SPEC_VERSION, ExperimentRow, RepetitionRow, StudyRow
@@ -52,7 +53,7 @@ def insert_study(session: Session, name: str) -> StudyRow:
 
 def insert_experiment(
     session: Session,
-    spec: ExperimentSpec,
+    spec: ResolvedSpec,
     extent: Extent,
     *,
     study: StudyRow | None = None,
@@ -63,7 +64,7 @@ def insert_experiment(
 
     Args:
         session: of a transaction that writes.
-        spec: resolved.
+        spec: of the experiment.
         extent: of each of its repetitions.
         study: that it belongs to.
         position: within the study.
@@ -73,7 +74,7 @@ def insert_experiment(
         id=new_id(),
         study_id=study.id if study else None,
         position=position,
-        name=_plain(spec.name or spec.strategy.name),
+        name=_plain(spec.name),
         strategy=spec.strategy.name,
         spec=spec.model_dump(mode="json", exclude=set(Schedule.model_fields)),
         iterations=extent.iterations,
@@ -85,7 +86,7 @@ def insert_experiment(
     )
     session.add(experiment)
     session.flush()
-    insert_repetitions(session, experiment.id, range(spec.repetitions or 0))
+    insert_repetitions(session, experiment.id, range(spec.repetitions))
     note(session, EventKind.SUBMITTED, experiment.id, name=experiment.name, repetitions=spec.repetitions)
     return experiment
 

@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.provenance import Provenance
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Claim
@@ -137,7 +137,7 @@ def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
         .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
         .where(row.id.in_(ids))
     ).all()
-    specs = {experiment: ExperimentSpec.model_validate(spec) for _, _, experiment, _, spec in found}
+    specs = {experiment: ResolvedSpec.model_validate(spec) for _, _, experiment, _, spec in found}
     past, begun = logs(session, ids), checkpoints.stored(session, ids)
     claims = {
         repetition: Claim(repetition, epoch, experiment, number, specs[experiment], past[repetition], begun[repetition])

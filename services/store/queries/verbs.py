@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import OPEN, PERMITTED, Ending, State, Verb
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict
 from gaplab.services.store.clock import now
 from gaplab.services.store.models import ExperimentRow, RepetitionRow, StudyRow
@@ -76,7 +76,7 @@ def ask_study(session: Session, study_id: str, verb: Verb) -> StudyRow:
 
 
 def extend(
-    session: Session, experiment_id: str, larger: Callable[[ExperimentSpec], tuple[ExperimentSpec, Extent]]
+    session: Session, experiment_id: str, larger: Callable[[ResolvedSpec], tuple[ResolvedSpec, Extent]]
 ) -> ExperimentRow:
     """The COMPLETED experiment QUEUED again with a larger spec; what is there stands.
 
@@ -93,8 +93,8 @@ def extend(
     if None in experiment.spec["reality"]["parameters"].values():
         msg = f"experiment {experiment_id!r} was imported before its reality was shown: nobody can go on with it"
         raise Conflict(msg)
-    spec, extent = larger(ExperimentSpec.model_validate(experiment.spec))
-    there, total = len(repetitions_of(session, experiment.id)), spec.repetitions or 0
+    spec, extent = larger(ResolvedSpec.model_validate(experiment.spec))
+    there, total = len(repetitions_of(session, experiment.id)), spec.repetitions
     again = session.scalars(
         update(row)
         .where(
