@@ -19,11 +19,11 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.clients import FOLLOW, READERS, READS, SUBMIT, SUBMITTERS, Load, Measured
-from benchmarks.filling import IN_A_STUDY, REPETITIONS, SAMPLES, fill
-from benchmarks.supervisor import postgres
 from gaplab import migrations
-from gaplab.api.process.local_service import own_service
+from gaplab.api.process.local_service import start_service
 from gaplab.services.store.session import Store
+from tests.filling import IN_A_STUDY, REPETITIONS, SAMPLES, fill
+from tests.postgres import running
 
 UNLIMITED = {f"GAPLAB_MAX_{name}": str(10**6) for name in ("EXPERIMENTS", "EXPERIMENTS_PER_TOKEN")}
 """What is submitted is never computed here, so that a thousand would soon wait."""
@@ -40,7 +40,7 @@ def measure(url: str, folder: Path, experiments: int, options: argparse.Namespac
     fill(store, experiments)
     store.dispose()
     print(f"  {experiments:,} experiments stored in {time.monotonic() - begun:.0f} s", flush=True)
-    with own_service(url, folder / "api.log", workers=False) as client:
+    with start_service(url, folder / "api.log", workers=False) as client:
         Load(client.url, experiments, min(3.0, options.seconds), options.pause).run()  # warms up
         return Load(client.url, experiments, options.seconds, options.pause).run()
 
@@ -80,7 +80,7 @@ def main() -> None:
             for experiments in (NEXT_TO_NOTHING, A_PAGE, options.experiments):
                 place = Path(folder) / str(experiments)
                 place.mkdir()
-                with postgres(place) if database == "postgres" else _sqlite(place) as url:
+                with running(place) if database == "postgres" else _sqlite(place) as url:
                     found[experiments] = measure(url, place, experiments, options)
             Console(width=120).print(table(database, found))
             if not any(each.events for each in found.values()):

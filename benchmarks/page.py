@@ -19,12 +19,12 @@ from tempfile import TemporaryDirectory
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.filling import fill
 from gaplab import migrations
 from gaplab.services.archives import import_archive
 from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import Chromium
+from tests.filling import fill
 
 PUBLISHED = Path(__file__).parents[1] / "docs" / "studies" / "mujoco-in-mujoco.zip"
 

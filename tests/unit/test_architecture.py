@@ -10,41 +10,46 @@ ROOT = Path(__file__).parents[2]
 OURS = ("schemas", "services", "workers", "api", "migrations")
 MODULES = sorted(path.relative_to(ROOT) for top in (*OURS, "gaplab") for path in (ROOT / top).rglob("*.py"))
 PHYSICS = {"pybullet", "mujoco", "numba", "sapien"}
-ON_DEMAND = {
-    "pandas",
-    "plotly",
-    "IPython",
-}  # heavy, or not installed everywhere: never at the top of a module of the API
+ON_DEMAND = {"pandas", "plotly", "IPython"}  # heavy, or optional: the API imports them inside functions alone
+WEB = {"fastapi", "starlette", "pydantic", "anyio", "prometheus_client"}
+
+ROOMS = {
+    "core": ((), {"numpy", "scipy", "pydantic", "cma"}),
+    "engines": (("core",), {"numpy", "pydantic"}),
+    "store": (("core",), {"sqlalchemy", "psycopg"}),
+    "figures": ((), {"plotly", "matplotlib"}),
+    "specs": (("core", "engines"), {"numpy"}),
+    "plugins": (("core", "engines", "specs"), set()),
+    "experiments": (("core", "engines", "store", "specs", "plugins", "settings"), {"sqlalchemy"}),
+    "running": (("core", "engines", "store", "plugins", "experiments"), {"sqlalchemy"}),
+    "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
+    "replay": (("core", "store", "specs", "experiments"), {"numpy", "cachetools"}),
+    "archives": (("core", "store", "specs", "experiments", "results"), {"pydantic", "pyarrow"}),
+}
+"""Rooms of services, each below those that may import it: what of services each may import, and what of others."""
 
 # code in -> what of ours it may import, and what of others; the first prefix that fits counts
 ARROWS = {
     "schemas": (("schemas",), {"pydantic", "pydantic_core"}),
-    "services/core": (("schemas", "services.core"), {"numpy", "scipy", "pydantic", "cma"}),
-    "services/engines": (("schemas", "services.core", "services.engines"), {"numpy", "pydantic"}),
-    "services/store": (("schemas", "services.core", "services.store"), {"sqlalchemy", "psycopg"}),
-    "services/archives": (("schemas", "services"), {"pydantic", "pyarrow"}),
-    "services/figures": (("schemas", "services.figures"), {"plotly", "matplotlib"}),
-    "services/replay": (("schemas", "services"), {"numpy", "cachetools"}),
-    "services": (("schemas", "services"), {"numpy"}),
-    "workers": (("schemas", "services", "workers"), {"numpy", "ray"}),
-    "api": (
-        ("schemas", "services", "api", "migrations"),
-        {
-            "fastapi",
-            "starlette",
-            "uvicorn",
-            "typer",
-            "rich",
-            "httpx2",
-            "pydantic",
-            "fastapi_offline",
-            "anyio",
-            "prometheus_client",
-            "pandas",  # these three only inside the functions that need them
-            "plotly",
-            "IPython",
-        },
+    **{
+        f"services/{room}": (("schemas", *(f"services.{each}" for each in (room, *below))), others)
+        for room, (below, others) in ROOMS.items()
+    },
+    "services": (
+        ("schemas", "services.core", "services.plugins", "services.store"),
+        {"pydantic", "pydantic_settings"},
     ),
+    "workers": (("schemas", "services", "workers"), {"numpy", "ray"}),
+    "api/http": (("schemas", "services", "api.http"), WEB | {"fastapi_offline"}),
+    "api/routes": (("schemas", "services", "api.http", "api.routes"), WEB),
+    "api/app.py": (("services", "api.http", "api.routes"), {"fastapi"}),
+    "api/process": (("services", "migrations", "api.app", "api.clients", "api.process"), {"fastapi", "uvicorn"}),
+    "api/clients": (("schemas", "services.settings", "api.clients"), ON_DEMAND | {"httpx2", "pydantic", "rich"}),
+    "api/commands": (
+        ("schemas", "services", "api.clients", "api.process", "api.commands"),
+        {"typer", "rich", "httpx2", "pydantic"},
+    ),
+    "api": (("services", "api.process"), set()),
     "gaplab": (("schemas", "services.core", "services.engines", "api"), set()),
     "migrations": (
         ("services.core.errors", "services.settings", "services.store", "migrations"),
@@ -64,7 +69,7 @@ def imports(path):
 
 
 def rule(path):
-    return next(rule for prefix, rule in ARROWS.items() if path.as_posix().startswith(f"{prefix}/"))
+    return next(rule for prefix, rule in ARROWS.items() if f"{path.as_posix()}/".startswith(f"{prefix}/"))
 
 
 def is_under(module, allowed):
@@ -82,6 +87,34 @@ def test_imports_follow_the_arrows(path):
             assert is_under(module.removeprefix("gaplab."), ours), f"{path} may not import {module}"
         elif top not in sys.stdlib_module_names:
             assert top in others, f"{path} may not import {module}"
+
+
+def test_each_room_of_services_imports_only_rooms_before_it():
+    """So there is no circle of rooms."""
+    order = [*ROOMS, "settings"]
+
+    for room, (below, _) in ROOMS.items():
+        assert all(each == "settings" or order.index(each) < order.index(room) for each in below), room
+    folders = {path.parent.name for path in (ROOT / "services").glob("*/__init__.py")}
+    assert folders == set(ROOMS)
+
+
+def test_states_are_written_in_one_place():
+    """`move` alone, which uses the table of permitted moves; what is inserted or imported is no move."""
+    writers = set()
+    for path in MODULES:
+        if path.parts[0] in {"services", "workers", "api"} and path.parts[1] != "archives":
+            for node in ast.walk(ast.parse((ROOT / path).read_text())):
+                match node:
+                    case ast.Call(func=ast.Attribute(attr="values"), keywords=keywords):
+                        writers |= {path.as_posix() for each in keywords if each.arg == "state"}
+                    case ast.Assign(targets=[ast.Attribute(attr="state")]):
+                        writers.add(path.as_posix())
+                    case ast.Dict(keys=keys, values=values):
+                        pairs = zip(keys, values, strict=True)
+                        named = [ast.unparse(value) for key, value in pairs if getattr(key, "value", None) == "state"]
+                        writers |= {path.as_posix() for each in named if each.startswith("State.")}
+    assert writers == {"services/experiments/states.py"}
 
 
 @pytest.mark.parametrize("path", [each for each in MODULES if each.as_posix().startswith("services/core/")], ids=str)
@@ -118,3 +151,9 @@ def test_a_module_stays_under_250_lines_and_a_function_under_40(path):
 @pytest.mark.parametrize("path", MODULES, ids=str)
 def test_every_module_says_what_it_is(path):
     assert ast.get_docstring(ast.parse((ROOT / path).read_text()))
+
+
+def test_benchmarks_use_what_tests_provide_and_no_test_uses_a_benchmark() -> None:
+    tests = sorted(path.relative_to(ROOT) for path in (ROOT / "tests").rglob("*.py"))
+
+    assert not [str(path) for path in tests if any(name.partition(".")[0] == "benchmarks" for name in imports(path))]
