@@ -17,6 +17,7 @@ from gaplab.schemas.records import (
     SimulatorRead,
     StudyRead,
 )
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.experiments import checks
 from gaplab.services.experiments.idempotency import Once, once
@@ -197,9 +198,9 @@ def cancel_experiment(store: Store, experiment_id: str) -> ExperimentRead:
     return ask_experiment(store, experiment_id, Verb.CANCEL)
 
 
-def extent_of(spec: ExperimentSpec) -> Extent:
+def extent_of(spec: ResolvedSpec) -> Extent:
     """How much one repetition of a resolved spec is."""
-    samples = 0 if is_direct(spec) else spec.iterations or 0
+    samples = 0 if is_direct(spec) else spec.iterations
     return Extent(iterations=samples + 1, rollouts=expected_rollouts(spec))
 
 
