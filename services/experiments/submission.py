@@ -4,6 +4,7 @@ All functions raise StoreUnavailable while the database cannot be used.
 """
 
 from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.experiments.checks import queue_for
 from gaplab.services.experiments.idempotency import Once, once
@@ -76,7 +77,7 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
     return once(store, admitted, spec, StudyRead, create)
 
 
-def extent_of(spec: ExperimentSpec) -> Extent:
+def extent_of(spec: ResolvedSpec) -> Extent:
     """Return the size of one repetition of a resolved spec."""
-    samples = 0 if is_direct(spec) else spec.iterations or 0
+    samples = 0 if is_direct(spec) else spec.iterations
     return Extent(iterations=samples + 1, rollouts=expected_rollouts(spec))

@@ -10,7 +10,8 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import OPEN, State
-from gaplab.schemas.spec import ExperimentSpec, Schedule
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.spec import Schedule
 from gaplab.services.core.errors import NotFound, StoreUnavailable
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import SPEC_VERSION, ExperimentRow, RepetitionRow, StudyRow
@@ -54,7 +55,7 @@ def insert_study(session: Session, name: str) -> StudyRow:
 
 def insert_experiment(
     session: Session,
-    spec: ExperimentSpec,
+    spec: ResolvedSpec,
     extent: Extent,
     *,
     study: StudyRow | None = None,
@@ -75,7 +76,7 @@ def insert_experiment(
         id=new_id(),
         study_id=study.id if study else None,
         position=position,
-        name=storable(spec.name or spec.strategy.name),
+        name=storable(spec.name),
         strategy=spec.strategy.name,
         spec=spec.model_dump(mode="json", exclude=set(Schedule.model_fields)),
         iterations=extent.iterations,
@@ -87,7 +88,7 @@ def insert_experiment(
     )
     session.add(experiment)
     session.flush()
-    insert_repetitions(session, experiment.id, range(spec.repetitions or 0))
+    insert_repetitions(session, experiment.id, range(spec.repetitions))
     note(session, EventKind.SUBMITTED, experiment.id, name=experiment.name, repetitions=spec.repetitions)
     return experiment
 
