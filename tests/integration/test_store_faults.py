@@ -4,6 +4,7 @@ What is asked is read from the supervisor's own source, so that nothing new is f
 """
 
 import ast
+import shutil
 from functools import partial
 from pathlib import Path
 from typing import ClassVar
@@ -21,6 +22,7 @@ from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.store.models import CheckpointRow, RepetitionRow, SensitivityRow
 from gaplab.services.store.queries.steps import logs
+from gaplab.services.store.session import Store
 from gaplab.workers import sensitivity as checking
 from gaplab.workers import supervisor
 from gaplab.workers.checkpoints import recorded
@@ -144,9 +146,8 @@ def requeue_late(module, requeue_lost, store, **_):
     return found
 
 
-@pytest.fixture(autouse=True)
-def quick(monkeypatch):
-    """Nothing waits for the clock, and no lease depends on it."""
+def hurry(monkeypatch):
+    """Let nothing wait for the clock, and no lease depend on it."""
     for name, value in {"HEARTBEATS": 1e9, "WAIT_S": 0.0, "RETRY_S": 0.0}.items():
         monkeypatch.setattr(supervisor, name, value)
     monkeypatch.setattr(checking, "LOOK_S", 0.0)
@@ -158,20 +159,24 @@ def quick(monkeypatch):
     monkeypatch.setattr(Trying, "lost", False)
 
 
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    hurry(monkeypatch)
+
+
 @pytest.fixture(scope="module")
-def undisturbed():
-    """What comes of it without faults; computed by the first test that wants it."""
-    return []
+def undisturbed(sqlite_template, tmp_path_factory):
+    """The outcome without faults."""
+    store = Store(f"sqlite:///{shutil.copy(sqlite_template, tmp_path_factory.mktemp('undisturbed'))}")
+    with pytest.MonkeyPatch.context() as patch:
+        hurry(patch)
+        found = outcome(store)
+    store.dispose()
+    return found
 
 
-def expected(undisturbed, store):
-    if not undisturbed:
-        undisturbed.append(outcome(store))
-    return undisturbed[0]
-
-
-def test_without_faults_all_that_may_happen_happens(sqlite_store, undisturbed):
-    repetitions, checks = expected(undisturbed, sqlite_store)
+def test_without_faults_all_that_may_happen_happens(undisturbed):
+    repetitions, checks = undisturbed
 
     assert [state for state, *_ in repetitions.values()] == [State.COMPLETED, State.COMPLETED, State.FAILED]
     assert [state for state, _ in checks] == [State.COMPLETED, State.FAILED]
@@ -207,5 +212,5 @@ def test_a_fault_of_the_store_loses_nothing_and_does_nothing_twice(store, undist
         claim, claims = execution.claim, []
         monkeypatch.setattr(execution, "claim", lambda *arguments: times_out_at_first(claims, claim(*arguments)))
 
-    assert outcome(store) == undisturbed[0]
+    assert outcome(store) == undisturbed
     assert calls
