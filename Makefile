@@ -2,6 +2,7 @@
 
 PYTHON ?= python3.11
 BIN := .venv/bin
+DENO := DENO_DIR=.venv/deno DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -19,6 +20,8 @@ lint: .venv/installed-dev  ## style, types, dependencies and the arrows between 
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(DENO) lint --quiet
+	$(DENO) check --quiet api/dashboard
 	$(BIN)/python -m pip check --disable-pip-version-check
 	$(BIN)/python -m pytest tests/unit/test_architecture.py tests/unit/test_dependencies.py
 

@@ -14,7 +14,7 @@ from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.workers import repetition as task
+from gaplab.workers import repetitions as task
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.cluster import cluster
 
@@ -54,7 +54,7 @@ def alone() -> int:
 
 def spread() -> int:
     """The steps of the repetition, as the service runs it."""
-    claim = Claim(repetition_id=0, epoch=0, experiment_id="none", number=0, spec=resolve_experiment(SPEC))
+    claim = Claim(id=0, epoch=0, experiment_id="none", number=0, spec=resolve_experiment(SPEC))
     stream = task.run.remote(claim, {}, CHECKPOINT_S)
     return sum(isinstance(each, TimedStep) for batch in stream for each in ray.get(batch))
 

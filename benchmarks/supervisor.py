@@ -18,8 +18,8 @@ from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.cluster import cluster
-from gaplab.workers.repetition import batches
-from gaplab.workers.supervisor import Run, Supervisor
+from gaplab.workers.repetitions import Repetitions, Run, batches
+from gaplab.workers.supervisor import Supervisor
 from tests.postgres import running
 
 AT_ONCE = 200
@@ -44,31 +44,34 @@ def simulated() -> Batches:
     return tuple(batches(recorded(setting(resolve_experiment(SPEC), 0), (), ())))
 
 
-class WithoutRay(Supervisor):
-    """The supervisor as it is, but for the workers: each round, every repetition has its next batch ready."""
+class WithoutRay(Repetitions):
+    """Repetitions without workers: each round, every repetition has its next batch ready."""
 
     def __init__(self, store: Store, delivered: Batches) -> None:
-        super().__init__(store, lambda: AT_ONCE)
+        super().__init__(store, "benchmark", {})
         self._delivered = delivered
 
-    def _launch(self, claim: Claim) -> Run:  # the claim's log is empty
+    def launch(self, claim: Claim) -> Run:
+        """Deliver what was computed beforehand; the claim's log is empty."""
         return Run(claim, iter(self._delivered))  # type: ignore[arg-type]
 
-    def _receive(self) -> None:
-        for run in self._runs:
+    def receive(self) -> None:
+        """Take the next batch of each run."""
+        for run in self.runs:
             batch = next(run.stream, None)
             run.ended = batch is None
             run.received += batch or ()
 
 
-class ThroughRay(Supervisor):
-    """The supervisor as it is, on tasks that stream what was computed beforehand."""
+class ThroughRay(Repetitions):
+    """Repetitions as tasks that stream what was computed beforehand."""
 
     def __init__(self, store: Store, delivered: Batches) -> None:
-        super().__init__(store, lambda: AT_ONCE)
+        super().__init__(store, "benchmark", {})
         self._delivered = ray.put(delivered)
 
-    def _launch(self, claim: Claim) -> Run:
+    def launch(self, claim: Claim) -> Run:
+        """Let Ray stream what was computed beforehand."""
         return Run(claim, _deliver.remote(self._delivered))
 
 
@@ -77,12 +80,13 @@ def _deliver(delivered: Batches) -> Iterator[tuple[Delivered, ...]]:
     yield from (batch for batch in delivered)  # a generator, as Ray wants it
 
 
-def steps_per_second(url: str, kind: type[Supervisor], delivered: Batches) -> float:
+def steps_per_second(url: str, kind: type[WithoutRay] | type[ThroughRay], delivered: Batches) -> float:
     """From a queued experiment to its end."""
     migrations.upgrade(url)
     store = Store(url)
     experiment = submission.submit_experiment(store, SPEC).id
-    ours = kind(store, delivered)
+    ours = Supervisor(store, lambda: AT_ONCE)
+    ours._repetitions = kind(store, delivered)
     begun = perf_counter()
     idle = 0
     while idle < 2:  # the round that ends the last repetition, and one that finds no more

@@ -1,17 +1,17 @@
-"""`python -m docs.generate`, or `make docs`: writes docs/reference/ out of the code itself.
+"""`python -m docs.generate`, or `make docs`: writes docs/reference/ and the types of the page from the code.
 
-tests/unit/test_docs.py fails as long as what is kept there is not what this would write.
+tests/unit/test_docs.py fails while the files in the repository differ from what this would write.
 """
 
 import inspect
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import typer
 
+from docs import typescript
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
 from gaplab.api.commands.cli import app
@@ -98,16 +98,11 @@ def python() -> Iterator[str]:
 def settings() -> Iterator[str]:
     """Every variable of the environment."""
     yield "The environment is read once, when a process starts.\n"
-    rows = [
-        (f"`GAPLAB_{each.name.upper()}`", _attribute(Settings, each.name), _default(each.default))
-        for each in fields(Settings)
-    ]
+    rows = [(f"`GAPLAB_{name.upper()}`", _attribute(Settings, name), _default(value)) for name, value in Settings()]
     own = "folders with plug-ins of your own, like `PATH`: [how](../how-to/strategy.md)"
     yield from _table(("variable", "meaning", "left out"), [*rows, (f"`{VARIABLE}`", own, "none")])
     yield "## Limits\n\nWhat is said of a token holds as well for all who need none, taken together.\n"
-    limits = [
-        (f"`{variable_of(each.name)}`", _attribute(Limits, each.name), f"{each.default:,}") for each in fields(Limits)
-    ]
+    limits = [(f"`{variable_of(name)}`", _attribute(Limits, name), f"{most:,}") for name, most in Limits()]
     yield from _table(("variable", "at most", "left out"), limits)
 
 
@@ -189,6 +184,8 @@ def main() -> None:
     for name, text in pages().items():
         (FOLDER / name).write_text(text, "utf-8")
         typer.echo(f"Wrote {FOLDER / name}.")
+    typescript.FILE.write_text(typescript.declarations(), "utf-8")
+    typer.echo(f"Wrote {typescript.FILE}.")
 
 
 if __name__ == "__main__":

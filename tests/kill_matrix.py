@@ -27,7 +27,7 @@ from gaplab.services.store.models import CheckpointRow, IterationRow, Measuremen
 from gaplab.services.store.queries import checkpoints, steps
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import Recorder
-from gaplab.workers.supervisor import Supervisor
+from gaplab.workers.repetitions import Repetitions
 from tests.kept_databases import Databases
 from tests.postgres import running
 from tests.without_ray import SPEC, work
@@ -64,9 +64,9 @@ POINTS: dict[str, Wrap] = {
     "checkpoint is written": around(checkpoints, "write"),
     "steps are written": around(steps, "record"),
     "commit": around(DefaultDialect, "do_commit"),
-    "acknowledgement": around(Supervisor, "_store_received"),
+    "acknowledgement": around(Repetitions, "store_received"),
     "heartbeat": around(execution, "heartbeat"),
-    "completion": around(execution, "complete_all"),
+    "completion": around(execution, "complete"),
     "hand back": around(execution, "hand_back"),
     "requeue of what was lost": around(execution, "requeue_lost"),
 }

@@ -12,10 +12,9 @@ from gaplab.services.running.execution import Claim
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.session import Store
-from gaplab.workers import supervisor
+from gaplab.workers import repetitions, supervisor
 from gaplab.workers.checkpoints import recorded
-from gaplab.workers.repetition import batches
-from gaplab.workers.run import Run
+from gaplab.workers.repetitions import Repetitions, Run, batches
 from gaplab.workers.supervisor import Supervisor
 
 SPEC = ExperimentSpec.model_validate(
@@ -63,21 +62,30 @@ class NoChecks:
         """None was taken."""
 
 
-class Here(Supervisor):
-    """The supervisor as it is, but for Ray; every answer of a simulator is a checkpoint."""
+class HereRepetitions(Repetitions):
+    """Repetitions that this process computes; every answer of a simulator is a checkpoint."""
 
-    def __init__(self, store: Store) -> None:
-        super().__init__(store, lambda: 2)
-        self._checks = NoChecks()  # type: ignore[assignment]
-
-    def _launch(self, claim: Claim) -> Run:
+    def launch(self, claim: Claim) -> Run:
+        """Compute the repetition in this process."""
         stream = batches(recorded(setting(claim.spec, claim.number), claim.log, claim.checkpoints, 0.0))
         return HereRun(claim, stream)  # type: ignore[arg-type]
 
-    def _receive(self) -> None:
-        for run in self._runs:
+    def receive(self) -> None:
+        """Take the next batch of each run."""
+        for run in self.runs:
             if not run.over:
                 run.receive()
+
+
+class Here(Supervisor):
+    """The supervisor as it is, but for Ray."""
+
+    repetitions: type[HereRepetitions] = HereRepetitions
+
+    def __init__(self, store: Store) -> None:
+        super().__init__(store, lambda: 2)
+        self._repetitions = self.repetitions(store, self._owner, {})
+        self._checks = NoChecks()  # type: ignore[assignment]
 
 
 class Stop:
@@ -98,7 +106,7 @@ class Stop:
 
 def work(url: str) -> None:
     """What a supervisor does from its start to the end of all that is queued; it is told to stop once on the way."""
-    supervisor.HEARTBEATS, supervisor.WAIT_S = 10**9, 0.0  # a heartbeat in each round, and no pause
+    supervisor.HEARTBEATS, repetitions.WAIT_S = 10**9, 0.0  # a heartbeat in each round, and no pause
     store = Store(url)
     execution.requeue_lost(store, stale_after_s=-1.0)  # half a minute has passed since the last one died
     Here(store).serve(Stop(8))  # type: ignore[arg-type]

@@ -14,7 +14,7 @@ import pytest
 
 from gaplab.schemas.lifecycle import OPEN
 from gaplab.services.archives import import_archive
-from gaplab.services.experiments.listing import Which
+from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.experiments.submission import cancel_experiment, list_experiments
 from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
@@ -65,7 +65,7 @@ def written(written_file):
     store = Store(f"sqlite:///{written_file}")
     yield store
     for state in OPEN:
-        for each in list_experiments(store, Which(state=state), limit=500, cursor=None).items:
+        for each in list_experiments(store, ListFilter(state=state), limit=500, cursor=None).items:
             cancel_experiment(store, each.id)
     store.dispose()
 

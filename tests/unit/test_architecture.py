@@ -16,16 +16,32 @@ ON_DEMAND = {
     "IPython",
 }  # heavy, or not installed everywhere: never at the top of a module of the API
 
+ROOMS = {
+    "core": ((), {"numpy", "scipy", "pydantic", "cma"}),
+    "engines": (("core",), {"numpy", "pydantic"}),
+    "store": (("core",), {"sqlalchemy", "psycopg"}),
+    "figures": ((), {"plotly", "matplotlib"}),
+    "specs": (("core", "engines"), {"numpy"}),
+    "plugins": (("core", "engines", "specs"), set()),
+    "experiments": (("core", "engines", "store", "specs", "plugins", "settings"), {"sqlalchemy"}),
+    "running": (("core", "engines", "store", "plugins", "experiments"), {"sqlalchemy"}),
+    "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
+    "replay": (("core", "store", "specs", "experiments"), {"numpy", "cachetools"}),
+    "archives": (("core", "store", "specs", "experiments", "results"), {"pydantic", "pyarrow"}),
+}
+"""Rooms of services, each below those that may import it: what of services each may import, and what of others."""
+
 # code in -> what of ours it may import, and what of others; the first prefix that fits counts
 ARROWS = {
     "schemas": (("schemas",), {"pydantic", "pydantic_core"}),
-    "services/core": (("schemas", "services.core"), {"numpy", "scipy", "pydantic", "cma"}),
-    "services/engines": (("schemas", "services.core", "services.engines"), {"numpy", "pydantic"}),
-    "services/store": (("schemas", "services.core", "services.store"), {"sqlalchemy", "psycopg"}),
-    "services/archives": (("schemas", "services"), {"pydantic", "pyarrow"}),
-    "services/figures": (("schemas", "services.figures"), {"plotly", "matplotlib"}),
-    "services/replay": (("schemas", "services"), {"numpy", "cachetools"}),
-    "services": (("schemas", "services"), {"numpy"}),
+    **{
+        f"services/{room}": (("schemas", *(f"services.{each}" for each in (room, *below))), others)
+        for room, (below, others) in ROOMS.items()
+    },
+    "services": (
+        ("schemas", "services.core", "services.plugins", "services.store"),
+        {"pydantic", "pydantic_settings"},
+    ),
     "workers": (("schemas", "services", "workers"), {"numpy", "ray"}),
     "api": (
         ("schemas", "services", "api", "migrations"),
@@ -82,6 +98,34 @@ def test_imports_follow_the_arrows(path):
             assert is_under(module.removeprefix("gaplab."), ours), f"{path} may not import {module}"
         elif top not in sys.stdlib_module_names:
             assert top in others, f"{path} may not import {module}"
+
+
+def test_each_room_of_services_imports_only_rooms_before_it():
+    """So there is no circle of rooms."""
+    order = [*ROOMS, "settings"]
+
+    for room, (below, _) in ROOMS.items():
+        assert all(each == "settings" or order.index(each) < order.index(room) for each in below), room
+    folders = {path.parent.name for path in (ROOT / "services").glob("*/__init__.py")}
+    assert folders == set(ROOMS)
+
+
+def test_states_are_written_in_one_place():
+    """`move` alone, which uses the table of permitted moves; what is inserted or imported is no move."""
+    writers = set()
+    for path in MODULES:
+        if path.parts[0] in {"services", "workers", "api"} and path.parts[1] != "archives":
+            for node in ast.walk(ast.parse((ROOT / path).read_text())):
+                match node:
+                    case ast.Call(func=ast.Attribute(attr="values"), keywords=keywords):
+                        writers |= {path.as_posix() for each in keywords if each.arg == "state"}
+                    case ast.Assign(targets=[ast.Attribute(attr="state")]):
+                        writers.add(path.as_posix())
+                    case ast.Dict(keys=keys, values=values):
+                        pairs = zip(keys, values, strict=True)
+                        named = [ast.unparse(value) for key, value in pairs if getattr(key, "value", None) == "state"]
+                        writers |= {path.as_posix() for each in named if each.startswith("State.")}
+    assert writers == {"services/experiments/states.py"}
 
 
 @pytest.mark.parametrize("path", [each for each in MODULES if each.as_posix().startswith("services/core/")], ids=str)
