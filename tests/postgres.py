@@ -57,7 +57,7 @@ class Installation:
             account = pwd.getpwnam(self.user)
             os.chown(data, account.pw_uid, account.pw_gid)
         options = ["--no-locale", "--encoding=UTF8", "--auth=trust", "--username=postgres", "--no-sync"]
-        call = [self.programs / "initdb", *options, "-D", data]
+        call: list[str | Path] = [self.programs / "initdb", *options, "-D", data]
         done = subprocess.run(call, user=self.user, cwd=data, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
 
