@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks import naive
 from benchmarks.measure import Row, rates, ratio
-from gaplab.api.process.local_service import own_service
+from gaplab.api.process.local_service import start_service
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Selected, Transferred, Tuned
@@ -36,7 +36,7 @@ def service() -> Iterator[Callable[[], int]]:
     """The whole experiment, submitted to a real service; its rollouts."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        with own_service(f"sqlite:///{folder / 'bench.db'}", folder / "service.log") as client:
+        with start_service(f"sqlite:///{folder / 'bench.db'}", folder / "service.log") as client:
             client.check({})  # comes with the first such experiment, and is no part of what is measured
 
             def work() -> int:

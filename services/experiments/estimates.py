@@ -5,7 +5,8 @@ from collections.abc import Mapping
 
 from gaplab.schemas.estimates import EngineCost, EstimateRead, ExperimentCost
 from gaplab.schemas.plugin import PluginRef
-from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.spec import StudySpec
 from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import check_extent
 from gaplab.services.settings import Limits
@@ -60,33 +61,30 @@ def _measured(found: tuple[tuple[dict[str, object], float, int], ...]) -> dict[K
     return {key: seconds[key] / count for key, count in rollouts.items() if count and seconds[key]}
 
 
-def _key(spec: ExperimentSpec) -> Key:
+def _key(spec: ResolvedSpec) -> Key:
     return spec.robot.model_dump_json(), _engine(spec).model_dump_json()
 
 
-def _engine(spec: ExperimentSpec) -> PluginRef:
-    """The engine that computes it."""
-    engine = spec.reality.engine if is_direct(spec) else spec.engine
-    assert engine is not None  # the spec is resolved
-    return engine
+def _engine(spec: ResolvedSpec) -> PluginRef:
+    """Return the engine that computes it."""
+    return spec.reality.engine if is_direct(spec) else spec.engine
 
 
-def _cost(spec: ExperimentSpec, measured: Mapping[Key, float]) -> EngineCost:
+def _cost(spec: ResolvedSpec, measured: Mapping[Key, float]) -> EngineCost:
     engine = _engine(spec)
     known = measured.get(_key(spec))
     usual = engines[engine.name].usual_rollout_s
     return EngineCost(engine=engine.name, seconds_per_rollout=known or usual, measured=known is not None)
 
 
-def _experiment(spec: ExperimentSpec, cost: EngineCost) -> ExperimentCost:
-    repetitions = spec.repetitions or 0
-    rollouts = expected_rollouts(spec) * repetitions
+def _experiment(spec: ResolvedSpec, cost: EngineCost) -> ExperimentCost:
+    rollouts = expected_rollouts(spec) * spec.repetitions
     return ExperimentCost(
-        name=spec.name or spec.strategy.name,
+        name=spec.name,
         strategy=spec.strategy.name,
         engine=cost.engine,
-        repetitions=repetitions,
-        iterations=0 if is_direct(spec) else spec.iterations or 0,
+        repetitions=spec.repetitions,
+        iterations=0 if is_direct(spec) else spec.iterations,
         rollouts=rollouts,
         core_seconds=rollouts * cost.seconds_per_rollout,
     )

@@ -17,10 +17,12 @@ from gaplab.schemas.records import (
     SimulatorRead,
     StudyRead,
 )
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.experiments import checks
+from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.lifecycle import ask_experiment
-from gaplab.services.experiments.limits import FREELY, Admission, Once, check_extent, check_load, once
+from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
 from gaplab.services.experiments.listing import list_experiments as list_experiments
 from gaplab.services.experiments.listing import list_studies as list_studies
 from gaplab.services.experiments.views import view_experiments, view_repetition, view_studies
@@ -196,9 +198,9 @@ def cancel_experiment(store: Store, experiment_id: str) -> ExperimentRead:
     return ask_experiment(store, experiment_id, Verb.CANCEL)
 
 
-def extent_of(spec: ExperimentSpec) -> Extent:
+def extent_of(spec: ResolvedSpec) -> Extent:
     """How much one repetition of a resolved spec is."""
-    samples = 0 if is_direct(spec) else spec.iterations or 0
+    samples = 0 if is_direct(spec) else spec.iterations
     return Extent(iterations=samples + 1, rollouts=expected_rollouts(spec))
 
 

@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import ASKED, Ending, State
 from gaplab.schemas.provenance import Provenance
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.types import Step
 from gaplab.services.experiments.states import settle
@@ -177,7 +177,7 @@ def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
         .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
         .where(row.id.in_(ids))
     ).all()
-    specs = {experiment: ExperimentSpec.model_validate(spec) for _, _, experiment, _, spec in rows}
+    specs = {experiment: ResolvedSpec.model_validate(spec) for _, _, experiment, _, spec in rows}
     past, parts = logs(session, ids), checkpoints.stored(session, ids)
     claims = {
         id_: Claim(id_, epoch, experiment, number, specs[experiment], past[id_], parts[id_])

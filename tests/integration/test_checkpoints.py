@@ -8,19 +8,18 @@ import numpy as np
 import pytest
 
 from gaplab.schemas.lifecycle import State
+from gaplab.services.core.answers import unpack
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.recall import unpack
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Checkpoint
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.store.models import CheckpointRow
 from gaplab.services.store.session import Store
-from gaplab.workers.checkpoints import Recorder, recorded
+from gaplab.workers.checkpoints import StepRecorder, recorded
 from tests.experiments import same, some_log, toy
-from tests.fakes import Recorder as Calls
-from tests.fakes import flat, paraboloid, small_setting
+from tests.fakes import Recorder, flat, paraboloid, small_setting
 
 
 def steps_of(told: Any) -> Any:
@@ -41,7 +40,7 @@ def test_a_repetition_told_at_any_moment_goes_on_from_there() -> None:
 
 
 def test_what_a_checkpoint_has_is_not_simulated_again() -> None:
-    first, second = Calls(), Calls()
+    first, second = Recorder(), Recorder()
     told = list(recorded(small_setting(simulate=first), (), (), 0.0))
     checkpoints = [each for each in told if isinstance(each, Checkpoint) and each.step == 1]
 
@@ -61,11 +60,11 @@ def test_a_call_that_would_take_long_is_made_in_several() -> None:
         time.sleep(0.002 * len(genomes))
         return paraboloid(genomes, parameters)
 
-    calls, told = Calls(slow), []
-    recorder = Recorder(calls, told.append, 0.02, 5)
+    calls, told = Recorder(slow), []
+    answers = StepRecorder(told.append, 0.02, 5).answers(small_setting(simulate=calls))
     genomes = np.random.default_rng(0).random((30, 2))
 
-    fitnesses = recorder(genomes, genomes[:2])
+    fitnesses = answers(genomes, genomes[:2])
 
     np.testing.assert_array_equal(fitnesses, paraboloid(genomes, genomes[:2]))
     assert len(calls.calls) > 2

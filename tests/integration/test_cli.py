@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 
-from gaplab.api.clients.client import Client, ServiceError, ServiceUnreachable
-from gaplab.api.commands import reading
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
+from gaplab.api.commands import records
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
@@ -39,7 +40,7 @@ def submitted(gaplab: Gaplab, spec: str = SMOKE) -> str:
 
 
 def test_submit_prints_the_id_that_show_and_list_know(gaplab: Gaplab) -> None:
-    id = submitted(gaplab)  # noqa: A001
+    id = submitted(gaplab)
 
     shown, listed = gaplab("show", id), gaplab("list")
 
@@ -51,7 +52,7 @@ def test_submit_prints_the_id_that_show_and_list_know(gaplab: Gaplab) -> None:
 
 
 def test_an_edit_that_is_none_is_a_sentence(gaplab: Gaplab) -> None:
-    id = submitted(gaplab)  # noqa: A001
+    id = submitted(gaplab)
 
     nothing, nameless = gaplab("edit", id), gaplab("edit", id, "--name", "")
 
@@ -73,7 +74,7 @@ def test_a_spec_with_several_strategies_or_none_is_a_study(gaplab: Gaplab) -> No
 def test_an_experiment_of_no_study_is_listed_whatever_many_of_studies_are_newer(
     gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(reading, "PAGE", 4)
+    monkeypatch.setattr(records, "PAGE", 4)
     older, alone = submitted(gaplab), submitted(gaplab)
     studies = [submitted(gaplab, str(EXAMPLES / "toy.json")) for _ in range(2)]
 
@@ -127,7 +128,7 @@ def test_watching_what_fails_says_why_and_ends_with_1(gaplab: Gaplab, sqlite_sto
 
 def test_curves_are_a_table_values_or_drawings(gaplab: Gaplab, sqlite_store: Store, tmp_path: Path) -> None:
     small = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "smoke", "repetitions": 3}
-    id = gaplab("submit", "-", stdin=json.dumps(small)).out.strip()  # noqa: A001
+    id = gaplab("submit", "-", stdin=json.dumps(small)).out.strip()
     finish(sqlite_store)
     svg, html = tmp_path / "new" / "fig.svg", tmp_path / "fig.html"
 
@@ -145,7 +146,7 @@ def test_curves_are_a_table_values_or_drawings(gaplab: Gaplab, sqlite_store: Sto
 
 
 def test_a_cancelled_study_has_no_experiment_left_to_run(gaplab: Gaplab) -> None:
-    id = submitted(gaplab, str(EXAMPLES / "toy.json"))  # noqa: A001
+    id = submitted(gaplab, str(EXAMPLES / "toy.json"))
 
     first, second = gaplab("cancel", id), gaplab("cancel", id)
 
@@ -155,7 +156,7 @@ def test_a_cancelled_study_has_no_experiment_left_to_run(gaplab: Gaplab) -> None
 
 
 def test_the_verbs_say_what_it_is_now_and_forbidden_ones_are_a_sentence(gaplab: Gaplab, sqlite_store: Store) -> None:
-    id = submitted(gaplab)  # noqa: A001
+    id = submitted(gaplab)
 
     said = [gaplab(verb, id) for verb in ("pause", "resume", "resume")]
     finish(sqlite_store)
@@ -228,7 +229,7 @@ def test_mistakes_in_what_is_to_be_checked_are_sentences(gaplab: Gaplab) -> None
 def test_show_tells_warnings_and_misfit(gaplab: Gaplab, sqlite_store: Store) -> None:
     small = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 3}
     tunables = ["static_friction", {"name": "restitution", "lower": 0.3, "upper": 0.3001}]
-    id = gaplab("submit", "-", stdin=json.dumps(small | {"tunables": tunables})).out.strip()  # noqa: A001
+    id = gaplab("submit", "-", stdin=json.dumps(small | {"tunables": tunables})).out.strip()
     checked(sqlite_store)
     before = gaplab("show", id)
     finish(sqlite_store)

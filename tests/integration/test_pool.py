@@ -47,7 +47,7 @@ def pool(alone: Any) -> Any:
     """A pool that knows how long a rollout takes, and has a helper."""
     warm = Pool(SPEC, alone.simulate, 1)
     deadline = time.monotonic() + 60
-    while warm.batch() < 2:
+    while warm.batch_size() < 2:
         assert time.monotonic() < deadline
         warm(*asked(alone, 2, 1))
     return warm
@@ -83,7 +83,7 @@ def until(pool: Any, alone: Any, batch: Any) -> None:
     """Wait until so many rollouts are what keeps the cores busy; one call has said that there is work for them."""
     deadline = time.monotonic() + 60
     pool(*asked(alone, batch, 1))
-    while pool.batch() != batch:
+    while pool.batch_size() != batch:
         assert time.monotonic() < deadline
         time.sleep(0.05)
 
@@ -115,7 +115,7 @@ def test_a_helper_that_dies_or_dawdles_costs_time_and_no_result(
 
     np.testing.assert_array_equal(got, expected)
     assert spreads[-1].lost
-    assert pool.batch() == 1  # it is not asked again
+    assert pool.batch_size() == 1  # it is not asked again
 
 
 def test_one_of_several_helpers_that_dies_is_asked_no_more(alone: Any, pool: Any) -> None:

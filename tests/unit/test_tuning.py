@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gaplab.services.core.answers import Answers
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
 from gaplab.services.core.tuning import Misfit, draw_simulators, simulator_fitness, squared_errors, tune
 from gaplab.services.core.types import Sample, Space
@@ -31,7 +32,7 @@ def test_a_simulator_that_fails_on_a_sample_has_an_infinite_error() -> None:
 
 
 def test_tuning_finds_the_parameters_of_reality() -> None:
-    best, *_ = tune(Misfit(paraboloid, SAMPLES), SPACE, SteadyState(), 1000, np.random.default_rng(1))
+    best, *_ = tune(Misfit(Answers(paraboloid), SAMPLES), SPACE, SteadyState(), 1000, np.random.default_rng(1))
 
     np.testing.assert_allclose(best.parameters, TRUTH, atol=0.01)
 
@@ -42,9 +43,9 @@ def many_samples(count: Any) -> Any:
 
 
 class Thorough(SteadyState):
-    """The same evolution, but it calls nothing hopeless: every simulator is asked for every sample."""
+    """The same evolution, but it knows no threshold: every simulator is asked for every sample."""
 
-    def hopeless(self, state: Any, genomes: Any) -> Any:
+    def rejection_thresholds(self, state: Any, genomes: Any) -> Any:
         return np.full(len(genomes), -np.inf)
 
     def diverse(self, size: Any) -> Any:
@@ -54,13 +55,14 @@ class Thorough(SteadyState):
 @pytest.mark.parametrize("batch", [1, 4])
 @pytest.mark.parametrize("count", [1, 3, 10])
 @pytest.mark.parametrize("diverse", [False, True])
-def test_giving_hopeless_simulators_up_saves_rollouts_and_changes_no_bit(count: Any, diverse: Any, batch: Any) -> None:
+def test_giving_up_simulators_below_their_threshold_saves_rollouts_and_changes_no_bit(
+    count: Any, diverse: Any, batch: Any
+) -> None:
     def tuned(optimizer: Any) -> Any:
         simulate = Recorder()
         optimizer = optimizer.diverse(8) if diverse else optimizer
-        found = tune(
-            Misfit(simulate, many_samples(count), lambda: batch), SPACE, optimizer, 300, np.random.default_rng(1)
-        )
+        misfit = Misfit(Answers(simulate, lambda: batch), many_samples(count))
+        found = tune(misfit, SPACE, optimizer, 300, np.random.default_rng(1))
         return [(each.parameters.tobytes(), each.squared_error) for each in found], simulate.rollouts
 
     thorough, all_rollouts = tuned(Thorough())
@@ -71,12 +73,12 @@ def test_giving_hopeless_simulators_up_saves_rollouts_and_changes_no_bit(count: 
     assert count <= batch or rollouts < 0.9 * all_rollouts
 
 
-def test_failing_physics_makes_a_simulator_hopeless_too() -> None:
+def test_a_simulator_whose_physics_fails_is_given_up_too() -> None:
     def half_broken(genomes: Any, parameters: Any) -> Any:
         return np.where(parameters[None, :, 0] < 0.5, np.nan, paraboloid(genomes, parameters))
 
     def tuned(optimizer: Any) -> Any:
-        found = tune(Misfit(half_broken, many_samples(5)), SPACE, optimizer, 200, np.random.default_rng(1))
+        found = tune(Misfit(Answers(half_broken), many_samples(5)), SPACE, optimizer, 200, np.random.default_rng(1))
         return [(each.parameters.tobytes(), each.squared_error) for each in found]
 
     assert tuned(SteadyState()) == tuned(Thorough())
@@ -92,7 +94,7 @@ def test_a_simulators_error_does_not_depend_on_how_many_are_asked_for_at_once() 
 
 
 def test_simulators_come_best_first_with_their_own_error() -> None:
-    simulators = tune(Misfit(paraboloid, SAMPLES), SPACE, SteadyState(), 100, np.random.default_rng(1))
+    simulators = tune(Misfit(Answers(paraboloid), SAMPLES), SPACE, SteadyState(), 100, np.random.default_rng(1))
 
     errors = [each.squared_error for each in simulators]
     measured = np.array([each.fitness for each in SAMPLES])
@@ -103,7 +105,7 @@ def test_simulators_come_best_first_with_their_own_error() -> None:
 
 def test_a_diverse_ensemble_stays_farther_apart_than_a_converged_population() -> None:
     def spread(optimizer: Any) -> Any:
-        found = tune(Misfit(paraboloid, SAMPLES), SPACE, optimizer, 500, np.random.default_rng(1))
+        found = tune(Misfit(Answers(paraboloid), SAMPLES), SPACE, optimizer, 500, np.random.default_rng(1))
         return np.array([each.parameters for each in found]).std(axis=0).mean()
 
     population = SteadyState(SteadyStateOptions(population=10))
@@ -115,7 +117,7 @@ def test_failing_physics_never_wins() -> None:
     def half_broken(genomes: Any, parameters: Any) -> Any:
         return np.where(parameters[None, :, 0] < 0.5, np.nan, paraboloid(genomes, parameters))
 
-    best, *_ = tune(Misfit(half_broken, SAMPLES), SPACE, SteadyState(), 300, np.random.default_rng(1))
+    best, *_ = tune(Misfit(Answers(half_broken), SAMPLES), SPACE, SteadyState(), 300, np.random.default_rng(1))
 
     assert best.parameters[0] >= 0.5
 
