@@ -64,7 +64,9 @@ def exact(value: Any) -> Any:
 def numbers(found: Any) -> Any:
     """The numbers of an archive: for each experiment, for each repetition, for each table its rows, in exact floats."""
     experiments = found["experiment"]
-    repetitions = {each["id"]: [{} for _ in range(each["spec"]["repetitions"])] for each in experiments}
+    repetitions: dict[str, list[dict[str, Any]]] = {
+        each["id"]: [{} for _ in range(each["spec"]["repetitions"])] for each in experiments
+    }
     for table, columns in NUMBERS.items():
         for row in found[table]:
             owner = row["experiment_id" if table == "repetition" else "experiment"]
