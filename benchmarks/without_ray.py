@@ -72,7 +72,7 @@ class Here(Supervisor):
 
     def _launch(self, claim: Claim) -> Run:
         stream = batches(recorded(setting(claim.spec, claim.number), claim.log, claim.checkpoints, 0.0))
-        return HereRun(claim, stream)  # type: ignore[arg-type]
+        return HereRun(claim, stream)
 
     def _receive(self) -> None:
         for run in self._runs:

@@ -145,4 +145,4 @@ def test_the_benchmark_runs_a_repetition_as_the_service_does(monkeypatch):
     )
     monkeypatch.setattr(benchmark, "SPEC", spec)
 
-    assert benchmark.spread() == sum(1 for _ in repetition(setting(resolve_experiment(spec), 0)))
+    assert benchmark.on_all_cores() == sum(1 for _ in repetition(setting(resolve_experiment(spec), 0)))
