@@ -2,7 +2,6 @@
 
 PYTHON ?= python3.11
 BIN := .venv/bin
-CHROMIUM := $(GAPLAB_CHROMIUM) $(shell which chromium chromium-browser google-chrome google-chrome-stable 2>/dev/null)
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -47,7 +46,7 @@ clean:  ## remove the environment and what tools cached; results stay
 	touch $@
 
 .venv/browser: .venv/installed-dev
-	$(if $(strip $(CHROMIUM)),,$(BIN)/playwright install --with-deps chromium-headless-shell)
+	$(BIN)/python -m tests.e2e.install_browser
 	touch $@
 
 .PHONY: help demo serve test lint bench docs soak clean

@@ -31,7 +31,7 @@ from gaplab.api.routes import (
     sensitivity,
     studies,
 )
-from gaplab.services.replay.process import Physics
+from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.settings import Limits, Settings
 from gaplab.services.store.session import Store
 
@@ -100,7 +100,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     limits = limits or Limits()
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
     app.state.feed = Feed(store)
-    app.state.physics = Physics()
+    app.state.rollout_process = RolloutProcess()
     app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
     app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(GZipMiddleware, minimum_size=20_000, compresslevel=4)

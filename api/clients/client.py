@@ -28,6 +28,7 @@ from gaplab.api.clients.life_cycle import LifeCycle, part
 from gaplab.api.clients.waiting import Waiting
 from gaplab.schemas.curves import Comparison, Curve
 from gaplab.schemas.editing import Edit
+from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.misfit import MisfitRead
 from gaplab.schemas.plugin import Catalogue
 from gaplab.schemas.records import ExperimentRead, Page, RepetitionRead, StudyRead
@@ -61,6 +62,10 @@ class Client(LifeCycle, Waiting, Frames, Figures, History, Archives, Connection)
         if "strategy" in body and "strategies" not in body:
             return self._read(ExperimentRead, self._create("/experiments", body))
         return self._read(StudyRead, self._create("/studies", body))
+
+    def estimate(self, spec: StudySpec | Mapping[str, Any]) -> EstimateRead:
+        """Return the rollouts and the time that a study would take on the service's machine; nothing is stored."""
+        return self._read(EstimateRead, self._patiently("POST", "/studies/estimate", json=_body(spec)))
 
     def experiment(self, id: str) -> ExperimentRead:  # noqa: A002 - as the API says
         """An experiment."""

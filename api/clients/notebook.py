@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from html import escape
 
 from gaplab.api.clients import display
+from gaplab.api.clients.pace import Pace
 from gaplab.schemas.records import ExperimentRead, StudyRead
 
 Watched = ExperimentRead | StudyRead
@@ -24,27 +25,27 @@ def follow_in_notebook(stages: Iterable[Watched]) -> Watched:
     from IPython.display import HTML
     from IPython.display import display as show
 
-    handle = None
+    handle, pace = None, Pace()
     for stage in stages:
         if handle is None:
-            handle = show(HTML(bars(stage)), display_id=True)
+            handle = show(HTML(bars(stage, pace)), display_id=True)
         else:
-            handle.update(HTML(bars(stage)))
+            handle.update(HTML(bars(stage, pace)))
     return stage
 
 
-def bars(stage: Watched) -> str:
+def bars(stage: Watched, pace: Pace) -> str:
     """A line of HTML with a progress bar for a study and each of its experiments, or for an experiment."""
     parts = (stage, *stage.experiments) if isinstance(stage, StudyRead) else (stage,)
-    return f'<table style="text-align: left">{"".join(map(_row, parts))}</table>'
+    return f'<table style="text-align: left">{"".join(_row(each, pace.left(each)) for each in parts)}</table>'
 
 
-def _row(each: Watched) -> str:
+def _row(each: Watched, left: str | None) -> str:
     name = escape(each.name.replace("_", " "))
     done = 1.0 if each.state.ended else display.fraction(each.progress)
-    left = "" if each.state.ended or each.progress.seconds_left is None else f"{display.left(each.progress)} left"
     return (
         f"<tr><td>{f'<b>{name}</b>' if isinstance(each, StudyRead) else name}</td>"
         f'<td><progress max="1" value="{done:.3f}" aria-label="{name}">{done:.0%}</progress></td>'
-        f"<td>{each.state}</td><td>{each.progress.rollouts_done:,} rollouts</td><td>{left}</td></tr>"
+        f"<td>{each.state}</td><td>{each.progress.rollouts_done:,} rollouts</td>"
+        f"<td>{f'{left} left' if left else ''}</td></tr>"
     )

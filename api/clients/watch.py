@@ -8,6 +8,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TextColumn
 
 from gaplab.api.clients import display
+from gaplab.api.clients.pace import Pace
 from gaplab.schemas.records import ExperimentRead, StudyRead
 
 Watched = ExperimentRead | StudyRead
@@ -34,49 +35,46 @@ def _bars(stages: Iterable[Watched], console: Console) -> Watched:
         TextColumn("{task.fields[left]}", justify="right"),
     )
     tasks: dict[str, TaskID] = {}
+    pace = Pace()
     with Progress(*columns, console=console, expand=True, transient=True) as bars:
         for stage in stages:
             for each in _parts(stage):
                 if each.id not in tasks:
                     tasks[each.id] = bars.add_task("", total=1.0, rollouts="", left="")
-                _update(bars, tasks[each.id], each)
+                _update(bars, tasks[each.id], each, pace.left(each))
     return stage
 
 
-def _update(bars: Progress, task: TaskID, each: Watched) -> None:
+def _update(bars: Progress, task: TaskID, each: Watched, left: str | None) -> None:
     bold = ("[bold]", "[/]") if isinstance(each, StudyRead) else ("", "")
     bars.update(
         task,
         description=f"{bold[0]}{escape(each.name.replace('_', ' '))}{bold[1]} {display.state(each.state)}",
         completed=1.0 if each.state.ended else display.fraction(each.progress),
         rollouts=f"{each.progress.rollouts_done:,} rollouts",
-        left=_left(each),
+        left=f"{left} left" if left else "",
     )
 
 
 def _lines(stages: Iterable[Watched], console: Console) -> Watched:
-    said_at = -LINE_EVERY_S
+    said_at, pace = -LINE_EVERY_S, Pace()
     ended: set[str] = set()
     for stage in stages:
         news = [each for each in _parts(stage)[1:] if each.state.ended and each.id not in ended]
         ended |= {each.id for each in news}
         for each in news:
             console.print(f"{_clock()} {escape(each.name)}: {each.state}, {display.numbers(each.progress)}")
+        left = pace.left(stage)
         if stage.state.ended or time.monotonic() - said_at >= LINE_EVERY_S:
             said_at = time.monotonic()
-            console.print(f"{_clock()} {_line(stage)}")
+            console.print(f"{_clock()} {_line(stage, left)}")
     return stage
 
 
-def _line(stage: Watched) -> str:
+def _line(stage: Watched, left: str | None) -> str:
     done = f"{display.percent(stage.progress)}, {display.numbers(stage.progress)}"
-    rest = stage.state if stage.state.ended else _left(stage) or "time left unknown yet"
+    rest = stage.state if stage.state.ended else f"{left} left" if left else "time left not known yet"
     return f"{escape(stage.name)}: {done}; {rest}"
-
-
-def _left(each: Watched) -> str:
-    unknown = each.state.ended or each.progress.seconds_left is None
-    return "" if unknown else f"{display.left(each.progress)} left"
 
 
 def _parts(stage: Watched) -> tuple[Watched, ...]:

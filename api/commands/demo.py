@@ -20,6 +20,7 @@ from gaplab.api.clients import display
 from gaplab.api.clients.client import Client, ServiceError
 from gaplab.api.clients.findings import findings
 from gaplab.api.clients.watch import follow
+from gaplab.api.commands import demo_size
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.process.local_service import own_service
 from gaplab.schemas.lifecycle import State
@@ -27,6 +28,8 @@ from gaplab.schemas.records import ExperimentRead, StudyRead
 
 SPECS = Path(__file__).parents[3] / "examples"
 STUDIES = ("toy", "quadruped")
+SIZED = "quadruped"
+"""The study that is made as large as this machine computes in time."""
 
 
 def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
@@ -62,7 +65,8 @@ def _run_study(name: str, spec: dict[str, object], client: Client, folder: Path,
     if study:
         console.print(f"\n[bold]{name}[/]: going on with study {study.id} of an earlier run")
     else:
-        study = _study(client.submit(spec))
+        fitting = _sized(name, spec, client, console) if name == SIZED else spec
+        study = _study(client.submit(fitting))
         _remember(folder, name, spec, study.id)
         console.print(f"\n[bold]{name}[/]: POST /studies → 202, study {study.id}")
     ended = follow(client.watch(study.id, every_s=0.5), console)
@@ -72,6 +76,14 @@ def _run_study(name: str, spec: dict[str, object], client: Client, folder: Path,
         raise CommandError(msg, Exit.FAILED)
     console.print(f"{name}: {display.numbers(ended.progress)}")
     _show(name, _study(ended), client, folder, console)
+
+
+def _sized(name: str, spec: dict[str, object], client: Client, console: Console) -> dict[str, object]:
+    """Time a few rollouts on this machine, and return the version of the study that suits it."""
+    client.wait(client.submit(demo_size.trial(spec)).id, progress=False)
+    found = demo_size.sized(spec, client)
+    console.print(f"\n[bold]{name}[/]: {found.reason}; the study is sized for this machine")
+    return found.spec
 
 
 def _study(found: ExperimentRead | StudyRead) -> StudyRead:

@@ -15,7 +15,7 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.access import Caller, demand
 from gaplab.services.core.errors import InvalidSpec, NotFound
 from gaplab.services.experiments.limits import Admission, Once
-from gaplab.services.replay.process import Physics
+from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.store.session import Store
 
 R = TypeVar("R", bound=Frozen)
@@ -56,10 +56,10 @@ def _caller(request: Request) -> Caller:
     return caller
 
 
-def _physics(request: Request) -> Physics:
+def _rollout_process(request: Request) -> RolloutProcess:
     """The process of the app that computes what is asked for while somebody waits."""
-    physics: Physics = request.app.state.physics
-    return physics
+    process: RolloutProcess = request.app.state.rollout_process
+    return process
 
 
 def _limited(request: Request) -> Admission:
@@ -74,7 +74,7 @@ def _admission(admitted: Annotated[Admission, Depends(_limited)], key: Idempoten
 
 StoreDep = Annotated[Store, Depends(_store)]
 CallerDep = Annotated[Caller, Depends(_caller)]
-PhysicsDep = Annotated[Physics, Depends(_physics)]
+RolloutProcessDep = Annotated[RolloutProcess, Depends(_rollout_process)]
 LimitedDep = Annotated[Admission, Depends(_limited)]
 AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]

@@ -79,7 +79,7 @@ class Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """End the streams and the physics, answer the requests under way, and close."""
         self.config.app.state.feed.close()
-        self.config.app.state.physics.close()
+        self.config.app.state.rollout_process.close()
         await super().shutdown(sockets)
 
 

@@ -106,10 +106,10 @@ def compare_experiments(store: StoreDep, query: Annotated[ComparisonQuery, Query
         raise InvalidSpec(renamed) from error
 
 
-def _wanted(curves: tuple[Curve, ...], query: CurveQuery) -> tuple[Curve, ...] | Response:
-    return _csv(curves) if query.format == "csv" else tuple(curves)
+def _wanted(found: tuple[Curve, ...], query: CurveQuery) -> tuple[Curve, ...] | Response:
+    return _csv(found) if query.format == "csv" else found
 
 
-def _csv(curves: tuple[Curve, ...]) -> Response:
+def _csv(found: tuple[Curve, ...]) -> Response:
     disposition = {"Content-Disposition": 'attachment; filename="gaplab-curves.csv"'}
-    return Response(curves.curves_csv(curves), media_type="text/csv", headers=disposition)
+    return Response(curves.curves_csv(found), media_type="text/csv", headers=disposition)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, FastAPI, Query, Request, Response
 from pydantic import Field, model_validator
 
-from gaplab.api.http.dependencies import Id, PhysicsDep, StoreDep
+from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import Drawing, answer, responses
 from gaplab.api.http.problems import documented
 from gaplab.schemas.figures import FigureRead
@@ -110,12 +110,14 @@ def draw_simulators(store: StoreDep, query: Annotated[SimulatorsDrawing, Query()
     response_model=FigureRead,
     responses=responses() | documented(404, 422, 429),
 )
-def draw_predictions(store: StoreDep, physics: PhysicsDep, query: Annotated[ExperimentDrawing, Query()]) -> Response:
+def draw_predictions(
+    store: StoreDep, process: RolloutProcessDep, query: Annotated[ExperimentDrawing, Query()]
+) -> Response:
     """The fitness of the samples of an experiment in simulation, before and after tuning on it, against reality.
 
     About two seconds are computed for each question; ask again while some samples are pending, as its caption says.
     """
-    found = predictions(store, physics, query.experiment)
+    found = predictions(store, process, query.experiment)
     counts = {"pending": found.pending, "left_out": found.left_out}
     figure = predictions_figure(found.items, unit=found.unit, **counts, title=_title(store, query))
     return answer(_explained(store, query, figure), query)
@@ -148,9 +150,9 @@ def _explained(store: Store, query: ExperimentDrawing, figure: Figure) -> Figure
 
 def _curves(store: Store, query: CurvesDrawing) -> Figure:
     studies = [submission.read_study(store, each) for each in query.study]
-    curves = [curve for each in studies for curve in curves.study_curves(store, each.id)]
-    curves += curves.curves(store, query.experiment) if query.experiment else ()
-    curves = list({each.experiment: each for each in curves}.values())  # one that is asked for twice is one line
+    found = [curve for study in studies for curve in curves.study_curves(store, study.id)]
+    found += curves.curves(store, query.experiment) if query.experiment else ()
+    found = list({curve.experiment: curve for curve in found}.values())  # an experiment that is named twice is one line
     title = query.title if query.title is not None else ", ".join(each.name for each in studies)
-    against = None if query.x == "evaluations" else abscissa(store, curves, query.x, cost_s=query.cost_s)
-    return curves_figure(curves, title=title, band=query.band, against=against, each=query.each)
+    against = None if query.x == "evaluations" else abscissa(store, found, query.x, cost_s=query.cost_s)
+    return curves_figure(found, title=title, band=query.band, against=against, each=query.each)

@@ -5,14 +5,15 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
-from gaplab.api.http.dependencies import Id, PhysicsDep, StoreDep
+from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import Drawing, answer, responses
 from gaplab.api.http.problems import documented
 from gaplab.api.routes.replays import ReplayQuery
 from gaplab.schemas.figures import FigureRead
 from gaplab.services.figures.kinds.gait import gait_figure
 from gaplab.services.figures.kinds.toy import toy_figure
-from gaplab.services.replay.replays import Wanted, replay
+from gaplab.services.replay.replays import replay
+from gaplab.services.replay.rollout import ReplayChoice
 from gaplab.services.results.toy import toys
 
 router = APIRouter(prefix="/figures", tags=["figures"])
@@ -37,13 +38,13 @@ class ToyDrawing(Drawing):
 @router.get(
     "/gait", summary="Draw a gait", response_model=FigureRead, responses=responses() | documented(404, 409, 422, 429)
 )
-def draw_gait(store: StoreDep, physics: PhysicsDep, query: Annotated[GaitDrawing, Query()]) -> Response:
+def draw_gait(store: StoreDep, process: RolloutProcessDep, query: Annotated[GaitDrawing, Query()]) -> Response:
     """A controller's footfalls, height and speed over time, in its simulator and in reality.
 
     As of a replay, reality is shown of controllers that were measured there; 409 before they are.
     """
-    wanted = Wanted(query.repetition, query.iteration, query.kind, query.simulator)
-    return answer(gait_figure(replay(store, physics, query.experiment, wanted), title=query.title), query)
+    wanted = ReplayChoice(query.repetition, query.iteration, query.kind, query.simulator)
+    return answer(gait_figure(replay(store, process, query.experiment, wanted), title=query.title), query)
 
 
 @router.get("/toy", summary="Draw the toy function", response_model=FigureRead, responses=responses())

@@ -6,11 +6,12 @@ from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
 from gaplab.api.http import examples, replay_examples
-from gaplab.api.http.dependencies import Id, Parameters, PhysicsDep, StoreDep
+from gaplab.api.http.dependencies import Id, Parameters, RolloutProcessDep, StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.predictions import Predictions
 from gaplab.schemas.replays import ControllerKind, Replay
 from gaplab.services.replay import predictions, replays
+from gaplab.services.replay.rollout import ReplayChoice
 
 router = APIRouter(prefix="/experiments", tags=["replays"])
 
@@ -42,14 +43,14 @@ class ReplayQuery(Parameters):
 def read_replay(
     id: Id,  # noqa: A002 - the address says {id}
     store: StoreDep,
-    physics: PhysicsDep,
+    process: RolloutProcessDep,
     which: Annotated[ReplayQuery, Query()],
 ) -> Response:
     """A sample or a transferred controller in its simulator and in reality, from the same start, computed anew.
 
     Reality is shown of controllers that were measured there: their motion is not its parameters. 409 before they are.
     """
-    shown = replays.replay_json(store, physics, id, replays.Wanted(**which.model_dump()))
+    shown = replays.replay_json(store, process, id, ReplayChoice(**which.model_dump()))
     return Response(shown, media_type="application/json")
 
 
@@ -61,9 +62,9 @@ def read_replay(
         **documented(404, 422, 429),
     },
 )
-def read_predictions(id: Id, store: StoreDep, physics: PhysicsDep) -> Predictions:  # noqa: A002 - the address says {id}
+def read_predictions(id: Id, store: StoreDep, process: RolloutProcessDep) -> Predictions:  # noqa: A002 - the address says {id}
     """The fitness of each sample in the best simulator before it was measured, and after tuning on it.
 
     About two seconds are computed for each question; ask again while some are pending.
     """
-    return predictions.predictions(store, physics, id)
+    return predictions.predictions(store, process, id)

@@ -1,1 +1,1 @@
-"""Rollouts computed on request: replays and predictions."""
+"""Replays and predictions: rollouts that are computed on request."""

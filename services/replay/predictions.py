@@ -1,7 +1,6 @@
-"""Fitness of samples in the simulators before and after they were tuned on them: physics at the time of asking."""
+"""Predictions: the fitness of samples in simulation, before and after tuning on them, computed on request."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from time import monotonic
 
 import numpy as np
@@ -9,114 +8,111 @@ import numpy as np
 from gaplab.schemas.predictions import Prediction, Predictions
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.robots import robots
-from gaplab.services.replay.process import Key, Memory, Physics
+from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess
 from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, refuse_missing
 from gaplab.services.specs.resolution import spec_of, unit
 from gaplab.services.store.queries import experiments, replays
-from gaplab.services.store.queries.replays import SampleBetween
+from gaplab.services.store.queries.replays import TunedSample
 from gaplab.services.store.session import Store
 
 SECONDS = 2.0
-"""That one question may compute for; the rest is pending."""
+"""Time limit of the rollouts of one request; the rest stays pending."""
 
-MOST_ASKED = 2_000
-"""Samples that one question may compute."""
+MOST_AT_ONCE = 2_000
+"""Samples that are sent to the process in one request."""
 
-WEIGHT = 300
-"""Bytes of memory that a prediction takes, about."""
+SIZE_BYTES = 300
+"""Approximate size of a cached prediction."""
 
 MOST_KEPT = 20_000
-"""Samples of one experiment, so that those of eight have room in memory at once; else one would push out the other.
+"""Samples of one experiment that are predicted: those of its first repetitions.
 
-The paper's experiments have 400. Of more, those of the first repetitions, which are as good as any others.
+The cache then has room for eight such experiments. An experiment of the paper has 400 samples.
 """
 
 Fitness = float | None
 Pair = tuple[Fitness, Fitness]
-"""Before and after."""
+"""Fitness before and after tuning."""
 
 
-@dataclass(frozen=True)
-class Asked:
-    """One sample: its genome, and the parameters of the best simulators before and after."""
+def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, seconds: float = SECONDS) -> Predictions:
+    """Return the predictions of an experiment's samples, as far as they are computed.
 
-    genome: tuple[float, ...]
-    before: tuple[float, ...]
-    after: tuple[float, ...]
+    Each request computes more of them, early iterations first. The rest counts as pending: request it again. Samples
+    beyond `MOST_KEPT` are left out.
 
-
-def predictions(store: Store, physics: Physics, experiment_id: str, *, seconds: float = SECONDS) -> Predictions:
-    """The predictions of every sample that simulators were tuned on.
-
-    What is not known yet is computed for so many seconds, in the order of iterations over all repetitions; the rest is
-    counted as pending, and computed when it is asked for again. What there is no room for is left out.
+    Args:
+        store: has the experiment.
+        process: executes the rollouts and caches their fitness.
+        experiment_id: the experiment.
+        seconds: time limit of the rollouts of this request.
 
     Raises:
         NotFound: no such experiment.
-        InvalidSpec: its robot, its engine or a tunable has gone from here.
-        EngineUnavailable: its engine is not installed here.
-        EngineInterrupted: the physics died.
-        LimitReached: others were asking for too long.
+        InvalidSpec: its robot, its engine or a tunable is no longer installed.
+        EngineUnavailable: the library of its engine is not installed.
+        EngineInterrupted: the physics ended its process.
+        LimitReached: earlier requests took too long.
     """
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
-        every = replays.samples_between(session, experiment_id)
+        every = replays.tuned_samples(session, experiment_id)
     samples = every[:MOST_KEPT]
     spec = spec_of(row.spec)
-    unknown = [each for each in samples if physics.memory.get(_key(row.id, each)) is None]
+    unknown = [each for each in samples if process.answers.get(_key(row.id, each)) is None]
     unknown.sort(key=lambda each: (each.iteration, each.repetition))
     if unknown:
         refuse_missing(spec)
-        asked = [Asked(tuple(each.genome), tuple(each.before), tuple(each.after)) for each in unknown[:MOST_ASKED]]
-        pairs = physics.ask(predict, spec.model_dump_json(), asked, seconds)
-        for each, pair in zip(unknown, pairs, strict=False):
-            physics.memory.keep(_key(row.id, each), pair, WEIGHT)
-    found = _read(row.id, unit(spec), samples, physics.memory)
-    return found.model_copy(update={"left_out": len(every) - len(samples)})
+        pairs = process.call(predict, spec.model_dump_json(), unknown[:MOST_AT_ONCE], seconds)
+        for sample, pair in zip(unknown, pairs, strict=False):
+            process.answers.keep(_key(row.id, sample), pair, SIZE_BYTES)
+    items = _items(row.id, samples, process.answers)
+    return Predictions(
+        experiment=row.id,
+        unit=unit(spec),
+        items=items,
+        pending=len(samples) - len(items),
+        left_out=len(every) - len(samples),
+    )
 
 
-def predict(spec: str, asked: Sequence[Asked], seconds: float) -> list[Pair]:
-    """Fitness before and after of the first of those asked for: at least one, and as many as there is time for.
+def predict(spec: str, samples: Sequence[TunedSample], seconds: float) -> list[Pair]:
+    """Return the fitness before and after tuning of the first samples: at least one, then until the time is over.
 
     Args:
         spec: resolved, as JSON.
-        asked: samples with their simulators.
-        seconds: after which no other is begun.
+        samples: with the simulators around them.
+        seconds: time limit.
     """
     read = ExperimentSpec.model_validate_json(spec)
     robot = robots.create(read.robot)
     simulate = Simulation(robot, engine_of(read.engine), edits_of(ref.name for ref in read.tunables))
     found: list[Pair] = []
     until = monotonic() + seconds
-    for each in asked:
-        before, after = simulate(np.array([each.genome]), np.array([each.before, each.after]))[0].tolist()
+    for sample in samples:
+        before, after = simulate(np.array([sample.genome]), np.array([sample.before, sample.after]))[0].tolist()
         found.append((_finite(before), _finite(after)))
         if monotonic() > until:
             break
     return found
 
 
-def _read(experiment: str, unit_: str, samples: Sequence[SampleBetween], memory: Memory) -> Predictions:
-    items, pending = [], 0
-    for each in samples:
-        pair: Pair | None = memory.get(_key(experiment, each))
-        if pair is None:
-            pending += 1
-            continue
-        before, after = pair
-        items.append(
-            Prediction(
-                repetition=each.repetition,
-                iteration=each.iteration,
-                simulated_before=before,
-                simulated_after=after,
-                fitness=each.fitness,
-            )
+def _items(experiment: str, samples: Sequence[TunedSample], answers: AnswerCache) -> tuple[Prediction, ...]:
+    found: list[tuple[TunedSample, Pair | None]] = [(each, answers.get(_key(experiment, each))) for each in samples]
+    return tuple(
+        Prediction(
+            repetition=sample.repetition,
+            iteration=sample.iteration,
+            simulated_before=pair[0],
+            simulated_after=pair[1],
+            fitness=sample.fitness,
         )
-    return Predictions(experiment=experiment, unit=unit_, items=tuple(items), pending=pending)
+        for sample, pair in found
+        if pair is not None
+    )
 
 
-def _key(experiment: str, sample: SampleBetween) -> Key:
+def _key(experiment: str, sample: TunedSample) -> Key:
     return "prediction", experiment, sample.repetition, sample.iteration
 
 

@@ -1,81 +1,77 @@
-"""Physics in a process of its own: what it takes or breaks there is not the caller's."""
+"""Rollouts in a subprocess: a crash, a hang or memory that physics takes there does no harm to the service."""
 
 import logging
 import os
 import signal
-from collections import OrderedDict
 from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from threading import Lock
 from typing import Any, TypeAlias, TypeVar
 
+from cachetools import LRUCache
+
 from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
 
 T = TypeVar("T")
 
 LONGEST_S = 120.0
-"""One question may take so long; the process that takes longer is ended. The first one loads all libraries."""
+"""Time limit of one call, after which its process is killed. The first call of a process loads all libraries."""
 
 QUEUE_S = 20.0
-"""A question waits so long for those before it."""
+"""Time limit of the wait for earlier calls."""
 
 NICENESS = 10
-"""Whoever asks for pictures does not slow down those who serve."""
+"""Replays and predictions yield the processor to the service."""
 
 MOST_BYTES = 50_000_000
-"""Of answers that are remembered."""
+"""Memory for cached answers."""
 
 Key: TypeAlias = tuple[str | int | None, ...]
 
 log = logging.getLogger(__name__)
 
 
-class Memory:
-    """Answers that never change, the longest unused forgotten first.
+class AnswerCache:
+    """A thread-safe cache of answers that never change; the least recently used make room for new ones.
 
     Args:
-        most_bytes: that they may take together.
+        most_bytes: the sum of the sizes of all answers.
     """
 
     def __init__(self, most_bytes: int = MOST_BYTES) -> None:
-        self._most, self._taken = most_bytes, 0
+        self._answers: LRUCache[Key, tuple[Any, int]] = LRUCache(most_bytes, getsizeof=lambda entry: entry[1])
         self._lock = Lock()
-        self._found: OrderedDict[Key, tuple[Any, int]] = OrderedDict()
 
-    def get(self, key: Key) -> Any:  # noqa: ANN401 - whatever was kept
-        """What was kept under the key; None if nothing is."""
+    def get(self, key: Key) -> Any:  # noqa: ANN401 - the type that was kept
+        """Return the answer, or None if the cache does not have it."""
         with self._lock:
-            if key not in self._found:
-                return None
-            self._found.move_to_end(key)
-            return self._found[key][0]
+            return self._answers.get(key, (None, 0))[0]
 
-    def keep(self, key: Key, answer: Any, weight: int) -> None:  # noqa: ANN401 - whatever it is
-        """Remember an answer that takes so many bytes."""
-        with self._lock:
-            self._taken += weight - self._found.pop(key, (None, 0))[1]
-            self._found[key] = (answer, weight)
-            while self._taken > self._most:
-                self._taken -= self._found.popitem(last=False)[1][1]
+    def keep(self, key: Key, answer: Any, size_bytes: int) -> None:  # noqa: ANN401 - of any type
+        """Add an answer, unless it alone is too large for the cache."""
+        with self._lock, suppress(ValueError):
+            self._answers[key] = (answer, size_bytes)
 
 
-class Physics:
-    """Answers one question at a time in one process: started at its first, started anew if it dies or takes too long.
+class RolloutProcess:
+    """A subprocess that executes one call at a time.
 
-    The process ends with this one, however that ends: its end of the pipe closes, and there is nothing left to do.
+    It starts with the first call, and again after a crash or a timeout. It ends with its parent, even a parent that was
+    killed: the parent's end of the pipe closes, and the next read fails.
 
     Args:
-        longest_s: that one question may take.
-        queue_s: that a question waits for those before it.
+        longest_s: time limit of one call.
+        queue_s: time limit of the wait for earlier calls.
 
     Attributes:
-        memory: of answers, for those who ask.
+        answers: a cache for the callers.
     """
 
     def __init__(self, longest_s: float = LONGEST_S, queue_s: float = QUEUE_S) -> None:
-        self.memory = Memory()
+        self.answers = AnswerCache()
         self._longest_s, self._queue_s = longest_s, queue_s
         self._lock = Lock()
         self._process: BaseProcess | None = None
@@ -84,28 +80,32 @@ class Physics:
 
     @property
     def pid(self) -> int | None:
-        """Of the process; None while there is none."""
+        """Process id; None if no process is running."""
         return self._process.pid if self._process else None
 
-    def ask(self, function: Callable[..., T], *arguments: Any) -> T:  # noqa: ANN401 - whatever the function takes
-        """What the function of a module returns for the arguments, in the process.
+    def call(self, function: Callable[..., T], *arguments: Any) -> T:  # noqa: ANN401 - what the function takes
+        """Return `function(*arguments)`, computed in the subprocess.
+
+        Args:
+            function: defined at the top of a module, so that it can be pickled.
+            arguments: values that can be pickled.
 
         Raises:
-            EngineInterrupted: the process died of it, or it took too long, or everything is closed.
+            EngineInterrupted: the process died or took too long, or `close` was called.
             EngineUnavailable: the library of an engine is not installed.
-            LimitReached: others were asking for too long.
-            RuntimeError: the function raised anything else; the message has what.
+            LimitReached: earlier calls took too long.
+            RuntimeError: the function raised another error; the message quotes it.
         """
         if not self._lock.acquire(timeout=self._queue_s):
             msg = f"other replays and predictions have been computed for {self._queue_s:g} s; try again soon"
             raise LimitReached(msg, retry_after_s=5)
         try:
-            return self._answer(function, arguments)
+            return self._call(function, arguments)
         finally:
             self._lock.release()
 
     def close(self) -> None:
-        """End the process, whatever it is at; questions are refused from now on."""
+        """Kill the process, even in the middle of a call; later calls are refused."""
         self._closed = True
         if (process := self._process) is not None:
             process.kill()
@@ -119,55 +119,49 @@ class Physics:
             self._process.join()
         self._process = self._pipe = None
 
-    def _answer(self, function: Callable[..., T], arguments: tuple[Any, ...]) -> T:
+    def _call(self, function: Callable[..., T], arguments: tuple[Any, ...]) -> T:
         try:
             pipe = self._started()
             pipe.send((function, arguments))
             if not pipe.poll(self._longest_s):
                 raise TimeoutError
-            good, answer = pipe.recv()
+            succeeded, answer = pipe.recv()
         except (OSError, EOFError) as error:
             self._discard()
             late = isinstance(error, TimeoutError)
-            what = f"took more than {self._longest_s:g} s in the process" if late else "ended the process"
-            log.warning("%s %s of physics; the next question starts another", function.__name__, what)
-            msg = f"computing it {what} of physics; nothing else was harmed"
+            what = f"took more than {self._longest_s:g} s in" if late else "ended"
+            log.warning("%s %s the process for rollouts; the next call starts another", function.__name__, what)
+            msg = f"the physics {what} its process; nothing else was harmed"
             raise EngineInterrupted(msg) from error
-        if good:
+        if succeeded:
             return answer  # type: ignore[no-any-return]
         kind, text = answer
         raise EngineUnavailable(text) if kind == EngineUnavailable.__name__ else RuntimeError(f"{kind}: {text}")
 
     def _started(self) -> Connection:
         if self._closed:
-            msg = "the service ends; nothing is computed any more"
-            raise EngineInterrupted(msg)
+            raise EngineInterrupted("the service is shutting down and computes no more replays or predictions")
         if self._process is not None and not self._process.is_alive():
             self._discard()
         if self._pipe is None:
             context = get_context("spawn")
             ours, theirs = context.Pipe()
-            process = context.Process(target=_serve, args=(theirs,), name="physics", daemon=True)
-            process.start()  # or raise: then there is none, and the next question starts one
+            process = context.Process(target=_serve, args=(theirs,), name="rollouts", daemon=True)
+            process.start()  # if this raises, the next call tries again
             theirs.close()
             self._process, self._pipe = process, ours
         return self._pipe
 
 
 def _serve(pipe: Connection) -> None:
-    """Answer until the other end of the pipe closes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, whose end is ours
+    """Execute calls until the other end of the pipe closes."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which closes the pipe
     os.nice(NICENESS)
-    while True:
-        try:
+    with suppress(EOFError, OSError):
+        while True:
             function, arguments = pipe.recv()
-        except (EOFError, OSError):
-            return
-        try:
-            answer = (True, function(*arguments))
-        except Exception as error:  # noqa: BLE001 - whatever it is, it is the asker's to see
-            answer = (False, (type(error).__name__, str(error)))
-        try:
+            try:
+                answer = (True, function(*arguments))
+            except Exception as error:  # noqa: BLE001 - the caller raises it
+                answer = (False, (type(error).__name__, str(error)))
             pipe.send(answer)
-        except OSError:
-            return

@@ -1,4 +1,4 @@
-"""What a process of physics computes for a replay: one controller in both worlds, as JSON."""
+"""The rollouts of a replay: one controller in its simulator and in reality."""
 
 from dataclasses import dataclass
 
@@ -16,34 +16,48 @@ from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, real
 
 FRAMES_PER_S = 50
 LONGEST_S = 20.0
-"""That is shown; a motion may be ten minutes long."""
+"""The part of a motion that is shown; a motion may last ten minutes."""
 
 AROUND_FRAMES = 5
-"""A speed is taken from so many frames before to so many after."""
+"""A speed is the mean over this many frames before and after."""
 
 
 @dataclass(frozen=True)
-class Film:
-    """What is to be filmed; plain, for it goes to another process.
+class ReplayChoice:
+    """The choice of a controller and of a simulator.
 
     Attributes:
-        experiment: of which all of it is.
-        repetition: the controller's.
-        iteration: the controller's.
-        kind: the controller's.
+        repetition: its number, from 0.
+        iteration: the iteration that measured the controller.
+        kind: a sample, or the transferred controller.
+        simulator: the iteration whose best simulator is used; None for the simulator that chose the controller: of the
+            same iteration for a transferred controller, of the iteration before for a sample.
+    """
+
+    repetition: int = 0
+    iteration: int = 0
+    kind: ControllerKind = ControllerKind.TRANSFER
+    simulator: int | None = None
+
+
+@dataclass(frozen=True)
+class ReplayRequest:
+    """Everything a subprocess needs to compute a replay, in plain values.
+
+    Attributes:
+        experiment: its id.
+        choice: the controller.
         spec: resolved, as JSON.
         genome: the controller's.
         simulator: the iteration of the simulator; None if the controller evolved in reality itself.
         parameters: the simulator's.
         simulated: the stored fitness in the simulator, if there is one.
         real: the stored fitness in reality.
-        known: whether reality's parameters are in the spec.
+        known: whether the spec has the parameters of reality.
     """
 
     experiment: str
-    repetition: int
-    iteration: int
-    kind: ControllerKind
+    choice: ReplayChoice
     spec: str
     genome: tuple[float, ...]
     simulator: int | None
@@ -53,33 +67,33 @@ class Film:
     known: bool
 
 
-def film(asked: Film) -> bytes:
-    """The Replay as JSON.
+def compute_replay(request: ReplayRequest) -> bytes:
+    """Return the Replay as JSON.
 
     Raises:
-        EngineUnavailable: an engine is not installed here.
+        EngineUnavailable: the library of an engine is not installed.
     """
-    spec = ExperimentSpec.model_validate_json(asked.spec)
+    spec, choice = ExperimentSpec.model_validate_json(request.spec), request.choice
     robot = robots.create(spec.robot)
-    genome = np.array(asked.genome)
+    genome = np.array(request.genome)
     observed = robot.motion(genome).observe_s
     times = np.arange(int(min(LONGEST_S, observed[-1]) * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S
     simulation = reality = None
-    if asked.parameters is not None:
+    if request.parameters is not None:
         simulate = Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))
-        world, seen = simulate.record(genome, np.array(asked.parameters), times)
-        simulation = _shown(robot, spec.engine.name if spec.engine else "", world, seen, asked.simulated)
-    if asked.known:
+        world, recording = simulate.record(genome, np.array(request.parameters), times)
+        simulation = _shown(robot, spec.engine.name if spec.engine else "", world, recording, request.simulated)
+    if request.known:
         truth, real = reality_of(spec, robot)
-        world, seen = real.record(genome, truth, times)
-        reality = _shown(robot, spec.reality.engine.name if spec.reality.engine else "", world, seen, asked.real)
+        world, recording = real.record(genome, truth, times)
+        reality = _shown(robot, spec.reality.engine.name if spec.reality.engine else "", world, recording, request.real)
     return (
         Replay(
-            experiment=asked.experiment,
-            repetition=asked.repetition,
-            iteration=asked.iteration,
-            kind=asked.kind,
-            simulator=asked.simulator,
+            experiment=request.experiment,
+            repetition=choice.repetition,
+            iteration=choice.iteration,
+            kind=choice.kind,
+            simulator=request.simulator,
             robot=robot.name,
             unit=robot.unit,
             bodies=tuple(body.name for body in robot.world.bodies),
@@ -94,14 +108,14 @@ def film(asked: Film) -> bytes:
     )
 
 
-def _shown(robot: Robot, engine: str, world: World, seen: Recording, recorded: float | None) -> ReplayWorld:
-    fitness = float(robot.fitness(seen.trajectory))
-    if not np.isfinite(fitness) or not np.all(np.isfinite(seen.poses)):
+def _shown(robot: Robot, engine: str, world: World, recording: Recording, recorded: float | None) -> ReplayWorld:
+    fitness = float(robot.fitness(recording.trajectory))
+    if not np.isfinite(fitness) or not np.all(np.isfinite(recording.poses)):
         return ReplayWorld(engine=engine, fitness=None, recorded=recorded, shapes=shapes_of(world))
-    told = seen.angles_rad is not None
+    told = recording.angles_rad is not None
     bare = world if told else _base_alone(world)
-    angles = seen.angles_rad if told else np.zeros((len(seen.times_s), 0))
-    positions, orientations = body_poses(bare, seen.poses, np.asarray(angles))
+    angles = recording.angles_rad if told else np.zeros((len(recording.times_s), 0))
+    positions, orientations = body_poses(bare, recording.poses, np.asarray(angles))
     return ReplayWorld(
         engine=engine,
         fitness=fitness,
@@ -109,9 +123,9 @@ def _shown(robot: Robot, engine: str, world: World, seen: Recording, recorded: f
         shapes=shapes_of(bare),
         positions_m=_rows(positions, 3),
         orientations=_rows(orientations, 4),
-        heights_m=tuple(_rounded(seen.poses[:, 2], 3).tolist()),
-        speeds_m_s=tuple(_rounded(_speeds(seen), 3).tolist()),
-        contacts=tuple(_contacts(bare, foot, positions, orientations, seen.times_s) for foot in feet_of(bare)),
+        heights_m=tuple(_rounded(recording.poses[:, 2], 3).tolist()),
+        speeds_m_s=tuple(_rounded(_speeds(recording), 3).tolist()),
+        contacts=tuple(_contacts(bare, foot, positions, orientations, recording.times_s) for foot in feet_of(bare)),
     )
 
 
@@ -119,19 +133,21 @@ def _base_alone(world: World) -> World:
     return World(bodies=world.bodies[:1], material=world.material, start_height_m=world.start_height_m)
 
 
-def _speeds(seen: Recording) -> FloatArray:
-    """`(k,)`: over ground, towards where the last observation saw the base from where the first did."""
-    travelled = seen.trajectory.positions_m[-1, :2] - seen.trajectory.positions_m[0, :2]
-    way = seen.poses[:, :2] @ (travelled / max(float(np.linalg.norm(travelled)), 1e-12))
+def _speeds(recording: Recording) -> FloatArray:
+    """Return the speed of the base over ground, `(frames,)` in m/s, in the direction of the whole motion."""
+    travelled = recording.trajectory.positions_m[-1, :2] - recording.trajectory.positions_m[0, :2]
+    way = recording.poses[:, :2] @ (travelled / max(float(np.linalg.norm(travelled)), 1e-12))
     frames = np.arange(len(way))
     before, after = np.maximum(frames - AROUND_FRAMES, 0), np.minimum(frames + AROUND_FRAMES, len(way) - 1)
-    return np.asarray((way[after] - way[before]) / np.maximum(seen.times_s[after] - seen.times_s[before], 1e-12))
+    return np.asarray(
+        (way[after] - way[before]) / np.maximum(recording.times_s[after] - recording.times_s[before], 1e-12)
+    )
 
 
 def _contacts(
     world: World, foot: int, positions: FloatArray, orientations: FloatArray, times_s: FloatArray
 ) -> tuple[Interval, ...]:
-    """From when to when the foot is on the ground; a frame stands for the time until the next."""
+    """Return the intervals in which the foot is on the ground; a frame holds until the next."""
     down = clearances_m(world.bodies[foot], positions[:, foot], orientations[:, foot]) < TOUCHING_M
     edges = np.flatnonzero(np.diff(np.concatenate([[0], down.astype(int), [0]])))
     ends = np.append(times_s, times_s[-1])[edges].tolist()
@@ -139,7 +155,7 @@ def _contacts(
 
 
 def _rows(values: FloatArray, size: int) -> tuple[tuple[float, ...], ...]:
-    """By frame, the numbers of all bodies in turn: to the millimetre, and quaternions to 1e-4."""
+    """Flatten `(frames, bodies, size)`: positions are rounded to the millimetre, quaternions to 1e-4."""
     flat = _rounded(values.reshape(len(values), -1), 3 if size == 3 else 4)
     return tuple(map(tuple, flat.tolist()))
 

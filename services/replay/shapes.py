@@ -1,4 +1,4 @@
-"""What a World looks like: its bodies, what reaches from a joint to a shape that is away from it, and the ground."""
+"""The shapes that draw a World: its bodies, the struts between joints and distant bodies, and the ground."""
 
 import numpy as np
 
@@ -7,16 +7,16 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.world import Body, Box, World
 
 SLENDER = 0.4
-"""Radius of what reaches from a joint to a shape, in that of the shape."""
+"""Radius of a strut, as a factor of the radius of its body."""
 
 
 def feet_of(world: World) -> tuple[int, ...]:
-    """The places of the bodies that are made to touch the ground: all that collide but the base."""
+    """Return the indices of the feet: all bodies that collide with the ground, except the base."""
     return tuple(place for place, body in enumerate(world.bodies) if place and body.collides)
 
 
 def labels(world: World) -> tuple[str, ...]:
-    """The feet's names without what they have in common: `front_left_shin` among shins is the front left."""
+    """Return the names of the feet without their common ending: `front_left_shin` becomes `front left`."""
     parts = [world.bodies[place].name.split("_") for place in feet_of(world)]
     while len(parts) > 1 and min(map(len, parts)) > 1 and len({each[-1] for each in parts}) == 1:
         parts = [each[:-1] for each in parts]
@@ -24,7 +24,7 @@ def labels(world: World) -> tuple[str, ...]:
 
 
 def shapes_of(world: World) -> tuple[Shape, ...]:
-    """All that can be seen of a world."""
+    """Return all visible shapes of a world."""
     ground = Shape(body=None, kind="plane", size_m=(), role="ground")
     return (ground, *(shape for place in range(len(world.bodies)) for shape in _shapes(world, place)))
 
@@ -56,8 +56,8 @@ def _strut(place: int, away: FloatArray, radius_m: float) -> Shape:
 
 
 def _from_z(away: FloatArray) -> Orientation:
-    """The shortest turn that brings the z axis onto the line of a vector, whichever way it points."""
+    """Return the smallest rotation of the z axis onto the line of a vector, as a quaternion x, y, z, w."""
     x, y, z = (away if away[2] >= 0 else -away) / np.linalg.norm(away)
-    turn = np.array([-y, x, 0.0, 1.0 + z])
-    turn = turn / np.linalg.norm(turn) + 0.0
-    return (float(turn[0]), float(turn[1]), float(turn[2]), float(turn[3]))
+    rotation = np.array([-y, x, 0.0, 1.0 + z])
+    rotation = rotation / np.linalg.norm(rotation) + 0.0
+    return (float(rotation[0]), float(rotation[1]), float(rotation[2]), float(rotation[3]))

@@ -16,7 +16,7 @@ from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, real
 from gaplab.services.specs.resolution import is_direct, spec_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, reads, replays, results
-from gaplab.services.store.queries.replays import Controlled
+from gaplab.services.store.queries.replays import MeasuredController
 from gaplab.services.store.session import Session, Store
 
 GENES = 201
@@ -34,7 +34,7 @@ class _Stored:
     shown: bool
     measured: tuple[SampleRead, ...]
     simulators: tuple[SimulatorRead, ...]
-    transferred: dict[int, Controlled | None]
+    transferred: dict[int, MeasuredController | None]
 
 
 def toys(store: Store, experiment_id: str, repetition: int, iterations: Sequence[int]) -> tuple[Toy, ...]:
@@ -143,7 +143,7 @@ def _toy(
     )
 
 
-def _transfer(controlled: Controlled | None) -> ToyTransfer | None:
+def _transfer(controlled: MeasuredController | None) -> ToyTransfer | None:
     if controlled is None:
         return None
     return ToyTransfer(gene=controlled.genome[0], simulated=controlled.simulated, real=controlled.real)

@@ -35,9 +35,7 @@ SERIOUS = {"serious", "critical"}
 
 def chromium():
     """The path of the machine's Chromium; None: Playwright's own, which `make test` installs where there is none."""
-    found = os.environ.get(VARIABLE) or next(filter(None, map(shutil.which, NAMES)), None)
-    assert found is None or Path(found).is_file(), f"{VARIABLE} names {found}, and there is no such file"
-    return found
+    return os.environ.get(VARIABLE) or next(filter(None, map(shutil.which, NAMES)), None)
 
 
 class Chromium:

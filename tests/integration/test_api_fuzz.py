@@ -3,6 +3,7 @@
 import copy
 import json
 from collections.abc import Iterator
+from contextlib import ExitStack
 from typing import Any
 
 import pytest
@@ -50,17 +51,16 @@ def mutated_specs(draw: st.DrawFn) -> dict[str, Any]:
 @pytest.fixture(scope="module", params=["sqlite", "postgres"])
 def api(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     """Over either database: Postgres refuses texts that SQLite takes."""
-    if request.param == "sqlite":
-        url = f"sqlite:///{tmp_path_factory.mktemp('fuzz') / 'gaplab.db'}"
-    else:
-        server = request.getfixturevalue("postgres")
-        server.create("fuzz")
-        url = server.url("fuzz")
-    upgrade(url)
-    store = Store(url)
-    with TestClient(create_app(store), raise_server_exceptions=False) as client:
-        yield client
-    store.dispose()
+    with ExitStack() as opened:
+        if request.param == "sqlite":
+            url = f"sqlite:///{tmp_path_factory.mktemp('fuzz') / 'gaplab.db'}"
+        else:
+            url = opened.enter_context(request.getfixturevalue("postgres").database())
+        upgrade(url)
+        store = Store(url)
+        with TestClient(create_app(store), raise_server_exceptions=False) as client:
+            yield client
+        store.dispose()
 
 
 FUZZ = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))

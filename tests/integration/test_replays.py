@@ -29,7 +29,7 @@ HIDDEN = {"static_friction": 0.9, "dynamic_friction": 0.6}
 def app(sqlite_store):
     found = create_app(sqlite_store)
     yield found
-    found.state.physics.close()
+    found.state.rollout_process.close()
 
 
 @pytest.fixture
@@ -113,12 +113,12 @@ def test_what_is_not_there_is_not_found_and_what_is_not_yet_there_is_a_conflict(
 
     refused = {
         "/experiments/no-such/replay": (404, "no-such"),
-        f"{there}?repetition=2": (404, "no repetition 2; there is 0 to 1"),
-        f"{there}?iteration=3": (404, "no iteration with a transfer 3; there is 0 to 2"),
-        f"{there}?kind=sample&iteration=0": (404, "no iteration with a sample 0; there is 1 to 2"),
+        f"{there}?repetition=2": (404, "no repetition 2; permitted: from 0 to 1"),
+        f"{there}?iteration=3": (404, "no iteration with a transfer 3; permitted: from 0 to 2"),
+        f"{there}?kind=sample&iteration=0": (404, "no iteration with a sample 0; permitted: from 1 to 2"),
         f"{there}?simulator=3": (404, "no tuned simulator of iteration 3"),
         f"{there}?iteration=2": (409, "transferred controller of iteration 2 of repetition 0"),
-        f"{there}?repetition=1": (409, "reality has not been asked yet"),
+        f"{there}?repetition=1": (409, "has not been measured in reality yet"),
         f"{there}?kind=sample&iteration=2&simulator=2": (409, "no simulator of iteration 2"),
         f"{there}?kind=walk": (422, "kind"),
     }
@@ -193,7 +193,7 @@ def test_the_gait_is_drawn_in_every_format(sqlite_store, api):
 def test_a_crash_of_physics_never_ends_the_api(sqlite_store, app, api):
     experiment, _, _ = walked(sqlite_store)
     first = api.get(f"/experiments/{experiment}/replay")
-    os.kill(app.state.physics.pid, signal.SIGKILL)
+    os.kill(app.state.rollout_process.pid, signal.SIGKILL)
 
     again = api.get(f"/experiments/{experiment}/replay?iteration=1")
     while again.status_code == 503:  # asked in the moment of its death
@@ -206,7 +206,7 @@ def test_a_crash_of_physics_never_ends_the_api(sqlite_store, app, api):
 def test_what_was_computed_once_is_remembered(sqlite_store, app, api):
     experiment, _, _ = walked(sqlite_store)
     first = api.get(f"/experiments/{experiment}/replay").content
-    app.state.physics.close()
+    app.state.rollout_process.close()
 
     assert api.get(f"/experiments/{experiment}/replay").content == first
     other = api.get(f"/experiments/{experiment}/replay?iteration=1")
@@ -222,7 +222,7 @@ def test_predictions_are_of_the_simulators_before_and_after_a_sample(store, app)
             if isinstance(step, Tuned):
                 errors[claim.number, step.iteration] = step.simulators[0].squared_error
 
-    found = predictions(store, app.state.physics, experiment)
+    found = predictions(store, app.state.rollout_process, experiment)
 
     assert (found.pending, found.unit) == (0, "m/s")
     assert [(each.repetition, each.iteration) for each in found.items] == [(0, 1), (0, 2), (1, 1), (1, 2)]
@@ -236,8 +236,8 @@ def test_predictions_take_a_while_and_are_pending_meanwhile(sqlite_store, app):
     experiment, log, claim = walked(sqlite_store)
     execution.record(sqlite_store, claim, Tuned(2, (Simulator(frozen(BEST)),)))
 
-    first = predictions(sqlite_store, app.state.physics, experiment, seconds=0)
-    second = predictions(sqlite_store, app.state.physics, experiment, seconds=0)
+    first = predictions(sqlite_store, app.state.rollout_process, experiment, seconds=0)
+    second = predictions(sqlite_store, app.state.rollout_process, experiment, seconds=0)
 
     assert (first.pending, len(first.items), second.pending, len(second.items)) == (1, 1, 0, 2)
     assert second.items[0] == first.items[0]

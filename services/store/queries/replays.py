@@ -1,4 +1,4 @@
-"""What replays and predictions start from: controllers, the simulators around them, and what reality said."""
+"""Rows for replays and predictions: controllers, their simulators, and their fitness in reality."""
 
 from dataclasses import dataclass
 
@@ -10,8 +10,8 @@ from gaplab.services.store.models import IterationRow, MeasurementRow, Repetitio
 
 
 @dataclass(frozen=True)
-class SampleBetween:
-    """A sample, and the parameters of the best simulators before it was measured and after tuning on it.
+class TunedSample:
+    """A sample that simulators were tuned on, and the parameters of the best simulators before and after.
 
     Attributes:
         fitness: in reality; None if the measurement failed.
@@ -25,8 +25,8 @@ class SampleBetween:
     after: list[float]
 
 
-def samples_between(session: Session, experiment: str) -> tuple[SampleBetween, ...]:
-    """The samples of an experiment that simulators were tuned on, by repetition and iteration."""
+def tuned_samples(session: Session, experiment: str) -> tuple[TunedSample, ...]:
+    """Return the samples of an experiment that simulators were tuned on, by repetition and iteration."""
     row, before, after = MeasurementRow, aliased(SimulatorRow), aliased(SimulatorRow)
     query = (
         select(RepetitionRow.number, row.iteration, row.genome, row.fitness, before.parameters, after.parameters)
@@ -41,16 +41,16 @@ def samples_between(session: Session, experiment: str) -> tuple[SampleBetween, .
         .where(RepetitionRow.experiment_id == experiment, row.kind == MeasurementKind.SAMPLE)
         .order_by(RepetitionRow.number, row.iteration)
     )
-    return tuple(SampleBetween(*each) for each in session.execute(query))
+    return tuple(TunedSample(*each) for each in session.execute(query))
 
 
 @dataclass(frozen=True)
-class Controlled:
-    """A controller that reality was asked about.
+class MeasuredController:
+    """A controller that was evaluated in reality.
 
     Attributes:
-        real: its fitness there; None if the measurement failed.
-        simulated: its fitness in the simulator that it was evolved in, of a transferred one; None otherwise, or if the
+        real: fitness in reality; None if the measurement failed.
+        simulated: fitness of a transferred controller in the simulator it evolved in; None for a sample, or if the
             physics failed.
     """
 
@@ -61,8 +61,8 @@ class Controlled:
 
 def measured_controller(
     session: Session, experiment: str, repetition: int, iteration: int, kind: MeasurementKind
-) -> Controlled | None:
-    """The sample or the transferred controller of an iteration; None if reality has not answered yet."""
+) -> MeasuredController | None:
+    """Return the sample or the transferred controller of an iteration; None if it is not measured yet."""
     row, measured = IterationRow, MeasurementRow
     query = (
         select(measured.genome, measured.fitness, row.simulated_fitness)
@@ -79,11 +79,11 @@ def measured_controller(
     if found is None:
         return None
     genome, real, simulated = found
-    return Controlled(genome, real, simulated if kind is MeasurementKind.PROBE else None)
+    return MeasuredController(genome, real, simulated if kind is MeasurementKind.PROBE else None)
 
 
 def tuned_parameters(session: Session, experiment: str, repetition: int, iteration: int) -> list[list[float]]:
-    """The parameters of the simulators of an iteration, the best first; none if they are not tuned yet."""
+    """Return the parameters of the simulators of an iteration, the best first; empty if they are not tuned yet."""
     row = SimulatorRow
     query = (
         select(row.parameters)

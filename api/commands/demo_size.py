@@ -1,0 +1,77 @@
+"""The size of the demo's study of physics: what this machine computes in the time that a person waits."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from gaplab.api.clients.client import Client
+
+SECONDS = 100.0
+"""Time for the study."""
+
+CHECK_ROLLOUTS = 800
+"""Rollouts of the sensitivity check, which an estimate does not count."""
+
+SIZES = (
+    (3, 3, 1.0),
+    (3, 3, 0.8),
+    (3, 3, 0.6),
+    (2, 3, 0.8),
+    (2, 3, 0.6),
+    (2, 3, 0.4),
+    (2, 2, 0.6),
+    (2, 2, 0.4),
+    (2, 2, 0.2),
+)
+"""Repetitions, iterations, and the part of each search's evaluations, from large to small."""
+
+POPULATION = 20
+"""Evaluations that fill the population with which a search starts."""
+
+SEARCHES = ("controller_evaluations", "selection_evaluations", "simulator_evaluations")
+
+Spec = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Sized:
+    """A study that suits a machine.
+
+    Attributes:
+        spec: with every number in it, so that it gives the same curves on any machine.
+        reason: the pace for which it is sized, and the time that it is expected to take.
+    """
+
+    spec: dict[str, Any]
+    reason: str
+
+
+def trial(spec: Spec) -> dict[str, Any]:
+    """Return the spec of a small experiment, from which the service learns what a rollout of the study takes."""
+    same = {name: spec[name] for name in ("robot", "engine", "reality", "seed") if name in spec}
+    size = {"strategy": "direct", "repetitions": 2, "budget": {"preset": "smoke", "controller_evaluations": 100}}
+    return same | size | {"name": "how long a rollout takes here"}
+
+
+def sized(spec: Spec, client: Client, seconds: float = SECONDS) -> Sized:
+    """Return the largest version of the study that is expected to fit into the time, or the smallest of all."""
+    for smaller in _versions(spec):
+        estimate = client.estimate(smaller)
+        rollout_s = max(cost.seconds_per_rollout for cost in estimate.engines)
+        expected_s = estimate.seconds + CHECK_ROLLOUTS * rollout_s / estimate.cores
+        if expected_s <= seconds:
+            break
+    pace = f"{rollout_s * 1000:.0f} ms a rollout"
+    named = smaller | {"name": f"{spec['name']}, sized for {pace}"}
+    return Sized(named, f"{pace} on {estimate.cores} cores: about {expected_s:.0f} s")
+
+
+def _versions(spec: Spec) -> Iterator[dict[str, Any]]:
+    for repetitions, iterations, part in SIZES:
+        budget = {name: _part(number, part) if name in SEARCHES else number for name, number in spec["budget"].items()}
+        counts = {"repetitions": repetitions, "direct_repetitions": 2 * repetitions, "iterations": iterations}
+        yield dict(spec) | counts | {"budget": budget}
+
+
+def _part(evaluations: int, part: float) -> int:
+    return max(POPULATION, round(part * evaluations))

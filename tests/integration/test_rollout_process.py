@@ -1,0 +1,160 @@
+"""Rollouts in a subprocess: whatever happens to it, the caller gets an answer, and so does the next one."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
+from gaplab.services.replay.process import NICENESS, AnswerCache, RolloutProcess
+
+DEADLINE_S = 120.0
+
+
+@pytest.fixture
+def rollouts():
+    found = RolloutProcess()
+    yield found
+    found.close()
+
+
+def gone(pid):
+    """Whether a process has ended, waited for or not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except OSError:
+        return True
+
+
+def wait_until(holds):
+    until = time.monotonic() + DEADLINE_S
+    while not holds():
+        assert time.monotonic() < until
+        time.sleep(0.05)
+
+
+def test_calls_are_executed_by_one_subprocess_of_lower_priority(rollouts):
+    assert rollouts.pid is None
+
+    first, second = rollouts.call(os.getpid), rollouts.call(os.getpid)
+
+    assert first == second == rollouts.pid != os.getpid()
+    assert os.getpriority(os.PRIO_PROCESS, first) == min(19, os.nice(0) + NICENESS)
+
+
+def test_a_process_that_was_killed_is_replaced(rollouts):
+    killed = rollouts.call(os.getpid)
+    os.kill(killed, signal.SIGKILL)
+    wait_until(lambda: gone(killed))
+
+    assert rollouts.call(os.getpid) not in {killed, os.getpid()}
+
+
+def test_a_process_that_could_not_be_started_is_started_by_the_next_call(rollouts, monkeypatch):
+    def out_of_memory(_):
+        raise OSError(12, "Cannot allocate memory")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("multiprocessing.context.SpawnProcess.start", out_of_memory)
+        with pytest.raises(EngineInterrupted):
+            rollouts.call(os.getpid)
+
+    assert rollouts.call(os.getpid) not in {None, os.getpid()}
+
+
+def test_physics_that_kills_its_process_is_an_error_of_that_call_alone(rollouts):
+    first = rollouts.call(os.getpid)
+
+    with pytest.raises(EngineInterrupted, match="ended its process"):
+        rollouts.call(os._exit, 11)
+
+    assert rollouts.call(os.getpid) not in {first, os.getpid()}
+
+
+def test_physics_that_takes_too_long_is_ended():
+    rollouts = RolloutProcess(longest_s=60)
+    first = rollouts.call(os.getpid)
+    rollouts._longest_s = 0.2
+
+    with pytest.raises(EngineInterrupted, match=r"more than 0\.2 s"):
+        rollouts.call(time.sleep, DEADLINE_S)
+
+    assert gone(first)
+    rollouts._longest_s = 60
+    assert rollouts.call(abs, -1) == 1
+    rollouts.close()
+
+
+def test_an_error_of_the_function_reaches_the_caller_and_the_process_goes_on(rollouts):
+    first = rollouts.call(os.getpid)
+
+    with pytest.raises(RuntimeError, match="ValueError: invalid literal"):
+        rollouts.call(int, "x")
+    with pytest.raises(EngineUnavailable, match="pip install"):
+        rollouts.call(_unavailable)
+
+    assert rollouts.call(os.getpid) == first
+
+
+def _unavailable():
+    raise EngineUnavailable("pip install it")
+
+
+def test_a_call_that_waits_too_long_for_others_is_refused():
+    rollouts = RolloutProcess(queue_s=0.1)
+    rollouts.call(abs, -1)
+    with ThreadPoolExecutor(1) as other:
+        slow = other.submit(rollouts.call, time.sleep, DEADLINE_S)
+        wait_until(rollouts._lock.locked)
+
+        with pytest.raises(LimitReached, match="try again soon"):
+            rollouts.call(abs, -1)
+
+        rollouts.close()  # at once
+        with pytest.raises(EngineInterrupted):
+            slow.result(DEADLINE_S)
+    with pytest.raises(EngineInterrupted, match="shutting down"):
+        rollouts.call(abs, -1)
+
+
+def test_the_process_ends_with_its_parent_even_if_that_is_killed():
+    program = (
+        "import os; from gaplab.services.replay.process import RolloutProcess\n"
+        "rollouts = RolloutProcess(); print(rollouts.call(os.getpid), flush=True); input()"
+    )
+    command = [sys.executable, "-c", program]
+    parent = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=Path(__file__).parents[2])
+    child = int(parent.stdout.readline())
+    assert not gone(child)
+
+    parent.kill()
+    parent.communicate()
+
+    wait_until(lambda: gone(child))
+
+
+def test_the_cache_drops_the_least_recently_used_answers_first():
+    cache = AnswerCache(most_bytes=10)
+    cache.keep(("a",), "A", 4)
+    cache.keep(("b",), "B", 4)
+    cache.get(("a",))
+    cache.keep(("c",), "C", 4)
+
+    assert [cache.get((each,)) for each in "abc"] == ["A", None, "C"]
+
+    cache.keep(("a",), "AA", 6)
+    assert [cache.get((each,)) for each in "ac"] == ["AA", "C"]
+
+
+def test_an_answer_that_is_too_large_for_the_cache_is_not_kept():
+    cache = AnswerCache(most_bytes=10)
+    cache.keep(("a",), "A", 4)
+
+    cache.keep(("b",), "B", 11)
+
+    assert [cache.get((each,)) for each in "ab"] == ["A", None]

@@ -1,0 +1,124 @@
+"""The real supervisor on a real Ray computes the kept numbers: with any number of workers, and if one is killed."""
+
+import lzma
+import os
+import signal
+import sqlite3
+import time
+
+import pytest
+
+from gaplab import migrations
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.archives import export_experiment
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.settings import Settings
+from gaplab.services.store.session import Store
+from gaplab.workers.cluster import cluster
+from gaplab.workers.supervisor import Supervisor
+from tests.numbers.keep import CHECKPOINTS
+from tests.numbers.kept import HALF_WAY, archive, members, numbers, other_machine
+from tests.processes import processes_of_ray
+
+DEADLINE_S = 400
+
+
+@pytest.fixture(scope="module", autouse=True)
+def own_ray():
+    with cluster(Settings(workers=2)):
+        yield
+
+
+@pytest.fixture(params=["one worker", "two workers"])
+def at_once(request):
+    return 1 if request.param == "one worker" else 2
+
+
+def submit(store, found):
+    """Submit the kept specs; the ids of their experiments."""
+    return [
+        submission.submit_experiment(store, ExperimentSpec.model_validate(each["spec"])).id
+        for each in found["experiment"]
+    ]
+
+
+def run(supervisor, store, ids, until=lambda: False):
+    """Let the supervisor work until all experiments have ended, or the condition holds."""
+    deadline = time.monotonic() + DEADLINE_S
+    while not (all(submission.read_experiment(store, each).state.ended for each in ids) or until()):
+        assert time.monotonic() < deadline
+        supervisor.step()
+
+
+def stored(store, ids):
+    """The numbers of these experiments, by way of an archive."""
+    found = []
+    for each in ids:
+        with export_experiment(store, each).file as file:
+            found += numbers(members(file.read()))
+    return found
+
+
+def assert_kept(computed, kept):
+    if computed != kept and (other := other_machine()):
+        pytest.skip(f"the numbers differ, and so does the machine: {other}")
+    assert computed == kept
+
+
+def test_any_number_of_workers_computes_the_kept_numbers(store, at_once):
+    studies = [members(archive(name)) for name in ("analytic", "cma_es", "options")]
+    ids = [submit(store, found) for found in studies]
+
+    run(Supervisor(store, lambda: at_once), store, [each for own in ids for each in own])
+
+    for own, found in zip(ids, studies, strict=True):
+        assert {submission.read_experiment(store, each).state for each in own} == {State.COMPLETED}
+        assert_kept(stored(store, own), numbers(found))
+
+
+def test_a_robot_among_idle_workers_has_the_kept_numbers(sqlite_store):
+    found = members(archive("elsewhere"))
+    ids = submit(sqlite_store, found)
+
+    run(Supervisor(sqlite_store, lambda: 1), sqlite_store, ids)
+
+    assert_kept(stored(sqlite_store, ids), numbers(found))
+
+
+def test_workers_killed_in_the_middle_of_a_step_cost_no_number(store):
+    found = members(archive("long"))
+    ids = submit(store, found)
+    supervisor = Supervisor(store, lambda: 2, checkpoint_s=0.05)
+    run(supervisor, store, ids, until=lambda: done(store, ids))
+    time.sleep(0.3)
+
+    for pid in processes_of_ray("run"):
+        os.kill(pid, signal.SIGKILL)
+    run(supervisor, store, ids)
+
+    assert sum(each.attempts for each in submission.list_repetitions(store, ids[0])) > 2
+    assert_kept(stored(store, ids), numbers(found))
+
+
+def done(store, ids):
+    """Whether a repetition is in the middle, with iteration 0 behind it."""
+    return any(submission.read_experiment(store, each).progress.iterations_done for each in ids)
+
+
+def test_a_database_of_a_killed_supervisor_ends_with_the_kept_numbers(tmp_path):
+    file = tmp_path / "half-way.db"
+    file.write_bytes(lzma.decompress(HALF_WAY.read_bytes()))
+    connection = sqlite3.connect(file)
+    assert connection.execute("SELECT count(*) FROM checkpoint").fetchone() == (CHECKPOINTS,)
+    connection.close()
+    migrations.upgrade(f"sqlite:///{file}")
+    store = Store(f"sqlite:///{file}")
+    ids = [each.id for each in submission.list_experiments(store).items]
+    execution.requeue_lost(store, stale_after_s=-1)
+
+    run(Supervisor(store, lambda: 2), store, ids)
+
+    assert_kept(stored(store, ids), numbers(members(archive("long"))))
+    store.dispose()
