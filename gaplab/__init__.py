@@ -1,4 +1,4 @@
-"""What programs and notebooks import.
+"""The Python API of gaplab, for programs and notebooks.
 
 from gaplab import Client
 
@@ -7,7 +7,7 @@ with Client() as gaplab:
     gaplab.wait(study.id)
     gaplab.figure(study.id).save("curves.pdf")
 
-Plug-ins of one's own import from `gaplab.plugins`.
+Your own plug-ins import from `gaplab.plugins`. The other modules are internal.
 """
 
 from importlib import import_module
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from gaplab.api.commands.exit_codes import CommandError as CommandError
     from gaplab.api.process.local_service import local_service as local_service
 
-_HOMES = {
+_MODULES = {
     "Client": "gaplab.api.clients.client",
     "CommandError": "gaplab.api.commands.exit_codes",
     "ExperimentFailed": "gaplab.api.clients.client",
@@ -46,12 +46,12 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever it is
-    """What is asked for, imported only now: a worker that loads a plug-in needs no client."""
-    if name not in _HOMES:
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - any exported class
+    """Return an exported name, imported on first use: a worker that loads a plug-in needs no client."""
+    if name not in _MODULES:
         msg = f"module {__name__!r} has no attribute {name!r}"
         raise AttributeError(msg)
-    return getattr(import_module(_HOMES[name]), name)
+    return getattr(import_module(_MODULES[name]), name)
 
 
 def __dir__() -> list[str]:
