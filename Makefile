@@ -2,6 +2,7 @@
 
 PYTHON ?= python3.11
 BIN := .venv/bin
+DENO := DENO_DIR=.venv/deno DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 help:  ## list the commands
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -12,13 +13,15 @@ demo: .venv/installed  ## tune a toy and a quadruped with every strategy, and dr
 serve: .venv/installed  ## start the service on http://127.0.0.1:8000, with its workers
 	$(BIN)/gaplab serve
 
-test: .venv/browser  ## run all tests: on SQLite, on a real Postgres, and of the page in a real Chromium
+test: .venv/prepared  ## run all tests: on SQLite, on a real Postgres, and of the page in a real Chromium
 	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 lint: .venv/installed-dev  ## check style, types, dependencies and the imports between layers
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(DENO) lint --quiet
+	$(DENO) check --quiet api/dashboard
 	$(BIN)/python -m pip check --disable-pip-version-check
 	$(BIN)/python -m pytest tests/unit/test_architecture.py tests/unit/test_dependencies.py
 
@@ -45,8 +48,8 @@ clean:  ## remove the environment and caches; results stay
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
 	touch $@
 
-.venv/browser: .venv/installed-dev
-	$(BIN)/python -m tests.e2e.install_browser
+.venv/prepared: .venv/installed-dev
+	$(BIN)/python -m tests.e2e.prepare_machine
 	touch $@
 
 .PHONY: help demo serve test lint bench docs soak clean

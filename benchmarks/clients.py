@@ -12,7 +12,7 @@ from http.client import HTTPConnection, HTTPException
 from statistics import quantiles
 from urllib.parse import urlsplit
 
-from benchmarks.filling import IN_A_STUDY, experiment_id, study_id
+from tests.filling import IN_A_STUDY, experiment_id, study_id
 
 READERS, SUBMITTERS, STREAMS = 50, 20, 10
 SPEC = json.dumps({"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "repetitions": 2})

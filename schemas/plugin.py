@@ -72,3 +72,6 @@ class Catalogue(Frozen):
     tunables: tuple[PluginRead, ...]
     optimizers: tuple[PluginRead, ...]
     budgets: tuple[BudgetRead, ...] = ()
+    defaults: dict[str, Any] = Field(
+        default_factory=dict, description="the value of each field that a study's spec leaves out"
+    )

@@ -50,6 +50,11 @@ class ExperimentRead(Frozen):
     notes: str | None = Field(default=None, description="free text by people")
     edits: int = Field(default=0, description="number of changes to the name or notes")
     strategy: str
+    direct: bool = Field(
+        default=False,
+        description="true for the direct baseline: controllers evolve in reality itself, without simulators and "
+        "samples, so iteration 0 is the only one",
+    )
     state: State
     spec: dict[str, Any]
     priority: int = Field(default=0, description="higher is computed first")

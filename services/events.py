@@ -11,8 +11,8 @@ from gaplab.services.store.session import Store
 
 
 @dataclass(frozen=True)
-class Which:
-    """Which events are wanted; all, where nothing is said.
+class WantedEvents:
+    """WantedEvents events are wanted; all, where nothing is said.
 
     Attributes:
         experiment: only of this one.
@@ -33,7 +33,7 @@ class Which:
         )
 
 
-def page(store: Store, after: int, which: Which, *, limit: int) -> EventPage:
+def page(store: Store, after: int, which: WantedEvents, *, limit: int) -> EventPage:
     """Up to `limit` of these events, in order, from the first that follows the number `after`."""
     with store.reading() as session:
         latest = events.latest(session)
@@ -50,7 +50,7 @@ def latest(store: Store) -> int:
         return events.latest(session)
 
 
-def check(store: Store, which: Which) -> None:
+def check(store: Store, which: WantedEvents) -> None:
     """Do nothing if there is what events are wanted of.
 
     Raises:

@@ -7,6 +7,8 @@ import signal
 import stat
 import subprocess
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -95,6 +97,18 @@ class Server:
             running = self._process.poll() is None and time.monotonic() < deadline
             assert running, f"Postgres does not start\n{self._log.read_text()}"
             time.sleep(0.05)
+
+
+@contextmanager
+def running(folder: Path) -> Iterator[str]:
+    """The URL of a new server that syncs to the disk, as one in production does."""
+    installation, data = Installation(folder), folder / "postgres"
+    installation.initialise(data)
+    server = Server(installation, data)
+    try:
+        yield url(data)
+    finally:
+        server.stop()
 
 
 def url(data: str | Path, database: str = "postgres", port: object = PORT) -> str:

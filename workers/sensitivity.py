@@ -74,7 +74,7 @@ class Checks:
 
     def heartbeat(self) -> None:
         """Hold on to the check that runs, or stop it if it is no longer ours; requeue those that others have lost."""
-        if self._run is not None and not sensitivity.heartbeat(self._store, self._run[0]):
+        if self._run is not None and not sensitivity.heartbeat(self._store, [self._run[0]]):
             ray.cancel(self._run[1], force=True)
             self._run = None
         sensitivity.requeue_lost(self._store, stale_after_s=self._lease_s)

@@ -33,7 +33,5 @@ def demo(
 
 
 def _settings(host: str | None, port: int | None) -> Settings:
-    from dataclasses import replace
-
     given: dict[str, Any] = {name: value for name, value in {"host": host, "port": port}.items() if value is not None}
-    return replace(Settings.from_environment(), **given)
+    return Settings.from_environment().model_copy(update=given)

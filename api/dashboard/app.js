@@ -1,10 +1,12 @@
-/** The page: a bar, and one view at a time, chosen by the address after `#`. */
+// @ts-check
+/** The page: a bar, and one view at a time, which the address after `#` chooses. */
 
-import { Problem } from "./lib/api.js";
-import { h } from "./lib/dom.js";
-import { empty, failed, loading } from "./lib/states.js";
+import { unreachable } from "./lib/api.js";
+import { byId, h } from "./lib/dom.js";
+import { empty, failed, loading } from "./lib/placeholders.js";
 import { switchTheme } from "./lib/theme.js";
 
+/** @type {[pattern: RegExp, name: string, keys: string[]][]} */
 const VIEWS = [
   [/^\/$/, "list", []],
   [/^\/new$/, "new", []],
@@ -14,87 +16,99 @@ const VIEWS = [
   [/^\/studies\/([\w-]+)$/, "study", ["id"]],
   [/^\/experiments\/([\w-]+)$/, "experiment", ["id"]],
 ];
-const ID = /^[\w-]*$/;  // with dots and slashes in it, a path of the service would be another
+const ID = /^[\w-]*$/;  // dots and slashes would lead to another path of the service
 
 const AWAY = new Set([0, 502, 503, 504]);
-const AGAIN_MS = 2000;
+const RETRY_MS = 2000;
 
 let leaving = new AbortController();
 
-/** What the address asks for: the view's name and its parameters, or nothing. */
-function wanted() {
+/** Return the name and the parameters of the view at the address, or null. */
+function viewAtAddress() {
   const [path, query] = (location.hash.slice(1) || "/").split("?");
   for (const [pattern, name, keys] of VIEWS) {
-    const found = pattern.exec(path);
-    if (!found) continue;
+    const match = pattern.exec(path);
+    if (!match) continue;
     const parameters = new URLSearchParams(query);
     if (!ID.test(parameters.get("experiment") ?? "")) return null;
-    keys.forEach((key, at) => parameters.set(key, found[at + 1]));
+    keys.forEach((key, index) => parameters.set(key, match[index + 1]));
     return { name, parameters };
   }
   return null;
 }
 
-/** Show the view of the address; what the former one had running ends. */
-async function route() {
+/** Show the view of the address, and end what the former view left running. */
+async function showView() {
   leaving.abort();
   leaving = new AbortController();
   const { signal } = leaving;
   const root = h("div", { class: "view" }, loading());
-  const main = document.getElementById("main");
-  main.replaceChildren(root);
-  const view = wanted();
-  for (const link of document.querySelectorAll("nav [data-view]")) {
+  byId("main").replaceChildren(root);
+  const view = viewAtAddress();
+  for (const link of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("nav [data-view]"))) {
     if (link.dataset.view === view?.name) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");
   }
   try {
-    const { show } = view ? await loaded(view.name) : { show: lost };
-    if (!signal.aborted) await show(root, view?.parameters, signal);
+    if (view) {
+      const { show } = await loadView(view.name);
+      if (!signal.aborted) await show(root, view.parameters, signal);
+    } else showLost(root);
   } catch (error) {
     if (signal.aborted) return;
-    root.replaceChildren(failed(error, route));
-    if (AWAY.has(error.status)) againOnce(error.again ?? route, signal);
+    root.replaceChildren(failed(error, showView));
+    if (AWAY.has(error.status)) retryLater(error.retry ?? showView, signal);
   }
   if (!signal.aborted) document.title = `${root.querySelector("h1")?.textContent ?? "gaplab"} · gaplab`;
 }
 
-/** There is no view at this address. */
-function lost(root) {
+/**
+ * Say that there is no view at the address.
+ *
+ * @param {HTMLElement} root
+ */
+function showLost(root) {
   const home = h("a", { class: "button quiet", href: "#/" }, "To the experiments");
-  root.replaceChildren(h("h1", {}, "There is no such page"), empty(`Nothing is shown at ${location.hash}.`, home));
+  root.replaceChildren(h("h1", {}, "There is no such page"), empty(`There is nothing at ${location.hash}.`, home));
 }
 
-/** A service that is away is asked again by itself. */
-function againOnce(again, signal) {
-  const timer = setTimeout(again, AGAIN_MS);
+/**
+ * @param {() => void} retry
+ * @param {AbortSignal} signal
+ */
+function retryLater(retry, signal) {
+  const timer = setTimeout(retry, RETRY_MS);
   signal.addEventListener("abort", () => clearTimeout(timer));
 }
 
-/** The module of a view. A browser may remember that it could not be had, so once the service is back all begins anew. */
-async function loaded(name) {
+/**
+ * Load the module of a view. A browser may remember that it failed, so once the service is back the page is loaded again.
+ *
+ * @param {string} name
+ */
+async function loadView(name) {
   try {
     return await import(`./views/${name}.js`);
   } catch (error) {
-    await fetch("livez").catch(() => { throw new Problem({ detail: "It may be down, or the network is. What it has stored is safe.", again: anew }); });
+    await fetch("livez").catch(() => { throw unreachable(reloadOnceBack); });
     throw error;
   }
 }
 
-async function anew() {
+async function reloadOnceBack() {
   const { signal } = leaving;
   const isBack = await fetch("livez").then((answer) => answer.ok, () => false);
   if (signal.aborted) return;
   if (isBack) location.reload();
-  else againOnce(anew, signal);
+  else retryLater(reloadOnceBack, signal);
 }
 
-document.getElementById("theme").addEventListener("click", switchTheme);
-document.querySelector(".skip").addEventListener("click", (event) => {
-  event.preventDefault();  // the address after `#` is the view's
-  document.getElementById("main").focus();
+byId("theme").addEventListener("click", switchTheme);
+byId("skip").addEventListener("click", (event) => {
+  event.preventDefault();  // the address after `#` belongs to the view
+  byId("main").focus();
 });
 addEventListener("hashchange", () => {
-  route().then(() => document.getElementById("main").focus({ preventScroll: true }));
+  showView().then(() => byId("main").focus({ preventScroll: true }));
 });
-route();
+showView();

@@ -11,7 +11,7 @@ from anyio.to_thread import run_sync
 from gaplab.schemas.events import EventPage, EventRead
 from gaplab.services import events
 from gaplab.services.core.errors import StoreUnavailable
-from gaplab.services.events import Which
+from gaplab.services.events import WantedEvents
 from gaplab.services.store.session import Store
 
 EVERY_S = 0.25
@@ -48,7 +48,7 @@ class Feed:
         """How many streams there are now."""
         return self._open
 
-    async def follow(self, after: int, which: Which) -> AsyncIterator[EventRead]:
+    async def follow(self, after: int, which: WantedEvents) -> AsyncIterator[EventRead]:
         """These events, in order and each once, from the first after that number; until the feed is closed."""
         with self._counted():
             while not (self._closed or self._reader is None or self._reader.done()):
@@ -92,7 +92,7 @@ class Feed:
             return None
         return tuple(each for each in self._recent if each.number > number)
 
-    async def _page(self, after: int, which: Which) -> EventPage:
+    async def _page(self, after: int, which: WantedEvents) -> EventPage:
         """What follows for one stream that is behind; nothing new while the database cannot be used."""
         try:
             return await run_sync(lambda: events.page(self._store, after, which, limit=PAGE))
@@ -120,7 +120,7 @@ class Feed:
             self._head = await run_sync(lambda: events.latest(self._store))
             self._tell()
         head = self._head
-        page = await run_sync(lambda: events.page(self._store, head, Which(), limit=PAGE))
+        page = await run_sync(lambda: events.page(self._store, head, WantedEvents(), limit=PAGE))
         if page.items:
             self._recent.extend(page.items)
             self._head = page.items[-1].number

@@ -17,7 +17,7 @@ from gaplab.api.http.limits import Streams
 from gaplab.api.http.problems import documented
 from gaplab.schemas.events import EventKind, EventPage
 from gaplab.services import events
-from gaplab.services.events import Which
+from gaplab.services.events import WantedEvents
 
 router = APIRouter(prefix="/events", tags=["events"])
 
@@ -32,9 +32,9 @@ class EventFilter(Parameters):
     kind: list[EventKind] = Field(default=[], max_length=50, description="only of these kinds; repeat it for several")
     after: After = 0
 
-    def which(self) -> Which:
+    def which(self) -> WantedEvents:
         """The same, as the service has it."""
-        return Which(experiment=self.experiment, study=self.study, kinds=frozenset(self.kind))
+        return WantedEvents(experiment=self.experiment, study=self.study, kinds=frozenset(self.kind))
 
 
 class EventPaging(EventFilter):
@@ -63,7 +63,7 @@ def _room(streams: StreamsDep, caller: CallerDep) -> Iterator[None]:
         yield
 
 
-def _found(store: StoreDep, asked: Annotated[EventFilter, Query()]) -> Which:
+def _found(store: StoreDep, asked: Annotated[EventFilter, Query()]) -> WantedEvents:
     """Before a stream begins, for later no problem can be answered any more."""
     events.check(store, asked.which())
     return asked.which()
@@ -84,7 +84,7 @@ def _found(store: StoreDep, asked: Annotated[EventFilter, Query()]) -> Which:
 )
 async def stream_events(
     asked: Annotated[EventFilter, Query()],
-    which: Annotated[Which, Depends(_found)],
+    which: Annotated[WantedEvents, Depends(_found)],
     feed: Annotated[Feed, Depends(_feed)],
     last_event_id: Annotated[After | None, Header(description="as `after`, and above it")] = None,
 ) -> AsyncIterator[ServerSentEvent]:

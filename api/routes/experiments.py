@@ -22,7 +22,7 @@ from gaplab.schemas.records import (
 )
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.experiments import editing, submission
-from gaplab.services.experiments.listing import Which
+from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.results.misfit import misfit
 
 router = APIRouter(prefix="/experiments", tags=["experiments"])
@@ -89,7 +89,7 @@ def submit_experiment(
 )
 def list_experiments(store: StoreDep, which: Annotated[ExperimentFilter, Query()]) -> Page[ExperimentRead]:
     """The experiments, the newest first unless sorted otherwise. A cursor is good only for the list that gave it."""
-    wanted = Which(**which.model_dump(exclude={"limit", "cursor"}))
+    wanted = ListFilter(**which.model_dump(exclude={"limit", "cursor"}))
     return submission.list_experiments(store, wanted, limit=which.limit, cursor=which.cursor)
 
 

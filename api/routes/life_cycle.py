@@ -10,7 +10,8 @@ from gaplab.api.http.problems import documented
 from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.schedule import ExtensionSpec, ScheduleChange
-from gaplab.services.experiments import life_cycle
+from gaplab.services.experiments import lifecycle
+from gaplab.services.experiments.extension import extend_experiment as extend_to
 
 router = APIRouter()
 
@@ -36,7 +37,7 @@ def _study(state: State, description: str) -> dict[str, object]:
 )
 def pause_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
     """Let running repetitions finish their step and give their core back, and start no other, until it is resumed."""
-    return life_cycle.ask_experiment(store, id, Verb.PAUSE)
+    return lifecycle.ask_experiment(store, id, Verb.PAUSE)
 
 
 @router.post(
@@ -47,7 +48,7 @@ def pause_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 -
 )
 def resume_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
     """Go on with an experiment that was paused, with the numbers that it would have had anyway."""
-    return life_cycle.ask_experiment(store, id, Verb.RESUME)
+    return lifecycle.ask_experiment(store, id, Verb.RESUME)
 
 
 @router.post(
@@ -61,7 +62,7 @@ def stop_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - 
 
     One of which no repetition has a point of the curve ends as CANCELLED.
     """
-    return life_cycle.ask_experiment(store, id, Verb.STOP)
+    return lifecycle.ask_experiment(store, id, Verb.STOP)
 
 
 @router.post(
@@ -72,7 +73,7 @@ def stop_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - 
 )
 def cancel_experiment(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
     """Call an experiment off at once; what is stored stays. One that has ended cannot be."""
-    return life_cycle.ask_experiment(store, id, Verb.CANCEL)
+    return lifecycle.ask_experiment(store, id, Verb.CANCEL)
 
 
 @router.post(
@@ -93,7 +94,7 @@ def extend_experiment(
     What is there stands, and the whole equals an experiment that was submitted with these totals. With the totals that
     it has, one that was stopped is brought to its end.
     """
-    return life_cycle.extend_experiment(store, id, extension, admitted)
+    return extend_to(store, id, extension, admitted)
 
 
 @router.patch(
@@ -108,7 +109,7 @@ def schedule_experiment(
     store: StoreDep,
 ) -> ExperimentRead:
     """Change the priority, or how many repetitions run at once. It changes no number, and stops nothing that runs."""
-    return life_cycle.schedule_experiment(store, id, change)
+    return lifecycle.schedule_experiment(store, id, change)
 
 
 @router.post(
@@ -119,7 +120,7 @@ def schedule_experiment(
 )
 def pause_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the address says {id}
     """Pause every experiment of the study that permits it."""
-    return life_cycle.ask_study(store, id, Verb.PAUSE)
+    return lifecycle.ask_study(store, id, Verb.PAUSE)
 
 
 @router.post(
@@ -130,7 +131,7 @@ def pause_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the addre
 )
 def resume_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the address says {id}
     """Resume every experiment of the study that is paused."""
-    return life_cycle.ask_study(store, id, Verb.RESUME)
+    return lifecycle.ask_study(store, id, Verb.RESUME)
 
 
 @router.post(
@@ -141,7 +142,7 @@ def resume_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the addr
 )
 def stop_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the address says {id}
     """Stop every experiment of the study that has not ended, and keep what is there."""
-    return life_cycle.ask_study(store, id, Verb.STOP)
+    return lifecycle.ask_study(store, id, Verb.STOP)
 
 
 @router.post(
@@ -152,4 +153,4 @@ def stop_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the addres
 )
 def cancel_study(id: Id, store: StoreDep) -> StudyRead:  # noqa: A002 - the address says {id}
     """Call off every experiment of the study that has not ended."""
-    return life_cycle.ask_study(store, id, Verb.CANCEL)
+    return lifecycle.ask_study(store, id, Verb.CANCEL)

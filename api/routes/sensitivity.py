@@ -8,7 +8,7 @@ from gaplab.api.http import examples, links
 from gaplab.api.http.dependencies import AdmissionDep, Id, StoreDep, created
 from gaplab.api.http.problems import documented
 from gaplab.schemas.sensitivity import SensitivityRead, SensitivitySpec
-from gaplab.services.running import sensitivity
+from gaplab.services.experiments import checks
 
 router = APIRouter(prefix="/sensitivity", tags=["sensitivity"])
 
@@ -35,7 +35,7 @@ def submit_sensitivity(
     Only robot, engine and tunables matter to it, and what was checked once is not checked again. Every experiment has
     such a check queued with it.
     """
-    done = sensitivity.admit(store, spec, admitted)
+    done = checks.admit(store, spec, admitted)
     return created(done, response, request.app.url_path_for("read_sensitivity", id=done.answer.id))
 
 
@@ -49,4 +49,4 @@ def submit_sensitivity(
 )
 def read_sensitivity(id: Id, store: StoreDep) -> SensitivityRead:  # noqa: A002 - the address says {id}
     """The check, with the profile of each tunable once it is COMPLETED."""
-    return sensitivity.read(store, id)
+    return checks.read(store, id)

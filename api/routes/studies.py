@@ -13,7 +13,7 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import Page, StudyRead
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.experiments import editing, submission
-from gaplab.services.experiments.listing import Which
+from gaplab.services.experiments.listing import ListFilter
 
 router = APIRouter(prefix="/studies", tags=["studies"])
 
@@ -58,7 +58,7 @@ def submit_study(
 )
 def list_studies(store: StoreDep, which: Annotated[StudyFilter, Query()]) -> Page[StudyRead]:
     """The studies, the newest first unless sorted otherwise. A cursor is good only for the list that gave it."""
-    wanted = Which(**which.model_dump(exclude={"limit", "cursor"}))
+    wanted = ListFilter(**which.model_dump(exclude={"limit", "cursor"}))
     return submission.list_studies(store, wanted, limit=which.limit, cursor=which.cursor)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.store.models import RepetitionRow
-from gaplab.services.store.queries import attempts, experiments, steps
+from gaplab.services.store.queries import attempts, experiments, logs
 from gaplab.services.store.session import Session
 
 
@@ -34,6 +34,6 @@ def check_logs(session: Session, ids: Sequence[str]) -> None:
 
 def _is_log(session: Session, row: RepetitionRow) -> bool:
     try:
-        return steps.is_whole(session, row)
+        return logs.is_whole(session, row)
     except (ValueError, TypeError, AssertionError):  # the steps check themselves
         return False

@@ -26,12 +26,12 @@ from gaplab.services.core.errors import Conflict, InvalidArchive
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
+from gaplab.services.experiments.states import settle
 from gaplab.services.specs.resolution import is_direct, spec_of
 from gaplab.services.store.archive_columns import EXPERIMENT, EXPORTED, REPETITION
 from gaplab.services.store.models import SPEC_VERSION, ExperimentRow, StudyRow
 from gaplab.services.store.queries import archives, provenance
 from gaplab.services.store.queries.events import note
-from gaplab.services.store.queries.settling import settle
 from gaplab.services.store.session import Session, Store
 
 Row = dict[str, Any]

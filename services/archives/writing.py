@@ -12,10 +12,11 @@ from pydantic import TypeAdapter
 from gaplab.schemas.archives import FORMAT, Manifest, Member
 from gaplab.schemas.curves import Curve
 from gaplab.services.archives.members import CURVES, MANIFEST, Hashed, member_of, write
+from gaplab.services.experiments import hiding
 from gaplab.services.results import curves
 from gaplab.services.store.archive_columns import EXPORTED
 from gaplab.services.store.models import REVISION, ExperimentRow
-from gaplab.services.store.queries import archives, experiments, reads
+from gaplab.services.store.queries import archives, experiments
 from gaplab.services.store.session import Session, Store
 
 _MOMENT = (1980, 1, 1, 0, 0, 0)
@@ -66,7 +67,7 @@ def export_study(store: Store, study_id: str) -> Archive:
 def _export(
     session: Session, kind: Literal["study", "experiment"], id_: str, owners: Sequence[ExperimentRow]
 ) -> Archive:
-    ids, hidden = [each.id for each in owners], reads.hidden(session, owners)
+    ids, hidden = [each.id for each in owners], hiding.hidden(session, owners)
     study = id_ if kind == "study" else None
     file = TemporaryFile()  # noqa: SIM115 - whoever sends it closes it
     try:

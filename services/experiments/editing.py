@@ -1,56 +1,69 @@
-"""Names and notes, changed after the fact. Each function is one transaction, and raises StoreUnavailable.
+"""Names and notes, changed after submission. Each function is one transaction, and raises StoreUnavailable.
 
-`starting_from` guards against undoing what somebody else changed meanwhile: it has the values of `edits` that the
-sender takes for the present one; None for whatever it is. Progress is no edit, and refuses none.
+`starting_from` protects another person's edit: it lists the values of `edits` that the sender takes for the present
+one; None takes any. Progress is no edit.
 """
 
 from collections.abc import Collection
 
+from sqlalchemy import update
+
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.records import ExperimentRead, StudyRead
-from gaplab.services.store.queries import editing, experiments, reads
-from gaplab.services.store.session import Session, Store
+from gaplab.services.core.errors import Changed
+from gaplab.services.experiments.views import view_experiments, view_studies
+from gaplab.services.store.models import ExperimentRow, StudyRow
+from gaplab.services.store.queries.experiments import get_experiment, get_study
+from gaplab.services.store.session import Session, transaction
+from gaplab.services.store.statements import storable
 
 
+@transaction
 def edit_experiment(
-    store: Store,
+    session: Session,
     id: str,  # noqa: A002 - as the API says
     edit: Edit,
     *,
     starting_from: Collection[int] | None,
 ) -> ExperimentRead:
-    """The experiment with its new name or notes; its spec stays as it was submitted.
+    """Change the experiment's name or notes; its spec stays as it was submitted.
 
     Raises:
         NotFound: no such experiment.
         Changed: it was edited meanwhile.
     """
-
-    def work(session: Session) -> ExperimentRead:
-        row = experiments.get_experiment(session, id)
-        editing.edit(session, row, edit.model_dump(exclude_unset=True), starting_from)
-        return reads.read_experiments(session, [row])[0]
-
-    return store.write(work)
+    row = get_experiment(session, id)
+    _edit(session, row, edit, starting_from)
+    return view_experiments(session, [row])[0]
 
 
+@transaction
 def edit_study(
-    store: Store,
+    session: Session,
     id: str,  # noqa: A002 - as the API says
     edit: Edit,
     *,
     starting_from: Collection[int] | None,
 ) -> StudyRead:
-    """The study with its new name or notes; its experiments keep theirs.
+    """Change the study's name or notes; its experiments keep theirs.
 
     Raises:
         NotFound: no such study.
         Changed: it was edited meanwhile.
     """
+    row = get_study(session, id)
+    _edit(session, row, edit, starting_from)
+    return view_studies(session, [row])[0]
 
-    def work(session: Session) -> StudyRead:
-        row = experiments.get_study(session, id)
-        editing.edit(session, row, edit.model_dump(exclude_unset=True), starting_from)
-        return reads.read_studies(session, [row])[0]
 
-    return store.write(work)
+def _edit(session: Session, row: ExperimentRow | StudyRow, edit: Edit, starting_from: Collection[int] | None) -> None:
+    table = type(row)
+    changes = edit.model_dump(exclude_unset=True)
+    values = {name: storable(value) if value is not None else None for name, value in changes.items()}
+    statement = update(table).where(table.id == row.id).values(values | {"edits": table.edits + 1})
+    if starting_from is not None:
+        statement = statement.where(table.edits.in_(sorted(starting_from)))
+    if session.execute(statement.returning(table.id)).first() is None:
+        msg = f"{row.id!r} was changed by somebody else since it was looked at; look again, and then decide"
+        raise Changed(msg)
+    session.refresh(row)

@@ -1,4 +1,4 @@
-"""Whether a submission is let in: within the limits, and once for each idempotency key."""
+"""Admission of submissions: within the limits, and once for each idempotency key."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -7,30 +7,35 @@ from datetime import timedelta
 from hashlib import sha256
 from typing import Generic, TypeVar
 
+from sqlalchemy import case, func, select, text
+
 from gaplab.schemas.base import Frozen
+from gaplab.schemas.lifecycle import OPEN
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import InvalidSpec, KeyReused, LimitReached, Violation
 from gaplab.services.settings import Limits, variable_of
 from gaplab.services.specs.resolution import expected_rollouts
-from gaplab.services.store.queries import admission, idempotency
-from gaplab.services.store.queries.admission import Load
+from gaplab.services.store.models import ExperimentRow, RepetitionRow
+from gaplab.services.store.queries import idempotency
 from gaplab.services.store.session import Session, Store
 
 KEYS_LIVE = timedelta(days=7)
 """How long an idempotency key stands for the request that it came with."""
 
 RETRY_AFTER_S = 60
-"""What is full of experiments is full for minutes at least."""
+"""A service that is full of experiments is full for minutes at least."""
+
+_LOCK = 0x67617071  # among the advisory locks of a Postgres database
 
 R = TypeVar("R", bound=Frozen)
 
 
 @dataclass(frozen=True)
 class Admission:
-    """Who submits, and within which limits.
+    """The sender of a submission, and the limits that hold for it.
 
     Attributes:
-        token: id of the token that was shown; None where none is needed.
+        token: id of the sender's token; None where none is needed.
         limits: None for none, as for programs that use the database directly.
         key: the idempotency key that came with the request.
     """
@@ -56,15 +61,23 @@ class Once(Generic[R]):
     replayed: bool = False
 
 
+@dataclass(frozen=True)
+class Load:
+    """Experiments that have not ended, and the rollouts that they have left."""
+
+    experiments: int
+    rollouts: int
+
+
 def once(store: Store, admitted: Admission, asked: Frozen, kind: type[R], work: Callable[[Session], R]) -> Once[R]:
-    """Do the work and keep its answer under the key, in one transaction; or give the answer that is kept.
+    """Do the work and keep its answer under the key, in one transaction; or return the answer that is kept.
 
     Args:
-        store: of what is created.
-        admitted: with the key; without one, the work is done.
-        asked: the body; its class tells one endpoint from another.
-        kind: of the answer.
-        work: in a transaction.
+        store: the database.
+        admitted: with the key; without one, the work is always done.
+        asked: the request's body; its class tells one endpoint from another.
+        kind: class of the answer.
+        work: creates the answer in the transaction.
 
     Raises:
         KeyReused: the key stands for another request.
@@ -89,7 +102,7 @@ def once(store: Store, admitted: Admission, asked: Frozen, kind: type[R], work: 
 
 
 def check_extent(specs: Sequence[ExperimentSpec], limits: Limits | None) -> None:
-    """Do nothing if one submission may ask for so much.
+    """Refuse a submission that is larger than one may be.
 
     Raises:
         InvalidSpec: it may not; the message names the limit.
@@ -109,21 +122,43 @@ def check_extent(specs: Sequence[ExperimentSpec], limits: Limits | None) -> None
 
 
 def check_load(session: Session, specs: Sequence[ExperimentSpec], admitted: Admission, *, done: int = 0) -> None:
-    """Do nothing if there is room for these, in the transaction that inserts them; `done` of their rollouts are over.
+    """Refuse a submission for which there is no room, in the transaction that inserts it.
+
+    Args:
+        session: of the transaction.
+        specs: resolved specs of the submission.
+        admitted: the sender and its limits.
+        done: rollouts of these specs that are over.
 
     Raises:
-        LimitReached: there is none; the message names the limit.
+        LimitReached: the message names the limit.
     """
     if (limits := admitted.limits) is None:
         return
-    admission.one_at_a_time(session)
-    under_way = admission.load(session)
-    own = under_way.get(admitted.token, Load(0, 0))
+    if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write overlap
+        session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
+    under_way = _load(session)
+    of_token = under_way.get(admitted.token, Load(0, 0))
     rollouts = max(0, sum(expected_rollouts(each) * (each.repetitions or 0) for each in specs) - done)
-    _check("experiments_per_token", own.experiments, len(specs), limits)
-    _check("rollouts_per_token", own.rollouts, rollouts, limits)
+    _check("experiments_per_token", of_token.experiments, len(specs), limits)
+    _check("rollouts_per_token", of_token.rollouts, rollouts, limits)
     _check("experiments", sum(each.experiments for each in under_way.values()), len(specs), limits)
     _check("rollouts", sum(each.rollouts for each in under_way.values()), rollouts, limits)
+
+
+def _load(session: Session) -> dict[str | None, Load]:
+    """Return what is under way, by the id of the token that submitted it."""
+    row, run = ExperimentRow, RepetitionRow
+    left = row.rollouts - run.rollouts_done - run.rollouts_saved
+    counts = select(row.token_id, func.count()).where(row.state.in_(OPEN)).group_by(row.token_id)
+    rollouts = (
+        select(row.token_id, func.sum(case((left > 0, left), else_=0)))
+        .join(run, run.experiment_id == row.id)
+        .where(row.state.in_(OPEN), run.state.in_(OPEN))
+        .group_by(row.token_id)
+    )
+    sums = {token: int(total) for token, total in session.execute(rollouts)}
+    return {token: Load(count, sums.get(token, 0)) for token, count in session.execute(counts)}
 
 
 def _check(name: str, present: int, more: int, limits: Limits) -> None:

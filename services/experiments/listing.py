@@ -1,47 +1,177 @@
-"""Lists of experiments and studies, page by page. Each function is one transaction, and raises StoreUnavailable."""
+"""Lists of experiments and studies, page by page, filtered and sorted. Use cases raise StoreUnavailable.
 
-from collections.abc import Sequence
-from typing import TypeVar
+A page begins after the key of the last row of the page before. The key is the sorted column, then the id. A row whose
+state or name changes between two pages may be in both or in none.
+"""
 
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from hashlib import sha256
+from typing import Any, TypeVar
+
+from sqlalchemy import ColumnElement, Select, String, or_, select, tuple_, type_coerce
+
+from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.schemas.records import ExperimentRead, Page, StudyRead
+from gaplab.services.experiments.views import view_experiments, view_studies
+from gaplab.services.store.cursor import Column, decode, encode
 from gaplab.services.store.models import ExperimentRow, StudyRow
-from gaplab.services.store.queries import listing, reads
-from gaplab.services.store.queries.listing import Which as Which
-from gaplab.services.store.session import Store
+from gaplab.services.store.session import Session, snapshot
+from gaplab.services.store.statements import storable
 
 R = TypeVar("R", ExperimentRow, StudyRow)
 
-NEWEST_FIRST = Which()
+Key = tuple[str | int | datetime, ...]
 
 
+@dataclass(frozen=True)
+class ListFilter:
+    """What a list has, and in which order.
+
+    Attributes:
+        study: experiments of this study only.
+        state: experiments in this state only, or studies whose experiments taken together are.
+        strategy: experiments with this strategy only, or studies that have one.
+        text: only what has this text in its name or id.
+        sort: a name of EXPERIMENT_ORDERS or STUDY_ORDERS; a minus before it reverses the order.
+    """
+
+    study: str | None = None
+    state: State | None = None
+    strategy: str | None = None
+    text: str | None = None
+    sort: str = "-created_at"
+
+    def digest(self) -> str:
+        """Return the text that a cursor is bound to."""
+        return sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:12]
+
+
+@dataclass(frozen=True)
+class Order:
+    """An order of a list: its columns, and the key of a row in them."""
+
+    columns: tuple[Column, ...]
+    key: Callable[[Any], Key]
+
+
+_STATE = type_coerce(ExperimentRow.state, String())
+
+EXPERIMENT_ORDERS = {
+    "created_at": Order(
+        (ExperimentRow.created_at, ExperimentRow.position, ExperimentRow.id),
+        lambda row: (row.created_at, row.position, row.id),
+    ),
+    "name": Order((ExperimentRow.name, ExperimentRow.id), lambda row: (row.name, row.id)),
+    "strategy": Order((ExperimentRow.strategy, ExperimentRow.id), lambda row: (row.strategy, row.id)),
+    "state": Order((_STATE, ExperimentRow.id), lambda row: (row.state.value, row.id)),
+}
+
+STUDY_ORDERS = {
+    "created_at": Order((StudyRow.created_at, StudyRow.id), lambda row: (row.created_at, row.id)),
+    "name": Order((StudyRow.name, StudyRow.id), lambda row: (row.name, row.id)),
+}
+
+
+NEWEST_FIRST = ListFilter()
+
+
+@snapshot
 def list_experiments(
-    store: Store, which: Which = NEWEST_FIRST, *, limit: int = 50, cursor: str | None = None
+    session: Session, wanted: ListFilter = NEWEST_FIRST, *, limit: int = 50, cursor: str | None = None
 ) -> Page[ExperimentRead]:
-    """A page of experiments; what is submitted meanwhile shifts no later page.
+    """Return a page of experiments; submissions meanwhile shift no later page.
 
     Raises:
         InvalidSpec: a cursor that no page of this list gave.
     """
-    with store.reading() as session:
-        rows = listing.page_of_experiments(session, which, limit=limit + 1, cursor=cursor)
-        shown = reads.read_experiments(session, rows[:limit])
-    return Page(items=shown, next=_next(rows, limit, which))
+    rows = _page_of_experiments(session, wanted, limit=limit + 1, cursor=cursor)
+    return Page(items=view_experiments(session, rows[:limit]), next=_next(rows, limit, wanted))
 
 
+@snapshot
 def list_studies(
-    store: Store, which: Which = NEWEST_FIRST, *, limit: int = 50, cursor: str | None = None
+    session: Session, wanted: ListFilter = NEWEST_FIRST, *, limit: int = 50, cursor: str | None = None
 ) -> Page[StudyRead]:
-    """A page of studies.
+    """Return a page of studies.
 
     Raises:
         InvalidSpec: a cursor that no page of this list gave.
     """
-    with store.reading() as session:
-        rows = listing.page_of_studies(session, which, limit=limit + 1, cursor=cursor)
-        shown = reads.read_studies(session, rows[:limit])
-    return Page(items=shown, next=_next(rows, limit, which))
+    rows = _page_of_studies(session, wanted, limit=limit + 1, cursor=cursor)
+    return Page(items=view_studies(session, rows[:limit]), next=_next(rows, limit, wanted))
 
 
-def _next(rows: Sequence[R], limit: int, which: Which) -> str | None:
-    """The cursor of the page that follows; `rows` has one more than the page if there is one."""
-    return listing.cursor_after(rows[limit - 1], which) if len(rows) > limit else None
+def _next(rows: Sequence[R], limit: int, wanted: ListFilter) -> str | None:
+    """Return the cursor of the next page; `rows` has one row more than the page if there is one."""
+    return _cursor_after(rows[limit - 1], wanted) if len(rows) > limit else None
+
+
+def _page_of_experiments(
+    session: Session, wanted: ListFilter, *, limit: int, cursor: str | None
+) -> tuple[ExperimentRow, ...]:
+    row = ExperimentRow
+    query = select(row).where(*_text(wanted.text, row.name, row.id))
+    equal = {row.study_id: wanted.study, row.strategy: wanted.strategy}
+    query = query.where(*(column == storable(value) for column, value in equal.items() if value is not None))
+    if wanted.state is not None:
+        query = query.where(row.state == wanted.state)
+    return tuple(session.scalars(_cut(query, wanted, EXPERIMENT_ORDERS, limit, cursor)))
+
+
+def _page_of_studies(session: Session, wanted: ListFilter, *, limit: int, cursor: str | None) -> tuple[StudyRow, ...]:
+    query = select(StudyRow).where(*_text(wanted.text, StudyRow.name, StudyRow.id))
+    if wanted.strategy is not None:
+        query = query.where(_has(ExperimentRow.strategy == storable(wanted.strategy)))
+    if wanted.state is not None:
+        query = query.where(*_study_is(wanted.state))
+    return tuple(session.scalars(_cut(query, wanted, STUDY_ORDERS, limit, cursor)))
+
+
+def _cursor_after(row: ExperimentRow | StudyRow, wanted: ListFilter) -> str:
+    """Return the cursor of the page that follows the row in this list."""
+    orders = EXPERIMENT_ORDERS if isinstance(row, ExperimentRow) else STUDY_ORDERS
+    return encode(*orders[wanted.sort.removeprefix("-")].key(row), bound_to=wanted.digest())
+
+
+def _cut(
+    query: Select[Any], wanted: ListFilter, orders: dict[str, Order], limit: int, cursor: str | None
+) -> Select[Any]:
+    columns = orders[wanted.sort.removeprefix("-")].columns
+    falling = wanted.sort.startswith("-")
+    if cursor is not None:
+        key, after = tuple_(*columns), decode(cursor, columns, wanted.digest())
+        query = query.where(key < after if falling else key > after)
+    return query.order_by(*(each.desc() if falling else each.asc() for each in columns)).limit(limit)
+
+
+def _text(text: str | None, *columns: Column) -> Sequence[ColumnElement[bool]]:
+    """SQL condition: a column contains the text; SQLite ignores the case of ASCII letters only."""
+    return [or_(*(each.icontains(storable(text), autoescape=True) for each in columns))] if text else []
+
+
+def _has(condition: ColumnElement[bool]) -> ColumnElement[bool]:
+    return select(ExperimentRow.id).where(ExperimentRow.study_id == StudyRow.id, condition).exists()
+
+
+def _study_is(state: State) -> list[ColumnElement[bool]]:
+    """SQL condition: the study's experiments taken together are in the state; as `views.state_of` for one study."""
+    open_ = _has(ExperimentRow.state.in_(OPEN))
+    if state is State.RUNNING:
+        return [open_, *(~_all_left_are(each) for each in OPEN if each is not State.RUNNING)]
+    if not state.ended:
+        return [open_, _all_left_are(state)]
+    ends = (State.COMPLETED, State.FAILED, State.CANCELLED)
+    return [
+        ~open_,
+        _has(ExperimentRow.state == state),
+        *(~_has(ExperimentRow.state == each) for each in ends[: ends.index(state)]),
+    ]
+
+
+def _all_left_are(state: State) -> ColumnElement[bool]:
+    """SQL condition: no open experiment is in another state; for QUEUED, no experiment at all is."""
+    others = State if state is State.QUEUED else OPEN
+    return ~_has(ExperimentRow.state.in_([each for each in others if each is not state]))

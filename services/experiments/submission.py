@@ -18,12 +18,14 @@ from gaplab.schemas.records import (
     StudyRead,
 )
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.experiments import checks
+from gaplab.services.experiments.lifecycle import ask_experiment
 from gaplab.services.experiments.limits import FREELY, Admission, Once, check_extent, check_load, once
 from gaplab.services.experiments.listing import list_experiments as list_experiments
 from gaplab.services.experiments.listing import list_studies as list_studies
-from gaplab.services.running.versions import outside
+from gaplab.services.experiments.views import view_experiments, view_repetition, view_studies
 from gaplab.services.specs.resolution import expected_rollouts, is_direct, resolve_experiment, resolve_study
-from gaplab.services.store.queries import attempts, experiments, reads, results, sensitivity, verbs
+from gaplab.services.store.queries import attempts, experiments, results
 from gaplab.services.store.queries.experiments import Extent
 from gaplab.services.store.session import Session, Store
 
@@ -53,8 +55,8 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
     def create(session: Session) -> ExperimentRead:
         check_load(session, [resolved], admitted)
         row = experiments.insert_experiment(session, resolved, extent_of(resolved), token=admitted.token)
-        sensitivity.queue_for(session, [row], outside())
-        return reads.read_experiments(session, [row])[0]
+        checks.queue_for(session, [row])
+        return view_experiments(session, [row])[0]
 
     return once(store, admitted, spec, ExperimentRead, create)
 
@@ -88,8 +90,8 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
             )
             for position, each in enumerate(resolved)
         ]
-        sensitivity.queue_for(session, rows, outside())
-        return reads.read_studies(session, [study])[0]
+        checks.queue_for(session, rows)
+        return view_studies(session, [study])[0]
 
     return once(store, admitted, spec, StudyRead, create)
 
@@ -102,7 +104,7 @@ def read_experiment(store: Store, experiment_id: str, *, reveal: bool = False) -
     """
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
-        return reads.read_experiments(session, [row], reveal=reveal)[0]
+        return view_experiments(session, [row], reveal=reveal)[0]
 
 
 def read_study(store: Store, study_id: str, *, reveal: bool = False) -> StudyRead:
@@ -113,7 +115,7 @@ def read_study(store: Store, study_id: str, *, reveal: bool = False) -> StudyRea
     """
     with store.reading() as session:
         row = experiments.get_study(session, study_id)
-        return reads.read_studies(session, [row], reveal=reveal)[0]
+        return view_studies(session, [row], reveal=reveal)[0]
 
 
 def list_repetitions(store: Store, experiment_id: str) -> tuple[RepetitionRead, ...]:
@@ -124,7 +126,7 @@ def list_repetitions(store: Store, experiment_id: str) -> tuple[RepetitionRead, 
     """
     with store.reading() as session:
         experiments.get_experiment(session, experiment_id)
-        return tuple(map(reads.read_repetition, experiments.repetitions_of(session, experiment_id)))
+        return tuple(map(view_repetition, experiments.repetitions_of(session, experiment_id)))
 
 
 def list_samples(
@@ -191,9 +193,7 @@ def cancel_experiment(store: Store, experiment_id: str) -> ExperimentRead:
         NotFound: no such experiment.
         Conflict: it has ended.
     """
-    return store.write(
-        lambda session: reads.read_experiments(session, [verbs.ask(session, experiment_id, Verb.CANCEL)])[0]
-    )
+    return ask_experiment(store, experiment_id, Verb.CANCEL)
 
 
 def extent_of(spec: ExperimentSpec) -> Extent:

@@ -3,6 +3,7 @@
 from dataclasses import asdict
 
 from gaplab.schemas.plugin import BudgetRead, Catalogue
+from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
@@ -20,4 +21,5 @@ def catalogue() -> Catalogue:
         tunables=tunables.describe(),
         optimizers=optimizers.describe(),
         budgets=tuple(BudgetRead(name=name, **asdict(preset)) for name, preset in PRESETS.items()),
+        defaults=StudySpec().model_dump(mode="json", exclude_none=True),
     )

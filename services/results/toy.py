@@ -12,10 +12,11 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
+from gaplab.services.experiments import hiding
 from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, reality_of
 from gaplab.services.specs.resolution import is_direct, spec_of
 from gaplab.services.store.models import ExperimentRow
-from gaplab.services.store.queries import experiments, reads, replays, results
+from gaplab.services.store.queries import experiments, replays, results
 from gaplab.services.store.queries.replays import MeasuredController
 from gaplab.services.store.session import Session, Store
 
@@ -58,7 +59,7 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
     row = experiments.get_experiment(session, experiment_id)
     spec = spec_of(row.spec)
     robot = robots.create(spec.robot)
-    if robot.world.bodies or robot.space.size != 1:
+    if not robot.is_function:
         message = f"the robot {spec.robot.name!r} is no function of one gene, so there is no curve to be drawn"
         raise InvalidSpec([Violation("experiment", row.id, message, "an experiment with the robot 'toy_function'")])
     _refuse_outside("repetition", [repetition], row.spec["repetitions"])
@@ -73,7 +74,7 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
         row=row,
         spec=spec,
         robot=robot,
-        shown=row.id not in reads.hidden(session, [row]) and None not in row.spec["reality"]["parameters"].values(),
+        shown=row.id not in hiding.hidden(session, [row]) and None not in row.spec["reality"]["parameters"].values(),
         measured=measured,
         simulators=simulators,
         transferred={

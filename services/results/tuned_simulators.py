@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.tunables import tunables
+from gaplab.services.experiments import hiding
 from gaplab.services.figures.kinds.simulators import Dimension, Tuned
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import spec_of, unit
-from gaplab.services.store.queries import experiments, reads, results
+from gaplab.services.store.queries import experiments, results
 from gaplab.services.store.session import Store
 
 
@@ -41,7 +42,7 @@ def tunings(store: Store, experiment_id: str) -> Tunings:
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
         found = results.best_simulators(session, experiment_id)
-        hidden = row.id in reads.hidden(session, [row])
+        hidden = row.id in hiding.hidden(session, [row])
     spec = spec_of(row.spec)
     errors: dict[int, dict[int, float | None]] = defaultdict(dict)
     for each in found:

@@ -1,170 +1,228 @@
-"""Running repetitions: claim them, record their steps, end them. For supervisors; each function is one transaction.
+"""Running repetitions: claim them in the order of turns, record their steps, end them.
 
-A claim is a lease. Its holder sends a heartbeat every 5 to 10 seconds, and is taken for lost after 30. Every write
-carries the claim and is refused once the lease has gone on to another, or the experiment was cancelled: False, or
-absence from `heartbeat`'s answer, tells the holder to drop the repetition.
+The lease mechanism is that of `gaplab.services.running.leases`. Requests of people are obeyed here, so that no holder
+can forget them: the first new step after a pause or a stop is stored, and is the last of its lease.
 
-What a person asks for is obeyed here, so that no holder can forget it: the first delivery after a pause or a stop is
-stored, and is the last of its lease.
-
-All of them raise StoreUnavailable while the database cannot be used; each may then be tried again.
+All functions raise StoreUnavailable while the database cannot be used; each may then be tried again.
 """
 
-from collections.abc import Iterable
-from datetime import timedelta
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
+from sqlalchemy import ColumnElement, func, select, update
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.lifecycle import ASKED, Ending, State
 from gaplab.schemas.provenance import Provenance
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.errors import Conflict
 from gaplab.services.core.types import Step
-from gaplab.services.running.versions import provenance
+from gaplab.services.experiments.states import settle
+from gaplab.services.running import provenance
+from gaplab.services.running.leases import STALE_AFTER_S as STALE_AFTER_S
+from gaplab.services.running.leases import Leases
+from gaplab.services.running.turns import ahead, next_repetitions
+from gaplab.services.running.versions import provenance as present_provenance
+from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Checkpoint as Checkpoint
 from gaplab.services.store.lease import Claim as Claim
 from gaplab.services.store.lease import Delivered as Delivered
 from gaplab.services.store.lease import TimedStep as TimedStep
-from gaplab.services.store.queries import giving_way, leases, unheard
+from gaplab.services.store.models import ExperimentRow, RepetitionRow
+from gaplab.services.store.queries import attempts, checkpoints, steps
+from gaplab.services.store.queries.experiments import lock
+from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 
-STALE_AFTER_S = 30.0
+_REQUESTED_ENDINGS = {State.PAUSING: Ending.PAUSED, State.STOPPING: Ending.STOPPED}
+
+
+class _Repetitions(Leases[Claim]):
+    """Leases of repetitions: an end is told to the history and to the experiment."""
+
+    table = RepetitionRow
+
+    def end(
+        self,
+        session: Session,
+        /,
+        which: ColumnElement[bool],
+        to: State,
+        ending: Ending,
+        reason: str | None = None,
+        **values: Any,  # noqa: ANN401 - columns of any type
+    ) -> list[int]:
+        """End leases as the base does; a hand-back to an experiment that is being paused or stopped is told as such.
+
+        Raises:
+            Conflict: a repetition is to be COMPLETED and iterations of it are missing.
+        """
+        row = RepetitionRow
+        held = select(row.id, row.experiment_id).where(which, row.state == State.RUNNING)
+        owners = dict(session.execute(held).all())
+        if not owners:
+            return []
+        states = lock(session, sorted(set(owners.values())))
+        if to is State.COMPLETED:
+            _refuse_unfinished(session, which)
+        ended: list[int] = super().end(session, which & row.id.in_(owners), to, ending, reason, **values)
+        endings = {id_: _ending(ending, states[owners[id_]]) for id_ in ended}
+        for each in Ending:
+            if ids := [id_ for id_ in ended if endings[id_] is each]:
+                attempts.end(session, ids, each, reason)
+        if to is State.FAILED:
+            checkpoints.forget(session, ended)
+        settle(session, states)
+        return ended
+
+
+def _ending(ending: Ending, state: State) -> Ending:
+    return _REQUESTED_ENDINGS.get(state, ending) if ending is Ending.HANDED_BACK else ending
+
+
+def _refuse_unfinished(session: Session, which: ColumnElement[bool]) -> None:
+    row = RepetitionRow
+    unfinished = session.execute(
+        select(row.number, row.experiment_id, ExperimentRow.iterations - row.iterations_done)
+        .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
+        .where(which, row.state == State.RUNNING, ExperimentRow.iterations != row.iterations_done)
+    ).first()
+    if unfinished is not None:
+        number, experiment, missing = unfinished
+        msg = f"repetition {number} of {experiment!r} is not complete: {missing} iterations are missing"
+        raise Conflict(msg)
+
+
+_LEASES = _Repetitions()
+
+heartbeat = _LEASES.heartbeat
+complete = _LEASES.complete
+fail = _LEASES.fail
+release = _LEASES.release
+hand_back = _LEASES.hand_back
+hand_back_unheard = _LEASES.hand_back_unheard
+requeue_lost = _LEASES.requeue_lost
 
 
 def claim(store: Store, owner: str, limit: int, under: Provenance | None = None) -> tuple[Claim, ...]:
-    """Up to `limit` queued repetitions for the owner to run, in the order of turns, each with its log.
+    """Claim up to `limit` queued repetitions in the order of turns, and return them with their logs.
 
     Args:
         store: where they are queued.
-        owner: who runs them.
-        limit: how many at most.
-        under: what they are to be computed with; this process's own if left out. An experiment that was begun under
-            other engines or plug-ins, another architecture or version of the spec is left alone.
+        owner: the supervisor that runs them.
+        limit: most repetitions.
+        under: provenance of the supervisor; this process's if left out. An experiment that was begun under another
+            engine, plug-in, architecture or version of the spec is left alone, and says so.
     """
-    own = under or provenance()
-    return store.write(lambda session: leases.claim(session, owner, limit, own)) if limit > 0 else ()
-
-
-def heartbeat(store: Store, claims: Iterable[Claim]) -> tuple[Claim, ...]:
-    """Those of the claims that still hold; they hold on from now."""
-    held = tuple(claims)
-    return store.write(lambda session: leases.heartbeat(session, held)) if held else ()
+    return store.write(_claim, owner, limit, under or present_provenance()) if limit > 0 else ()
 
 
 def record(store: Store, claim: Claim, step: Step, *, seconds: float = 0.0) -> bool:
-    """Append a step to the repetition's log.
-
-    A step that is there already stays as it is, so that a second delivery changes nothing and is True too.
-
-    Args:
-        store: of the claim.
-        claim: as it was given out; its own log need not be up to date.
-        step: the next one.
-        seconds: of work that it took.
-
-    Returns:
-        Whether the claim still holds. If not, nothing was written, unless the experiment was asked to pause or stop:
-        then the step was, as the last one.
-
-    Raises:
-        Conflict: the step is not the next one: some before it are missing.
-    """
+    """Append a step to the repetition's log, as `record_all` does, and return whether the claim still holds."""
     return bool(record_all(store, [(claim, (TimedStep(step, seconds),))]))
 
 
 def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[Delivered]]]) -> tuple[Claim, ...]:
-    """Append steps to the logs of many repetitions in one transaction, each as `record` does.
+    """Append steps to the logs of repetitions in one transaction, and return the claims that still hold.
 
-    A checkpoint is kept until its step is there; the next claim has it. One whose step is there already is left out.
-
-    Returns:
-        The claims that still hold; of the others nothing was written, but for those whose experiment was asked to pause
-        or stop.
+    A second delivery of a step changes nothing. A checkpoint is kept until its step is recorded. Nothing is written for
+    a claim that does not hold. A claim whose experiment is being paused or stopped ends with its first new step, which
+    is written.
 
     Raises:
-        Conflict: as `record`; then nothing at all was written.
+        Conflict: steps before a delivered one are missing; nothing at all was written.
     """
-    gathered: dict[Claim, list[Delivered]] = {}
+    by_claim: dict[Claim, list[Delivered]] = {}
     for claim, delivered in deliveries:
-        gathered.setdefault(claim, []).extend(delivered)
-    return store.write(lambda session: giving_way.record(session, gathered)) if gathered else ()
-
-
-def complete(store: Store, claim: Claim) -> bool:
-    """The repetition is COMPLETED, and with its last one the experiment; False if the claim holds no more.
-
-    Raises:
-        Conflict: some of its iterations are missing.
-    """
-    return bool(complete_all(store, [claim]))
-
-
-def complete_all(store: Store, claims: Iterable[Claim]) -> tuple[Claim, ...]:
-    """Complete many repetitions in one transaction, each as `complete` does.
-
-    Returns:
-        The claims that held; the others were left alone.
-
-    Raises:
-        Conflict: as `complete`; then nothing at all was written.
-    """
-    ended = tuple(claims)
-    return store.write(lambda session: leases.complete(session, ended)) if ended else ()
-
-
-def fail(store: Store, claim: Claim, reason: str) -> bool:
-    """The repetition is FAILED; the others go on. False if the claim holds no more.
-
-    The experiment is FAILED once all of its repetitions are.
-    """
-    return store.write(lambda session: leases.fail(session, claim, reason))
-
-
-def release(store: Store, claim: Claim, reason: str) -> bool:
-    """The worker was lost: the repetition is QUEUED again, to go on from its log. False if the claim holds no more.
-
-    One that loses its worker five times without a step in between is FAILED: it is what kills them.
-    """
-    return store.write(lambda session: leases.release(session, claim, reason))
-
-
-def hand_back(store: Store, claim: Claim) -> bool:
-    """The holder stops in good order: the repetition is QUEUED again, as if it had not been claimed, but for its log.
-
-    False if the claim holds no more.
-    """
-    return bool(store.write(lambda session: giving_way.hand_back(session, [claim])))
+        by_claim.setdefault(claim, []).extend(delivered)
+    return store.write(_record, by_claim) if by_claim else ()
 
 
 def give_way(store: Store, waiting: Iterable[Claim], under: Provenance | None = None) -> tuple[Claim, ...]:
-    """Hand back those of the claims that had better not begin: asked to pause or stop, or it is another's turn.
+    """Hand back claims that should not begin now, and return them: a request to pause or stop, or another's turn.
 
     Args:
         store: of the claims.
-        waiting: claims whose repetition waits for a core; one that runs is never interrupted for another.
+        waiting: claims whose repetition waits for a core; a running one is never interrupted for another.
         under: as of `claim`.
-
-    Returns:
-        Those that were handed back; `claim` gives them out again in their turn.
     """
-    held = tuple(waiting)
-    if not held:
+    claims = tuple(waiting)
+    if not claims:
         return ()
     with store.reading() as session:
-        unwanted = giving_way.unwanted(session, held, under or provenance())
-    return store.write(lambda session: giving_way.hand_back(session, unwanted)) if unwanted else ()
+        unwanted = _unwanted(session, claims, under or present_provenance())
+    return hand_back(store, *unwanted)
 
 
-def hand_back_unheard(store: Store, owner: str, claims: Iterable[Claim]) -> int:
-    """Hand back what the owner was given and does not know of, since `claim` did its work and could not say so.
+def _claim(session: Session, owner: str, limit: int, under: Provenance) -> tuple[Claim, ...]:
+    ids = next_repetitions(session, limit, provenance.permitted(session, under))
+    if len(ids) < limit:
+        provenance.refuse(session, under)
+    if not ids:
+        return ()
+    _LEASES.take(session, ids, owner)
+    attempts.begin(session, ids)
+    claims = _claims(session, ids)
+    row, experiments = ExperimentRow, sorted({claim.experiment_id for claim in claims})
+    session.execute(update(row).where(row.id.in_(experiments)).values(started_at=func.coalesce(row.started_at, now())))
+    settle(session, experiments)
+    provenance.record(session, under, claims)
+    return claims
 
-    Args:
-        store: of the claims.
-        owner: who asks.
-        claims: all that the owner knows of.
 
-    Returns:
-        How many there were.
+def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
+    row = RepetitionRow
+    rows = session.execute(
+        select(row.id, row.epoch, row.experiment_id, row.number, ExperimentRow.spec)
+        .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
+        .where(row.id.in_(ids))
+    ).all()
+    specs = {experiment: ExperimentSpec.model_validate(spec) for _, _, experiment, _, spec in rows}
+    past, parts = logs(session, ids), checkpoints.stored(session, ids)
+    claims = {
+        id_: Claim(id_, epoch, experiment, number, specs[experiment], past[id_], parts[id_])
+        for id_, epoch, experiment, number, _ in rows
+    }
+    return tuple(claims[id_] for id_ in ids)
+
+
+def _record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -> tuple[Claim, ...]:
+    requested = _locked_requests(session, deliveries)
+    before = _lengths(session, [claim for claim in deliveries if claim.experiment_id in requested])
+    held = steps.record(session, deliveries)
+    after = _lengths(session, [claim for claim in held if claim.experiment_id in requested])
+    leaving = {claim.id for claim in after if after[claim] > before[claim]}
+    if leaving:
+        row = RepetitionRow
+        iterations = select(ExperimentRow.iterations).where(ExperimentRow.id == row.experiment_id).correlate(row)
+        done = row.id.in_(leaving) & (row.iterations_done >= iterations.scalar_subquery())
+        _LEASES.end(session, done, State.COMPLETED, Ending.COMPLETED, owner=None)
+        _LEASES.end(session, row.id.in_(leaving), State.QUEUED, Ending.HANDED_BACK, owner=None)
+    return tuple(claim for claim in held if claim.id not in leaving)
+
+
+def _locked_requests(session: Session, claims: Iterable[Claim]) -> dict[str, State]:
+    """Lock the experiments of these claims that are being paused or stopped, and return their states.
+
+    An experiment is always locked before its repetitions; hence the first look without a lock.
     """
-    held = tuple(claims)
-    return store.write(lambda session: unheard.hand_back(session, owner, held))
+    row = ExperimentRow
+    requested = select(row.id).where(row.id.in_({claim.experiment_id for claim in claims}), row.state.in_(ASKED))
+    states = lock(session, ids) if (ids := session.scalars(requested).all()) else {}
+    return {experiment: state for experiment, state in states.items() if state in ASKED}
 
 
-def requeue_lost(store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:
-    """QUEUE again, as `release` does, repetitions whose holder was not heard of for so long; how many there were."""
-    return store.write(lambda session: leases.requeue_lost(session, timedelta(seconds=stale_after_s)))
+def _lengths(session: Session, claims: Sequence[Claim]) -> dict[Claim, int]:
+    """Return the number of steps in the log of each claim's repetition."""
+    if not claims:
+        return {}
+    row = RepetitionRow
+    lengths = dict(session.execute(select(row.id, row.steps).where(row.id.in_([each.id for each in claims]))).all())
+    return {claim: lengths[claim.id] for claim in claims}
+
+
+def _unwanted(session: Session, waiting: Sequence[Claim], under: Provenance) -> tuple[Claim, ...]:
+    row, experiments = ExperimentRow, sorted({claim.experiment_id for claim in waiting})
+    requested = session.scalars(select(row.id).where(row.id.in_(experiments), row.state.in_(ASKED))).all()
+    gone = {*requested, *ahead(session, experiments, provenance.permitted(session, under))}
+    return tuple(claim for claim in waiting if claim.experiment_id in gone)

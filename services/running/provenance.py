@@ -1,29 +1,159 @@
-"""Under what experiments are computed, and going on under something else. Each function is one transaction.
+"""Provenance: what experiments were computed with, and which supervisors may go on with them.
 
-All of them raise StoreUnavailable while the database cannot be used.
+An experiment keeps what computed its first steps: its engines with their libraries, the machine's architecture, the
+version of the spec, its external plug-ins. A supervisor that differs leaves it alone until a person accepts that.
 """
 
-from gaplab.schemas.provenance import ProvenanceRead
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from sqlalchemy import ColumnElement, func, select, update
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.provenance import Provenance, ProvenanceRead, ProvenanceUse
 from gaplab.schemas.records import ExperimentRead
-from gaplab.services.store.queries import provenance, reads
-from gaplab.services.store.session import Store
+from gaplab.services.core.errors import Conflict
+from gaplab.services.experiments.views import view_experiments
+from gaplab.services.store.lease import Claim
+from gaplab.services.store.models import ExperimentProvenanceRow, ExperimentRow, ProvenanceRow, RepetitionRow
+from gaplab.services.store.queries.events import note
+from gaplab.services.store.queries.experiments import get_experiment, lock
+from gaplab.services.store.queries.provenance import id_of, insert_unless_there
+from gaplab.services.store.session import snapshot, transaction
+from gaplab.services.store.statements import insert_new
 
 
-def read(store: Store, experiment_id: str) -> ProvenanceRead:
-    """Under what the experiment was computed, and who has left it alone for having something else.
+@snapshot
+def read(session: Session, experiment_id: str) -> ProvenanceRead:
+    """Return what the experiment was computed with, and what a supervisor has that left it alone.
 
     Raises:
         NotFound: no such experiment.
+        StoreUnavailable: the database cannot be used now.
     """
-    with store.reading() as session:
-        return provenance.read(session, experiment_id)
+    experiment = get_experiment(session, experiment_id)
+    return ProvenanceRead(
+        computed_with=experiment.computed_with, refused_by=experiment.refused_by, uses=_uses(session, experiment_id)
+    )
 
 
-def accept_versions(store: Store, experiment_id: str) -> ExperimentRead:
-    """Let the experiment go on under other engines or plug-ins than it was begun with: those of the next supervisor.
+@transaction
+def accept_versions(session: Session, experiment_id: str) -> ExperimentRead:
+    """Let the next supervisor go on with the experiment whatever its versions, which bind it from then on.
 
     Raises:
         NotFound: no such experiment.
         Conflict: it has ended, or has not begun.
+        StoreUnavailable: the database cannot be used now.
     """
-    return store.write(lambda session: reads.read_experiments(session, [provenance.accept(session, experiment_id)])[0])
+    experiment = get_experiment(session, experiment_id)
+    lock(session, [experiment_id])
+    session.refresh(experiment)
+    if experiment.state.ended or experiment.computed_with is None:
+        why = f"has ended: it is {experiment.state}" if experiment.state.ended else "has not begun under any versions"
+        msg = f"experiment {experiment_id!r} {why}; nothing is to accept"
+        raise Conflict(msg)
+    told = {"computed_with": experiment.computed_with, "refused_by": experiment.refused_by}
+    note(session, EventKind.VERSIONS_ACCEPTED, experiment_id, **told)
+    experiment.computed_with = experiment.refused_by = None
+    session.flush()
+    return view_experiments(session, [experiment])[0]
+
+
+def decisive(under: Provenance, spec: Mapping[str, Any]) -> str:
+    """Return the part of a provenance that all supervisors of an experiment with this spec must share."""
+    engines = (_engine(under, name) for name in sorted(_engines(spec)))
+    external = (_external(under, plugin) for plugin in _plugins(spec) if plugin in under.outside)
+    return ", ".join([*engines, *_machine(under), *external])
+
+
+def permitted(session: Session, under: Provenance) -> ColumnElement[bool]:
+    """SQL condition: the experiment has not started, or started with the same; and its spec can be read."""
+    row = ExperimentRow
+    begun = row.claimable.is_(True) & row.computed_with.is_not(None)
+    used = session.scalars(select(row.computed_with).where(begun).distinct())
+    same = row.computed_with.in_([text for text in used if text is not None and _holds(text, under)])
+    return (row.spec_version <= under.spec_version) & (row.computed_with.is_(None) | same)
+
+
+def record(session: Session, under: Provenance, claims: Sequence[Claim]) -> None:
+    """Store the provenance of claims, and bind experiments that begin to it. The experiments are locked."""
+    id_, experiment = id_of(under), ExperimentRow
+    specs = {claim.experiment_id: claim.spec.model_dump(mode="json") for claim in claims}
+    insert_unless_there(session, [{"id": id_, "facts": under.model_dump(mode="json")}])
+    uses = [{"experiment_id": each, "provenance_id": id_} for each in specs]
+    session.execute(insert_new(session, ExperimentProvenanceRow).values(uses))
+    for experiment_id, spec in specs.items():
+        unbound = update(experiment).where(experiment.id == experiment_id, experiment.computed_with.is_(None))
+        session.execute(unbound.values(computed_with=decisive(under, spec), refused_by=None))
+    row = RepetitionRow
+    session.execute(update(row).where(row.id.in_([claim.id for claim in claims])).values(provenance_id=id_))
+    for claim in claims:
+        told = {"epoch": claim.epoch, "steps": len(claim.log), "provenance": id_}
+        note(session, EventKind.REPETITION_CLAIMED, claim.experiment_id, claim.number, **told)
+
+
+def refuse(session: Session, under: Provenance) -> None:
+    """Note once, on each waiting experiment that may not be claimed with this provenance, why that is."""
+    row = ExperimentRow
+    waiting = (
+        row.claimable.is_(True) & row.refused_by.is_(None) & row.computed_with.is_not(None) & ~permitted(session, under)
+    )
+    refused = session.execute(select(row.id, row.spec, row.computed_with).where(waiting).order_by(row.id)).all()
+    for experiment, spec, before in refused:
+        theirs = decisive(under, spec)
+        new = update(row).where(row.id == experiment, row.refused_by.is_(None)).values(refused_by=theirs)
+        if session.execute(new.returning(row.id)).first() is not None:
+            note(session, EventKind.VERSIONS_REFUSED, experiment, computed_with=before, refused_by=theirs)
+
+
+def _uses(session: Session, experiment_id: str) -> tuple[ProvenanceUse, ...]:
+    use, fact, row = ExperimentProvenanceRow, ProvenanceRow, RepetitionRow
+    claimed = (
+        select(func.count())
+        .where(row.experiment_id == use.experiment_id, row.provenance_id == use.provenance_id)
+        .scalar_subquery()
+    )
+    rows = session.execute(
+        select(fact.id, use.since, claimed, fact.facts)
+        .join(fact, fact.id == use.provenance_id)
+        .where(use.experiment_id == experiment_id)
+        .order_by(use.since, fact.id)
+    )
+    return tuple(
+        ProvenanceUse(id=id_, since=since, repetitions=count, provenance=Provenance.model_validate(facts))
+        for id_, since, count, facts in rows
+    )
+
+
+def _holds(text: str, under: Provenance) -> bool:
+    """Return whether each part of a `decisive` text is true of this provenance."""
+    true = [*(_engine(under, name) for name in under.engines), *_machine(under)]
+    part = "|".join(map(re.escape, [*true, *(_external(under, plugin) for plugin in under.outside)]))
+    return re.fullmatch(rf"(?:{part})(?:, (?:{part}))*", text) is not None
+
+
+def _engine(under: Provenance, name: str) -> str:
+    return f"{name} ({under.engines.get(name, 'none')})"
+
+
+def _machine(under: Provenance) -> tuple[str, str]:
+    return under.architecture, f"spec {under.spec_version}"
+
+
+def _external(under: Provenance, plugin: str) -> str:
+    return f"{plugin} ({under.outside[plugin]})"
+
+
+def _engines(spec: Mapping[str, Any]) -> set[str]:
+    """Return the names of the simulators' engine and of reality's."""
+    chosen = (spec.get("engine"), spec["reality"].get("engine"))
+    return {ref["name"] for ref in chosen if ref}
+
+
+def _plugins(spec: Mapping[str, Any]) -> list[str]:
+    """Return its plug-ins of other kinds, each by kind and name as in `Provenance.outside`."""
+    single = [f"{kind} {spec[kind]['name']}" for kind in ("strategy", "robot", "optimizer")]
+    return [*single, *(f"tunable {ref['name']}" for ref in spec["tunables"])]

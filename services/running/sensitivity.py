@@ -1,103 +1,69 @@
-"""Sensitivity checks: submitted and looked at through the API, claimed and ended by supervisors.
+"""Running sensitivity checks, the oldest first, under the lease of `gaplab.services.running.leases`.
 
-Each function is one transaction, and raises StoreUnavailable while the database cannot be used. A claim is a lease as
-in `gaplab.services.running.execution`: False tells its holder to drop the check.
+All functions raise StoreUnavailable while the database cannot be used; each may then be tried again.
 """
 
 from collections.abc import Sequence
-from datetime import timedelta
+from typing import Any
 
-from gaplab.schemas.sensitivity import Checked, Sensitivity, SensitivityRead, SensitivitySpec
-from gaplab.services.core.sensitivity import Effort
-from gaplab.services.experiments.limits import FREELY, Admission, Once, once
-from gaplab.services.running.execution import STALE_AFTER_S
-from gaplab.services.running.versions import outside
-from gaplab.services.specs.resolution import resolve_sensitivity, unit
+from sqlalchemy import ColumnElement, select
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.sensitivity import Checked, Sensitivity
+from gaplab.services.experiments import checks
+from gaplab.services.running.leases import Leases
 from gaplab.services.store.lease import CheckClaim as CheckClaim
-from gaplab.services.store.models import SensitivityRow
-from gaplab.services.store.queries import sensitivity
-from gaplab.services.store.session import Store
+from gaplab.services.store.models import ExperimentRow, SensitivityRow
+from gaplab.services.store.session import Store, transaction
 
 
-def submit(store: Store, spec: SensitivitySpec) -> SensitivityRead:
-    """The check of these settings: QUEUED, unless it is there already and has not FAILED.
+class _Checks(Leases[CheckClaim]):
+    """Leases of sensitivity checks: an end is told to the experiments that the check belongs to."""
 
-    Raises:
-        InvalidSpec: with everything that is wrong with them.
-    """
-    return admit(store, spec, FREELY).answer
+    table = SensitivityRow
 
-
-def admit(store: Store, spec: SensitivitySpec, admitted: Admission) -> Once[SensitivityRead]:
-    """Submit the check, once for each idempotency key.
-
-    Raises:
-        InvalidSpec: with everything that is wrong with them.
-        KeyReused: the key stands for another request.
-    """
-    checked = resolve_sensitivity(spec)
-    return once(
-        store, admitted, spec, SensitivityRead, lambda session: _read(sensitivity.queue(session, checked, outside()))
-    )
-
-
-def read(store: Store, id: str) -> SensitivityRead:  # noqa: A002 - as the API says
-    """The check, with what it found once it is COMPLETED.
-
-    Raises:
-        NotFound: no such check.
-    """
-    with store.reading() as session:
-        return _read(sensitivity.get(session, id))
+    def end(
+        self,
+        session: Session,
+        /,
+        which: ColumnElement[bool],
+        to: State,
+        ending: Ending,
+        reason: str | None = None,
+        **values: Any,  # noqa: ANN401 - columns of any type
+    ) -> list[str]:
+        """End leases as the base does."""
+        ended: list[str] = super().end(session, which, to, ending, reason, **values)
+        row = ExperimentRow
+        for id_ in ended if to.ended else ():
+            experiments = session.scalars(select(row.id).where(row.sensitivity_id == id_).order_by(row.id))
+            checks.tell(session, checks.get(session, id_), experiments)
+        return ended
 
 
-def claim(store: Store, owner: str) -> CheckClaim | None:
-    """The oldest queued check, for the owner to run; None if there is none."""
-    return store.write(lambda session: sensitivity.claim(session, owner))
+_LEASES = _Checks()
+
+heartbeat = _LEASES.heartbeat
+fail = _LEASES.fail
+release = _LEASES.release
+hand_back = _LEASES.hand_back
+requeue_lost = _LEASES.requeue_lost
 
 
-def heartbeat(store: Store, claim: CheckClaim) -> bool:
-    """The claim holds on from now; False if it holds no more."""
-    return store.write(lambda session: sensitivity.heartbeat(session, claim))
+def complete(store: Store, lease: CheckClaim, found: Sequence[Sensitivity]) -> bool:
+    """End the check as COMPLETED with what it found; return False if the lease no longer holds."""
+    return bool(_LEASES.complete(store, lease, found=[each.model_dump(mode="json") for each in found]))
 
 
-def complete(store: Store, claim: CheckClaim, found: Sequence[Sensitivity]) -> bool:
-    """The check is COMPLETED; False if the claim holds no more."""
-    return store.write(lambda session: sensitivity.complete(session, claim, found))
-
-
-def fail(store: Store, claim: CheckClaim, reason: str) -> bool:
-    """The check is FAILED, and no experiment with it; False if the claim holds no more."""
-    return store.write(lambda session: sensitivity.fail(session, claim, reason))
-
-
-def release(store: Store, claim: CheckClaim, reason: str) -> bool:
-    """The worker was lost: the check is QUEUED again, or FAILED at the fifth time; False if the claim holds no more."""
-    return store.write(lambda session: sensitivity.release(session, claim, reason))
-
-
-def hand_back(store: Store, claim: CheckClaim) -> bool:
-    """The holder stops in good order: the check is QUEUED again; False if the claim holds no more."""
-    return store.write(lambda session: sensitivity.hand_back(session, claim))
-
-
-def requeue_lost(store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:
-    """QUEUE again checks whose holder was not heard of for so long; how many there were."""
-    return store.write(lambda session: sensitivity.requeue_lost(session, timedelta(seconds=stale_after_s)))
-
-
-def _read(row: SensitivityRow) -> SensitivityRead:
-    spec = Checked.model_validate(row.spec)
-    return SensitivityRead(
-        id=row.id,
-        state=row.state,
-        spec=spec,
-        rollouts=Effort(spec.points, spec.evaluations).rollouts(len(spec.tunables)),
-        unit=unit(spec),
-        tunables=sensitivity.findings(row),
-        warnings=sensitivity.warnings(row),
-        reason=row.error,
-        created_at=row.created_at,
-        started_at=row.started_at,
-        ended_at=row.ended_at,
-    )
+@transaction
+def claim(session: Session, owner: str) -> CheckClaim | None:
+    """Claim the oldest queued check that no other supervisor is claiming; None if there is none."""
+    row = SensitivityRow
+    oldest = select(row.id).where(row.state == State.QUEUED).order_by(row.created_at, row.id).limit(1)
+    if (id_ := session.scalar(oldest.with_for_update(skip_locked=True))) is None or not _LEASES.take(
+        session, [id_], owner
+    ):
+        return None
+    check = session.get_one(row, id_, populate_existing=True)
+    return CheckClaim(check.id, check.epoch, Checked.model_validate(check.spec))

@@ -1,14 +1,28 @@
-"""Supervisors tell that they work; each function is one transaction, and raises StoreUnavailable."""
+"""Signs of life of supervisors. Each function is one transaction, and raises StoreUnavailable."""
 
-from gaplab.services.store.queries import supervisors
-from gaplab.services.store.session import Store
+from datetime import timedelta
+
+from sqlalchemy import delete, update
+
+from gaplab.services.store.clock import moment, now
+from gaplab.services.store.models import SupervisorRow
+from gaplab.services.store.session import Session, transaction
+
+FORGET_AFTER = timedelta(days=1)
+"""Age of the last sign of life after which a supervisor is forgotten."""
 
 
-def heartbeat(store: Store, owner: str) -> None:
-    """The supervisor works, as of now, whether it has anything to do or not."""
-    store.write(lambda session: supervisors.heartbeat(session, owner))
+@transaction
+def heartbeat(session: Session, owner: str) -> None:
+    """Note that the supervisor works now, whether it has anything to do or not."""
+    row = SupervisorRow
+    beaten = session.execute(update(row).where(row.owner == owner).values(heartbeat_at=now()).returning(row.owner))
+    if beaten.first() is None:
+        session.execute(delete(row).where(row.heartbeat_at < moment(session) - FORGET_AFTER))
+        session.add(row(owner=owner))
 
 
-def end(store: Store, owner: str) -> None:
-    """The supervisor has stopped in good order, and will not be missed."""
-    store.write(lambda session: supervisors.end(session, owner))
+@transaction
+def end(session: Session, owner: str) -> None:
+    """Forget a supervisor that has stopped in good order."""
+    session.execute(delete(SupervisorRow).where(SupervisorRow.owner == owner))

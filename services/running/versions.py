@@ -8,17 +8,12 @@ from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, packages_distributions, version
 from pathlib import Path
-from typing import Any
 
 from gaplab.schemas.provenance import Provenance
 from gaplab.services.core.external_plugins import file_of
-from gaplab.services.core.optimizers import optimizers
-from gaplab.services.core.registry import Registry
-from gaplab.services.core.robots import robots
-from gaplab.services.core.strategies import strategies
-from gaplab.services.core.tunables import tunables
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.plugins.external import external_plugins
 from gaplab.services.plugins.folders import digest, digest_of, digests
 from gaplab.services.store.models import SPEC_VERSION
 
@@ -63,20 +58,8 @@ def provenance() -> Provenance:
         system=platform.platform(),
         spec_version=SPEC_VERSION,
         plugins=digests(),
-        outside=outside(),
+        outside=external_plugins(),
     )
-
-
-@cache
-def outside() -> Mapping[str, str]:
-    """The plug-ins that are not gaplab's own, by kind and name, each with what changes when its numbers may."""
-    registries: tuple[Registry[Any], ...] = (strategies, robots, engines, tunables, optimizers)
-    return {
-        f"{registry.kind} {name}": f"{file} {digest_of(file)}"
-        for registry in registries
-        for name, plugin in registry.items()
-        if (file := file_of(plugin)) is not None
-    }
 
 
 def _engine(engine: type[Engine]) -> str:

@@ -3,8 +3,9 @@
 from datetime import UTC, datetime
 from typing import Any
 
-from sqlalchemy import DateTime, Dialect
+from sqlalchemy import DateTime, Dialect, select
 from sqlalchemy.ext.compiler import compiles
+from sqlalchemy.orm import Session
 from sqlalchemy.sql.functions import FunctionElement
 from sqlalchemy.types import TypeDecorator
 
@@ -51,3 +52,9 @@ def _now_of_sqlite(element: now, compiler: Any, **options: Any) -> str:  # noqa:
 @compiles(now, "postgresql")
 def _now_of_postgres(element: now, compiler: Any, **options: Any) -> str:  # noqa: ANN401, ARG001  # SQLAlchemy's hook
     return "clock_timestamp()"
+
+
+def moment(session: Session) -> datetime:
+    """Return the time by the database's clock."""
+    found: datetime = session.execute(select(now())).scalar_one()
+    return found

@@ -1,4 +1,4 @@
-"""A repetition, or a sensitivity check, in the hands of one supervisor, and what it delivers."""
+"""Leases of repetitions and sensitivity checks, and what the holder of a repetition delivers."""
 
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -26,26 +26,48 @@ class Checkpoint:
 
 
 @dataclass(frozen=True)
-class Claim:
-    """The right to go on with a repetition, until its epoch is over; equal to another of the same epoch.
+class Lease:
+    """The right of one supervisor to a piece of work; a write with an old epoch is refused.
 
     Attributes:
-        repetition_id: in the store.
-        epoch: of the lease; a write that carries an old one is refused.
-        experiment_id: whose repetition it is.
+        id: of the work.
+        epoch: number of the lease among the leases of this work, from 1.
+    """
+
+    id: int | str
+    epoch: int
+
+
+@dataclass(frozen=True)
+class Claim(Lease):
+    """The lease of a repetition; equal to another of the same epoch.
+
+    Attributes:
+        experiment_id: of the repetition's experiment.
         number: of the repetition within its experiment, from 0.
         spec: resolved.
         log: the steps recorded so far, from which to go on.
-        checkpoints: of the step that comes next, if it was under way before.
+        checkpoints: of the next step, if it was under way before.
     """
 
-    repetition_id: int
-    epoch: int
+    id: int
     experiment_id: str
     number: int
     spec: ExperimentSpec = field(compare=False)
     log: tuple[Step, ...] = field(default=(), compare=False)
     checkpoints: tuple[Checkpoint, ...] = field(default=(), compare=False)
+
+
+@dataclass(frozen=True)
+class CheckClaim(Lease):
+    """The lease of a sensitivity check.
+
+    Attributes:
+        spec: what is checked.
+    """
+
+    id: str
+    spec: Checked = field(compare=False)
 
 
 @dataclass(frozen=True)
@@ -57,19 +79,4 @@ class TimedStep:
 
 
 Delivered: TypeAlias = TimedStep | Checkpoint
-"""What a worker gives, in its order."""
-
-
-@dataclass(frozen=True)
-class CheckClaim:
-    """The right to run a sensitivity check, until its epoch is over.
-
-    Attributes:
-        id: of the check.
-        epoch: of the lease.
-        spec: what is checked.
-    """
-
-    id: str
-    epoch: int
-    spec: Checked = field(compare=False)
+"""What a worker delivers."""

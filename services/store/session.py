@@ -3,7 +3,8 @@
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TypeVar
+from functools import wraps
+from typing import Concatenate, ParamSpec, TypeVar
 
 from sqlalchemy import event, text
 from sqlalchemy.exc import DBAPIError
@@ -16,6 +17,7 @@ from gaplab.services.store.engine import WRITES, open_engine
 from gaplab.services.store.models import REVISION
 from gaplab.services.store.queries import events
 
+P = ParamSpec("P")
 T = TypeVar("T")
 
 _TRIES = 5
@@ -59,8 +61,10 @@ class Store:
         with self._named(), self._reader.begin() as session:
             yield session
 
-    def write(self, work: Callable[[Session], T]) -> T:
-        """What `work` returns from a transaction of its own; run anew when Postgres gave it up for another.
+    def write(self, work: Callable[Concatenate[Session, P], T], /, *args: P.args, **kwargs: P.kwargs) -> T:
+        """Return `work(session, *args, **kwargs)` from a transaction of its own.
+
+        The transaction runs again when Postgres gave it up for another one.
 
         Raises:
             StoreUnavailable: the database cannot be used now.
@@ -69,14 +73,14 @@ class Store:
             for attempt in range(1, _TRIES):
                 try:
                     with self._writer.begin() as session:
-                        return work(session)
+                        return work(session, *args, **kwargs)
                 except DBAPIError as error:
                     if not database_errors.is_clash(error):
                         raise
                 self.retries += 1
                 time.sleep(0.01 * 2**attempt)
             with self._writer.begin() as session:
-                return work(session)
+                return work(session, *args, **kwargs)
 
     def check(self) -> None:
         """Do nothing if the database is there and its schema is the one this version needs.
@@ -104,3 +108,24 @@ class Store:
     def dispose(self) -> None:
         """Close the idle connections; the store may be used again."""
         self._engine.dispose()
+
+
+def transaction(work: Callable[Concatenate[Session, P], T]) -> Callable[Concatenate[Store, P], T]:
+    """Make a use case of a function of a session: called with a store, it runs as `Store.write` does."""
+
+    @wraps(work)
+    def use_case(store: Store, /, *args: P.args, **kwargs: P.kwargs) -> T:
+        return store.write(work, *args, **kwargs)
+
+    return use_case
+
+
+def snapshot(work: Callable[Concatenate[Session, P], T]) -> Callable[Concatenate[Store, P], T]:
+    """Make a use case of a function that only reads: called with a store, it sees one moment of the database."""
+
+    @wraps(work)
+    def use_case(store: Store, /, *args: P.args, **kwargs: P.kwargs) -> T:
+        with store.reading() as session:
+            return work(session, *args, **kwargs)
+
+    return use_case

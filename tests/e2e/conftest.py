@@ -12,15 +12,15 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.filling import fill
 from gaplab.schemas.lifecycle import OPEN
 from gaplab.services.archives import import_archive
-from gaplab.services.experiments.listing import Which
+from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.experiments.submission import cancel_experiment, list_experiments
 from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import Chromium
 from tests.e2e.service import Service
+from tests.filling import fill
 
 STUDY = Path(__file__).parents[2] / "docs" / "studies" / "mujoco-in-mujoco.zip"
 
@@ -65,7 +65,7 @@ def written(written_file):
     store = Store(f"sqlite:///{written_file}")
     yield store
     for state in OPEN:
-        for each in list_experiments(store, Which(state=state), limit=500, cursor=None).items:
+        for each in list_experiments(store, ListFilter(state=state), limit=500, cursor=None).items:
             cancel_experiment(store, each.id)
     store.dispose()
 

@@ -64,7 +64,7 @@ def test_a_study_is_found_as_one_types_and_added_by_keyboard(archive, study, ids
     page.go_back()
     expect(chosen).to_have_count(0)
     field.fill("no such thing")
-    expect(page.get_by_role("option", name="Nothing has that in its name or id.")).to_be_visible()
+    expect(page.get_by_role("option", name="No name or id contains this.")).to_be_visible()
     axe(page)
 
 
@@ -132,26 +132,6 @@ def test_what_should_not_be_compared_is_warned_of(archive, ids, visit):
     expect(warned).to_contain_text("Different realities")
     page.get_by_role("button", name="Remove").nth(2).click()
     expect(warned).to_have_count(0)
-
-
-def test_what_differs_between_robots_and_realities_of_one_name_is_said(archive, visit):
-    page = visit(f"{archive.url}/#/compare")
-    warnings = """async (specs) => {
-      const { warnings } = await import("/assets/dashboard/views/compare/remarks.js");
-      return warnings(specs.map((spec, at) => ["AB"[at], { id: String(at), study: null, spec }]));
-    }"""
-    specs = [
-        {
-            "robot": {"name": "quadruped", "options": {"counted_s": seconds, "legs": 4}},
-            "reality": {"engine": {"name": "mujoco", "options": {"solver": solver}}, "parameters": {"restitution": 0}},
-        }
-        for seconds, solver in ((5, "newton"), (10, "cg"))
-    ]
-
-    robots, realities = page.evaluate(warnings, specs)
-
-    assert "A: quadruped (counted s 5); B: quadruped (counted s 10)." in robots
-    assert 'A: mujoco (solver "newton"), restitution 0; B: mujoco (solver "cg"), restitution 0.' in realities
 
 
 def test_a_reality_that_is_hidden_is_not_taken_for_the_same(api, written, visit):

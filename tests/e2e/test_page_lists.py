@@ -84,7 +84,7 @@ def test_experiments_are_filtered_sorted_and_shown_page_by_page(visit, archive):
     page.locator("tr.experiment", has_text="completed").first.wait_for(state="detached")
     assert "Informative" in page.locator("tr.experiment").get_by_role("link").all_text_contents()
     page.get_by_label("Strategy").select_option("known_fit")
-    page.get_by_text("Nothing here is like that").wait_for()
+    page.get_by_text("Nothing fits these filters").wait_for()
     page.get_by_role("link", name="Show everything").click()
 
     page.locator("tr.study").nth(5).wait_for()
@@ -137,7 +137,7 @@ def test_errors_stand_beside_their_fields_until_they_are_right(visit, archive):
     screenshot(page, "new-errors")
     assert page.locator("[aria-invalid]").count() == 2
     page.get_by_role("button", name="Submit the study").click()
-    page.get_by_text("It was not submitted").wait_for()
+    page.get_by_text("The study was not submitted").wait_for()
     page.get_by_label("Restitution from").fill("")
     page.get_by_label("Static friction", exact=True).last.fill("0.5")
 
@@ -174,7 +174,7 @@ def test_a_strategy_is_compared_with_itself_under_other_options(visit, archive):
     box.get_by_text("Options", exact=True).click()
     box.get_by_label("Spread").fill("0.5")
 
-    box.get_by_role("button", name="Once more").click()
+    box.get_by_role("button", name="Add again").click()
     page.locator(".strategy", has_text="Known fit").nth(1).get_by_label("Spread").fill("0.1")
 
     page.get_by_text("rollouts at most").wait_for()
@@ -203,7 +203,7 @@ def test_an_empty_service_says_how_to_begin(visit, sqlite_url, tmp_path):
     api = Api(sqlite_url, tmp_path / "api.log").start()
     try:
         page = visit(api.url)
-        page.get_by_text("Nothing was submitted yet").wait_for()
+        page.get_by_text("There are no studies yet").wait_for()
         axe(page)
         screenshot(page, "empty")
 

@@ -192,7 +192,7 @@ def test_what_is_not_yet_there_may_be_looked_for_again(visit, archive):
     page.wait_for_selector(
         f"text=Reality has not been asked yet about the transferred controller of iteration {done[number]}"
     )
-    assert page.get_by_role("button", name="Look again").is_visible()
+    assert page.get_by_role("button", name="Try again").is_visible()
 
 
 def test_the_page_of_an_experiment_leads_to_its_replays(visit, archive, walker):

@@ -31,7 +31,7 @@ def address(api, experiment):
 def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api, written, visit):
     submitted = submission.submit_experiment(written, toy())
     page = visit(address(api, submitted.id))
-    verbs = page.get_by_role("group", name="Ask of this experiment")
+    verbs = page.get_by_role("group", name="Actions on this experiment")
     state = page.locator(".state-now")
     verbs.get_by_role("button", name="Resume").press("Enter")
     expect(page.locator(".verbs .said")).to_contain_text("queued cannot be resumed, only one that is pausing or paused")
@@ -41,7 +41,7 @@ def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api, written, vis
     verbs.get_by_role("button", name="Resume").click()
     expect(state).to_contain_text("queued")
 
-    verbs.get_by_role("button", name="Change its turn").click()
+    verbs.get_by_role("button", name="Change schedule").click()
     page.get_by_label("Priority").fill("7")
     page.get_by_label("Repetitions at once").fill("2")
     page.get_by_role("button", name="Change it", exact=True).click()

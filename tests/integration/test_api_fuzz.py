@@ -11,11 +11,11 @@ from fastapi.testclient import TestClient
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from benchmarks.mutated_specs import EXPERIMENT, places
 from gaplab.api.app import create_app
 from gaplab.migrations import upgrade
 from gaplab.schemas.problems import Problem
 from gaplab.services.store.session import Store
+from tests.mutated_specs import EXPERIMENT, places
 
 ANYTHING = st.recursive(
     st.none()

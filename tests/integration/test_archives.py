@@ -23,7 +23,7 @@ from gaplab.services.archives import export_experiment, export_study, import_arc
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
-from gaplab.services.experiments import life_cycle, submission
+from gaplab.services.experiments import extension, submission
 from gaplab.services.results import curves
 from gaplab.services.results.misfit import misfit
 from gaplab.services.running import execution
@@ -339,7 +339,7 @@ def test_what_came_without_its_reality_cannot_be_extended(store, other):
 
     assert submission.read_experiment(other, direct).state is State.COMPLETED
     with pytest.raises(Conflict, match="before its reality was shown"):
-        life_cycle.extend_experiment(other, direct, ExtensionSpec(repetitions=3))
+        extension.extend_experiment(other, direct, ExtensionSpec(repetitions=3))
 
 
 def test_times_keep_their_microseconds(store, other):

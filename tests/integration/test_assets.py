@@ -118,6 +118,22 @@ def test_files_of_the_page_are_short_and_say_what_they_are(path: Path):
 
     if path.suffix in {".js", ".css"}:
         assert len(text.splitlines()) <= 250
-        assert text.startswith("/*")
+        assert text.startswith("// @ts-check\n/**" if path.suffix == ".js" else "/*")
     assert "http://" not in text.replace("http://www.w3.org/", "")
     assert "https://" not in text
+
+
+def test_the_catalogue_has_what_a_study_leaves_out():
+    assert StudySpec.model_validate(catalogue().defaults) == StudySpec()
+
+
+def test_the_catalogue_tells_functions_from_robots_with_bodies():
+    functions = {each.name: each.details["function"] for each in catalogue().robots}
+
+    assert (functions["toy_function"], functions["quadruped"]) == (True, False)
+
+
+def test_the_direct_baseline_is_marked_as_such_and_no_other_experiment_is(api: TestClient):
+    study = api.post("/studies", json={"robot": "toy_function", "budget": "smoke", "iterations": 1}).json()
+
+    assert [each["strategy"] for each in study["experiments"] if each["direct"]] == ["direct"]

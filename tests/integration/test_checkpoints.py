@@ -13,8 +13,8 @@ from gaplab.services.core.recall import unpack
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Checkpoint
+from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.store.models import CheckpointRow
-from gaplab.services.store.queries.leases import MAX_LOSSES
 from gaplab.workers.checkpoints import Recorder, recorded
 from tests.experiments import same, some_log, toy
 from tests.fakes import Recorder as Calls

@@ -25,15 +25,15 @@ from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.services import archives, events
 from gaplab.services.core.errors import NotFound
-from gaplab.services.events import Which
-from gaplab.services.experiments import life_cycle, submission
+from gaplab.services.events import WantedEvents
+from gaplab.services.experiments import extension, lifecycle, submission
+from gaplab.services.experiments.checks import queue_for
 from gaplab.services.running import execution, provenance, sensitivity
+from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.running.versions import provenance as own
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.queries.events import note, write
 from gaplab.services.store.queries.experiments import insert_experiment
-from gaplab.services.store.queries.leases import MAX_LOSSES
-from gaplab.services.store.queries.sensitivity import queue_for
 from gaplab.services.store.session import Store
 from tests.experiments import run, some_log, toy
 
@@ -41,11 +41,11 @@ DEADLINE_S = 180
 OTHER = own().model_copy(update={"architecture": "riscv64"})
 
 
-def told(store: Store, which: Which | None = None, after: int = 0) -> tuple[EventRead, ...]:
-    return events.page(store, after, which or Which(), limit=1_000).items
+def told(store: Store, which: WantedEvents | None = None, after: int = 0) -> tuple[EventRead, ...]:
+    return events.page(store, after, which or WantedEvents(), limit=1_000).items
 
 
-def kinds(store: Store, which: Which | None = None) -> list[str]:
+def kinds(store: Store, which: WantedEvents | None = None) -> list[str]:
     return [each.kind.value for each in told(store, which)]
 
 
@@ -111,14 +111,14 @@ def all_verbs(store: Store) -> None:
     steps = some_log()
     for verb in (Verb.PAUSE, Verb.STOP):
         (claim,) = execution.claim(store, "me", 1)
-        life_cycle.ask_experiment(store, asked, verb)
+        lifecycle.ask_experiment(store, asked, verb)
         while execution.record(store, claim, next(steps)):
             continue
         if verb is Verb.PAUSE:
-            life_cycle.ask_experiment(store, asked, Verb.RESUME)
+            lifecycle.ask_experiment(store, asked, Verb.RESUME)
     whole = submission.submit_experiment(store, toy(repetitions=1)).id
     run(store, *execution.claim(store, "me", 1))
-    life_cycle.extend_experiment(store, whole, ExtensionSpec(repetitions=2))
+    extension.extend_experiment(store, whole, ExtensionSpec(repetitions=2))
     with archives.export_experiment(store, asked).file as file:
         archives.import_archive(store, file)
 
@@ -146,7 +146,7 @@ def test_an_experiment_submitted_after_its_check_is_told_of_it_at_once(store):
     later = submission.submit_experiment(store, toy()).id
 
     for each in (before, later):
-        assert kinds(store, Which(experiment=each)) == ["submitted", "sensitivity_ended"]
+        assert kinds(store, WantedEvents(experiment=each)) == ["submitted", "sensitivity_ended"]
 
 
 def test_an_experiment_submitted_while_its_check_ends_is_told_of_it(store):
@@ -156,12 +156,12 @@ def test_an_experiment_submitted_while_its_check_ends_is_told_of_it(store):
     with ThreadPoolExecutor(1) as pool:
         with store.transaction() as session:
             row = insert_experiment(session, spec, submission.extent_of(spec))
-            queue_for(session, [row], {})
+            queue_for(session, [row])
             ending = pool.submit(sensitivity.complete, store, check, [])
             time.sleep(0.3)  # it waits for what is locked here
         assert ending.result(timeout=30)
 
-    assert kinds(store, Which(experiment=row.id)) == ["submitted", "sensitivity_ended"]
+    assert kinds(store, WantedEvents(experiment=row.id)) == ["submitted", "sensitivity_ended"]
 
 
 def test_a_step_that_is_delivered_twice_is_told_once(store):
@@ -172,7 +172,7 @@ def test_a_step_that_is_delivered_twice_is_told_once(store):
         execution.record(store, claim, step)
         execution.record(store, claim, step)
 
-    assert kinds(store, Which(kinds=frozenset({EventKind.PROBED}))) == ["probed"] * 3
+    assert kinds(store, WantedEvents(kinds=frozenset({EventKind.PROBED}))) == ["probed"] * 3
 
 
 def test_what_is_rolled_back_was_never_told_and_leaves_no_hole(store):
@@ -244,7 +244,7 @@ def test_a_reader_that_resumes_among_many_writers_misses_nothing(store):
         seen: list[int] = []
         while True:
             ended = over.is_set()
-            page = events.page(store, seen[-1] if seen else 0, Which(), limit=7)
+            page = events.page(store, seen[-1] if seen else 0, WantedEvents(), limit=7)
             seen += [each.number for each in page.items]
             if ended and not page.items:
                 return seen
@@ -277,7 +277,7 @@ def test_supervisors_that_record_claim_and_end_at_once_do_not_wait_for_each_othe
     with ThreadPoolExecutor(4) as pool:
         assert sum(pool.map(work, "abcd")) == 24
 
-    found = [each.number for each in events.page(store, 0, Which(), limit=1_000).items]
+    found = [each.number for each in events.page(store, 0, WantedEvents(), limit=1_000).items]
     assert found == list(range(1, len(found) + 1))
 
 
@@ -400,7 +400,7 @@ def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(sqlite_store, mo
 
     async def follow() -> list[int]:
         feed = Feed(sqlite_store, every_s=0.01)
-        stalled, resumed = feed.follow(0, Which()), feed.follow(0, Which())
+        stalled, resumed = feed.follow(0, WantedEvents()), feed.follow(0, WantedEvents())
         first = await anext(stalled)
         failing.append(True)
         monkeypatch.setattr(feeding.events, "page", fail_once)
@@ -518,9 +518,9 @@ def test_events_of_a_study_are_those_of_its_experiments(sqlite_store):
     )
     submission.submit_experiment(sqlite_store, toy())
 
-    found = told(sqlite_store, Which(study=study.id))
+    found = told(sqlite_store, WantedEvents(study=study.id))
 
     assert [each.experiment for each in found] == [study.experiments[0].id]
     assert found[0].study == study.id
     with pytest.raises(NotFound, match="there is no study"):
-        events.check(sqlite_store, Which(study="none"))
+        events.check(sqlite_store, WantedEvents(study="none"))

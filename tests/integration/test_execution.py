@@ -10,8 +10,8 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Cost
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
+from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import setting
-from gaplab.services.store.queries.leases import MAX_LOSSES
 from tests.experiments import run, same, some_log, toy
 
 
@@ -43,7 +43,7 @@ def test_claims_of_many_owners_never_overlap(store):
     def claim_all(owner):
         claimed = []
         while claims := execution.claim(store, owner, 3):
-            claimed += [each.repetition_id for each in claims]
+            claimed += [each.id for each in claims]
         return claimed
 
     with ThreadPoolExecutor(4) as pool:
@@ -129,7 +129,7 @@ def test_of_many_deliveries_only_those_whose_claim_holds_are_written(store):
     execution.release(store, lost, "killed")
 
     assert execution.record_all(store, [(each, timed(some_log())) for each in (lost, *held)]) == tuple(held)
-    assert execution.complete_all(store, (lost, *held)) == tuple(held)
+    assert execution.complete(store, lost, *held) == tuple(held)
 
     (again,) = execution.claim(store, "me", 3)
     assert (again.number, again.log) == (lost.number, ())
@@ -158,7 +158,7 @@ def test_a_holder_who_wakes_up_late_cannot_write(store):
     refused = (
         execution.record(store, late, first),
         execution.record(store, late, second),
-        execution.complete(store, late),
+        bool(execution.complete(store, late)),
         execution.fail(store, late, "x"),
         execution.release(store, late, "x"),
     )
@@ -208,7 +208,7 @@ def test_a_repetition_that_kills_its_workers_is_failed_in_the_end(store):
     assert found.state is State.FAILED
     assert found.ended_at is not None
     assert found.reasons == (
-        f"lost {MAX_LOSSES} times without a step in between; the last time its worker ran out of memory??",
+        f"lost {MAX_LOSSES} times without progress; the last time its worker ran out of memory\ufffd?",
     )
 
 

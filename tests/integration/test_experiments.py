@@ -10,7 +10,7 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound
 from gaplab.services.experiments import submission
-from gaplab.services.experiments.listing import Which
+from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.running import execution
 from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
 from tests.experiments import AWKWARD, run, some_log, toy
@@ -144,7 +144,7 @@ def test_a_list_is_filtered_by_study_state_and_strategy(store):
     submission.cancel_experiment(store, alone.id)
 
     def found(**filters):
-        return {each.id for each in submission.list_experiments(store, Which(**filters)).items}
+        return {each.id for each in submission.list_experiments(store, ListFilter(**filters)).items}
 
     assert found(study=study.id) == {each.id for each in study.experiments}
     assert found(state=State.CANCELLED) == {alone.id}
@@ -258,7 +258,7 @@ def test_realitys_parameters_are_hidden_while_any_experiment_of_the_study_can_le
     submission.cancel_experiment(store, second.id)
 
     assert str(SECRET) not in study.model_dump_json() + meanwhile.model_dump_json()
-    assert str(SECRET) not in submission.list_experiments(store, Which(state=State.QUEUED)).model_dump_json()
+    assert str(SECRET) not in submission.list_experiments(store, ListFilter(state=State.QUEUED)).model_dump_json()
     assert submission.read_experiment(store, first.id).spec["reality"]["parameters"]["static_friction"] == SECRET
 
 

@@ -4,7 +4,6 @@ import json
 import logging
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from io import BytesIO
 from itertools import islice
 from typing import Any
@@ -190,7 +189,7 @@ def test_the_digits_would_be_found_in_whatever_form():
 
 
 def test_limits_are_told_without_what_they_refused(sqlite_store: Store):
-    api = TestClient(create_app(sqlite_store, limits=replace(Limits(), iterations=1, experiments=1)))
+    api = TestClient(create_app(sqlite_store, limits=Limits(iterations=1, experiments=1)))
 
     refused = api.post("/studies", json=STUDY)
     full = api.post("/studies", json=STUDY | {"iterations": 1})

@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 def test_no_kill_leaves_a_trace_in_the_results(database, postgres, folder):
     place = folder / f"kill-{database}"  # in memory, and apart from other tests' files
     place.mkdir()
-    command = [sys.executable, "-W", "error", "-m", "benchmarks.kill_matrix", "--kills", "1", "--only", database]
+    command = [sys.executable, "-W", "error", "-m", "tests.kill_matrix", "--kills", "1", "--only", database]
 
     done = subprocess.run(
         [*command, "--postgres", postgres.url("postgres"), "--folder", str(place)],

@@ -7,13 +7,13 @@ from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import life_cycle, submission
+from gaplab.services.experiments import extension, lifecycle, submission
 from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.running.execution import TimedStep
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import RepetitionRow
-from gaplab.services.store.queries.steps import logs
+from gaplab.services.store.queries.logs import logs
 from tests.experiments import run, same, some_log, toy
 
 
@@ -30,7 +30,7 @@ def states(store, experiment):
 
 
 def ask(store, experiment, verb):
-    return life_cycle.ask_experiment(store, experiment, verb).state
+    return lifecycle.ask_experiment(store, experiment, verb).state
 
 
 def deliver(store, claim, count, log=some_log):
@@ -56,7 +56,7 @@ def compute(store, experiment=None):
         for each in claims:
             steps = repetition(setting(each.spec, each.number), each.log)
             execution.record_all(store, [(each, [TimedStep(step, 0.1) for step in steps])])
-        assert execution.complete_all(store, claims) == claims
+        assert execution.complete(store, *claims) == claims
     return stored(store, experiment) if experiment else None
 
 
@@ -234,7 +234,7 @@ def compute_with(store, log):
 
 def obey(store, experiment, verb):
     if verb is Verb.EXTEND:
-        return life_cycle.extend_experiment(store, experiment, ExtensionSpec(iterations=9)).state
+        return extension.extend_experiment(store, experiment, ExtensionSpec(iterations=9)).state
     return ask(store, experiment, verb)
 
 
@@ -259,17 +259,17 @@ def test_a_verb_of_a_study_goes_to_all_of_its_experiments_that_permit_it(store):
     ask(store, first, Verb.CANCEL)
     ask(store, second, Verb.PAUSE)
 
-    paused = life_cycle.ask_study(store, study.id, Verb.PAUSE)
+    paused = lifecycle.ask_study(store, study.id, Verb.PAUSE)
     with pytest.raises(Conflict, match="they are CANCELLED, PAUSED; permitted is QUEUED, RUNNING"):
-        life_cycle.ask_study(store, study.id, Verb.PAUSE)
-    resumed = life_cycle.ask_study(store, study.id, Verb.RESUME)
-    cancelled = life_cycle.ask_study(store, study.id, Verb.CANCEL)
+        lifecycle.ask_study(store, study.id, Verb.PAUSE)
+    resumed = lifecycle.ask_study(store, study.id, Verb.RESUME)
+    cancelled = lifecycle.ask_study(store, study.id, Verb.CANCEL)
 
     assert [each.state for each in paused.experiments] == [State.CANCELLED, State.PAUSED, State.PAUSED]
     assert (paused.state, resumed.state, cancelled.state) == (State.PAUSED, State.RUNNING, State.CANCELLED)
     assert [each.id for each in cancelled.experiments] == [first, second, third]
     with pytest.raises(NotFound):
-        life_cycle.ask_study(store, "nope", Verb.STOP)
+        lifecycle.ask_study(store, "nope", Verb.STOP)
 
 
 @pytest.mark.parametrize("strategy", ["simulated_fit_and_informative", "simulated_fit"])
@@ -279,7 +279,7 @@ def test_an_extended_experiment_equals_one_that_was_submitted_with_the_larger_to
     large = submitted(store, strategy=strategy, iterations=3, repetitions=2)
     expected = compute(store, large)
 
-    extended = life_cycle.extend_experiment(store, small, ExtensionSpec(iterations=3, repetitions=2))
+    extended = extension.extend_experiment(store, small, ExtensionSpec(iterations=3, repetitions=2))
     queued = states(store, small)
     found = compute(store, small)
 
@@ -302,13 +302,13 @@ def test_extending_a_stopped_experiment_to_what_it_had_brings_it_to_its_end(stor
     ask(store, experiment, Verb.STOP)
     execution.record(store, second, next(repetition(setting(second.spec, 1))))
 
-    life_cycle.extend_experiment(store, experiment, ExtensionSpec(repetitions=3))
+    extension.extend_experiment(store, experiment, ExtensionSpec(repetitions=3))
     found = compute(store, experiment)
 
     assert same(tuple(found), tuple(expected))
     assert states(store, experiment) == [State.COMPLETED] * 3
     with pytest.raises(Conflict, match="2 iterations and 3 repetitions already"):
-        life_cycle.extend_experiment(store, experiment, ExtensionSpec(repetitions=3))
+        extension.extend_experiment(store, experiment, ExtensionSpec(repetitions=3))
 
 
 def test_repetitions_of_the_direct_baseline_can_be_extended_but_it_has_no_iterations(store):
@@ -316,8 +316,8 @@ def test_repetitions_of_the_direct_baseline_can_be_extended_but_it_has_no_iterat
     before = compute(store, experiment)
 
     with pytest.raises(InvalidSpec, match="direct baseline has no iterations"):
-        life_cycle.extend_experiment(store, experiment, ExtensionSpec(iterations=5))
-    life_cycle.extend_experiment(store, experiment, ExtensionSpec(repetitions=2))
+        extension.extend_experiment(store, experiment, ExtensionSpec(iterations=5))
+    extension.extend_experiment(store, experiment, ExtensionSpec(repetitions=2))
 
     found = compute(store, experiment)
     assert same(found[0], before[0])
@@ -329,7 +329,7 @@ def test_totals_below_what_is_there_are_refused(store, totals):
     experiment = in_state(store, State.COMPLETED)
 
     with pytest.raises(InvalidSpec, match=r"a total, not what is added|name the total"):
-        life_cycle.extend_experiment(store, experiment, ExtensionSpec(**totals))
+        extension.extend_experiment(store, experiment, ExtensionSpec(**totals))
 
     assert state(store, experiment) is State.COMPLETED
 
@@ -340,7 +340,7 @@ def test_a_failed_repetition_is_not_tried_again_by_extending(store):
     run(store, first)
     execution.fail(store, second, "broken")
 
-    life_cycle.extend_experiment(store, experiment, ExtensionSpec(iterations=3))
+    extension.extend_experiment(store, experiment, ExtensionSpec(iterations=3))
 
     assert states(store, experiment) == [State.QUEUED, State.FAILED]
 
@@ -349,7 +349,7 @@ def test_reality_is_hidden_again_while_an_extended_experiment_runs(store):
     experiment = in_state(store, State.COMPLETED)
     shown = submission.read_experiment(store, experiment).spec["reality"]["parameters"]
 
-    extended = life_cycle.extend_experiment(store, experiment, ExtensionSpec(repetitions=9))
+    extended = extension.extend_experiment(store, experiment, ExtensionSpec(repetitions=9))
 
     assert set(extended.spec["reality"]["parameters"].values()) == {None}
     assert None not in shown.values()

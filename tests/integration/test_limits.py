@@ -1,7 +1,6 @@
 """Limits: beyond each there is a problem that names it, and what is within is let in."""
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
@@ -29,7 +28,7 @@ STUDY = {
 
 
 def served(store: Store, **limits: int) -> TestClient:
-    return TestClient(create_app(store, limits=replace(Limits(), **limits)))
+    return TestClient(create_app(store, limits=Limits(**limits)))
 
 
 @pytest.mark.parametrize(
@@ -136,7 +135,7 @@ def test_a_body_has_the_limit_that_is_set(sqlite_store: Store):
 
 
 def test_streams_are_limited_for_a_token_and_in_all_and_a_closed_one_makes_room():
-    streams = Streams(replace(Limits(), streams_per_token=2, streams=3))
+    streams = Streams(Limits(streams_per_token=2, streams=3))
     with streams.open("a"), streams.open("a"):
         with pytest.raises(LimitReached, match="GAPLAB_MAX_STREAMS_PER_TOKEN"), streams.open("a"):
             pass
@@ -154,7 +153,7 @@ def test_streams_are_limited_for_a_token_and_in_all_and_a_closed_one_makes_room(
 
 
 def test_who_waits_for_events_has_a_stream_open_and_who_does_not_wait_has_none(sqlite_store: Store):
-    app = create_app(sqlite_store, limits=replace(Limits(), streams_per_token=1))
+    app = create_app(sqlite_store, limits=Limits(streams_per_token=1))
     api = TestClient(app)
     wait = {"wait_s": 0.05}
 
@@ -172,7 +171,7 @@ def test_who_waits_for_events_has_a_stream_open_and_who_does_not_wait_has_none(s
 def test_limits_come_from_the_environment(monkeypatch: pytest.MonkeyPatch):
     assert Limits.from_environment() == Limits()
     monkeypatch.setenv("GAPLAB_MAX_ROLLOUTS_PER_TOKEN", "7")
-    assert Limits.from_environment() == replace(Limits(), rollouts_per_token=7)
+    assert Limits.from_environment() == Limits(rollouts_per_token=7)
     monkeypatch.setenv("GAPLAB_MAX_STREAMS", "many")
     with pytest.raises(ValueError, match="GAPLAB_MAX_STREAMS is 'many'"):
         Limits.from_environment()
@@ -206,8 +205,8 @@ def test_a_number_that_is_none_is_said_with_its_variable(monkeypatch: pytest.Mon
 def test_every_limit_is_documented_with_its_default():
     text = (Path(__file__).parents[2] / "docs" / "security.md").read_text()
 
-    for each in fields(Limits):
-        assert f"| `{variable_of(each.name)}` | {each.default:,} |" in text
+    for name, field in Limits.model_fields.items():
+        assert f"| `{variable_of(name)}` | {field.default:,} |" in text
 
 
 def test_the_papers_whole_figure_is_let_in(sqlite_store: Store):

@@ -5,20 +5,20 @@ from contextlib import contextmanager
 import pytest
 from sqlalchemy import event
 
-from benchmarks.filling import IN_A_STUDY, experiment_id, fill, study_id
 from gaplab.schemas.lifecycle import State
 from gaplab.services.archives import export_study, import_archive
 from gaplab.services.experiments import listing, submission
+from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.store.models import Base
-from gaplab.services.store.queries.listing import Which
 from tests.experiments import toy
+from tests.filling import IN_A_STUDY, experiment_id, fill, study_id
 
 READS = {
     "experiments": lambda store: listing.list_experiments(store, limit=5),
-    "experiments of a study": lambda store: listing.list_experiments(store, Which(study=study_id(0))),
-    "experiments in a state": lambda store: listing.list_experiments(store, Which(state=State.COMPLETED)),
+    "experiments of a study": lambda store: listing.list_experiments(store, ListFilter(study=study_id(0))),
+    "experiments in a state": lambda store: listing.list_experiments(store, ListFilter(state=State.COMPLETED)),
     "studies": lambda store: listing.list_studies(store, limit=2),
     "an experiment": lambda store: submission.read_experiment(store, experiment_id(0)),
     "samples": lambda store: submission.list_samples(store, experiment_id(0)),
@@ -56,7 +56,7 @@ def test_what_benchmarks_fill_a_database_with_is_what_the_service_stores(store, 
 
     with export_study(store, study_id(1)).file as archive:
         assert len(import_archive(store, archive).experiments) == IN_A_STUDY  # whole logs, or it would be refused
-    shown = listing.list_experiments(store, Which(study=study_id(0))).items
+    shown = listing.list_experiments(store, ListFilter(study=study_id(0))).items
     assert {each.state for each in shown} == {State.COMPLETED}
     assert all(each.progress.iterations_done == each.progress.iterations == 44 for each in shown)
     assert [point.n for point in curves.curve(store, experiment_id(3)).points] == [4] * 11
@@ -94,7 +94,7 @@ def test_every_read_finds_its_rows_by_an_index(sqlite_store):
 def test_a_page_of_experiments_is_read_in_its_order_and_not_sorted(sqlite_store, filters):
     fill(sqlite_store, IN_A_STUDY)
     with statements(sqlite_store) as found:
-        listing.list_experiments(sqlite_store, Which(**filters))
+        listing.list_experiments(sqlite_store, ListFilter(**filters))
     page, parameters = next(each for each in found if "FROM experiment" in each[0] and "LIMIT" in each[0])
 
     with sqlite_store.reading() as session:

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from benchmarks.mutated_specs import FORBIDDEN_NAMES, VALID_SPECS, measure, mutated
 from gaplab.api.app import create_app
 from gaplab.services.store.session import Store
+from tests.mutated_specs import FORBIDDEN_NAMES, VALID_SPECS, measure, mutated
 
 
 @pytest.fixture

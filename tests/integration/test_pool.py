@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 import ray
 
-from benchmarks import pool as benchmark
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
+from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.workers import repetitions as task
+from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.cluster import cluster
 from gaplab.workers.pool import Pool
 from gaplab.workers.spread import Spread, sizes
@@ -139,10 +141,15 @@ def test_a_call_is_dealt_in_large_parts_first_and_small_ones_in_the_end(rows, co
     assert sizes(rows, cores, least) == parts
 
 
-def test_the_benchmark_runs_a_repetition_as_the_service_does(monkeypatch):
-    spec = ExperimentSpec.model_validate(
-        {"strategy": "random", "robot": "toy_function", "iterations": 2, "repetitions": 1, "budget": "smoke"}
+def test_a_task_computes_every_step_of_a_repetition():
+    spec = resolve_experiment(
+        ExperimentSpec.model_validate(
+            {"strategy": "random", "robot": "toy_function", "iterations": 2, "repetitions": 1, "budget": "smoke"}
+        )
     )
-    monkeypatch.setattr(benchmark, "SPEC", spec)
+    claim = Claim(id=0, epoch=0, experiment_id="none", number=0, spec=spec)
 
-    assert benchmark.on_all_cores() == sum(1 for _ in repetition(setting(resolve_experiment(spec), 0)))
+    stream = task.run.remote(claim, {}, CHECKPOINT_S)
+
+    steps = [each for batch in stream for each in ray.get(batch) if isinstance(each, TimedStep)]
+    assert len(steps) == sum(1 for _ in repetition(setting(spec, 0)))

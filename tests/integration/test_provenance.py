@@ -14,11 +14,10 @@ from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import State
 from gaplab.services import events
 from gaplab.services.core.errors import Conflict, StoreUnavailable
-from gaplab.services.events import Which
+from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution, provenance, versions
 from gaplab.services.store.models import SPEC_VERSION
-from gaplab.services.store.queries import leases
 from tests.experiments import run, same, some_log, toy
 
 HERE = versions.provenance()
@@ -62,7 +61,7 @@ def test_of_two_that_begin_it_at_once_one_is_bound_and_the_other_leaves_it_alone
 
     with ThreadPoolExecutor(1) as pool:
         with store.transaction() as session:
-            first = leases.claim(session, "me", 1, HERE)
+            first = execution._claim(session, "me", 1, HERE)
             second = pool.submit(execution.claim, store, "you", 1, OTHERS["engine"])
             sleep(0.3)  # the other one waits for what is locked here
         assert second.result(timeout=30) == ()
@@ -88,10 +87,10 @@ def test_it_knows_the_commit_and_whether_the_code_was_changed_since(tmp_path, mo
     def git(*command):
         subprocess.run(["git", "-C", tmp_path, *command], check=True, capture_output=True)
 
-    monkeypatch.setattr(versions, "ROOT", tmp_path)
+    monkeypatch.setattr(versions, "ROOT", tmp_path / "gaplab")
     for folder in versions.CODE:
-        (tmp_path / folder).mkdir()
-    file = tmp_path / "schemas" / "a.py"
+        (tmp_path / "gaplab" / folder).mkdir(parents=True)
+    file = tmp_path / "gaplab" / "schemas" / "a.py"
     file.write_text("a = 1\n")
     fresh = versions.provenance.__wrapped__
 
@@ -114,7 +113,7 @@ def test_a_supervisor_with_another_of_what_decides_leaves_it_alone_and_the_exper
     (warning,) = submission.read_experiment(store, id_).warnings
     assert "does not go on" in warning
     assert f"gaplab accept-versions {id_}" in warning
-    refused = events.page(store, 0, Which(kinds=frozenset({EventKind.VERSIONS_REFUSED})), limit=9).items
+    refused = events.page(store, 0, WantedEvents(kinds=frozenset({EventKind.VERSIONS_REFUSED})), limit=9).items
     assert [each.body["refused_by"] for each in refused] == [provenance.read(store, id_).refused_by]
     assert len(execution.claim(store, "me", 9)) == 2
 
@@ -176,7 +175,7 @@ def test_accepted_it_goes_on_from_its_log_and_both_are_recorded(store):
     assert [each.provenance for each in found.uses] == [HERE, other]
     assert [each.repetitions for each in found.uses] == [0, 2]
     assert "analytic 2.0" in found.computed_with
-    told = events.page(store, 0, Which(kinds=frozenset({EventKind.VERSIONS_ACCEPTED})), limit=9).items
+    told = events.page(store, 0, WantedEvents(kinds=frozenset({EventKind.VERSIONS_ACCEPTED})), limit=9).items
     assert "of gaplab's own" in told[0].body["computed_with"]
     assert "analytic 2.0" in told[0].body["refused_by"]
     for claim in claims:

@@ -10,12 +10,12 @@ from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import InvalidSpec, NotFound
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import checks, submission
 from gaplab.services.running import execution, sensitivity
+from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import subject
 from gaplab.services.specs.resolution import resolve_sensitivity
 from gaplab.services.store.models import SensitivityRow
-from gaplab.services.store.queries.leases import MAX_LOSSES
 from tests.experiments import toy
 
 SECRET = 0.987654321
@@ -39,7 +39,7 @@ def shown(verdict, name="grip", effect=0.001):
     )
 
 
-def checks(store):
+def stored_checks(store):
     with store.reading() as session:
         return [row.id for row in session.query(SensitivityRow)]
 
@@ -47,7 +47,7 @@ def checks(store):
 def test_submitting_an_experiment_queues_a_check_of_what_it_tunes(store):
     experiment = submission.submit_experiment(store, toy())
 
-    found = sensitivity.read(store, experiment.sensitivity)
+    found = checks.read(store, experiment.sensitivity)
 
     assert found.state is State.QUEUED
     assert found.spec.robot.name == "toy_function"
@@ -64,28 +64,27 @@ def test_the_same_robot_engine_and_tunables_are_checked_once(store):
     second = submission.submit_experiment(
         store, toy(strategy="random", seed=7, budget="desk", reality={"parameters": {"static_friction": SECRET}})
     )
-    asked = sensitivity.submit(store, settings(seed=3))
+    asked = checks.submit(store, settings(seed=3))
     narrower = submission.submit_experiment(store, toy(tunables=[{"name": "static_friction", "upper": 1.0}]))
-    finer = sensitivity.submit(store, settings(points=33))
+    finer = checks.submit(store, settings(points=33))
 
     assert first.sensitivity == second.sensitivity == asked.id
-    assert set(checks(store)) == {asked.id, narrower.sensitivity, finer.id}
-    assert len(checks(store)) == 3
-    assert str(SECRET) not in sensitivity.read(store, asked.id).model_dump_json()
+    assert set(stored_checks(store)) == {asked.id, narrower.sensitivity, finer.id}
+    assert len(stored_checks(store)) == 3
+    assert str(SECRET) not in checks.read(store, asked.id).model_dump_json()
 
 
 @pytest.mark.parametrize("kind", ["robot toy_function", "engine analytic", "tunable dynamic_friction"])
 def test_what_was_edited_since_is_checked_anew_and_earlier_experiments_keep_their_check(store, monkeypatch, kind):
     def edited(file):
-        for module in (submission, sensitivity):
-            monkeypatch.setattr(module, "outside", lambda: {kind: file, "robot other": file})
+        monkeypatch.setattr(checks, "external_plugins", lambda: {kind: file, "robot other": file})
 
     edited("own.py 0123456789ab")
     before = submission.submit_experiment(store, toy())
-    asked_before = sensitivity.submit(store, settings())
+    asked_before = checks.submit(store, settings())
     edited("own.py ba9876543210")
     after = submission.submit_experiment(store, toy())
-    asked_after = sensitivity.submit(store, settings())
+    asked_after = checks.submit(store, settings())
     other = submission.submit_experiment(store, toy(tunables=["static_friction"], robot="toy_function"))
 
     assert before.sensitivity == asked_before.id != after.sensitivity == asked_after.id
@@ -99,17 +98,17 @@ def test_a_study_has_one_check_and_the_direct_baseline_alone_has_none(store):
 
     strategies = {each.strategy: each.sensitivity for each in study.experiments}
 
-    assert strategies == {"random": checks(store)[0], "direct": None}
+    assert strategies == {"random": stored_checks(store)[0], "direct": None}
     other = submission.submit_experiment(store, toy(strategy="direct", tunables=["restitution"]))
     assert other.sensitivity is None
-    assert len(checks(store)) == 1
+    assert len(stored_checks(store)) == 1
 
 
 def test_experiments_that_are_submitted_at_once_share_a_check(store):
     with ThreadPoolExecutor(4) as pool:
         submitted = list(pool.map(lambda seed: submission.submit_experiment(store, toy(seed=seed)), range(8)))
 
-    assert len({each.sensitivity for each in submitted}) == len(checks(store)) == 1
+    assert len({each.sensitivity for each in submitted}) == len(stored_checks(store)) == 1
 
 
 def test_what_a_check_finds_is_shown_and_warns_the_experiments(store):
@@ -119,7 +118,7 @@ def test_what_a_check_finds_is_shown_and_warns_the_experiments(store):
 
     assert sensitivity.complete(store, claim, (*found, shown(Verdict.NOTHING), shown(Verdict.ROUGH, "slip", 0.5)))
 
-    read = sensitivity.read(store, claim.id)
+    read = checks.read(store, claim.id)
     assert read.state is State.COMPLETED
     assert read.tunables[:2] == found
     assert read.warnings == (
@@ -158,83 +157,83 @@ def test_a_failed_check_fails_no_experiment_and_says_why(store):
     found = submission.read_experiment(store, experiment)
     assert found.state is State.QUEUED
     assert found.warnings == (
-        "the sensitivity check failed, so that nothing is known of the tunables: ValueError: nul?",
+        "the sensitivity check failed, so that nothing is known of the tunables: ValueError: nul\ufffd",
     )
     assert len(execution.claim(store, "me", 9)) == 3
 
 
 def test_a_failed_check_is_queued_again_when_it_is_asked_for_again(store):
-    check_id = sensitivity.submit(store, settings()).id
+    check_id = checks.submit(store, settings()).id
     sensitivity.fail(store, sensitivity.claim(store, "me"), "out of luck")
 
-    again = sensitivity.submit(store, settings())
+    again = checks.submit(store, settings())
 
     assert (again.id, again.state, again.reason, again.ended_at) == (check_id, State.QUEUED, None, None)
     assert sensitivity.claim(store, "me").epoch == 2
 
 
 def test_a_check_is_claimed_once_the_oldest_first(store):
-    first, second = (sensitivity.submit(store, settings(points=points)).id for points in (20, 21))
+    first, second = (checks.submit(store, settings(points=points)).id for points in (20, 21))
 
     with ThreadPoolExecutor(4) as pool:
         claims = [each for each in pool.map(lambda owner: sensitivity.claim(store, owner), "abcd") if each]
 
     assert sorted(each.id for each in claims) == sorted([first, second])
     assert sensitivity.claim(store, "me") is None
-    assert {sensitivity.read(store, each).state for each in (first, second)} == {State.RUNNING}
+    assert {checks.read(store, each).state for each in (first, second)} == {State.RUNNING}
 
 
 def test_a_lost_check_is_queued_again_and_its_old_holder_can_write_no_more(store):
-    check_id = sensitivity.submit(store, settings()).id
+    check_id = checks.submit(store, settings()).id
     old = sensitivity.claim(store, "first")
 
     assert sensitivity.requeue_lost(store) == 0
-    assert sensitivity.heartbeat(store, old)
+    assert sensitivity.heartbeat(store, [old])
     assert sensitivity.requeue_lost(store, stale_after_s=-1) == 1
     new = sensitivity.claim(store, "second")
 
-    assert not sensitivity.heartbeat(store, old)
+    assert not sensitivity.heartbeat(store, [old])
     assert not sensitivity.complete(store, old, (shown(Verdict.NOTHING),))
     assert not sensitivity.fail(store, old, "late")
     assert not sensitivity.release(store, old, "late")
     assert sensitivity.complete(store, new, ())
-    assert sensitivity.read(store, check_id).state is State.COMPLETED
+    assert checks.read(store, check_id).state is State.COMPLETED
 
 
 def test_a_check_that_loses_its_worker_again_and_again_is_what_kills_them(store):
-    check_id = sensitivity.submit(store, settings()).id
+    check_id = checks.submit(store, settings()).id
 
     for _ in range(MAX_LOSSES):
         assert sensitivity.release(store, sensitivity.claim(store, "me"), "killed")
 
-    found = sensitivity.read(store, check_id)
-    assert (found.state, found.reason) == (State.FAILED, "lost 5 times; the last time killed")
+    found = checks.read(store, check_id)
+    assert (found.state, found.reason) == (State.FAILED, "lost 5 times without progress; the last time killed")
     assert sensitivity.claim(store, "me") is None
 
 
 def test_a_check_that_is_handed_back_is_queued_as_if_it_had_not_been_claimed(store):
-    check_id = sensitivity.submit(store, settings()).id
+    check_id = checks.submit(store, settings()).id
 
     assert sensitivity.hand_back(store, sensitivity.claim(store, "me"))
 
-    assert sensitivity.read(store, check_id).state is State.QUEUED
+    assert checks.read(store, check_id).state is State.QUEUED
     assert sensitivity.claim(store, "me").id == check_id
 
 
 @pytest.mark.parametrize("name", ["no-such", "", "nul\0", "'; DROP TABLE sensitivity; --"])
 def test_an_unknown_check_is_not_found(store, name):
     with pytest.raises(NotFound) as caught:
-        sensitivity.read(store, name)
+        checks.read(store, name)
 
     assert repr(name) in str(caught.value)
 
 
 def test_settings_that_no_experiment_could_have_are_refused_with_every_violation(store):
     with pytest.raises(InvalidSpec) as caught:
-        sensitivity.submit(store, settings(engine="pybullet", tunables=["grip"], optimizer="no_such"))
+        checks.submit(store, settings(engine="pybullet", tunables=["grip"], optimizer="no_such"))
 
     assert {each.pointer for each in caught.value.violations} == {"/optimizer"}
     with pytest.raises(InvalidSpec) as caught:
-        sensitivity.submit(store, settings(tunables=["grip", {"name": "restitution", "upper": 7.0}]))
+        checks.submit(store, settings(tunables=["grip", {"name": "restitution", "upper": 7.0}]))
     assert {each.pointer for each in caught.value.violations} == {"/tunables/0", "/tunables/1/upper"}
-    assert checks(store) == []
+    assert stored_checks(store) == []

@@ -19,13 +19,13 @@ from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import life_cycle, submission
+from gaplab.services.experiments import extension, lifecycle, submission
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import AttemptRow, ExperimentRow, RepetitionRow
-from gaplab.services.store.queries.steps import logs
+from gaplab.services.store.queries.logs import logs
 from tests.fakes import flat
 
 MOST_ITERATIONS, MOST_REPETITIONS = 2, 3
@@ -146,10 +146,10 @@ class LifeCycle(RuleBasedStateMachine):
         held = self.claims()
         if experiment.state not in PERMITTED[verb]:
             with pytest.raises(Conflict):
-                life_cycle.ask_experiment(self.store, experiment.id, verb)
+                lifecycle.ask_experiment(self.store, experiment.id, verb)
             return
         experiment.ask(verb)
-        assert life_cycle.ask_experiment(self.store, experiment.id, verb).state is experiment.state
+        assert lifecycle.ask_experiment(self.store, experiment.id, verb).state is experiment.state
         self.gone += [each for each in held if each not in self.claims()]
 
     @precondition(lambda self: any(each.state is State.COMPLETED for each in self.experiments))
@@ -160,20 +160,20 @@ class LifeCycle(RuleBasedStateMachine):
         new = repetitions - len(experiment.repetitions)
         if new < 0 or iterations < experiment.iterations:
             with pytest.raises(InvalidSpec):
-                life_cycle.extend_experiment(self.store, experiment.id, totals)
+                extension.extend_experiment(self.store, experiment.id, totals)
             return
         again = [
             each for each in experiment.of(State.COMPLETED, State.CANCELLED) if points(each.steps) < iterations + 1
         ]
         if not (again or new):
             with pytest.raises(Conflict):
-                life_cycle.extend_experiment(self.store, experiment.id, totals)
+                extension.extend_experiment(self.store, experiment.id, totals)
             return
         for each in again:
             each.state, each.losses = State.QUEUED, 0
         experiment.repetitions += [Repetition() for _ in range(new)]
         experiment.iterations, experiment.state = iterations, State.QUEUED
-        life_cycle.extend_experiment(self.store, experiment.id, totals)
+        extension.extend_experiment(self.store, experiment.id, totals)
 
     @rule(limit=st.integers(1, 3))
     def claim(self, limit):
@@ -324,7 +324,7 @@ class LifeCycle(RuleBasedStateMachine):
     def teardown(self):
         for each in self.experiments:
             with suppress(Conflict):
-                life_cycle.ask_experiment(self.store, each.id, Verb.CANCEL)
+                lifecycle.ask_experiment(self.store, each.id, Verb.CANCEL)
 
 
 def drive(store, examples, steps):

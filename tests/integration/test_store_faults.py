@@ -11,7 +11,6 @@ from typing import ClassVar
 import pytest
 from ray.exceptions import RayTaskError, WorkerCrashedError
 
-from benchmarks.without_ray import OPEN, SPEC, Here, HereRun, Stop
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import StoreUnavailable
@@ -21,12 +20,13 @@ from gaplab.services.experiments import submission
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.store.models import CheckpointRow, RepetitionRow, SensitivityRow
-from gaplab.services.store.queries.steps import logs
+from gaplab.services.store.queries.logs import logs
+from gaplab.workers import repetitions, supervisor
 from gaplab.workers import sensitivity as checking
-from gaplab.workers import supervisor
 from gaplab.workers.checkpoints import recorded
-from gaplab.workers.repetition import batches
+from gaplab.workers.repetitions import batches
 from tests.fakes import flat
+from tests.without_ray import OPEN, SPEC, Here, HereRepetitions, HereRun, Stop
 
 MODULES = {"execution": execution, "sensitivity": sensitivity}
 
@@ -54,9 +54,23 @@ class Troubled(HereRun):
         self.lost, self.failed = ("the worker was lost", None) if self.trouble == "lost" else (None, "it is broken")
 
 
-class Trying(Here):
-    """Runs everything that may happen to a repetition: the second of the first experiment loses its first worker."""
+class TryingRepetitions(HereRepetitions):
+    """Everything that may happen to a repetition: the second of the first experiment loses its first worker."""
 
+    def launch(self, claim):
+        stream = batches(recorded(setting(claim.spec, claim.number), claim.log, claim.checkpoints, 0.0))
+        if claim.spec.name == "broken":
+            return Troubled(claim, stream, "failed")
+        if claim.number == 1 and not Trying.lost:
+            Trying.lost = True
+            return Troubled(claim, stream, "lost")
+        return HereRun(claim, stream)
+
+
+class Trying(Here):
+    """A supervisor of such repetitions, and of sensitivity checks."""
+
+    repetitions = TryingRepetitions
     lost = False
     late: ClassVar = set()
     """The modules whose leases have run out: much time passes before each supervisor, and none while it works."""
@@ -65,15 +79,6 @@ class Trying(Here):
         super().__init__(store)
         self._checks = checking.Checks(store, self._owner)
         Trying.late = set(MODULES.values())
-
-    def _launch(self, claim):
-        stream = batches(recorded(setting(claim.spec, claim.number), claim.log, claim.checkpoints, 0.0))
-        if claim.spec.name == "broken":
-            return Troubled(claim, stream, "failed")
-        if claim.number == 1 and not Trying.lost:
-            Trying.lost = True
-            return Troubled(claim, stream, "lost")
-        return HereRun(claim, stream)
 
 
 class Ray:
@@ -147,8 +152,9 @@ def requeue_late(module, requeue_lost, store, **_):
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """Nothing waits for the clock, and no lease depends on it."""
-    for name, value in {"HEARTBEATS": 1e9, "WAIT_S": 0.0, "RETRY_S": 0.0}.items():
+    for name, value in {"HEARTBEATS": 1e9, "RETRY_S": 0.0}.items():
         monkeypatch.setattr(supervisor, name, value)
+    monkeypatch.setattr(repetitions, "WAIT_S", 0.0)
     monkeypatch.setattr(checking, "LOOK_S", 0.0)
     for module in MODULES.values():
         monkeypatch.setattr(module, "requeue_lost", partial(requeue_late, module, module.requeue_lost))

@@ -15,13 +15,13 @@ import pytest
 from gaplab.schemas.lifecycle import Ending, State, Verb
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import life_cycle, submission
+from gaplab.services.experiments import lifecycle, submission
 from gaplab.services.running import execution
 from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import RepetitionRow
-from gaplab.services.store.queries.steps import logs
+from gaplab.services.store.queries.logs import logs
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
 from tests.fakes import flat
@@ -84,13 +84,13 @@ def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numb
     supervisor = Supervisor(store, lambda: 3)
     wait(lambda: len(stored(store, experiment)[0]) > 1, supervisor.step)
 
-    life_cycle.ask_experiment(store, experiment, Verb.PAUSE)
+    lifecycle.ask_experiment(store, experiment, Verb.PAUSE)
     wait(lambda: state(store, experiment) is State.PAUSED, supervisor.step)
     wait(lambda: not (supervisor.busy or processes_of_ray("run")), supervisor.step)
     paused = stored(store, experiment)
     for _ in range(3):
         supervisor.step()
-    life_cycle.ask_experiment(store, experiment, Verb.RESUME)
+    lifecycle.ask_experiment(store, experiment, Verb.RESUME)
     wait(lambda: state(store, experiment).ended, supervisor.step)
 
     found = stored(store, experiment)
@@ -105,7 +105,7 @@ def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sq
     done = lambda: submission.read_experiment(sqlite_store, experiment).progress.iterations_done  # noqa: E731
     wait(done, supervisor.step)
 
-    life_cycle.ask_experiment(sqlite_store, experiment, Verb.STOP)
+    lifecycle.ask_experiment(sqlite_store, experiment, Verb.STOP)
     wait(lambda: state(sqlite_store, experiment).ended, supervisor.step)
 
     found = stored(sqlite_store, experiment)

@@ -3,9 +3,8 @@
 from sqlalchemy import text
 
 from gaplab.schemas.schedule import ScheduleChange
-from gaplab.services.experiments import life_cycle, submission
-from gaplab.services.running import execution
-from gaplab.services.store.queries import turns
+from gaplab.services.experiments import lifecycle, submission
+from gaplab.services.running import execution, turns
 from tests.experiments import run, toy
 
 
@@ -66,8 +65,8 @@ def test_the_schedule_can_be_changed_and_is_shown_and_the_spec_is_as_it_was(stor
     first, second = submitted(store, max_parallel=1), submitted(store)
     spec = submission.read_experiment(store, second).spec
 
-    changed = life_cycle.schedule_experiment(store, second, ScheduleChange(priority=3))
-    free = life_cycle.schedule_experiment(store, first, ScheduleChange(max_parallel=None))
+    changed = lifecycle.schedule_experiment(store, second, ScheduleChange(priority=3))
+    free = lifecycle.schedule_experiment(store, first, ScheduleChange(max_parallel=None))
 
     assert (changed.priority, changed.max_parallel, changed.spec) == (3, None, spec)
     assert (free.priority, free.max_parallel) == (0, None)

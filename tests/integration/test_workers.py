@@ -16,14 +16,14 @@ from gaplab.services.core.errors import ClusterUnusable, StoreUnavailable
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import checks, submission
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import CheckpointRow, RepetitionRow
-from gaplab.services.store.queries.steps import logs
-from gaplab.workers import repetition as task
+from gaplab.services.store.queries.logs import logs
+from gaplab.workers import repetitions as task
 from gaplab.workers import sensitivity as checking
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.cluster import cluster
@@ -281,10 +281,10 @@ def test_told_to_stop_in_the_middle_of_a_step_it_hands_over_what_the_step_has(sq
 
 def checked(store, check, supervisor):
     deadline = time.monotonic() + DEADLINE_S
-    while not sensitivity.read(store, check).state.ended:
+    while not checks.read(store, check).state.ended:
         assert time.monotonic() < deadline
         supervisor.step()
-    return sensitivity.read(store, check)
+    return checks.read(store, check)
 
 
 def test_a_sensitivity_check_runs_beside_repetitions_and_tells_the_same_as_in_one_process(store):
@@ -341,34 +341,34 @@ def test_a_supervisor_that_is_told_to_stop_hands_its_check_to_the_next(sqlite_st
     check_id = submission.submit_experiment(sqlite_store, toy()).sensitivity
     first, stop = Supervisor(sqlite_store, lambda: 2), Event()
     first.step()
-    states = [sensitivity.read(sqlite_store, check_id).state]
+    states = [checks.read(sqlite_store, check_id).state]
     stop.set()
 
     first.serve(stop)
-    states.append(sensitivity.read(sqlite_store, check_id).state)
+    states.append(checks.read(sqlite_store, check_id).state)
 
     assert states == [State.RUNNING, State.QUEUED]
     assert checked(sqlite_store, check_id, Supervisor(sqlite_store, lambda: 2)).state is State.COMPLETED
 
 
 def test_a_check_that_was_taken_over_is_dropped(sqlite_store):
-    check_id = sensitivity.submit(sqlite_store, SensitivitySpec(robot="toy_function")).id
-    checks = checking.Checks(sqlite_store, "first")
-    checks.step()
+    check_id = checks.submit(sqlite_store, SensitivitySpec(robot="toy_function")).id
+    first = checking.Checks(sqlite_store, "first")
+    first.step()
 
     sensitivity.requeue_lost(sqlite_store, stale_after_s=-1)
     sensitivity.claim(sqlite_store, "second")
-    checks.heartbeat()
-    checks.step()
+    first.heartbeat()
+    first.step()
 
-    assert sensitivity.read(sqlite_store, check_id).state is State.RUNNING
+    assert checks.read(sqlite_store, check_id).state is State.RUNNING
 
 
 def test_a_check_on_a_node_with_other_versions_is_not_stored(sqlite_store):
-    check_id = sensitivity.submit(sqlite_store, SensitivitySpec(robot="toy_function")).id
+    check_id = checks.submit(sqlite_store, SensitivitySpec(robot="toy_function")).id
     supervisor = Supervisor(sqlite_store, lambda: 2, {"gaplab": "0.0.1"})
 
     with pytest.raises(ClusterUnusable, match=r"the supervisor has gaplab 0\.0\.1"):
         checked(sqlite_store, check_id, supervisor)
 
-    assert sensitivity.read(sqlite_store, check_id).state is State.RUNNING
+    assert checks.read(sqlite_store, check_id).state is State.RUNNING

@@ -10,7 +10,7 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
 from tests.soak.evidence import undisturbed
 
-GIVEN_UP = "lost 5 times without a step in between"
+GIVEN_UP = "lost 5 times without progress"
 """Why the service may fail a repetition whose worker dies again and again; it is counted, and shown in the table."""
 
 

@@ -11,9 +11,9 @@ from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Probed, Step, Tuned
 from gaplab.services.specs.assembly import setting
-from gaplab.services.store import mapping
 from gaplab.services.store.models import ExperimentRow, RepetitionRow, SensitivityRow, StudyRow
-from gaplab.services.store.queries.steps import logs
+from gaplab.services.store.queries import step_rows as mapping
+from gaplab.services.store.queries.logs import logs
 from tests.soak import witness
 
 

@@ -16,16 +16,32 @@ ON_DEMAND = {
     "IPython",
 }  # heavy, or not installed everywhere: never at the top of a module of the API
 
+ROOMS = {
+    "core": ((), {"numpy", "scipy", "pydantic", "cma"}),
+    "engines": (("core",), {"numpy", "pydantic"}),
+    "store": (("core",), {"sqlalchemy", "psycopg"}),
+    "figures": ((), {"plotly", "matplotlib"}),
+    "specs": (("core", "engines"), {"numpy"}),
+    "plugins": (("core", "engines", "specs"), set()),
+    "experiments": (("core", "engines", "store", "specs", "plugins", "settings"), {"sqlalchemy"}),
+    "running": (("core", "engines", "store", "plugins", "experiments"), {"sqlalchemy"}),
+    "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
+    "replay": (("core", "store", "specs", "experiments"), {"numpy", "cachetools"}),
+    "archives": (("core", "store", "specs", "experiments", "results"), {"pydantic", "pyarrow"}),
+}
+"""Rooms of services, each below those that may import it: what of services each may import, and what of others."""
+
 # code in -> what of ours it may import, and what of others; the first prefix that fits counts
 ARROWS = {
     "schemas": (("schemas",), {"pydantic", "pydantic_core"}),
-    "services/core": (("schemas", "services.core"), {"numpy", "scipy", "pydantic", "cma"}),
-    "services/engines": (("schemas", "services.core", "services.engines"), {"numpy", "pydantic"}),
-    "services/store": (("schemas", "services.core", "services.store"), {"sqlalchemy", "psycopg"}),
-    "services/archives": (("schemas", "services"), {"pydantic", "pyarrow"}),
-    "services/figures": (("schemas", "services.figures"), {"plotly", "matplotlib"}),
-    "services/replay": (("schemas", "services"), {"numpy", "cachetools"}),
-    "services": (("schemas", "services"), {"numpy"}),
+    **{
+        f"services/{room}": (("schemas", *(f"services.{each}" for each in (room, *below))), others)
+        for room, (below, others) in ROOMS.items()
+    },
+    "services": (
+        ("schemas", "services.core", "services.plugins", "services.store"),
+        {"pydantic", "pydantic_settings"},
+    ),
     "workers": (("schemas", "services", "workers"), {"numpy", "ray"}),
     "api": (
         ("schemas", "services", "api", "migrations"),
@@ -84,6 +100,34 @@ def test_imports_follow_the_arrows(path):
             assert top in others, f"{path} may not import {module}"
 
 
+def test_each_room_of_services_imports_only_rooms_before_it():
+    """So there is no circle of rooms."""
+    order = [*ROOMS, "settings"]
+
+    for room, (below, _) in ROOMS.items():
+        assert all(each == "settings" or order.index(each) < order.index(room) for each in below), room
+    folders = {path.parent.name for path in (ROOT / "services").glob("*/__init__.py")}
+    assert folders == set(ROOMS)
+
+
+def test_states_are_written_in_one_place():
+    """`move` alone, which uses the table of permitted moves; what is inserted or imported is no move."""
+    writers = set()
+    for path in MODULES:
+        if path.parts[0] in {"services", "workers", "api"} and path.parts[1] != "archives":
+            for node in ast.walk(ast.parse((ROOT / path).read_text())):
+                match node:
+                    case ast.Call(func=ast.Attribute(attr="values"), keywords=keywords):
+                        writers |= {path.as_posix() for each in keywords if each.arg == "state"}
+                    case ast.Assign(targets=[ast.Attribute(attr="state")]):
+                        writers.add(path.as_posix())
+                    case ast.Dict(keys=keys, values=values):
+                        pairs = zip(keys, values, strict=True)
+                        named = [ast.unparse(value) for key, value in pairs if getattr(key, "value", None) == "state"]
+                        writers |= {path.as_posix() for each in named if each.startswith("State.")}
+    assert writers == {"services/experiments/states.py"}
+
+
 @pytest.mark.parametrize("path", [each for each in MODULES if each.as_posix().startswith("services/core/")], ids=str)
 def test_the_core_has_no_clock_no_chance_of_its_own_and_no_side_effects(path):
     assert not {module.partition(".")[0] for module in imports(path)} & IMPURE
@@ -118,3 +162,9 @@ def test_a_module_stays_under_250_lines_and_a_function_under_40(path):
 @pytest.mark.parametrize("path", MODULES, ids=str)
 def test_every_module_says_what_it_is(path):
     assert ast.get_docstring(ast.parse((ROOT / path).read_text()))
+
+
+def test_benchmarks_use_what_tests_provide_and_no_test_uses_a_benchmark() -> None:
+    tests = sorted(path.relative_to(ROOT) for path in (ROOT / "tests").rglob("*.py"))
+
+    assert not [str(path) for path in tests if any(name.partition(".")[0] == "benchmarks" for name in imports(path))]

@@ -7,6 +7,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
+from docs import typescript
 from docs.generate import FOLDER, pages
 
 ROOT = Path(__file__).parents[2]
@@ -83,6 +84,10 @@ def test_the_reference_is_what_the_code_says():
 
     assert {name for name, text in pages().items() if kept.get(name) != text} == set(), "run `make docs`"
     assert set(kept) == set(pages())
+
+
+def test_the_types_of_the_page_are_those_of_the_openapi_document():
+    assert typescript.FILE.read_text() == typescript.declarations(), "run `make docs`"
 
 
 def test_documents_name_no_path_of_a_machine():

@@ -183,7 +183,7 @@ def test_without_folders_there_is_nothing_to_tell():
 ELSEWHERE = """
 from gaplab.services.running.versions import provenance, versions
 from gaplab.services.plugins.catalogue import catalogue
-from gaplab.services.store.queries.provenance import decisive
+from gaplab.services.running.provenance import decisive
 
 found = provenance()
 print("careful" in [each.name for each in catalogue().strategies])

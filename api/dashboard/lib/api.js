@@ -1,48 +1,103 @@
-/** The service: what is asked of it, what it answers, and what happens there. */
+// @ts-check
+/** Requests to the service, and the stream of its events. */
 
-import { read, written } from "./json.js";
-import { inSight, whileInSight } from "./sight.js";
+import { parse, stringify } from "./json.js";
 import { token } from "./token.js";
+import { abortWhenHidden, untilVisible } from "./visibility.js";
 
-/** A problem that the service answered with, or that it did not answer (status 0). */
+const RECONNECT_MS = 1500;
+
+/** A problem that the service answered with; status 0 means that it did not answer. */
 export class Problem extends Error {
-  constructor({ status = 0, title = "The service does not answer", detail = "", errors = [], again = null }) {
+  /** @param {Partial<Api.Problem> & { retry?: () => void }} problem */
+  constructor({ status = 0, title = "The service does not answer", detail, errors, retry }) {
     super(detail || title);
-    Object.assign(this, { status, title, errors, again });
+    this.status = status;
+    this.title = title;
+    this.errors = errors ?? [];
+    this.retry = retry;
   }
 }
 
-/** The JSON at `path`; `query` may hold lists, and leaves out what is null or empty. */
-export const get = async (path, query = {}, signal = undefined) =>
-  (await request(path + search(query), { signal })).json();
+/**
+ * Return the JSON at a path.
+ *
+ * @param {string} path
+ * @param {Page.Query} [query] may hold lists; what is null or empty is left out
+ * @param {AbortSignal} [signal]
+ * @returns {Promise<any>}
+ */
+export const get = async (path, query = {}, signal = undefined) => (await request(path + queryString(query), { signal })).json();
 
-/** The JSON at `path`, and the tag that a change of it names. */
-export const tagged = async (path, signal = undefined) => withTag(await request(path, { signal }));
+/**
+ * Return the JSON at a path, with its tag.
+ *
+ * @param {string} path
+ * @param {AbortSignal} [signal]
+ */
+export const getTagged = async (path, signal = undefined) => tagged(await request(path, { signal }));
 
-/** The file at `path`. */
-export const blob = async (path, query = {}) => (await request(path + search(query), {})).blob();
+/**
+ * Return the file at a path.
+ *
+ * @param {string} path
+ * @param {Page.Query} [query]
+ */
+export const getFile = async (path, query = {}) => (await request(path + queryString(query), {})).blob();
 
-/** What the service made of a POST. */
+/**
+ * Send a POST, and return the JSON of the answer.
+ *
+ * @param {string} path
+ * @param {unknown} [body]
+ * @param {Record<string, string>} [headers]
+ * @returns {Promise<any>}
+ */
 export const post = async (path, body = undefined, headers = {}) => (await send("POST", path, body, headers)).json();
 
-/** What the service made of a PATCH, and its tag. */
-export const patch = async (path, body, headers = {}) => withTag(await send("PATCH", path, body, headers));
+/**
+ * Send a PATCH, and return the JSON of the answer with its tag.
+ *
+ * @param {string} path
+ * @param {unknown} body
+ * @param {Record<string, string>} [headers]
+ */
+export const patch = async (path, body, headers = {}) => tagged(await send("PATCH", path, body, headers));
 
-/** A query as it stands in an address: `?a=1&a=2`, or nothing. */
-export function search(query) {
+/**
+ * Return a query as it stands in an address: `?a=1&a=2`, or nothing.
+ *
+ * @param {Page.Query} query
+ */
+export function queryString(query) {
   const pairs = Object.entries(query).flatMap(([key, value]) =>
-    [value].flat().filter((each) => each !== null && each !== undefined && each !== "").map((each) => [key, String(each)]));
+    [value].flat().filter((item) => item !== null && item !== undefined && item !== "").map((item) => [key, String(item)]));
   return pairs.length ? `?${new URLSearchParams(pairs)}` : "";
 }
 
-const withTag = async (answer) => ({ value: read(await answer.text()), tag: answer.headers.get("ETag") });
+/**
+ * @param {Response} answer
+ * @returns {Promise<Page.Tagged<any>>}
+ */
+const tagged = async (answer) => ({ value: parse(await answer.text()), tag: answer.headers.get("ETag") });
 
+/**
+ * @param {string} method
+ * @param {string} path
+ * @param {unknown} body
+ * @param {Record<string, string>} headers
+ */
 function send(method, path, body, headers) {
-  const json = body === undefined ? {} : { body: written(body) };
+  const json = body === undefined ? {} : { body: stringify(body) };
   return request(path, { method, headers: { "Content-Type": "application/json", ...headers }, ...json });
 }
 
-/** Ask, and raise what is wrong as a Problem. Addresses are relative, so that the service may live below a prefix. */
+/**
+ * Send a request, and throw a Problem unless it succeeds. Addresses are relative, so that the service may live below a prefix.
+ *
+ * @param {string} path
+ * @param {RequestInit} options
+ */
 async function request(path, options) {
   const headers = { ...options.headers, ...(token() ? { Authorization: `Bearer ${token()}` } : {}) };
   let answer;
@@ -50,49 +105,66 @@ async function request(path, options) {
     answer = await fetch(path.replace(/^\//, ""), { ...options, headers });
   } catch (error) {
     if (error.name === "AbortError") throw error;
-    throw new Problem({ detail: "It may be down, or the network is. What it has stored is safe." });
+    throw unreachable();
   }
   if (answer.ok) return answer;
   throw new Problem(await answer.json().catch(() => ({ status: answer.status, title: answer.statusText })));
 }
 
 /**
- * Server-sent events after `query.after`, or from now on, for as long as `signal` lasts: `handler({ kind, id, data })` for each of them, and
- * `connected(true | false, why)` as the stream comes and goes, with why the service refused it. It is taken up again where it broke off,
- * without a hole. A page that is out of sight lets go of it without a word, until it is in sight again.
+ * Return the problem of a service that does not answer.
+ *
+ * @param {() => void} [retry]
  */
-export async function events(query, handler, connected, signal) {
-  let last = null;
+export const unreachable = (retry = undefined) =>
+  new Problem({ detail: "It may be down, or the network is. What it has stored is safe.", retry });
+
+/**
+ * Follow the server-sent events after number `query.after`, or from now on, until `signal`.
+ *
+ * A stream that breaks off is resumed without a gap. While the page is hidden the stream is closed, and `connected` is not told.
+ *
+ * @param {Page.Query} query
+ * @param {(event: Page.ServerEvent) => void} handler
+ * @param {(isConnected: boolean, reason?: string) => void} connected learns why the service refused the stream
+ * @param {AbortSignal} signal
+ */
+export async function streamEvents(query, handler, connected, signal) {
+  let last = query.after ?? null;
   while (!signal.aborted) {
-    let why = "";
-    let seen = null;
+    let reason = "";
+    let visible = null;
     try {
-      last ??= query.after ?? (await get("/events/page", { limit: 1 }, signal)).latest;
-      await inSight(signal);
+      last ??= /** @type {Api.EventPage} */ (await get("/events/page", { limit: 1 }, signal)).latest;
+      await untilVisible(signal);
       if (signal.aborted) return;
-      seen = whileInSight(signal);
-      const headers = { Accept: "text/event-stream", "Last-Event-ID": last };
-      const answer = await request(`/events${search(query)}`, { headers, signal: seen.signal });
+      visible = abortWhenHidden(signal);
+      const headers = { Accept: "text/event-stream", "Last-Event-ID": String(last) };
+      const answer = await request(`/events${queryString(query)}`, { headers, signal: visible.signal });
       connected(true);
-      for await (const event of parsed(answer.body)) {
+      for await (const event of eventsOf(/** @type {ReadableStream<Uint8Array<ArrayBuffer>>} */ (answer.body))) {
         last = event.id ?? last;
         if (event.data) handler({ ...event, data: JSON.parse(event.data) });
       }
     } catch (error) {
       if (signal.aborted) return;
-      if (seen?.signal.aborted) continue;
+      if (visible?.signal.aborted) continue;
       if (error.status === 401 || error.status === 403) throw error;
-      if (error.status < 500 && error.status > 0) why = error.message;
+      if (error.status < 500 && error.status > 0) reason = error.message;
     } finally {
-      seen?.abort();
+      visible?.abort();
     }
-    connected(false, why);
-    await new Promise((resume) => setTimeout(resume, 1500));
+    connected(false, reason);
+    await new Promise((resume) => setTimeout(resume, RECONNECT_MS));
   }
 }
 
-/** The events of a stream, by the grammar of the HTML standard. */
-async function* parsed(stream) {
+/**
+ * Yield the events of a stream, by the grammar of the HTML standard.
+ *
+ * @param {ReadableStream<Uint8Array<ArrayBuffer>>} stream
+ */
+export async function* eventsOf(stream) {
   const reader = stream.pipeThrough(new TextDecoderStream()).getReader();
   let text = "";
   for (;;) {
@@ -100,13 +172,14 @@ async function* parsed(stream) {
     if (done) return;
     text += value.replaceAll("\r\n", "\n");
     const blocks = text.split("\n\n");
-    text = blocks.pop();
-    for (const block of blocks) yield fields(block);
+    text = blocks.pop() ?? "";
+    for (const block of blocks) yield eventOf(block);
   }
 }
 
-function fields(block) {
-  const event = { kind: "message", id: null, data: "" };
+/** @param {string} block */
+function eventOf(block) {
+  const event = { kind: "message", id: /** @type {string | null} */ (null), data: "" };
   for (const line of block.split("\n")) {
     const [, name, value] = /^(\w+): ?(.*)$/.exec(line) ?? [];
     if (name === "event") event.kind = value;

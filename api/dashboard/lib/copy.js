@@ -1,27 +1,36 @@
+// @ts-check
 /** Text for the clipboard. */
 
 import { h } from "./dom.js";
 
 const SHOWN_MS = 2000;
 
-/** A button that copies what `text()` says, and says that it did. */
-export function copyButton(words, text) {
+/**
+ * Return a button that copies what `text()` returns, and says whether it could.
+ *
+ * @param {string} label
+ * @param {() => string} text
+ */
+export function copyButton(label, text) {
   const button = h("button", { type: "button", class: "quiet", onclick: async () => {
-    const done = await copied(text());
-    button.textContent = done ? "Copied" : "Copying is not permitted here";
-    setTimeout(() => { button.textContent = words; }, SHOWN_MS);
-  } }, words);
+    button.textContent = await copy(text()) ? "Copied" : "Copying is not permitted here";
+    setTimeout(() => { button.textContent = label; }, SHOWN_MS);
+  } }, label);
   return button;
 }
 
-/** Whether it was copied; pages that are not on loopback or HTTPS have no clipboard, only the older command. */
-async function copied(text) {
-  if (navigator.clipboard) return navigator.clipboard.writeText(text).then(() => true, () => false);
+/**
+ * Copy a text, and return whether that worked. Pages that are not on loopback or HTTPS have the older command only.
+ *
+ * @param {string} text
+ */
+async function copy(text) {
+  if (navigator.clipboard) return await navigator.clipboard.writeText(text).then(() => true, () => false);
   const area = h("textarea", { class: "away" });
   area.value = text;
   document.body.append(area);
   area.select();
-  const done = document.execCommand("copy");
+  const isDone = document.execCommand("copy");
   area.remove();
-  return done;
+  return isDone;
 }

@@ -1,47 +1,67 @@
-/** Questions that are asked in a dialog: what cannot be undone, and what needs more than a press of a button. */
+// @ts-check
+/** Dialogs for what cannot be undone, and for what needs more than a press of a button. */
 
 import { h } from "./dom.js";
 
 /**
- * Ask, and do: `act(values)` is called with the fields' values when the reader agrees, and closes the dialog unless it
- * fails; its error stands in the dialog then. Fields are `{ name, label, value, hint, multiline, ...attributes }`.
+ * @typedef {{ name: string, label: string, value: unknown, hint?: string, multiline?: boolean, [attribute: string]: unknown }} Field
+ * @typedef {object} Question
+ * @property {string} title
+ * @property {string} [text]
+ * @property {Field[]} [fields]
+ * @property {string} action the label of the button that agrees
+ * @property {boolean} [danger] whether the action loses something
+ * @property {(values: Record<string, any>) => Promise<void>} act called with the values of the fields when the reader agrees
  */
-export function ask({ title, words = "", fields = [], action, danger = false, act }, signal) {
-  const trouble = h("div", { class: "failed", role: "alert" });
-  const go = h("button", { type: "submit", class: danger ? "danger" : null }, action);
-  const back = h("button", { type: "button", class: "quiet", onclick: () => dialog.close() }, "Back");
-  const submit = async (event) => {
+
+/**
+ * Open a dialog until `act` succeeds or the reader goes back; an error of `act` is shown in it.
+ *
+ * @param {Question} question
+ * @param {AbortSignal} signal
+ */
+export function openDialog({ title, text = "", fields = [], action, danger = false, act }, signal) {
+  const errors = h("div", { class: "failed", role: "alert" });
+  const agree = h("button", { type: "submit", class: danger ? "danger" : null }, action);
+  const back = h("button", { type: "button", class: "quiet", onclick: () => { dialog.close(); } }, "Back");
+  const submit = async (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
-    go.disabled = true;
-    trouble.replaceChildren();
+    agree.disabled = true;
+    errors.replaceChildren();
     try {
       await act(Object.fromEntries(new FormData(form)));
       dialog.close();
     } catch (error) {
-      trouble.replaceChildren(...said(error));
+      errors.replaceChildren(...errorParagraphs(error));
     }
-    go.disabled = false;
+    agree.disabled = false;
   };
-  const form = h("form", { onsubmit: submit }, h("h2", { id: "asked" }, title), words ? h("p", {}, words) : null,
-    ...fields.map(labelled), trouble, h("p", { class: "choices" }, go, back));
-  const dialog = h("dialog", { "aria-labelledby": "asked", onclose: () => dialog.remove() }, form);
+  const form = h("form", { onsubmit: submit }, h("h2", { id: "asked" }, title), text ? h("p", {}, text) : null,
+    ...fields.map(labelledField), errors, h("p", { class: "choices" }, agree, back));
+  const dialog = h("dialog", { "aria-labelledby": "asked", onclose: () => { dialog.remove(); } }, form);
   signal.addEventListener("abort", () => dialog.close());
   document.body.append(dialog);
   dialog.showModal();
   return dialog;
 }
 
-function labelled({ name, label, value, hint, multiline = false, ...attributes }) {
+/** @param {Field} field */
+function labelledField({ name, label, value, hint, multiline = false, ...attributes }) {
   const id = `asked-${name}`;
   const described = hint ? { "aria-describedby": `${id}-hint` } : {};
   const field = h(multiline ? "textarea" : "input", { id, name, ...attributes, ...described });
-  field.value = value ?? "";
+  field.value = String(value ?? "");
   return h("p", { class: "field" }, h("label", { for: id }, label), field,
     hint ? h("small", { id: `${id}-hint` }, hint) : null);
 }
 
-/** What went wrong, as paragraphs: the problem's words, and a line for each value that it names. */
-export function said(error) {
-  const places = (error.errors ?? []).map((each) => h("p", {}, h("code", {}, each.pointer || "all of it"), ` ${each.message}`));
-  return places.length ? places : [h("p", {}, error.message)];
+/**
+ * Return an error as paragraphs: one for each value that it names, else its message.
+ *
+ * @param {any} error
+ */
+export function errorParagraphs(error) {
+  const named = /** @type {Api.SpecError[]} */ (error.errors ?? []);
+  const lines = named.map(({ pointer, message }) => h("p", {}, h("code", {}, pointer || "the whole request"), ` ${message}`));
+  return lines.length ? lines : [h("p", {}, error.message)];
 }

@@ -1,34 +1,54 @@
-/** Files of the service: a plain link where no token is asked for, else fetched with the token and handed on. */
+// @ts-check
+/** Links to files of the service. With a token, the file is fetched by script, since a plain link cannot send it. */
 
-import { blob, search } from "./api.js";
+import { getFile, queryString } from "./api.js";
 import { h } from "./dom.js";
 import { token } from "./token.js";
 
 const FORMATS = ["svg", "png", "pdf"];
 
-/** A link that saves what is at `path` as `name`. */
-export function download(words, path, query, name) {
+/**
+ * Return a link that saves the file at a path.
+ *
+ * @param {string} label
+ * @param {string} path
+ * @param {Page.Query} query
+ * @param {string} name of the saved file
+ */
+export function downloadLink(label, path, query, name) {
   const status = h("span", { role: "alert", class: "failed" });
-  const click = async (event) => {
+  const click = async (/** @type {Event} */ event) => {
     if (!token()) return;
     event.preventDefault();
     status.textContent = "";
     try {
-      save(await blob(path, query), name);
+      save(await getFile(path, query), name);
     } catch (error) {
       status.textContent = ` ${error.message}`;
     }
   };
-  const link = h("a", { href: path.replace(/^\//, "") + search(query), download: name, onclick: click }, words);
+  const link = h("a", { href: path.replace(/^\//, "") + queryString(query), download: name, onclick: click }, label);
   return h("span", { class: "download" }, link, status);
 }
 
-/** The figure in every format for papers, and what else there is of it: `[words, path, query, name]` each. */
-export function figureFiles(kind, query, name, ...others) {
-  const files = FORMATS.map((format) => download(format.toUpperCase(), `/figures/${kind}`, { ...query, format }, `${name}.${format}`));
-  return h("p", { class: "files" }, "Save as ", ...[...files, ...others.map((each) => download(...each))].flatMap((each) => [each, " "]));
+/**
+ * Return links to a figure in every format, and to other files of it.
+ *
+ * @param {string} kind of the figure
+ * @param {Page.Query} query
+ * @param {string} name of the files, without their ending
+ * @param {...Parameters<typeof downloadLink>} others
+ */
+export function figureDownloads(kind, query, name, ...others) {
+  const files = FORMATS.map((format) => downloadLink(format.toUpperCase(), `/figures/${kind}`, { ...query, format }, `${name}.${format}`));
+  const links = [...files, ...others.map((other) => downloadLink(...other))];
+  return h("p", { class: "files" }, "Save as ", ...links.flatMap((link) => [link, " "]));
 }
 
+/**
+ * @param {Blob} content
+ * @param {string} name
+ */
 function save(content, name) {
   const address = URL.createObjectURL(content);
   const link = h("a", { href: address, download: name, hidden: true });

@@ -1,32 +1,78 @@
-/** Numbers, times and names as people read them. */
+// @ts-check
+/** Numbers, times and names as people read them; a value that is missing is a dash. */
+
+/** @typedef {number | null | undefined} Value */
 
 const NUMBER = new Intl.NumberFormat("en", { maximumFractionDigits: 3 });
 const COUNT = new Intl.NumberFormat("en");
+const MISSING = "–";
 
-/** A number in three digits, or a dash. */
-export const number = (value) => (value === null || value === undefined ? "–" : NUMBER.format(value));
+/** @type {(value: Value) => value is null | undefined} */
+const isMissing = (value) => value === null || value === undefined;
 
-/** A number with three digits after the point, for columns. */
-export const fixed = (value) => (value === null || value === undefined ? "–" : value.toFixed(3).replace("-", "−"));
+/**
+ * Format a number with at most three decimals.
+ *
+ * @param {Value} value
+ */
+export const number = (value) => (isMissing(value) ? MISSING : NUMBER.format(value));
 
-/** A whole number in groups of three. */
-export const count = (value) => (value === null || value === undefined ? "–" : COUNT.format(value));
+/**
+ * Format a number with exactly three decimals, for columns.
+ *
+ * @param {Value} value
+ */
+export const fixed = (value) => (isMissing(value) ? MISSING : value.toFixed(3).replace("-", "−"));
 
-/** Seconds as `3 min`, `2 h`, `5 days`, or `7 years`. */
+/**
+ * Format a whole number in groups of three digits.
+ *
+ * @param {Value} value
+ */
+export const count = (value) => (isMissing(value) ? MISSING : COUNT.format(value));
+
+/**
+ * Format a share between 0 and 1 in whole per cent, rounded down: 100 % is complete.
+ *
+ * @param {number} share
+ */
+export const percent = (share) => `${Math.floor(100 * share)} %`;
+
+/**
+ * Format seconds as `3 min`, `2 h`, `5 days`, or `7 years`.
+ *
+ * @param {Value} seconds
+ */
 export function duration(seconds) {
-  if (seconds === null || seconds === undefined) return "–";
+  if (isMissing(seconds)) return MISSING;
   if (seconds > 0 && seconds < 0.5) return "less than 1 s";
-  for (const [unit, size, until] of [["s", 1, 90], ["min", 60, 5400], ["h", 3600, 172800]]) {
+  for (const { unit, size, until } of [{ unit: "s", size: 1, until: 90 }, { unit: "min", size: 60, until: 5400 }, { unit: "h", size: 3600, until: 172800 }]) {
     if (seconds < until) return `${Math.round(seconds / size)} ${unit}`;
   }
   const days = Math.round(seconds / 86400);
   return days < 730 ? `${days} days` : `${Math.round(days / 365)} years`;
 }
 
-/** How long ago a time was. */
+/**
+ * Format the time between two moments; a dash unless both are known.
+ *
+ * @param {string | null} start
+ * @param {string | null} end
+ */
+export const timeBetween = (start, end) => duration(start && end ? (Date.parse(end) - Date.parse(start)) / 1000 : null);
+
+/**
+ * Format how long ago a moment was.
+ *
+ * @param {string} time
+ */
 export const age = (time) => `${duration(Math.max(0, (Date.now() - Date.parse(time)) / 1000))} ago`;
 
-/** `simulated_fit` as *Simulated fit*; a name that a person gave stays. */
-export function spoken(name) {
+/**
+ * Write `some_name` as *Some name*; a name that a person gave stays.
+ *
+ * @param {string} name
+ */
+export function readableName(name) {
   return /^[a-z][a-z0-9_]*$/.test(name) ? (name[0].toUpperCase() + name.slice(1)).replaceAll("_", " ") : name;
 }

@@ -1,18 +1,40 @@
+// @ts-check
 /** JSON whose whole numbers keep all their digits: a seed has 64 bits, of which a number of JavaScript holds 53. */
 
 const WHOLE = /^-?\d+$/;
 
-/** A number that a text is, as a BigInt where a number would be another; what is none or infinite is nothing. */
-export function numberOf(text) {
-  const found = Number(text);
-  if (!Number.isFinite(found)) return null;
-  return WHOLE.test(text) && !Number.isSafeInteger(found) ? BigInt(text) : found;
+/**
+ * Return the number that a text is: a BigInt where a number would lose digits, null if it is no finite number.
+ *
+ * @param {string} text
+ */
+export function parseNumber(text) {
+  const value = Number(text);
+  if (!Number.isFinite(value)) return null;
+  return WHOLE.test(text) && !Number.isSafeInteger(value) ? BigInt(text) : value;
 }
 
-/** The value as text. */
-export const written = (value, indent = undefined) =>
-  JSON.stringify(value, (_, each) => (typeof each === "bigint" ? `\0${each}\0` : each), indent).replace(/"\\u0000(-?\d+)\\u0000"/g, "$1");
+/**
+ * Return a value as JSON.
+ *
+ * @param {unknown} value
+ * @param {number} [indent]
+ */
+export const stringify = (value, indent = undefined) =>
+  JSON.stringify(value, (_, item) => (typeof item === "bigint" ? `\0${item}\0` : item), indent).replace(/"\\u0000(-?\d+)\\u0000"/g, "$1");
 
-/** The text as a value; a browser that does not tell how a number was written has the nearest. */
-export const read = (text) =>
-  JSON.parse(text, (_, each, context) => (typeof each === "number" && context?.source ? numberOf(context.source) ?? each : each));
+/**
+ * Return the value of a JSON text; a browser that does not tell how a number was written has the nearest one.
+ *
+ * @param {string} text
+ */
+export const parse = (text) => JSON.parse(text, reviveNumber);
+
+/**
+ * @param {string} _
+ * @param {unknown} item
+ * @param {{ source?: string }} [context] newer than the declarations of the language
+ */
+function reviveNumber(_, item, context) {
+  return typeof item === "number" && context?.source ? parseNumber(context.source) ?? item : item;
+}

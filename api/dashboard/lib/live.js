@@ -1,71 +1,95 @@
-/** What a view shows is kept up to date: it is asked for anew when something happened, and when the service is back. */
+// @ts-check
+/** Keeps a view up to date: it is refreshed when something happened, and when the service is back. */
 
-import { events } from "./api.js";
+import { streamEvents } from "./api.js";
+import { byId, setText } from "./dom.js";
 
-const EVERY_MS = 1000;
-const MANY = 1000;
+const INTERVAL_MS = 1000;
+const MOST_EVENTS = 1000;
 
 /**
- * Call `refresh(some)` soon after events that fit `query`, at most once a second however many come, with all that came
- * since the last call; with none after a break, or after more than anybody wants to look at one by one. It is not called
- * again before it has ended, and again if it failed. A page that nobody sees waits until somebody does. The bar says when
- * the service is away.
+ * Call `refresh` soon after events that fit a query, at most once a second, with the events since the last call.
+ *
+ * No events are given after a break of the stream, or if there were too many to look at one by one: then everything may have
+ * changed. Calls do not overlap; one that failed is repeated. A hidden page waits until it is visible. The bar at the top says
+ * when the service is away.
+ *
+ * @param {Page.Query} query
+ * @param {(events: Page.ServerEvent[]) => Promise<void>} refresh
+ * @param {AbortSignal} signal
  */
 export function follow(query, refresh, signal) {
-  let some = [];
-  let all = false;  // whatever happens until it was asked for anew: what is missing is not told by events alone
-  let due = false;
+  /** @type {Page.ServerEvent[]} */
+  let events = [];
+  let hasGap = false;  // until the next successful refresh: the events alone do not tell what is missing
+  let isDue = false;
+  let isBusy = false;
+  let isAway = false;
+  /** @type {number | null} */
   let timer = null;
-  let busy = false;
-  let away = false;
   const run = async () => {
     timer = null;
-    if (signal.aborted || busy || document.hidden) return;
-    const taken = all || some.length > MANY ? [] : some;
-    some = [];
-    all = false;
-    busy = true;
-    due = false;
+    if (signal.aborted || isBusy || document.hidden) return;
+    const taken = hasGap || events.length > MOST_EVENTS ? [] : events;
+    events = [];
+    hasGap = false;
+    isBusy = true;
+    isDue = false;
     try {
       await refresh(taken);
     } catch (error) {
       if (signal.aborted) return;
       console.warn(error.message);
-      some = [...taken, ...some];
-      all ||= !taken.length;
-      due = true;
+      events = [...taken, ...events];
+      hasGap ||= !taken.length;
+      isDue = true;
     }
-    busy = false;
-    if (due) soon();
+    isBusy = false;
+    if (isDue) schedule();
   };
-  const soon = () => {
-    due = true;
-    timer ??= setTimeout(run, EVERY_MS);
+  const schedule = () => {
+    isDue = true;
+    timer ??= setTimeout(run, INTERVAL_MS);
   };
-  const happened = (event) => {
-    if (some.length <= MANY) some.push(event);
-    soon();
+  const happened = (/** @type {Page.ServerEvent} */ event) => {
+    if (events.length <= MOST_EVENTS) events.push(event);
+    schedule();
   };
-  const connected = (is, why = "") => {
+  const connected = (/** @type {boolean} */ isConnected, reason = "") => {
     if (signal.aborted) return;
-    announce(is, why);
-    if (is && away) {
-      all = true;
-      soon();
+    showConnection(isConnected, reason);
+    if (isConnected && isAway) {
+      hasGap = true;
+      schedule();
     }
-    away = !is;
+    isAway = !isConnected;
   };
-  document.addEventListener("visibilitychange", () => { if (due) soon(); }, { signal });
+  document.addEventListener("visibilitychange", () => { if (isDue) schedule(); }, { signal });
   signal.addEventListener("abort", () => {
-    clearTimeout(timer);
-    announce(true);
+    clearTimeout(timer ?? undefined);
+    showConnection(true);
   });
-  events(query, happened, connected, signal).catch(() => {});
+  streamEvents(query, happened, connected, signal).catch(() => {});
 }
 
-/** Say in the bar whether the service is there, or why what happens is not told. */
-export function announce(isThere, why = "") {
-  const place = document.getElementById("connection");
-  const words = isThere ? "" : `${why ? `What happens is not seen here: ${why.replace(/\.$/, "")}` : "The service is away"}; trying again…`;
-  if (place.textContent !== words) place.textContent = words;
+/**
+ * Reload a page at regular intervals until its signal: times pass without events too.
+ *
+ * @param {Page.Editable} page
+ * @param {number} intervalMs
+ */
+export function reloadEvery(page, intervalMs) {
+  const timer = setInterval(() => page.reload().catch(() => {}), intervalMs);
+  page.signal.addEventListener("abort", () => clearInterval(timer));
+}
+
+/**
+ * Say in the bar that the service is away, or why it refused the stream of events.
+ *
+ * @param {boolean} isConnected
+ * @param {string} [reason]
+ */
+function showConnection(isConnected, reason = "") {
+  const problem = reason ? `Live updates are refused: ${reason.replace(/\.$/, "")}` : "The service is away";
+  setText(byId("connection"), isConnected ? "" : `${problem}; trying again…`);
 }

@@ -1,108 +1,121 @@
-/** Figures: defined by the service, drawn here by Plotly in the page's own colours. */
+// @ts-check
+/** Figures: defined by the service, and drawn here by Plotly in the colours of the page. */
 
 import { get } from "./api.js";
 import { h } from "./dom.js";
-import { dressed } from "./look.js";
-import { empty, failed, loading } from "./states.js";
+import { themed } from "./figure_theme.js";
+import { empty, failed, loading } from "./placeholders.js";
 import { table } from "./table.js";
 import { onTheme } from "./theme.js";
 
-let loaded = null;
+/** @type {Promise<NonNullable<typeof Plotly>> | null} */
+let library = null;
 
-/** Plotly, fetched when the first figure is drawn; if that fails, with the next one. */
+/** Return Plotly, which is loaded for the first figure; if that fails, with the next one. */
 function plotly() {
-  loaded ??= new Promise((resolve, reject) => {
+  library ??= new Promise((resolve, reject) => {
     const src = `assets/plotly/plotly.min.js?v=${document.documentElement.dataset.plotly}`;
     const fail = () => {
-      loaded = null;
-      reject(new Error("What draws figures could not be loaded."));
+      library = null;
+      reject(new Error("The library that draws figures could not be loaded."));
     };
-    document.head.append(h("script", { src, onload: () => resolve(globalThis.Plotly), onerror: fail }));
+    document.head.append(h("script", { src, onload: () => (globalThis.Plotly ? resolve(globalThis.Plotly) : fail()), onerror: fail }));
   });
-  return loaded;
+  return library;
 }
 
 /**
- * Draw `/figures/{kind}` into `element`, with its caption and its words for those who do not see it.
- * Returns a function that draws it anew, with another query if one is given, and says whether it is as of now; its `drawn` is when it was
- * drawn at first. After each painting the event `painted` rises from it, for what stands over the figure.
+ * Prepare the figure `/figures/{kind}` in an element, with its caption and its description for screen readers.
+ *
+ * Returns a function that draws it for a query. That function resolves to false if the figure could not be updated and an earlier
+ * answer to the same query still stands. After each drawing the element dispatches the event `drawn`, for what stands over the figure.
+ *
+ * @param {HTMLElement} element
+ * @param {string} kind
+ * @param {AbortSignal} signal
  */
-export function plot(element, kind, query, signal) {
-  const canvas = h("div", { class: "plot" });
+export function plot(element, kind, signal) {
+  const canvas = h("div", { class: "plot" }, loading());
   const caption = h("figcaption");
   const numbers = h("div");
-  canvas.append(loading());
-  plotly().catch(() => {});  // while the service computes the figure; what is wrong is said when it is drawn
-  element.replaceChildren(h("figure", {}, canvas, caption, numbers));
+  const figure = h("figure", {}, canvas, caption, numbers);
+  element.replaceChildren(figure);
+  /** @type {Api.FigureRead | null} */
   let answer = null;
-  let drawn = false;
-  let shown = null;  // the query of what is drawn
-  let asked = 0;
-  const say = (words) => {
-    drawn = false;
+  let isDrawn = false;
+  let drawnQuery = "";
+  let requests = 0;
+  const replaceDrawing = (/** @type {HTMLElement} */ words) => {
+    isDrawn = false;
     globalThis.Plotly?.purge(canvas);
-    for (const each of ["role", "aria-label"]) canvas.removeAttribute(each);
+    for (const name of ["role", "aria-label"]) canvas.removeAttribute(name);
     canvas.style.height = "";
     canvas.replaceChildren(words);
   };
-  const paint = async () => {
+  const drawNow = async () => {
     if (!answer || signal.aborted) return;
     if (answer.empty) {
-      say(empty("Nothing to draw yet."));
+      replaceDrawing(empty("Nothing to draw yet."));
       return;
     }
-    const library = await plotly();
+    const Plotly = await plotly();
     if (signal.aborted) return;
     canvas.querySelector(".state")?.remove();
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", answer.alt);
-    const { data, layout } = dressed(answer.figure, canvas);
+    const { data, layout } = themed(answer.figure, canvas);
     canvas.style.height = layout.height ? `${layout.height}px` : "";
-    await library.react(canvas, data, layout, { displayModeBar: false });
-    drawn = true;
-    canvas.dispatchEvent(new Event("painted", { bubbles: true }));
+    await Plotly.react(canvas, data, layout, { displayModeBar: false });
+    isDrawn = true;
+    canvas.dispatchEvent(new Event("drawn", { bubbles: true }));
   };
-  let painting = Promise.resolve();
-  /** One after the other: of two at once Plotly may keep the size of the one that began first. */
-  const draw = () => {
-    painting = painting.catch(() => {}).then(paint);
-    return painting;
+  let drawing = Promise.resolve();
+  /** Draw after what is being drawn: of two drawings at once Plotly may keep the size of the one that began first. */
+  const redraw = () => {
+    drawing = drawing.catch(() => {}).then(drawNow);
+    return drawing;
   };
-  const refresh = async (changed = query) => {
-    query = changed;
-    const mine = ++asked;
-    const wanted = JSON.stringify(query);
+  /** @type {(query: Page.Query) => Promise<boolean>} */
+  const draw = async (query) => {
+    const request = ++requests;
+    const key = JSON.stringify(query);
+    plotly().catch(() => {});  // while the service computes the figure; an error shows when the figure is drawn
+    if (element.firstChild !== figure) element.replaceChildren(figure);
     try {
-      const found = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
-      if (mine !== asked) return true;  // another query has overtaken it
-      answer = found;
-      shown = wanted;
+      const newAnswer = await get(`/figures/${kind}`, { ...query, format: "json" }, signal);
+      if (request !== requests) return true;  // a later query has replaced this one
+      answer = /** @type {Api.FigureRead} */ (newAnswer);
+      drawnQuery = key;
       caption.textContent = answer.caption;
-      numbers.replaceChildren(...(answer.table && !answer.empty ? [counted(answer.table, numbers.querySelector("details")?.open)] : []));
-      await draw();
+      numbers.replaceChildren(...(answer.table && !answer.empty ? [numbersTable(answer.table, numbers.querySelector("details")?.open)] : []));
+      await redraw();
       return true;
     } catch (error) {
-      if (signal.aborted || mine !== asked) return true;
-      if (drawn && shown === wanted) return false;  // it stays as it was
-      say(failed(error, () => refresh(), "h3"));
+      if (signal.aborted || request !== requests) return true;
+      if (isDrawn && drawnQuery === key) return false;
+      replaceDrawing(failed(error, () => draw(query), "h3"));
       return true;
     }
   };
-  onTheme(draw, signal);
+  onTheme(redraw, signal);
   let width = 0;
-  const watch = new ResizeObserver(() => {  // also of a change while it is drawn, which Plotly's own watch misses
+  const sizes = new ResizeObserver(() => {  // Plotly's own observer misses a change of size while it draws
     if (canvas.clientWidth === width) return;
     width = canvas.clientWidth;
-    draw().catch(() => {});
+    redraw().catch(() => {});
   });
-  watch.observe(canvas);
+  sizes.observe(canvas);
   signal.addEventListener("abort", () => {
-    watch.disconnect();
+    sizes.disconnect();
     globalThis.Plotly?.purge(canvas);
   });
-  return Object.assign(refresh, { drawn: refresh() });
+  return draw;
 }
 
-function counted({ head, rows }, open) {
+/**
+ * @param {Api.TableRead} numbers
+ * @param {boolean | undefined} open
+ */
+function numbersTable({ head, rows }, open) {
   return h("details", { class: "numbers", open }, h("summary", {}, "The numbers"), table("The numbers of the figure", head, rows));
 }

@@ -1,29 +1,63 @@
-/** How far something is, as a bar and in per cent; of rollouts, which is where the time goes. */
+// @ts-check
+/** Progress as a bar and in per cent of the rollouts, which take nearly all of the time. */
 
-import { h } from "./dom.js";
-import { count, duration } from "./format.js";
-import { say } from "./rows.js";
+import { h, setText } from "./dom.js";
+import { count, duration, percent } from "./format.js";
 
-/** How much is behind it, between 0 and 1. */
+const WORKING = ["RUNNING", "PAUSING", "STOPPING"];
+
+/**
+ * Return the share that is done, between 0 and 1; a rollout that was not needed is done.
+ *
+ * @param {Api.Progress} progress
+ */
 export function fraction(progress) {
   return progress.rollouts ? Math.min(1, (progress.rollouts_done + progress.rollouts_saved) / progress.rollouts) : 0;
 }
 
-/** A bar with its per cent, and `update(progress)`. */
-export function progressBar(label) {
-  const bar = h("progress", { max: 1, "aria-label": label });
-  const words = h("span", { class: "percent" });
-  const update = (progress) => {
-    bar.value = fraction(progress);
-    say(words, `${Math.floor(100 * fraction(progress))} %`);
-    const rollouts = `${count(progress.rollouts_done)} rollouts and ${count(progress.rollouts_saved)} saved of ${count(progress.rollouts)}`;
-    bar.title = `${count(progress.completed)} of ${count(progress.repetitions)} repetitions, ${rollouts}`;
-  };
-  return { element: h("span", { class: "bar-of" }, bar, words), update };
+/**
+ * Return the number of completed repetitions, with those that failed.
+ *
+ * @param {Api.Progress} progress
+ */
+export function repetitionsDone({ completed, repetitions, failed }) {
+  return `${count(completed)} of ${count(repetitions)}${failed ? `, ${count(failed)} failed` : ""}`;
 }
 
-/** What is left, in words: only what runs has a time. */
+/**
+ * Return a bar with its per cent.
+ *
+ * @param {string} label
+ * @returns {Page.Updatable<Api.Progress>}
+ */
+export function progressBar(label) {
+  const bar = h("progress", { max: 1, "aria-label": label });
+  const shownPercent = h("span", { class: "percent" });
+  const update = (/** @type {Api.Progress} */ progress) => {
+    bar.value = fraction(progress);
+    setText(shownPercent, percent(fraction(progress)));
+    const rollouts = `${count(progress.rollouts_done)} of ${count(progress.rollouts)} rollouts, ${count(progress.rollouts_saved)} not needed`;
+    bar.title = `${count(progress.completed)} of ${count(progress.repetitions)} repetitions; ${rollouts}`;
+  };
+  return { element: h("span", { class: "bar-of" }, bar, shownPercent), update };
+}
+
+/**
+ * Return the time left; nothing unless the experiment or study is running.
+ *
+ * @param {{ state: Api.State, progress: Api.Progress }} item
+ */
 export function timeLeft({ state, progress }) {
-  if (!["RUNNING", "PAUSING", "STOPPING"].includes(state)) return "";
+  if (!WORKING.includes(state)) return "";
   return progress.seconds_left === null ? "…" : duration(progress.seconds_left);
+}
+
+/**
+ * Return the time left as a fact: a dash unless it is running.
+ *
+ * @param {{ state: Api.State, progress: Api.Progress }} item
+ */
+export function timeLeftFact({ state, progress }) {
+  if (state !== "RUNNING") return "–";
+  return progress.seconds_left === null ? "not known yet" : duration(progress.seconds_left);
 }

@@ -1,62 +1,87 @@
-/** Parts of a view that are filled when they come into sight, and filled anew when something that they show happened. */
+// @ts-check
+/** Sections of a view that load when they come into sight, and again after events that change them. */
 
-import { failed, loading } from "./states.js";
+import { failed, loading } from "./placeholders.js";
 
-const REST = 4;
-const AGAIN_MS = 1000;
+const REST_FACTOR = 4;
+const RETRY_MS = 1000;
 
 /**
- * The parts of one view. `add(element, kinds, load)` has `load()` fill the element once it can be seen; `tell(events)`
- * has those loaded anew that show one of these events' kinds, or all of them if there are no events: those in sight at
- * once, the others when they come into sight. No part is loaded twice at a time, and each rests four times as long as it took.
- * One whose `load()` says true is not complete yet, and loaded again; so is one that was filled and could not be filled anew.
+ * @typedef {object} Section
+ * @property {HTMLElement} element
+ * @property {Set<string>} kinds of events that change it
+ * @property {() => Promise<unknown>} load
+ * @property {boolean} isStale
+ * @property {boolean} isInSight
+ * @property {boolean} isBusy
+ * @property {boolean} isFilled
+ */
+
+/**
+ * Return the sections of one view, until `signal`.
+ *
+ * `add(element, kinds, load)` has `load()` fill the element. `reload(events)` loads the sections that these kinds of events change, or
+ * all if there are no events; sections out of sight wait until they come into sight. No section is loaded twice at a time, and each
+ * rests four times as long as its loading took. A section is loaded again if `load()` returns true, or failed after an earlier success.
+ *
+ * @param {AbortSignal} signal
+ * @returns {Page.Sections}
  */
 export function sections(signal) {
-  const parts = new Map();
-  const sight = new IntersectionObserver((entries) => {
+  /** @type {Map<Element, Section>} */
+  const all = new Map();
+  const observer = new IntersectionObserver((entries) => {
     for (const { target, isIntersecting } of entries) {
-      const part = parts.get(target);
-      part.seen = isIntersecting;
-      go(part);
+      const section = /** @type {Section} */ (all.get(target));
+      section.isInSight = isIntersecting;
+      load(section);
     }
   }, { rootMargin: "200px" });
-  signal.addEventListener("abort", () => sight.disconnect());
+  signal.addEventListener("abort", () => observer.disconnect());
 
-  async function go(part) {
-    if (!part.stale || !part.seen || part.busy || signal.aborted) return;
-    Object.assign(part, { busy: true, stale: false });
-    const began = performance.now();
+  /** @param {Section} section */
+  async function load(section) {
+    if (!section.isStale || !section.isInSight || section.isBusy || signal.aborted) return;
+    Object.assign(section, { isBusy: true, isStale: false });
+    const start = performance.now();
     try {
-      part.stale ||= Boolean(await part.load());
-      part.filled = true;
+      section.isStale ||= Boolean(await section.load());
+      section.isFilled = true;
     } catch (error) {
-      part.stale ||= part.filled;
-      if (!signal.aborted && !part.filled) part.element.replaceChildren(failed(error, () => again(part), "h3"));
+      section.isStale ||= section.isFilled;
+      if (!signal.aborted && !section.isFilled) section.element.replaceChildren(failed(error, () => reload(section), "h3"));
     }
-    if (part.filled) await rest(Math.max(REST * (performance.now() - began), part.stale ? AGAIN_MS : 0), signal);
-    part.busy = false;
-    go(part);
+    if (section.isFilled) await rest(Math.max(REST_FACTOR * (performance.now() - start), section.isStale ? RETRY_MS : 0), signal);
+    section.isBusy = false;
+    load(section);
   }
 
-  function again(part) {
-    part.stale = true;
-    go(part);
+  /** @param {Section} section */
+  function reload(section) {
+    section.isStale = true;
+    load(section);
   }
 
   return {
-    add(element, kinds, load) {
+    add(element, kinds, loadSection) {
       if (!element.hasChildNodes()) element.append(loading());
-      parts.set(element, { element, kinds: new Set(kinds), load, stale: true, seen: false, busy: false, filled: false });
-      sight.observe(element);
+      const flags = { isStale: true, isInSight: false, isBusy: false, isFilled: false };
+      all.set(element, { element, kinds: new Set(kinds), load: loadSection, ...flags });
+      observer.observe(element);
     },
-    tell(events) {
-      for (const part of parts.values()) {
-        if (!events.length || events.some((each) => part.kinds.has(each.kind))) again(part);
+    reload(events) {
+      for (const section of all.values()) {
+        if (!events.length || events.some(({ kind }) => section.kinds.has(kind))) reload(section);
       }
     },
   };
 }
 
+/**
+ * @param {number} ms
+ * @param {AbortSignal} signal
+ * @returns {Promise<void>}
+ */
 const rest = (ms, signal) => new Promise((resume) => {
   const timer = setTimeout(resume, ms);
   signal.addEventListener("abort", () => { clearTimeout(timer); resume(); }, { once: true });

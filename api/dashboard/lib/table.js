@@ -1,13 +1,25 @@
-/** Tables that scroll sideways in their own frame, so that no page does. */
+// @ts-check
+/** Tables that scroll sideways in a frame of their own, so that no page does. */
 
 import { h } from "./dom.js";
 
-/** A table with a caption for those who do not see it; a cell is text or an element, the first of a row is its head. */
+/**
+ * Return a table in a frame; the first cell of each row is its head.
+ *
+ * @param {string} caption for screen readers
+ * @param {Page.Child[]} columns
+ * @param {Page.Child[][]} rows
+ */
 export function table(caption, columns, rows) {
-  const head = h("tr", {}, ...columns.map((each) => h("th", { scope: "col" }, each)));
-  return framed(caption, h("table", {}, h("caption", { class: "away" }, caption), h("thead", {}, head),
-    h("tbody", {}, ...rows.map((cells) => h("tr", {}, ...cells.map((cell, at) => at ? h("td", {}, cell) : h("th", { scope: "row" }, cell)))))));
+  const head = h("tr", {}, ...columns.map((column) => h("th", { scope: "col" }, column)));
+  const body = rows.map(([first, ...cells]) => h("tr", {}, h("th", { scope: "row" }, first), ...cells.map((cell) => h("td", {}, cell))));
+  return framed(caption, h("table", {}, h("caption", { class: "away" }, caption), h("thead", {}, head), h("tbody", {}, ...body)));
 }
 
-/** A frame that scrolls, also by the keyboard. */
+/**
+ * Return a frame that scrolls, also by keyboard.
+ *
+ * @param {string} label
+ * @param {...Page.Child} content
+ */
 export const framed = (label, ...content) => h("div", { class: "framed", role: "region", "aria-label": label, tabindex: "0" }, ...content);

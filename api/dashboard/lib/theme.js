@@ -1,27 +1,34 @@
-/** Light or dark: what the system says, until the reader says otherwise. */
+// @ts-check
+/** Light or dark: as the system is, until the reader chooses. */
 
 const KEY = "gaplab-theme";
-const dark = matchMedia("(prefers-color-scheme: dark)");
+const systemIsDark = matchMedia("(prefers-color-scheme: dark)");
 
 /** Whether the page is dark now. */
-export const isDark = () => (document.documentElement.dataset.theme ?? (dark.matches ? "dark" : "light")) === "dark";
+export const isDark = () => (document.documentElement.dataset.theme ?? (systemIsDark.matches ? "dark" : "light")) === "dark";
 
-/** The other one. */
+/** Switch between light and dark, and remember the choice. */
 export function switchTheme() {
   const theme = isDark() ? "light" : "dark";
   localStorage.setItem(KEY, theme);
   apply(theme);
 }
 
-/** Call `handler` whenever light and dark change places. */
+/**
+ * Call a handler after every switch between light and dark, until `signal`.
+ *
+ * @param {() => void} handler
+ * @param {AbortSignal} signal
+ */
 export function onTheme(handler, signal) {
   addEventListener("gaplab-theme", handler, { signal });
 }
 
+/** @param {string | null} theme */
 function apply(theme) {
   if (theme) document.documentElement.dataset.theme = theme;
   dispatchEvent(new Event("gaplab-theme"));
 }
 
-dark.addEventListener("change", () => apply(localStorage.getItem(KEY)));
+systemIsDark.addEventListener("change", () => apply(localStorage.getItem(KEY)));
 apply(localStorage.getItem(KEY));

@@ -1,24 +1,30 @@
-/** The token that the service asks for; kept for as long as the tab is open, and sent to this service alone. */
+// @ts-check
+/** The token that a guarded service asks for: kept while the tab is open, and sent to this service only. */
 
 import { h } from "./dom.js";
 
 const KEY = "gaplab-token";
 
-/** The token, or nothing. */
+/** Return the token, or null. */
 export const token = () => sessionStorage.getItem(KEY);
 
-/** Asks for a token, and goes on with it. */
-export function TokenForm(problem, again) {
+/**
+ * Return a form that asks for a token, and then tries again.
+ *
+ * @param {{ status: number, message: string }} problem
+ * @param {() => unknown} retry
+ */
+export function tokenForm(problem, retry) {
   const field = h("input", { id: "token", type: "password", autocomplete: "off", required: true });
-  const use = (event) => {
+  const use = (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
     sessionStorage.setItem(KEY, field.value.trim());
-    again();
+    retry();
   };
-  const words = problem.status === 401
-    ? ["This service lets in whoever has a token. ", h("code", {}, "gaplab token create"), " makes one; it is kept for as long as this tab is open."]
+  const text = problem.status === 401
+    ? ["This service needs a token. ", h("code", {}, "gaplab token create"), " makes one. This tab keeps it until it is closed."]
     : [problem.message];
   return h("form", { class: "state token", onsubmit: use },
-    h("h1", {}, "A token, please"), h("p", {}, ...words), h("label", { for: "token" }, "Token"), field,
+    h("h1", {}, "A token, please"), h("p", {}, ...text), h("label", { for: "token" }, "Token"), field,
     h("button", { type: "submit" }, "Go on"));
 }

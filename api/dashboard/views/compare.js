@@ -1,62 +1,79 @@
+// @ts-check
 /** Any experiments in one figure, and which of them differ. */
 
+import { copyButton } from "../lib/copy.js";
 import { h } from "../lib/dom.js";
 import { follow } from "../lib/live.js";
-import { copyButton } from "../lib/copy.js";
-import { empty } from "../lib/states.js";
-import { address, chosen } from "./compare/address.js";
+import { empty } from "../lib/placeholders.js";
+import { ENDED } from "../lib/state_badge.js";
+import { addressOf, comparisonOf } from "./compare/address.js";
+import { experimentCache } from "./compare/cache.js";
 import { chooser } from "./compare/chooser.js";
+import { chosenList } from "./compare/chosen.js";
 import { controls } from "./compare/controls.js";
 import { figure } from "./compare/figure.js";
-import { library } from "./compare/library.js";
-import { list } from "./compare/list.js";
 import { remarks } from "./compare/remarks.js";
 import { significance } from "./compare/significance.js";
 
-const ENDED = ["COMPLETED", "FAILED", "CANCELLED"];
 const KINDS = ["transferred", "probed", "repetition_completed", "started", "paused", "completed", "failed", "cancelled", "extended"];
 
-/** Fill `root` with the comparison that the address asks for, until `signal`. */
+/**
+ * Fill `root` with the comparison that the address asks for, until `signal`.
+ *
+ * @param {HTMLElement} root
+ * @param {URLSearchParams} parameters
+ * @param {AbortSignal} signal
+ */
 export async function show(root, parameters, signal) {
-  const books = library(signal);
-  const view = { choice: chosen(parameters), books, signal };
-  const parts = [chooser, list, remarks, controls, figure, significance].map((make) => make(view));
-  const [search, shown, warned, how, drawn, tested] = parts.map((each) => each.element);
-  const results = h("div", { class: "results" }, how, drawn, tested);
+  const cache = experimentCache(signal);
+  const { studies, ...choice } = comparisonOf(parameters);
+  /** @type {Page.CompareView} */
+  const view = {
+    choice, cache, signal,
+    async change(changes) {
+      view.choice = { ...view.choice, ...changes };
+      history.pushState(null, "", addressOf(view.choice));
+      await cache.load(view.choice.experiments).catch(() => {});  // it is loaded once the service is back
+      if (!signal.aborted) update();
+    },
+  };
+  const parts = [chooser, chosenList, remarks, controls, figure, significance].map((make) => make(view));
+  const [search, chosen, warnings, ...others] = parts.map(({ element }) => element);
+  const results = h("div", { class: "results" }, ...others);
   const nothing = empty("Choose experiments above: one, two, or all of a study. The address then holds the comparison, to be shared.");
-  const update = (events = []) => {
-    const some = view.choice.experiments.some((each) => books.get(each));
-    results.hidden = !some;
-    nothing.hidden = some || view.choice.experiments.length > 0;
+  const update = (/** @type {unknown[]} */ events = []) => {
+    const { experiments } = view.choice;
+    results.hidden = !cache.known(experiments).length;
+    nothing.hidden = experiments.length > 0;
     for (const part of parts) part.update(events);
   };
-  view.change = async (changes) => {
-    view.choice = { ...view.choice, ...changes };
-    history.pushState(null, "", address(view.choice));
-    await books.fetch(view.choice.experiments).catch(() => {});  // it is asked for again when the service is back
-    if (!signal.aborted) update();
-  };
-  await arrive(view);
+  await loadChoice(view, studies);
   root.replaceChildren(h("div", { class: "titled" }, h("h1", {}, "Compare"), copyButton("Copy the link", () => location.href)),
-    search, shown, warned, results, nothing);
+    search, chosen, warnings, results, nothing);
   update();
-  const changed = async (events) => {
-    const news = events.filter(({ data }) => view.choice.experiments.includes(data.experiment));
-    if (events.length && !news.length) return;
-    await books.fetch(view.choice.experiments);
-    const told = new Set(news.map(({ data }) => data.experiment));
-    await books.anew(view.choice.experiments.filter((each) => told.has(each) || !ENDED.includes(books.get(each)?.state)));
-    update([...news, null]);
+  const refresh = async (/** @type {Page.ServerEvent[]} */ events) => {
+    const { experiments } = view.choice;
+    const ours = events.filter(({ data }) => experiments.includes(data.experiment));
+    if (events.length && !ours.length) return;
+    await cache.load(experiments);
+    const changed = new Set(ours.map(({ data }) => data.experiment));
+    const isOpen = (/** @type {string} */ id) => !ENDED.includes(/** @type {Api.State} */ (cache.get(id)?.state));
+    await cache.reload(view.choice.experiments.filter((id) => changed.has(id) || isOpen(id)));
+    update([...ours, null]);
   };
-  follow({ kind: KINDS }, changed, signal);
+  follow({ kind: KINDS }, refresh, signal);
 }
 
-/** Look up what the address names; studies in it stand for their experiments. */
-async function arrive(view) {
-  const { studies, ...choice } = view.choice;
-  const of = await Promise.all(studies.map((each) => view.books.study(each)));
-  const experiments = [...new Set([...choice.experiments, ...of.flat()])];
-  view.choice = { ...choice, experiments };
-  if (studies.length) history.replaceState(null, "", address(view.choice));
-  await view.books.fetch(experiments);
+/**
+ * Load the experiments in the address; studies in it stand for their experiments.
+ *
+ * @param {Page.CompareView} view
+ * @param {string[]} studies
+ */
+async function loadChoice(view, studies) {
+  const ofStudies = await Promise.all(studies.map(view.cache.loadStudy));
+  const experiments = [...new Set([...view.choice.experiments, ...ofStudies.flat()])];
+  view.choice = { ...view.choice, experiments };
+  if (studies.length) history.replaceState(null, "", addressOf(view.choice));
+  await view.cache.load(experiments);
 }

@@ -1,12 +1,14 @@
-/** An experiment, live: how far it is, what came out of it, and what may be asked of it. */
+// @ts-check
+/** An experiment, live: its progress, its results, and the actions on it. */
 
-import { get, tagged } from "../lib/api.js";
+import { get, getTagged } from "../lib/api.js";
 import { h } from "../lib/dom.js";
-import { follow } from "../lib/live.js";
+import { follow, reloadEvery } from "../lib/live.js";
 import { sections } from "../lib/sections.js";
 import { tabs } from "../lib/tabs.js";
-import { feed } from "./experiment/feed.js";
-import { figures, isDirect } from "./experiment/figures.js";
+import { isFunction } from "../lib/robots.js";
+import { eventList } from "./experiment/event_list.js";
+import { curve, otherFigures } from "./experiment/figures.js";
 import { head } from "./experiment/head.js";
 import { misfit } from "./experiment/misfit.js";
 import { provenance } from "./experiment/provenance.js";
@@ -14,45 +16,66 @@ import { repetitions } from "./experiment/repetitions.js";
 import { samples } from "./experiment/samples.js";
 import { spec } from "./experiment/spec.js";
 
-const LOOK_EVERY_MS = 15_000;  // time passes without events too, and what is left of it is shown
+const RELOAD_MS = 15_000;
 
-/** Fill `root` with the experiment that `parameters` name, until `signal`. */
+/**
+ * Fill `root` with the experiment that the parameters name, until `signal`.
+ *
+ * @param {HTMLElement} root
+ * @param {URLSearchParams} parameters
+ * @param {AbortSignal} signal
+ */
 export async function show(root, parameters, signal) {
-  const id = parameters.get("id");
+  const id = String(parameters.get("id"));
   const { latest } = await get("/events/page", { experiment: id, limit: 1 }, signal);
-  const found = await tagged(`/experiments/${id}`, signal);
-  const page = { id, signal, latest, experiment: found.value, tag: found.tag, parts: sections(signal) };
-  const top = head(page);
-  page.take = ({ value, tag }) => {
-    Object.assign(page, { experiment: value, tag });
-    top.update();
+  const [loaded, catalogue] = await Promise.all([getTagged(`/experiments/${id}`, signal), get("/catalogue", {}, signal)]);
+  /** @type {Page.ExperimentPage} */
+  const page = {
+    id, signal, latest, experiment: loaded.value, tag: loaded.tag, isFunction: isFunction(catalogue, loaded.value), sections: sections(signal),
+    take({ value, tag }) {
+      Object.assign(page, { experiment: value, tag });
+      top.update();
+    },
+    reload: async () => page.take(await getTagged(`/experiments/${id}`, signal)),
   };
-  page.look = async () => page.take(await tagged(`/experiments/${id}`, signal));
-  const drawn = figures(page);
+  const top = head(page);
+  const rememberTab = (/** @type {string} */ name) => history.replaceState(null, "", `#/experiments/${id}?tab=${name}`);
   root.replaceChildren(
     top.element,
-    h("div", { class: "stage" }, drawn.curve, feed(page)),
-    ...drawn.others,
-    tabs("Details", panels(page), parameters.get("tab"), (name) => history.replaceState(null, "", `#/experiments/${id}?tab=${name}`)),
+    h("div", { class: "stage" }, curve(page), eventList(page)),
+    ...otherFigures(page),
+    tabs("Details", panels(page), parameters.get("tab"), rememberTab),
   );
   keepUp(page);
 }
 
+/**
+ * @param {Page.ExperimentPage} page
+ * @returns {Parameters<typeof tabs>[1]}
+ */
 function panels(page) {
-  const entries = [["repetitions", "Repetitions", repetitions(page)], ["samples", "Real-world samples", samples(page)]];
-  if (!isDirect(page.experiment)) entries.push(["misfit", "Misfit", misfit(page)]);
-  return [...entries, ["provenance", "Provenance", provenance(page)], ["spec", "Spec", spec(page)]];
+  const misfitPanel = page.experiment.direct ? [] : [/** @type {[string, string, Page.Child]} */ (["misfit", "Misfit", misfit(page)])];
+  return [
+    ["repetitions", "Repetitions", repetitions(page)],
+    ["samples", "Real-world samples", samples(page)],
+    ...misfitPanel,
+    ["provenance", "Provenance", provenance(page)],
+    ["spec", "Spec", spec(page)],
+  ];
 }
 
-/** Whatever happens to the experiment is seen; so is an end that came while nobody listened. */
+/**
+ * Reload what events change, and everything after a change of state whose event was missed.
+ *
+ * @param {Page.ExperimentPage} page
+ */
 function keepUp(page) {
-  const changed = async (events) => {
-    page.parts.tell(events);
+  const refresh = async (/** @type {Page.ServerEvent[]} */ events) => {
+    page.sections.reload(events);
     const before = page.experiment.state;
-    await page.look();
-    if (page.experiment.state !== before) page.parts.tell([]);
+    await page.reload();
+    if (page.experiment.state !== before) page.sections.reload([]);
   };
-  follow({ experiment: page.id, after: page.latest }, changed, page.signal);
-  const timer = setInterval(() => page.look().catch(() => {}), LOOK_EVERY_MS);
-  page.signal.addEventListener("abort", () => clearInterval(timer));
+  follow({ experiment: page.id, after: page.latest }, refresh, page.signal);
+  reloadEvery(page, RELOAD_MS);
 }

@@ -1,131 +1,188 @@
-/** Studies and experiments: how each is, live, to be found, opened and compared. */
+// @ts-check
+/** The list of studies and experiments, live: to find them, to open them, and to choose some for a comparison. */
 
 import { get } from "../lib/api.js";
 import { h } from "../lib/dom.js";
+import { keyedRows } from "../lib/keyed_rows.js";
 import { follow } from "../lib/live.js";
-import { rows } from "../lib/rows.js";
-import { empty, failed, loading } from "../lib/states.js";
-import { addressOf, filters, isFiltered, wantedBy } from "./list/filters.js";
-import { experimentRow, heads, studyRow } from "./list/rows.js";
-import { following } from "./list/seam.js";
+import { empty, failed, loading } from "../lib/placeholders.js";
+import { unitsOf } from "../lib/robots.js";
+import { addressOf, filterForm, filtersOf, isFiltered } from "./list/filters.js";
+import { restOfList } from "./list/merging.js";
+import { experimentRow, headCells, studyRow } from "./list/rows.js";
 import { selectionBar } from "./list/selection.js";
 
-const AT_ONCE = 20;
+const AT_FIRST = 20;
 const MOST = 500;
 const MINUTE_MS = 60_000;
 
-/** Fill `root` with the list that `parameters` ask for, until `signal`. */
+/** @typedef {import("./list/filters.js").Filters} Filters */
+/** @typedef {Api.StudyRead | Api.ExperimentRead} Item */
+/** @typedef {{ value: Item, isNested?: boolean }} Row */
+
+/**
+ * Fill `root` with the list that the parameters ask for, until `signal`.
+ *
+ * @param {HTMLElement} root
+ * @param {URLSearchParams} parameters
+ * @param {AbortSignal} signal
+ */
 export async function show(root, parameters, signal) {
-  const catalogue = await get("/catalogue", {}, signal);
-  const units = Object.fromEntries(catalogue.robots.map((each) => [each.name, each.details.unit]));
-  const list = new List(signal, (experiment) => units[experiment?.spec.robot.name] ?? "");
-  const strategies = catalogue.strategies.map((each) => each.name);
+  const catalogue = /** @type {Api.Catalogue} */ (await get("/catalogue", {}, signal));
+  const list = new List(signal, unitsOf(catalogue), filtersOf(parameters));
+  const strategies = catalogue.strategies.map(({ name }) => name);
   const place = h("div");
-  const changed = async (wanted) => {
-    if (signal.aborted) return;  // what was typed just before one left would change the address of another view
-    history.replaceState(null, "", addressOf(wanted));
-    const focused = place.querySelector(":focus")?.textContent;
-    if (list.wanted?.show !== wanted.show) {
-      place.replaceChildren(filters(wanted, strategies, changed));
-      [...place.querySelectorAll("button")].find((each) => each.textContent === focused)?.focus();
+  const makeForm = () => place.replaceChildren(filterForm({ ...list.filters }, strategies, changed));
+  const changed = async (/** @type {Filters} */ filters) => {
+    if (signal.aborted) return;  // words typed just before the reader left would change the address of another view
+    history.replaceState(null, "", addressOf(filters));
+    const loaded = list.change({ ...filters });
+    if (filters.show !== shown) {
+      const focused = place.querySelector(":focus")?.textContent;
+      makeForm();
+      [...place.querySelectorAll("button")].find((button) => button.textContent === focused)?.focus();
     }
-    await list.ask({ ...wanted });
+    shown = filters.show;
+    await loaded;
   };
-  const head = h("div", { class: "titled" }, h("h1", {}, "Studies and experiments"), h("a", { class: "button", href: "#/new" }, "New study"));
-  root.replaceChildren(head, place, list.element);
-  await changed(wantedBy(parameters));
+  let shown = list.filters.show;
+  makeForm();
+  const title = h("div", { class: "titled" }, h("h1", {}, "Studies and experiments"), h("a", { class: "button", href: "#/new" }, "New study"));
+  root.replaceChildren(title, place, list.element);
+  await changed(list.filters);
   if (signal.aborted) return;
   follow({}, () => list.refresh(), signal);
-  const clock = setInterval(() => list.draw(), MINUTE_MS);
-  signal.addEventListener("abort", () => clearInterval(clock));
+  const timer = setInterval(() => list.draw(), MINUTE_MS);
+  signal.addEventListener("abort", () => clearInterval(timer));
 }
 
-/** The table, as much of it as was asked for. */
+/** The table, with as many rows as the reader asked for. */
 class List {
-  constructor(signal, unit) {
-    Object.assign(this, { signal, unit, open: new Set(), items: [], next: null, wanted: null, turn: 0, trouble: null });
+  /**
+   * @param {AbortSignal} signal
+   * @param {(experiment: Api.ExperimentRead | undefined) => string} unit
+   * @param {Filters} filters
+   */
+  constructor(signal, unit, filters) {
+    this.signal = signal;
+    this.unit = unit;
+    this.filters = filters;
+    /** @type {Set<string>} */
+    this.unfolded = new Set();
+    /** @type {Item[]} */
+    this.items = [];
+    /** @type {string | null} */
+    this.cursor = null;
+    /** @type {HTMLElement | null} */
+    this.error = null;
+    this.requests = 0;
     const body = h("tbody");
-    const make = (each) => (each.value.experiments ? studyRow(each, this) : experimentRow(each, this));
-    this.fill = rows(body, (each) => `${each.value.id} ${each.nested ?? ""}`, make);
-    this.table = h("table", { class: "list" }, h("caption", { class: "away" }, "Studies and experiments"), h("thead", {}, h("tr", {}, ...heads())), body);
-    this.more = h("button", { type: "button", class: "quiet more", onclick: () => this.lengthen() }, "Show more");
+    this.fill = keyedRows(body, (/** @type {Row} */ { value, isNested }) => `${value.id} ${isNested ?? ""}`, (row) => this.makeRow(row));
+    this.table = h("table", { class: "list" }, h("caption", { class: "away" }, "Studies and experiments"), h("thead", {}, h("tr", {}, ...headCells())), body);
+    this.more = h("button", { type: "button", class: "quiet more", onclick: () => { this.lengthen(); } }, "Show more");
     this.bar = selectionBar(() => this.draw());
     this.note = h("div", {}, loading());
     this.element = h("div", {}, this.bar.element, this.table, this.note, this.more);
-    this.ticked = () => { this.bar.update(); this.draw(); };
+    this.ticked = () => {
+      this.bar.update();
+      this.draw();
+    };
   }
 
-  /** Another list than before. If it does not come, that stands in place of the former one. */
-  async ask(wanted) {
-    Object.assign(this, { wanted, next: null });
-    const coming = this.refresh(AT_ONCE, []);
-    const { turn } = this;
+  /**
+   * @param {Row} row
+   * @returns {Page.Updatable<any>}
+   */
+  makeRow({ value, isNested }) {
+    return "experiments" in value ? studyRow(value, this) : experimentRow({ value, isNested }, this);
+  }
+
+  /**
+   * Show the list of other filters; an error replaces the former list.
+   *
+   * @param {Filters} filters
+   */
+  async change(filters) {
+    Object.assign(this, { filters, cursor: null });
+    const loaded = this.refresh(AT_FIRST, []);
+    const { requests } = this;
     try {
-      await coming;
+      await loaded;
     } catch (error) {
-      if (turn !== this.turn || this.signal.aborted) return;
+      if (requests !== this.requests || this.signal.aborted) return;
       this.items = [];
-      this.fail(error, () => this.ask(wanted));
+      this.fail(error, () => this.change(filters));
     }
   }
 
-  /** The same list anew, as long as it is. */
-  async refresh(limit = Math.min(MOST, Math.max(AT_ONCE, this.items.length)), former = null) {
-    const turn = ++this.turn;
-    const { show: kind, ...which } = this.wanted;
-    const page = await get(`/${kind}`, { ...which, limit }, this.signal);
-    if (turn !== this.turn || this.signal.aborted) return;
+  /**
+   * Load the list again, as long as it is.
+   *
+   * @param {number} [limit] of the part that is loaded
+   * @param {Item[] | null} [former] the list so far
+   */
+  async refresh(limit = Math.min(MOST, Math.max(AT_FIRST, this.items.length)), former = null) {
+    const request = ++this.requests;
+    const { show: kind, ...query } = this.filters;
+    const page = await get(`/${kind}`, { ...query, limit }, this.signal);
+    if (request !== this.requests || this.signal.aborted) return;
     const all = former ?? this.items;
-    const rest = all.length > limit ? following(page.items, all) : [];
-    if (former || !this.items.length) this.trouble = null;
-    Object.assign(this, { items: [...page.items, ...rest], next: rest.length ? this.next : page.next });
+    const rest = all.length > limit ? restOfList(page.items, all) : [];
+    if (former || !this.items.length) this.error = null;
+    Object.assign(this, { items: [...page.items, ...rest], cursor: rest.length ? this.cursor : page.next });
     this.draw();
   }
 
-  /** What follows. If it does not come, that is said below the list. */
+  /** Load the next part of the list; an error stands below it. */
   async lengthen() {
-    const asked = this.wanted;
-    const { show: kind, ...which } = asked;
+    const { filters } = this;
+    const { show: kind, ...query } = filters;
     this.more.disabled = true;
-    this.trouble = null;
+    this.error = null;
     try {
-      const page = await get(`/${kind}`, { ...which, limit: AT_ONCE * 2, cursor: this.next }, this.signal);
-      if (asked !== this.wanted) return;  // another list has taken its place
+      const page = await get(`/${kind}`, { ...query, limit: AT_FIRST * 2, cursor: this.cursor }, this.signal);
+      if (filters !== this.filters) return;  // another list has taken its place
       this.items.push(...page.items);
-      this.next = page.next;
+      this.cursor = page.next;
       this.draw();
     } catch (error) {
-      if (asked === this.wanted && !this.signal.aborted) this.fail(error, () => this.lengthen());
+      if (filters === this.filters && !this.signal.aborted) this.fail(error, () => this.lengthen());
     } finally {
       this.more.disabled = false;
     }
   }
 
-  fail(error, again) {
-    this.trouble = failed(error, again, "h2");
+  /**
+   * @param {unknown} error
+   * @param {() => void} retry
+   */
+  fail(error, retry) {
+    this.error = failed(error, retry, "h2");
     this.draw();
   }
 
+  /** @param {string} id of a study */
   toggle(id) {
-    if (!this.open.delete(id)) this.open.add(id);
+    if (!this.unfolded.delete(id)) this.unfolded.add(id);
     this.draw();
   }
 
   draw() {
-    const below = (value) => (this.open.has(value.id) ? value.experiments.map((each) => ({ value: each, nested: true })) : []);
-    const shown = this.items.flatMap((value) => [{ value }, ...below(value)]);
-    this.fill(shown);
-    this.table.hidden = !shown.length;
-    this.more.hidden = !this.next;
-    const note = this.trouble ?? (shown.length ? null : this.nothing());
+    const below = (/** @type {Item} */ value) =>
+      ("experiments" in value && this.unfolded.has(value.id) ? value.experiments.map((experiment) => ({ value: experiment, isNested: true })) : []);
+    const rows = this.items.flatMap((value) => [{ value }, ...below(value)]);
+    this.fill(rows);
+    this.table.hidden = !rows.length;
+    this.more.hidden = !this.cursor;
+    const note = this.error ?? (rows.length ? null : this.nothing());
     if (!note || note !== this.note.firstChild) this.note.replaceChildren(...(note ? [note] : []));
   }
 
   nothing() {
-    if (isFiltered(this.wanted)) {
+    if (isFiltered(this.filters)) {
       const again = () => dispatchEvent(new HashChangeEvent("hashchange"));  // also where the address is the same already
-      return empty("Nothing here is like that.", h("a", { class: "button quiet", href: "#/", onclick: again }, "Show everything"));
+      return empty("Nothing fits these filters.", h("a", { class: "button quiet", href: "#/", onclick: again }, "Show everything"));
     }
-    return empty("Nothing was submitted yet.", h("a", { class: "button", href: "#/new" }, "Submit a study"));
+    return empty("There are no studies yet.", h("a", { class: "button", href: "#/new" }, "Submit a study"));
   }
 }

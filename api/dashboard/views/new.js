@@ -1,113 +1,155 @@
-/** A new study: a form made from the catalogue, checked by the service while one types, with what it costs. */
+// @ts-check
+/** A new study: a form made from the catalogue, which the service checks and prices while the reader types. */
 
 import { get, post } from "../lib/api.js";
 import { h } from "../lib/dom.js";
-import { written } from "../lib/json.js";
+import { stringify } from "../lib/json.js";
 import { draftOf, specOf } from "./new/draft.js";
-import { Places } from "./new/fields.js";
+import { ErrorPlaces } from "./new/fields.js";
+import { budgetPart, realityPart, simulationPart, strategiesPart, studyPart, tunablesPart } from "./new/form_parts.js";
 import { panel } from "./new/panel.js";
-import { budget, extent, reality, simulation, strategies, tunables } from "./new/parts.js";
 
 const TYPING_MS = 300;
+const PARTS = [studyPart, strategiesPart, simulationPart, tunablesPart, realityPart, budgetPart];
 
-/** Fill `root` with the form, until `signal`. */
-export async function show(root, parameters, signal) {
+/** @typedef {{ name: string, summary: string, spec: Record<string, any> }} Preset */
+
+/**
+ * Fill `root` with the form, until `signal`.
+ *
+ * @param {HTMLElement} root
+ * @param {URLSearchParams} _parameters
+ * @param {AbortSignal} signal
+ */
+export async function show(root, _parameters, signal) {
+  /** @type {[Api.Catalogue, Preset[]]} */
   const [catalogue, presets] = await Promise.all([get("/catalogue", {}, signal), get("/assets/dashboard/presets.json", {}, signal)]);
-  const form = new Form(catalogue, signal);
+  const form = new Form(catalogue, presets[0].spec, signal);
   const starts = presets.map(({ name, summary, spec }) =>
     h("button", { type: "button", class: "quiet", title: summary, onclick: () => form.start(spec) }, name));
   root.replaceChildren(h("h1", {}, "New study"),
     h("div", { class: "starts", role: "group", "aria-label": "Start from" }, h("span", { class: "note" }, "Start from"), ...starts), form.element);
-  form.start(presets[0].spec);
+  form.remake();
 }
 
-/** The form, its draft, and what the service says of it. */
-class Form {
-  constructor(catalogue, signal) {
-    Object.assign(this, { catalogue, signal, draft: null, places: new Places(), timer: null, turn: 0, refused: false, key: null, keyOf: null });
+/** The form, its content, and what the service says about it. */
+export class Form {
+  /**
+   * @param {Api.Catalogue} catalogue
+   * @param {Record<string, any>} spec the one to start from
+   * @param {AbortSignal} signal
+   */
+  constructor(catalogue, spec, signal) {
+    this.catalogue = catalogue;
+    this.signal = signal;
+    this.draft = draftOf(spec, catalogue);
+    this.places = new ErrorPlaces();
+    /** @type {number | undefined} */
+    this.timer = undefined;
+    this.requests = 0;
+    this.isRefused = false;
+    this.idempotency = { key: "", spec: "" };
     this.panel = panel();
     this.parts = h("div", { class: "parts" });
-    this.element = h("form", { class: "new", novalidate: true, onsubmit: (event) => this.submit(event) }, this.parts, this.panel.element);
+    this.element = h("form", { class: "new", novalidate: true, onsubmit: (event) => { this.submit(event); } }, this.parts, this.panel.element);
     this.changed = () => this.check();
     signal.addEventListener("abort", () => clearTimeout(this.timer));
   }
 
-  /** A function that sets a value of the draft. */
-  set(object, name) {
-    return (value) => {
+  /**
+   * Return a function that sets a value of the draft.
+   *
+   * @param {Record<string, any>} object
+   * @param {string} name
+   */
+  setter(object, name) {
+    return (/** @type {unknown} */ value) => {
       object[name] = value;
       this.changed();
     };
   }
 
-  /** Begin with another spec. */
+  /**
+   * Start from another spec.
+   *
+   * @param {Record<string, any>} spec
+   */
   start(spec) {
     this.draft = draftOf(spec, this.catalogue);
     this.remake();
   }
 
-  /** Make the fields anew, for there are others now; what had the focus has it again. */
+  /** Make all fields again, since a choice adds or removes some; the focus stays, and so do unfolded parts. */
   remake() {
-    const inputs = () => [...this.parts.querySelectorAll("input, select, summary, button")];
-    const at = inputs().indexOf(document.activeElement);
-    const isOpen = [...this.parts.querySelectorAll("details")].map((each) => each.open);
-    this.parts.replaceChildren(...[extent, strategies, simulation, tunables, reality, budget].map((each) => each(this)));
-    if (at >= 0) inputs()[at]?.focus();
-    const details = [...this.parts.querySelectorAll("details")];
-    if (details.length === isOpen.length) details.forEach((each, number) => { each.open ||= isOpen[number]; });
+    const inputs = () => /** @type {HTMLElement[]} */ ([...this.parts.querySelectorAll("input, select, summary, button")]);
+    const details = () => [...this.parts.querySelectorAll("details")];
+    const focused = inputs().findIndex((input) => input === document.activeElement);
+    const isOpen = details().map(({ open }) => open);
+    this.parts.replaceChildren(...PARTS.map((make) => make(this)));
+    if (focused >= 0) inputs()[focused]?.focus();
+    if (details().length === isOpen.length) details().forEach((element, index) => { element.open ||= isOpen[index]; });
     this.check(0);
   }
 
-  /** Ask the service what the spec costs and what is wrong with it, soon. */
-  check(after = TYPING_MS) {
-    this.refused = false;
-    this.panel.show(specOf(this.draft));
+  /** Ask the service soon what the spec costs, and what is wrong with it. */
+  check(afterMs = TYPING_MS) {
+    this.isRefused = false;
+    this.panel.showSpec(specOf(this.draft));
     clearTimeout(this.timer);
-    this.timer = setTimeout(() => this.estimate(), after);
+    this.timer = setTimeout(() => this.estimate(), afterMs);
   }
 
-  /** What was said of a submission that was refused stays until something is changed. */
+  /** Show the cost or the errors of the spec. The errors of a refused submission stay until something is changed. */
   async estimate() {
-    const turn = ++this.turn;
-    const overtaken = () => turn !== this.turn || this.signal.aborted;
+    const request = ++this.requests;
+    const isReplaced = () => request !== this.requests || this.signal.aborted;
     try {
-      const found = await post("/studies/estimate", specOf(this.draft));
-      if (overtaken()) return;
-      this.panel.estimate(found);
-      if (this.refused) return;
+      const estimate = await post("/studies/estimate", specOf(this.draft));
+      if (isReplaced()) return;
+      this.panel.showCost(estimate);
+      if (this.isRefused) return;
       this.places.show([]);
-      this.panel.refuse([]);
+      this.panel.showErrors([]);
     } catch (error) {
-      if (!overtaken() && !this.refused) this.refuse(error, "Once what is marked is right, this says what it costs.");
+      if (!isReplaced() && !this.isRefused) this.showErrors(error, "The cost is shown once the marked fields are right.");
     }
   }
 
-  refuse(error, words) {
+  /**
+   * @param {any} error
+   * @param {string} words
+   */
+  showErrors(error, words) {
     const errors = error.errors ?? [];
     const others = this.places.show(errors);
-    this.panel.refuse(errors.length ? others : [{ pointer: error.title, message: error.message }], errors.length ? words : null);
+    this.panel.showErrors(errors.length ? others : [{ pointer: error.title, message: error.message }], errors.length ? words : null);
   }
 
+  /** @param {SubmitEvent} event */
   async submit(event) {
     event.preventDefault();
     const spec = specOf(this.draft);
-    this.panel.busy(true);
+    this.panel.setBusy(true);
     try {
-      const study = await post("/studies", spec, { "Idempotency-Key": this.keyFor(written(spec)) });
+      const study = await post("/studies", spec, { "Idempotency-Key": this.idempotencyKey(stringify(spec)) });
       location.hash = `#/studies/${study.id}`;
     } catch (error) {
       if (this.signal.aborted) return;
-      this.refused = true;
-      this.refuse(error, "It was not submitted: what is marked is not right yet.");
-      this.parts.querySelector("[aria-invalid]")?.focus();
-      this.panel.busy(false);
+      this.isRefused = true;
+      this.showErrors(error, "The study was not submitted: the marked fields are not right yet.");
+      /** @type {HTMLElement | null} */ (this.parts.querySelector("[aria-invalid]"))?.focus();
+      this.panel.setBusy(false);
     }
   }
 
-  /** The same key for the same spec: pressed again after no answer came, it is submitted once. */
-  keyFor(text) {
-    const random = () => Array.from(crypto.getRandomValues(new Uint32Array(4)), (each) => each.toString(16)).join("-");
-    if (this.keyOf !== text) Object.assign(this, { keyOf: text, key: random() });
-    return this.key;
+  /**
+   * Return the same key for the same spec: a second press, after an answer was lost, submits nothing twice.
+   *
+   * @param {string} spec
+   */
+  idempotencyKey(spec) {
+    const random = () => Array.from(crypto.getRandomValues(new Uint32Array(4)), (part) => part.toString(16)).join("-");
+    if (this.idempotency.spec !== spec) this.idempotency = { key: random(), spec };
+    return this.idempotency.key;
   }
 }

@@ -1,70 +1,87 @@
-/** The toy of the paper's Fig. 3, stepped through: truth, tuned approximations, samples and transfer, by iteration. */
+// @ts-check
+/** The toy of the paper's Fig. 3, iteration by iteration: truth, tuned approximations, samples and transfer. */
 
-import { get, search } from "../lib/api.js";
+import { get, queryString } from "../lib/api.js";
 import { h } from "../lib/dom.js";
-import { figureFiles } from "../lib/downloads.js";
+import { figureDownloads } from "../lib/downloads.js";
+import { empty } from "../lib/placeholders.js";
 import { plot } from "../lib/plot.js";
-import { empty } from "../lib/states.js";
 
 const STEP_MS = 1300;
 
-/** Fill `root` with the iterations of one repetition of the experiment that `parameters` name, until `signal`. */
+/**
+ * Fill `root` with the iterations of one repetition of the experiment that the parameters name, until `signal`.
+ *
+ * @param {HTMLElement} root
+ * @param {URLSearchParams} parameters
+ * @param {AbortSignal} signal
+ */
 export async function show(root, parameters, signal) {
   const id = parameters.get("experiment");
   if (!id) {
-    const make = h("a", { href: "#/new", class: "button" }, "New study");
-    root.replaceChildren(h("h1", {}, "The toy function"), empty("It is stepped through from the page of an experiment with the robot toy_function.", make));
+    const link = h("a", { href: "#/new", class: "button" }, "New study");
+    root.replaceChildren(h("h1", {}, "The toy function"), empty("An experiment whose robot is a function of one gene can be stepped through, from its own page.", link));
     return;
   }
-  const experiment = await get(`/experiments/${id}`, {}, signal);
-  const most = experiment.strategy === "direct" ? 0 : experiment.spec.iterations;
-  const asked = { experiment: id, repetition: Number(parameters.get("repetition") ?? 0), iteration: Math.min(Number(parameters.get("iteration") ?? 0), most) };
+  /** @type {Api.ExperimentRead} */
+  const { name, direct, spec } = await get(`/experiments/${id}`, {}, signal);
+  const last = direct ? 0 : spec.iterations;
+  const query = { experiment: id, repetition: Number(parameters.get("repetition") ?? 0), iteration: Math.min(Number(parameters.get("iteration") ?? 0), last) };
   const figure = h("div", { class: "card toy" });
-  const files = h("div");
-  const slider = h("input", { type: "range", id: "iteration", min: 0, max: most, step: 1, value: asked.iteration, list: "iterations", oninput: () => step(Number(slider.value)) });
-  const marks = h("datalist", { id: "iterations" }, ...Array.from({ length: most + 1 }, (_, each) => h("option", { value: each })));
-  const shown = h("output", { for: "iteration", class: "time" });
-  const repetition = h("input", { type: "number", min: 0, max: experiment.spec.repetitions - 1, value: asked.repetition, class: "short",
-    onchange: () => { if (repetition.value !== "" && repetition.reportValidity()) { asked.repetition = Number(repetition.value); draw(); } } });
-  const button = h("button", { type: "button", class: "play", disabled: most === 0, onclick: () => play(timer === null) }, "Play");
-  let [refresh, timer] = [null, null];
+  const drawFigure = plot(figure, "toy", signal);
+  const downloads = h("div");
+  const slide = () => { goTo(Number(slider.value)); };
+  const slider = h("input", { type: "range", id: "iteration", min: 0, max: last, step: 1, value: query.iteration, list: "iterations", oninput: slide });
+  const marks = h("datalist", { id: "iterations" }, ...Array.from({ length: last + 1 }, (_, iteration) => h("option", { value: iteration })));
+  const output = h("output", { for: "iteration", class: "time" });
+  const changeRepetition = () => {
+    if (repetition.value === "" || !repetition.reportValidity()) return;
+    query.repetition = Number(repetition.value);
+    draw();
+  };
+  const repetition = h("input", { type: "number", min: 0, max: spec.repetitions - 1, value: query.repetition, class: "short", onchange: changeRepetition });
+  const button = h("button", { type: "button", class: "play", disabled: last === 0, onclick: () => { toggle(); } }, "Play");
+  /** @type {number | undefined} */
+  let timer;
 
   function draw() {
-    history.replaceState(null, "", `#/toy${search(asked)}`);
-    slider.value = asked.iteration;
-    slider.setAttribute("aria-valuetext", `iteration ${asked.iteration} of ${most}`);
-    shown.textContent = `${asked.iteration} of ${most}`;
-    files.replaceChildren(figureFiles("toy", asked, `gaplab-${id}-toy`));
-    if (refresh) refresh(asked);
-    else refresh = plot(figure, "toy", asked, signal);
+    history.replaceState(null, "", `#/toy${queryString(query)}`);
+    slider.value = String(query.iteration);
+    slider.setAttribute("aria-valuetext", `iteration ${query.iteration} of ${last}`);
+    output.textContent = `${query.iteration} of ${last}`;
+    downloads.replaceChildren(figureDownloads("toy", query, `gaplab-${id}-toy`));
+    drawFigure({ ...query });
   }
 
-  function step(iteration) {
-    asked.iteration = Math.min(Math.max(iteration, 0), most);
+  /** @param {number} iteration */
+  function goTo(iteration) {
+    query.iteration = Math.min(Math.max(iteration, 0), last);
     draw();
   }
 
-  function play(on) {
+  function toggle(isPlaying = timer === undefined) {
     clearInterval(timer);
-    timer = on ? setInterval(() => (asked.iteration < most ? step(asked.iteration + 1) : play(false)), STEP_MS) : null;
-    button.textContent = on ? "Pause" : "Play";
-    if (on && asked.iteration >= most) step(0);
+    timer = isPlaying ? setInterval(() => (query.iteration < last ? goTo(query.iteration + 1) : toggle(false)), STEP_MS) : undefined;
+    button.textContent = isPlaying ? "Pause" : "Play";
+    if (isPlaying && query.iteration >= last) goTo(0);
   }
 
   signal.addEventListener("abort", () => clearInterval(timer));
+  /** @type {Record<string, () => void>} */
+  const keys = { ArrowLeft: () => goTo(query.iteration - 1), ArrowRight: () => goTo(query.iteration + 1), " ": () => toggle() };
   addEventListener("keydown", (event) => {
-    if (event.target.closest?.("input, select, textarea, button, a") || event.altKey || event.ctrlKey || event.metaKey) return;
-    const moves = { ArrowLeft: () => step(asked.iteration - 1), ArrowRight: () => step(asked.iteration + 1), " ": () => play(timer === null) };
-    if (!moves[event.key]) return;
+    const hasOwnUse = event.target instanceof Element && event.target.closest("input, select, textarea, button, a");
+    if (hasOwnUse || event.altKey || event.ctrlKey || event.metaKey || !(event.key in keys)) return;
     event.preventDefault();
-    moves[event.key]();
+    keys[event.key]();
   }, { signal });
   root.replaceChildren(
     h("h1", {}, "The toy function"),
-    h("p", { class: "note" }, h("a", { href: `#/experiments/${id}` }, experiment.name), " · as in the paper's Fig. 3: a function of one gene, its approximations by simulators, and what was tried of it"),
-    h("div", { class: "player" }, button, h("label", { for: "iteration" }, "Iteration"), slider, marks, shown, h("label", {}, "Repetition ", repetition),
-      h("p", { class: "note" }, "← and → go by an iteration, space plays.")),
-    figure, files,
+    h("p", { class: "note" }, h("a", { href: `#/experiments/${id}` }, name),
+      " · as in the paper's Fig. 3: a function of one gene, its approximations by simulators, and the samples of it"),
+    h("div", { class: "player" }, button, h("label", { for: "iteration" }, "Iteration"), slider, marks, output, h("label", {}, "Repetition ", repetition),
+      h("p", { class: "note" }, "← and → go by one iteration. Space plays and pauses.")),
+    figure, downloads,
   );
   draw();
 }

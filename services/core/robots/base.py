@@ -34,7 +34,13 @@ class Robot(Plugin):
     def fitness(self, trajectory: Trajectory) -> FloatArray:
         """`(...)`: the worth of each trajectory, maximised; nan where the physics failed."""
 
+    @property
+    def is_function(self) -> bool:
+        """Whether the robot is a function of one gene: its curve can be drawn, and it has no body to replay."""
+        return not self.world.bodies and self.space.size == 1
+
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """The robot's default engine, its unit of fitness, and the size of its genome."""
-        return {"engine": cls.engine, "unit": cls.unit, "genes": cls().space.size}
+        """The robot's default engine, its unit of fitness, the size of its genome, and whether it is a function."""
+        robot = cls()
+        return {"engine": cls.engine, "unit": cls.unit, "genes": robot.space.size, "function": robot.is_function}

@@ -30,6 +30,7 @@ from gaplab.services.store.models.events import EventRow as EventRow
 from gaplab.services.store.models.experiments import ExperimentRow as ExperimentRow
 from gaplab.services.store.models.experiments import RepetitionRow as RepetitionRow
 from gaplab.services.store.models.experiments import StudyRow as StudyRow
+from gaplab.services.store.models.leased import LeasedRow as LeasedRow
 from gaplab.services.store.models.provenance import ExperimentProvenanceRow as ExperimentProvenanceRow
 from gaplab.services.store.models.provenance import ProvenanceRow as ProvenanceRow
 from gaplab.services.store.models.provenance import SupervisorRow as SupervisorRow

@@ -3,18 +3,12 @@
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import (
-    BigInteger,
-    ForeignKey,
-    Index,
-    String,
-    Text,
-    UniqueConstraint,
-)
+from sqlalchemy import BigInteger, ForeignKey, Index, String, Text, UniqueConstraint
 from sqlalchemy.orm import Mapped, mapped_column
 
 from gaplab.schemas.lifecycle import State
 from gaplab.services.store.models.base import SPEC_VERSION, Base
+from gaplab.services.store.models.leased import LeasedRow
 
 
 class StudyRow(Base):
@@ -42,16 +36,16 @@ class ExperimentRow(Base):
         spec: what makes its results.
         iterations: of one repetition, number 0 included.
         rollouts: expected of one repetition.
-        precedence: its priority, negated: the least has its turn first, so that one index is in the order of turns.
-        max_parallel: repetitions that run at once; NULL for any number.
-        running: repetitions that somebody has claimed.
-        claimable: whether one more may be claimed now. Both are kept by `repository/settling.py`.
-        computed_with: engines, machine, version of the spec and plug-ins from outside, as its first steps had them.
-        refused_by: what a supervisor has that did not go on with it, for it is not the same.
+        precedence: its negated priority: the least has its turn first, so that one index is in the order of turns.
+        max_parallel: most repetitions that run at once; NULL for any number.
+        running: number of claimed repetitions.
+        claimable: whether one more may be claimed now. `services/experiments/states.py` keeps it and `running`.
+        computed_with: engines, machine, version of the spec and external plug-ins that computed its first steps.
+        refused_by: the same of a supervisor that left it alone because they differ.
         sensitivity_id: of the check of what it tunes.
         token_id: of the token that submitted it; NULL where none is needed.
-        notes: of people, about it.
-        edits: how often people changed its name or notes.
+        notes: written by people.
+        edits: number of changes of its name or notes.
     """
 
     __tablename__ = "experiment"
@@ -90,19 +84,15 @@ class ExperimentRow(Base):
     ended_at: Mapped[datetime | None]
 
 
-class RepetitionRow(Base):
+class RepetitionRow(LeasedRow):
     """One run of the algorithm, with its lease and its tallies.
 
     Attributes:
-        owner: who holds or held the lease.
-        epoch: of the lease; every write of a holder carries it, and a write with an old one changes nothing.
-        heartbeat_at: when the holder was last heard of.
-        attempts: times that it was claimed.
-        losses: times that its worker was lost since a step, or a part of one, was last recorded.
-        steps: recorded so far; the position that the next step takes in the log.
-        checkpoints: parts of that next step that are stored.
+        losses: number of workers lost since a step or a checkpoint was last recorded.
+        steps: number of recorded steps, and so the position of the next one in the log.
+        checkpoints: stored parts of the next step.
         seconds: of work in the recorded steps.
-        provenance_id: under what it was claimed the last time.
+        provenance_id: of its latest claim.
     """
 
     __tablename__ = "repetition"
@@ -115,13 +105,6 @@ class RepetitionRow(Base):
     id: Mapped[int] = mapped_column(primary_key=True)
     experiment_id: Mapped[str] = mapped_column(ForeignKey("experiment.id"))
     number: Mapped[int]
-    state: Mapped[State] = mapped_column(default=State.QUEUED)
-    owner: Mapped[str | None] = mapped_column(String(200))
-    epoch: Mapped[int] = mapped_column(default=0)
-    heartbeat_at: Mapped[datetime | None]
-    attempts: Mapped[int] = mapped_column(default=0)
-    losses: Mapped[int] = mapped_column(default=0)
-    error: Mapped[str | None] = mapped_column(Text)
     steps: Mapped[int] = mapped_column(default=0)
     checkpoints: Mapped[int] = mapped_column(default=0, server_default="0")
     iterations_done: Mapped[int] = mapped_column(default=0)
@@ -130,5 +113,3 @@ class RepetitionRow(Base):
     rollouts_saved: Mapped[int] = mapped_column(BigInteger, default=0)
     seconds: Mapped[float] = mapped_column(default=0.0)
     provenance_id: Mapped[str | None] = mapped_column(String(32))
-    started_at: Mapped[datetime | None]
-    ended_at: Mapped[datetime | None]

@@ -15,7 +15,7 @@ from gaplab.services.store.clock import now
 from gaplab.services.store.models import ExperimentProvenanceRow, ExperimentRow, ProvenanceRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries import provenance
 from gaplab.services.store.queries.experiments import new_id
-from gaplab.services.store.queries.reads import without_truth
+from gaplab.services.store.stored_specs import without_truth
 
 __all__ = ["Refused", "free", "insert_rows", "moment", "rows"]
 

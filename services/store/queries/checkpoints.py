@@ -37,7 +37,7 @@ def fresh(checkpoints: Sequence[Checkpoint], step: int, parts: int) -> list[Chec
 def write(session: Session, parts: Mapping[Claim, Sequence[Checkpoint]]) -> None:
     """Add these parts to the steps under way; their repetitions are locked, and the claims hold."""
     rows = [
-        {"repetition_id": claim.repetition_id} | {name: getattr(each, name) for name in Checkpoint.__dataclass_fields__}
+        {"repetition_id": claim.id} | {name: getattr(each, name) for name in Checkpoint.__dataclass_fields__}
         for claim, checkpoints in parts.items()
         for each in checkpoints
     ]
@@ -45,9 +45,7 @@ def write(session: Session, parts: Mapping[Claim, Sequence[Checkpoint]]) -> None
         return
     session.execute(insert(CheckpointRow), rows)
     counts = [
-        {"of_id": claim.repetition_id, "count": checkpoints[-1].part + 1}
-        for claim, checkpoints in parts.items()
-        if checkpoints
+        {"of_id": claim.id, "count": checkpoints[-1].part + 1} for claim, checkpoints in parts.items() if checkpoints
     ]
     row = RepetitionRow
     counted = {"checkpoints": bindparam("count"), "losses": 0, "heartbeat_at": now()}

@@ -15,8 +15,8 @@ from gaplab.schemas.events import EventKind, EventRead
 from gaplab.services.core.types import Measured, Probed, Selected, Step, Transferred, Tuned
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Claim, TimedStep
-from gaplab.services.store.mapping import finite
 from gaplab.services.store.models import EventCounterRow, EventRow, ExperimentRow
+from gaplab.services.store.queries.step_rows import finite
 
 _NOTED = "events"
 

@@ -2,20 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from secrets import choice
-from typing import TypeVar
 
 from sqlalchemy import event, insert, select
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.lifecycle import OPEN
+from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.schemas.spec import ExperimentSpec, Schedule
 from gaplab.services.core.errors import NotFound, StoreUnavailable
-from gaplab.services.store.clock import now
+from gaplab.services.store.clock import moment
 from gaplab.services.store.models import SPEC_VERSION, ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries.events import note
+from gaplab.services.store.statements import storable
 
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 
@@ -44,7 +43,7 @@ def new_id() -> str:
 
 def insert_study(session: Session, name: str) -> StudyRow:
     """A study without experiments yet."""
-    study = StudyRow(id=new_id(), name=_plain(name), created_at=_moment(session))
+    study = StudyRow(id=new_id(), name=storable(name), created_at=moment(session))
     session.add(study)
     session.flush()
     return study
@@ -73,7 +72,7 @@ def insert_experiment(
         id=new_id(),
         study_id=study.id if study else None,
         position=position,
-        name=_plain(spec.name or spec.strategy.name),
+        name=storable(spec.name or spec.strategy.name),
         strategy=spec.strategy.name,
         spec=spec.model_dump(mode="json", exclude=set(Schedule.model_fields)),
         iterations=extent.iterations,
@@ -81,7 +80,7 @@ def insert_experiment(
         precedence=-spec.priority,
         max_parallel=spec.max_parallel,
         token_id=token,
-        created_at=study.created_at if study else _moment(session),
+        created_at=study.created_at if study else moment(session),
     )
     session.add(experiment)
     session.flush()
@@ -103,7 +102,7 @@ def get_experiment(session: Session, experiment_id: str) -> ExperimentRow:
     Raises:
         NotFound: there is none.
     """
-    if (found := session.get(ExperimentRow, _plain(experiment_id))) is None:
+    if (found := session.get(ExperimentRow, storable(experiment_id))) is None:
         msg = f"there is no experiment {experiment_id!r}"
         raise NotFound(msg)
     return found
@@ -115,7 +114,7 @@ def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow
     Raises:
         NotFound: there is none of one of them.
     """
-    named = ExperimentRow.id.in_([_plain(each) for each in ids])
+    named = ExperimentRow.id.in_([storable(each) for each in ids])
     found = {row.id: row for row in session.scalars(select(ExperimentRow).where(named))}
     if missing := [each for each in ids if each not in found]:
         msg = f"there is no experiment {', '.join(map(repr, missing))}"
@@ -129,7 +128,7 @@ def get_study(session: Session, study_id: str) -> StudyRow:
     Raises:
         NotFound: there is none.
     """
-    if (found := session.get(StudyRow, _plain(study_id))) is None:
+    if (found := session.get(StudyRow, storable(study_id))) is None:
         msg = f"there is no study {study_id!r}"
         raise NotFound(msg)
     return found
@@ -154,13 +153,14 @@ def repetitions_of(session: Session, experiment_id: str) -> tuple[RepetitionRow,
     return tuple(session.scalars(select(row).where(row.experiment_id == experiment_id).order_by(row.number)))
 
 
-def lock(session: Session, experiments: Sequence[str]) -> None:
-    """Keep other transactions from moving these experiments between states until this one ends.
+def lock(session: Session, experiments: Sequence[str]) -> dict[str, State]:
+    """Lock experiments until the transaction ends, and return their states.
 
-    Whoever moves repetitions of an experiment between states locks the experiment first, in the order of ids.
+    A transaction that moves repetitions between states locks their experiments first, in the order of ids.
     """
     row = ExperimentRow
-    session.execute(select(row.id).where(row.id.in_(experiments)).order_by(row.id).with_for_update())
+    locked = select(row.id, row.state).where(row.id.in_(experiments)).order_by(row.id).with_for_update()
+    return dict(session.execute(locked).all())
 
 
 @event.listens_for(ExperimentRow, "load")
@@ -170,15 +170,3 @@ def _refuse_newer(row: ExperimentRow, _: object) -> None:
         msg = f"the spec of experiment {row.id!r} is of version {row.spec_version}, and this gaplab reads up to "
         msg += f"{SPEC_VERSION}: use a later gaplab with this database"
         raise StoreUnavailable(msg)
-
-
-T = TypeVar("T", str, str | None)
-
-
-def _plain(text: T) -> T:
-    """The text without the NULs that Postgres refuses: to look for, a name like any other that is not there."""
-    return text.replace("\0", "\N{REPLACEMENT CHARACTER}") if text else text
-
-
-def _moment(session: Session) -> datetime:
-    return session.execute(select(now())).scalar_one()

@@ -1,19 +1,15 @@
 """Answers to requests that created something, by the key that their sender gave them."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import datetime, timedelta
-from typing import Any, TypeAlias
+from datetime import timedelta
+from typing import Any
 
 from sqlalchemy import delete, select, update
-from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
-from gaplab.services.store.clock import now
+from gaplab.services.store.clock import moment
 from gaplab.services.store.models import IdempotencyRow
-
-_Insert: TypeAlias = Callable[..., postgresql.Insert | sqlite.Insert]
-_INSERT: dict[str, _Insert] = {"sqlite": sqlite.insert, "postgresql": postgresql.insert}
+from gaplab.services.store.statements import insert_new
 
 
 @dataclass(frozen=True)
@@ -35,13 +31,8 @@ def reserve(session: Session, caller: str, key: str, digest: str) -> Answered | 
     Another transaction that has taken it is waited for: in Postgres by the unique key, in SQLite by the one writer.
     """
     row = IdempotencyRow
-    moment = session.execute(select(now())).scalar_one()
-    insert = _INSERT[session.get_bind().dialect.name]
-    values = {"caller": caller, "key": key, "digest": digest, "created_at": moment}
-    taken = session.execute(
-        insert(row).values(values).on_conflict_do_nothing(index_elements=[row.caller, row.key]).returning(row.key)
-    ).first()
-    if taken:
+    values = {"caller": caller, "key": key, "digest": digest, "created_at": moment(session)}
+    if session.execute(insert_new(session, row).values(values).returning(row.key)).first():
         return None
     known = session.execute(select(row.digest, row.answer).where(row.caller == caller, row.key == key)).one()
     return Answered(known.digest, known.answer or {})
@@ -55,5 +46,4 @@ def keep(session: Session, caller: str, key: str, answer: dict[str, Any]) -> Non
 
 def forget(session: Session, older_than: timedelta) -> None:
     """Remove keys of longer ago."""
-    before: datetime = session.execute(select(now())).scalar_one() - older_than
-    session.execute(delete(IdempotencyRow).where(IdempotencyRow.created_at < before))
+    session.execute(delete(IdempotencyRow).where(IdempotencyRow.created_at < moment(session) - older_than))

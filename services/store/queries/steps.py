@@ -1,21 +1,19 @@
 """The log of a repetition: steps are appended in one transaction, and one that is there already stays as it is."""
 
-from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
-from sqlalchemy import ColumnElement, Table, and_, bindparam, select, tuple_, update
+from sqlalchemy import Table, bindparam, select, tuple_, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import Conflict
-from gaplab.services.core.types import Probed, Step
-from gaplab.services.store import mapping
+from gaplab.services.core.types import Cost, Probed
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Checkpoint, Claim, Delivered, TimedStep
-from gaplab.services.store.models import IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
+from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries import checkpoints, events
-from gaplab.services.store.queries.batch import Batch
+from gaplab.services.store.queries.step_rows import StepRows, position
 
 _REPETITION = cast("Table", RepetitionRow.__table__)
 
@@ -41,20 +39,6 @@ _ADVANCE = (
 )
 """Built once: for a database that is asked little, to build a statement costs more than to execute it."""
 
-R = TypeVar("R", IterationRow, MeasurementRow, SimulatorRow)
-
-
-def mine(claim: Claim) -> ColumnElement[bool]:
-    """That the claim still holds; goes into the WHERE of every write."""
-    row = RepetitionRow
-    return and_(row.id == claim.repetition_id, row.epoch == claim.epoch, row.state == State.RUNNING)
-
-
-def any_of(claims: Sequence[Claim]) -> ColumnElement[bool]:
-    """That a lease is one of these claims'; with `state = RUNNING`, that it still holds."""
-    row = RepetitionRow
-    return tuple_(row.id, row.epoch).in_([(each.repetition_id, each.epoch) for each in claims])
-
 
 def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -> tuple[Claim, ...]:
     """Append the steps to the logs of their repetitions; the claims that still hold, which alone were written.
@@ -71,12 +55,12 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
     if moving and session.connection().execute(_ADVANCE, moving).rowcount != len(moving):
         msg = "a log moved on although it was locked"
         raise Conflict(msg)
-    batch = Batch()
+    batch = StepRows()
     for claim, steps in fresh.items():
         for each in steps:
             batch.add(claim, each)
     batch.write(session)
-    checkpoints.forget(session, [claim.repetition_id for claim, steps in fresh.items() if steps and lengths[claim][1]])
+    checkpoints.forget(session, [claim.id for claim, steps in fresh.items() if steps and lengths[claim][1]])
     checkpoints.write(
         session, {claim: _parts(deliveries[claim], *lengths[claim], len(fresh[claim])) for claim in fresh}
     )
@@ -84,26 +68,9 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
     return tuple(fresh)
 
 
-def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, ...]]:
-    """The log of each of these repetitions."""
-    iterations = _rows(session, repetitions, IterationRow, IterationRow.number)
-    measurements = _rows(session, repetitions, MeasurementRow, MeasurementRow.iteration)
-    simulators = _rows(session, repetitions, SimulatorRow, SimulatorRow.iteration, SimulatorRow.rank)
-    return {each: mapping.log(iterations[each], measurements[each], simulators[each]) for each in repetitions}
-
-
-def is_whole(session: Session, repetition: RepetitionRow) -> bool:
-    """Whether the rows of the repetition tell of as many steps and iterations as it counts, in order, without holes."""
-    (log,) = logs(session, [repetition.id]).values()
-    done = sum(isinstance(each, Probed) for each in log)
-    return done == repetition.iterations_done and [mapping.position(each) for each in log] == list(
-        range(repetition.steps)
-    )
-
-
 def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, tuple[int, int]]:
     """How many steps the log of each claim that holds has, and checkpoints of the next; locked for the transaction."""
-    by_key = {(each.repetition_id, each.epoch): each for each in claims}
+    by_key = {(each.id, each.epoch): each for each in claims}
     row = RepetitionRow
     found = session.execute(
         select(row.id, row.epoch, row.steps, row.checkpoints)
@@ -120,7 +87,7 @@ def _new(claim: Claim, length: int, delivered: Iterable[Delivered]) -> list[Time
     for each in delivered:
         if isinstance(each, Checkpoint):
             continue
-        place, following = mapping.position(each.step), length + len(found)
+        place, following = position(each.step), length + len(found)
         if place > following:
             msg = f"step {place} of repetition {claim.number} cannot be recorded: the log has {following} steps"
             raise Conflict(msg)
@@ -136,9 +103,9 @@ def _parts(delivered: Iterable[Delivered], length: int, parts: int, new: int) ->
 
 
 def _move(claim: Claim, length: int, steps: Sequence[TimedStep]) -> dict[str, Any]:
-    costs = [mapping.cost(each.step) for each in steps]
+    costs = [getattr(each.step, "cost", Cost()) for each in steps]
     return {
-        "of_id": claim.repetition_id,
+        "of_id": claim.id,
         "of_epoch": claim.epoch,
         "from_steps": length,
         "to_steps": length + len(steps),
@@ -148,11 +115,3 @@ def _move(claim: Claim, length: int, steps: Sequence[TimedStep]) -> dict[str, An
         "more_saved": sum(int(each.saved) for each in costs),
         "more_seconds": sum(each.seconds for each in steps),
     }
-
-
-def _rows(session: Session, repetitions: Sequence[int], table: type[R], *order: Any) -> dict[int, list[R]]:  # noqa: ANN401  # columns
-    found: Iterable[R] = session.scalars(select(table).where(table.repetition_id.in_(repetitions)).order_by(*order))
-    gathered: dict[int, list[R]] = defaultdict(list)
-    for row in found:
-        gathered[row.repetition_id].append(row)
-    return gathered

@@ -1,17 +1,17 @@
 """Tokens: inserted, found, used, revoked; never removed."""
 
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import timedelta
 
 from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.access import Role
 from gaplab.services.core.errors import NotFound
-from gaplab.services.store.clock import now
+from gaplab.services.store.clock import moment, now
 from gaplab.services.store.models import TokenRow
 from gaplab.services.store.queries.experiments import new_id
-from gaplab.services.store.queries.leases import plain
+from gaplab.services.store.statements import storable
 
 USED_EVERY = timedelta(minutes=1)
 """How exactly it is known when a token was last used; a write with every request would cost more than it tells."""
@@ -38,8 +38,7 @@ class Known:
 
 def insert(session: Session, name: str, role: Role, digest: str) -> TokenRow:
     """A new token."""
-    moment: datetime = session.execute(select(now())).scalar_one()
-    row = TokenRow(id=new_id(), name=plain(name), role=role, digest=digest, created_at=moment)
+    row = TokenRow(id=new_id(), name=storable(name), role=role, digest=digest, created_at=moment(session))
     session.add(row)
     session.flush()
     return row
@@ -47,11 +46,11 @@ def insert(session: Session, name: str, role: Role, digest: str) -> TokenRow:
 
 def find(session: Session, id_: str) -> Known | None:
     """The token of that id, revoked or not; None if there is none."""
-    found = session.execute(select(TokenRow, now()).where(TokenRow.id == plain(id_))).first()
+    found = session.execute(select(TokenRow, now()).where(TokenRow.id == storable(id_))).first()
     if found is None:
         return None
-    row, moment = found
-    stale = row.last_used_at is None or moment - row.last_used_at > USED_EVERY
+    row, present = found
+    stale = row.last_used_at is None or present - row.last_used_at > USED_EVERY
     return Known(row.id, row.role, row.digest, revoked=row.revoked_at is not None, stale=stale)
 
 
@@ -72,8 +71,8 @@ def revoke(session: Session, id_: str) -> TokenRow:
         NotFound: there is no such token.
     """
     revoked = func.coalesce(TokenRow.revoked_at, now())
-    session.execute(update(TokenRow).where(TokenRow.id == plain(id_)).values(revoked_at=revoked))
-    if (row := session.get(TokenRow, plain(id_), populate_existing=True)) is None:
+    session.execute(update(TokenRow).where(TokenRow.id == storable(id_)).values(revoked_at=revoked))
+    if (row := session.get(TokenRow, storable(id_), populate_existing=True)) is None:
         msg = f"there is no token {id_!r}"
         raise NotFound(msg)
     return row

@@ -1,64 +1,91 @@
-/** A camera that goes round what it looks at: by mouse, touch, wheel, or keys. */
+// @ts-check
+/** A camera that goes round the worlds: by mouse, touch, wheel, or keys. */
 
-const STEEPEST = 1.5;
 const LOWEST = 0.05;
+const STEEPEST = 1.5;
+const NEAREST_M = 0.4;
+const FARTHEST_M = 8;
 const STEP = 0.12;
+
+/** @typedef {[turn: number, rise: number, zoom: number]} Move angles in radians, and a factor of the distance */
+
+/** @type {Record<string, Move>} */
 const KEYS = { ArrowLeft: [-STEP, 0, 1], ArrowRight: [STEP, 0, 1], ArrowUp: [0, STEP, 1], ArrowDown: [0, -STEP, 1], "+": [0, 0, 0.9], "-": [0, 0, 1.1] };
 
-/** The camera; `changed` is called when somebody moved it. */
-export function camera(changed) {
-  const at = { turn: -1.0, rise: 0.35, distance: 1.25 };
+/** @typedef {ReturnType<typeof camera>} Camera */
 
-  function go(turn, rise, nearer = 1) {
-    at.turn += turn;
-    at.rise = Math.min(Math.max(at.rise + rise, LOWEST), STEEPEST);
-    at.distance = Math.min(Math.max(at.distance * nearer, 0.4), 8);
+/**
+ * Return a camera; `changed` is called after each move.
+ *
+ * @param {() => void} changed
+ */
+export function camera(changed) {
+  const position = { turn: -1.0, rise: 0.35, distance: 1.25 };
+
+  /** @type {(turn: number, rise: number, zoom?: number) => void} */
+  function move(turn, rise, zoom = 1) {
+    position.turn += turn;
+    position.rise = Math.min(Math.max(position.rise + rise, LOWEST), STEEPEST);
+    position.distance = Math.min(Math.max(position.distance * zoom, NEAREST_M), FARTHEST_M);
     changed();
   }
 
-  /** Let the canvas move the camera. */
-  function follow(canvas, signal) {
-    const held = new Map();
-    const on = (kind, handler, options = {}) => canvas.addEventListener(kind, handler, { signal, ...options });
-    on("pointerdown", (event) => {
-      held.set(event.pointerId, event);
+  /**
+   * Let a canvas move the camera, until `signal`.
+   *
+   * @param {HTMLCanvasElement} canvas
+   * @param {AbortSignal} signal
+   */
+  function listen(canvas, signal) {
+    /** @type {Map<number, PointerEvent>} */
+    const pointers = new Map();
+    canvas.addEventListener("pointerdown", (event) => {
+      pointers.set(event.pointerId, event);
       canvas.setPointerCapture(event.pointerId);
-    });
-    on("pointermove", (event) => {
-      const before = held.get(event.pointerId);
+    }, { signal });
+    canvas.addEventListener("pointermove", (event) => {
+      const before = pointers.get(event.pointerId);
       if (!before) return;
-      if (held.size === 1) go(-(event.clientX - before.clientX) / 150, (event.clientY - before.clientY) / 150);
-      else pinch(held, before, event);
-      held.set(event.pointerId, event);
-    });
-    for (const kind of ["pointerup", "pointercancel"]) on(kind, (event) => held.delete(event.pointerId));
-    on("wheel", (event) => {
-      if (!event.ctrlKey && document.activeElement !== canvas) return;  // the page scrolls, unless one is at the camera
+      if (pointers.size === 1) move(-(event.clientX - before.clientX) / 150, (event.clientY - before.clientY) / 150);
+      else pinch([...pointers.values()], before, event);
+      pointers.set(event.pointerId, event);
+    }, { signal });
+    canvas.addEventListener("pointerup", (event) => pointers.delete(event.pointerId), { signal });
+    canvas.addEventListener("pointercancel", (event) => pointers.delete(event.pointerId), { signal });
+    canvas.addEventListener("wheel", (event) => {
+      if (!event.ctrlKey && document.activeElement !== canvas) return;  // the page scrolls, unless the canvas has the focus
       event.preventDefault();
-      go(0, 0, Math.exp(event.deltaY / 800));
-    }, { passive: false });
-    on("keydown", (event) => {
-      const step = KEYS[event.key];
-      if (!step) return;
+      move(0, 0, Math.exp(event.deltaY / 800));
+    }, { signal, passive: false });
+    canvas.addEventListener("keydown", (event) => {
+      if (!(event.key in KEYS)) return;
       event.preventDefault();
       event.stopPropagation();
-      go(...step);
-    });
+      move(...KEYS[event.key]);
+    }, { signal });
   }
 
-  function pinch(held, before, event) {
-    const other = [...held.values()].find((each) => each.pointerId !== event.pointerId);
-    const far = (one) => Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY) || 1;
-    go(0, 0, far(before) / far(event));
+  /** @type {(pointers: PointerEvent[], before: PointerEvent, event: PointerEvent) => void} */
+  function pinch(pointers, before, event) {
+    const other = pointers.find(({ pointerId }) => pointerId !== event.pointerId) ?? before;
+    const gap = (/** @type {PointerEvent} */ pointer) => Math.hypot(pointer.clientX - other.clientX, pointer.clientY - other.clientY) || 1;
+    move(0, 0, gap(before) / gap(event));
   }
 
-  /** Where it is and what it looks at, so far from a point. */
-  function of(target, further = 0) {
-    const distance = at.distance + further;
-    const level = distance * Math.cos(at.rise);
-    const eye = [target[0] + level * Math.cos(at.turn), target[1] + level * Math.sin(at.turn), target[2] + distance * Math.sin(at.rise)];
+  /**
+   * Return where the camera is while it looks at a point from `further` metres farther away than its own distance.
+   *
+   * @param {Page.Vector} target
+   * @param {number} [further]
+   * @returns {Page.Viewpoint}
+   */
+  function viewpoint(target, further = 0) {
+    const distance = position.distance + further;
+    const level = distance * Math.cos(position.rise);
+    const eye = [
+      target[0] + level * Math.cos(position.turn), target[1] + level * Math.sin(position.turn), target[2] + distance * Math.sin(position.rise)];
     return { eye, target, distance };
   }
 
-  return { follow, of };
+  return { listen, move, viewpoint };
 }

@@ -1,36 +1,56 @@
-/** The time of a replay: it runs, stands, is moved by hand, and begins anew at the end. */
+// @ts-check
+/** The time of a replay: it runs, stops, is moved by hand, and starts over at the end. */
 
-/** A clock of so many seconds; `changed(time)` is called at each change of it, `state(playing)` when it starts or stops. */
-export function clock(lengthS, { changed, state, signal }) {
-  let [time, rate, before, playing] = [0, 1, null, false];
+/**
+ * @typedef {object} Listeners
+ * @property {(time: number) => void} changed called at each change of the time
+ * @property {(isPlaying: boolean) => void} toggled called when the clock starts or stops
+ * @property {AbortSignal} signal
+ */
 
+/** @typedef {ReturnType<typeof clock>} Clock */
+
+/**
+ * Return a clock from 0 to `lengthS` seconds.
+ *
+ * @param {number} lengthS
+ * @param {Listeners} listeners
+ */
+export function clock(lengthS, { changed, toggled, signal }) {
+  let time = 0;
+  let speed = 1;
+  let isPlaying = false;
+  /** @type {number | null} */
+  let lastFrame = null;
+
+  /** @param {number} now */
   function tick(now) {
-    if (!playing || signal.aborted) return;
-    if (before !== null) time += (rate * (now - before)) / 1000;
-    before = now;
+    if (!isPlaying || signal.aborted) return;
+    if (lastFrame !== null) time += (speed * (now - lastFrame)) / 1000;
+    lastFrame = now;
     if (time > lengthS) time %= lengthS;
     changed(time);
     requestAnimationFrame(tick);
   }
 
-  function play(on = !playing) {
-    if (on === playing) return;
-    [playing, before] = [on, null];
+  function play(on = !isPlaying) {
+    if (on === isPlaying) return;
+    isPlaying = on;
+    lastFrame = null;
     if (on && time >= lengthS) time = 0;
-    state(on);
+    toggled(on);
     if (on) requestAnimationFrame(tick);
   }
 
   return {
     play,
     get time() { return time; },
-    get playing() { return playing; },
-    /** Go to a time. */
-    to(wanted) {
-      time = Math.min(Math.max(wanted, 0), lengthS);
+    /** @param {number} newTime */
+    goTo(newTime) {
+      time = Math.min(Math.max(newTime, 0), lengthS);
       changed(time);
     },
-    /** How fast it runs: 1 is as in the world. */
-    at(speed) { rate = speed; },
+    /** @param {number} newSpeed 1 is as fast as the world */
+    setSpeed(newSpeed) { speed = newSpeed; },
   };
 }

@@ -1,23 +1,48 @@
-/** The colours of a stage, as CSS says them for light and dark. */
+// @ts-check
+/** The colours of a stage, from CSS, for light and dark. */
 
 const NAMES = ["trunk", "limb", "foot-up", "foot-down", "floor", "floor-other", "sky", "shadow", "trail"];
 
-/** `{ name: [r, g, b, a] }`, each from 0 to 1, of the custom properties `--stage-…` where the element is. */
+/**
+ * Return the colours of the custom properties `--stage-…` inside an element; red, green, blue and opacity go from 0 to 1.
+ *
+ * @param {Element} element
+ * @returns {Page.Palette}
+ */
 export function colours(element) {
   const probe = document.createElement("span");
   element.append(probe);
-  const found = {};
-  for (const name of NAMES) {
+  const palette = Object.fromEntries(NAMES.map((name) => {
     probe.style.color = `var(--stage-${name})`;
-    const [r, g, b, a = 1] = getComputedStyle(probe).color.match(/[\d.]+/g).map(Number);
-    found[name] = [r / 255, g / 255, b / 255, a];
-  }
+    return [name, components(getComputedStyle(probe).color)];
+  }));
   probe.remove();
-  return found;
+  return palette;
 }
 
-/** The colour of a shape; a foot's says whether it is on the ground. */
-export const colourOf = (shape, all, down) => all[shape.role === "foot" ? (down ? "foot-down" : "foot-up") : shape.role];
+/**
+ * Return the components of `rgb(…)` or `rgba(…)`.
+ *
+ * @param {string} color
+ * @returns {Page.Colour}
+ */
+export function components(color) {
+  const [red, green, blue, opacity = 1] = (color.match(/[\d.]+/g) ?? []).map(Number);
+  return [red / 255, green / 255, blue / 255, opacity];
+}
 
-/** The same for CSS. */
-export const css = ([r, g, b, a]) => `rgb(${255 * r} ${255 * g} ${255 * b} / ${a})`;
+/**
+ * Return the colour of a shape; a foot has another one while it is on the ground.
+ *
+ * @param {Api.Shape} shape
+ * @param {Page.Palette} palette
+ * @param {boolean} isGrounded
+ */
+export const colourOf = (shape, palette, isGrounded) => palette[shape.role === "foot" ? (isGrounded ? "foot-down" : "foot-up") : shape.role];
+
+/**
+ * Return a colour as CSS.
+ *
+ * @param {Page.Colour} colour
+ */
+export const css = ([red, green, blue, opacity]) => `rgb(${255 * red} ${255 * green} ${255 * blue} / ${opacity})`;

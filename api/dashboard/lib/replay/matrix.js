@@ -1,7 +1,14 @@
+// @ts-check
 /** 4 × 4 matrices as WebGL takes them, column by column; quaternions are x, y, z, w. */
 
-/** The product a · b: b is applied first. */
-export function times(a, b) {
+/**
+ * Return the product a · b, which applies b first.
+ *
+ * @param {Page.Matrix} a
+ * @param {Page.Matrix} b
+ * @returns {Page.Matrix}
+ */
+export function product(a, b) {
   const out = new Float32Array(16);
   for (let column = 0; column < 4; column += 1) {
     for (let row = 0; row < 4; row += 1) {
@@ -13,7 +20,13 @@ export function times(a, b) {
   return out;
 }
 
-/** A body's frame: turned by `q`, then moved to `p`. */
+/**
+ * Return the frame of a body: turned by a quaternion, then moved to a point.
+ *
+ * @param {Page.Vector} position
+ * @param {Page.Vector} orientation
+ * @returns {Page.Matrix}
+ */
 export function pose([px, py, pz], [x, y, z, w]) {
   return new Float32Array([
     1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w), 0,
@@ -23,14 +36,28 @@ export function pose([px, py, pz], [x, y, z, w]) {
   ]);
 }
 
-/** What a camera with this vertical angle of view sees between two distances. */
+/**
+ * Return the projection of a camera.
+ *
+ * @param {number} angle vertical angle of view, in radians
+ * @param {number} aspect
+ * @param {number} near
+ * @param {number} far
+ * @returns {Page.Matrix}
+ */
 export function perspective(angle, aspect, near, far) {
   const f = 1 / Math.tan(angle / 2);
   return new Float32Array([f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0]);
 }
 
-/** The world as it is from `eye` towards `target`, z upwards. */
-export function look(eye, target) {
+/**
+ * Return the world as seen from `eye` towards `target`, with z upwards.
+ *
+ * @param {Page.Vector} eye
+ * @param {Page.Vector} target
+ * @returns {Page.Matrix}
+ */
+export function viewFrom(eye, target) {
   const back = unit([0, 1, 2].map((k) => eye[k] - target[k]));
   const right = unit([-back[1], back[0], 0]);
   const up = cross(back, right);
@@ -40,19 +67,37 @@ export function look(eye, target) {
   ]);
 }
 
-/** The world pressed flat onto the ground along the light. */
-export function flattened([x, y, z], height) {
+/**
+ * Return the projection of the world along the light onto the level ground at a height.
+ *
+ * @param {Page.Vector} light
+ * @param {number} height
+ * @returns {Page.Matrix}
+ */
+export function shadowOnto([x, y, z], height) {
   return new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, -x / z, -y / z, 0, 0, 0, 0, height, 1]);
 }
 
-/** A point under a matrix. */
-export const moved = (m, [x, y, z]) => [0, 1, 2].map((row) => m[row] * x + m[4 + row] * y + m[8 + row] * z + m[12 + row]);
+/**
+ * Return a point transformed by a matrix.
+ *
+ * @param {Page.Matrix} m
+ * @param {Page.Vector} point
+ */
+export const transformed = (m, [x, y, z]) => [0, 1, 2].map((row) => m[row] * x + m[4 + row] * y + m[8 + row] * z + m[12 + row]);
 
-/** The vector in length 1. */
-export function unit(v) {
-  const length = Math.hypot(...v) || 1;
-  return v.map((each) => each / length);
+/**
+ * Return a vector scaled to length 1; the zero vector stays.
+ *
+ * @param {Page.Vector} vector
+ */
+export function unit(vector) {
+  const length = Math.hypot(...vector) || 1;
+  return vector.map((component) => component / length);
 }
 
+/** @type {(a: Page.Vector, b: Page.Vector) => number} */
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
+/** @type {(a: Page.Vector, b: Page.Vector) => Page.Vector} */
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];

@@ -1,4 +1,5 @@
-/** What the graphics card does: bodies in light, the ground in squares that fade with distance, shadows, and trails. */
+// @ts-check
+/** The programs of the graphics card: lit bodies, the ground in squares that fade with distance, shadows, and paths. */
 
 export const VERTEX = `#version 300 es
 in vec3 place;

@@ -1,58 +1,79 @@
+// @ts-check
 /** One world on one canvas: by WebGL, or flat where that is missing. */
 
 import { h } from "../dom.js";
 import { onTheme } from "../theme.js";
 import { colours } from "./colours.js";
-import { bodies, onGround, placed, trail } from "./motion.js";
-import * as side from "./side.js";
+import { bodyPoses, feetOnGround, pathUntil, shapePoses } from "./motion.js";
+import * as sideView from "./side_view.js";
 import * as webgl from "./webgl.js";
 
 /**
- * The stage of a world: its `canvas`, and `draw(time)`, or of the same time as before if it is left out.
- * `looked(time)` gives what the camera looks at, and how much farther away than usual it has to be.
+ * @typedef {object} Shared what the stages of a replay have in common
+ * @property {import("./camera.js").Camera} camera
+ * @property {(time: number) => { target: Page.Vector, further: number }} lookAt the camera's target, and how much farther away it is than usual
+ * @property {AbortSignal} signal
  */
-export function stage(world, timesS, label, { camera, looked, signal }) {
+
+/**
+ * Return the canvas of a world, and `draw(time)`, which draws the same time as before if none is given.
+ *
+ * @param {Api.ReplayWorld} world
+ * @param {number[]} timesS
+ * @param {string} label
+ * @param {Shared} shared
+ */
+export function stage(world, timesS, label, { camera, lookAt, signal }) {
   const canvas = h("canvas", { class: "stage-canvas", tabindex: "0", role: "img", "aria-label": label });
-  const feet = [...new Set(world.shapes.filter((each) => each.role === "foot").map((each) => each.body))];
+  const feet = [...new Set(world.shapes.filter(({ role }) => role === "foot").map(({ body }) => body))];
+  /** @type {WebGL2RenderingContext | null} */
   let gl = null;
+  /** @type {Page.Painter | null} */
   let paint = null;
-  let palette = null;
-  let now = 0;
+  /** @type {Page.Palette} */
+  let palette = {};
+  let lastTime = 0;
+
+  const readColours = () => { palette = colours(/** @type {Element} */ (canvas.parentElement)); };
 
   function begin() {
     gl = webgl.context(canvas);
-    paint = gl ? webgl.painter(canvas, gl, world.shapes) : side.painter(canvas, world.shapes);
-    palette = colours(canvas.parentElement);
+    readColours();
     canvas.dataset.drawn = gl ? "webgl" : "flat";
+    return gl ? webgl.painter(canvas, gl, world.shapes) : sideView.painter(canvas, world.shapes);
   }
 
-  function draw(time = now) {
-    now = time;
+  function draw(time = lastTime) {
+    lastTime = time;
     if (!canvas.width || !canvas.isConnected || signal.aborted) return;
-    if (!paint) begin();
-    const down = new Set([...onGround(world, time)].map((foot) => feet[foot]));
-    const { target, further } = looked(time);
-    paint(placed(world, bodies(world, timesS, time)), down, camera.of(target, further), palette, trail(world, timesS, time));
+    paint ??= begin();
+    const grounded = new Set(feetOnGround(world, time).map((foot) => feet[foot]));
+    const { target, further } = lookAt(time);
+    const models = shapePoses(world, bodyPoses(world, timesS, time));
+    paint(models, grounded, camera.viewpoint(target, further), palette, pathUntil(world, timesS, time));
     canvas.dataset.time = time.toFixed(3);
   }
 
   const sizes = new ResizeObserver(() => {
-    const sharp = Math.min(devicePixelRatio, 2);
-    Object.assign(canvas, { width: Math.round(canvas.clientWidth * sharp), height: Math.round(canvas.clientHeight * sharp) });
+    const sharpness = Math.min(devicePixelRatio, 2);
+    Object.assign(canvas, { width: Math.round(canvas.clientWidth * sharpness), height: Math.round(canvas.clientHeight * sharpness) });
     draw();
   });
   sizes.observe(canvas);
   signal.addEventListener("abort", () => {
     sizes.disconnect();
-    gl?.getExtension("WEBGL_lose_context")?.loseContext();  // a browser has few of them
+    gl?.getExtension("WEBGL_lose_context")?.loseContext();  // a browser has only a few contexts
   });
   onTheme(() => {
     if (!paint) return;
-    palette = colours(canvas.parentElement);
+    readColours();
     draw();
   }, signal);
   canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
-  canvas.addEventListener("webglcontextrestored", () => { paint = null; draw(); });
-  camera.follow(canvas, signal);
+  canvas.addEventListener("webglcontextrestored", () => {
+    paint = null;
+    draw();
+  });
+  camera.listen(canvas, signal);
   return { canvas, draw };
 }

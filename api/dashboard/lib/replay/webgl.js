@@ -1,76 +1,92 @@
+// @ts-check
 /** A world drawn by WebGL. */
 
 import { colourOf } from "./colours.js";
-import { flattened, look, perspective, times, unit } from "./matrix.js";
+import { perspective, product, shadowOnto, unit, viewFrom } from "./matrix.js";
 import { mesh } from "./meshes.js";
+import { solidsOf } from "./motion.js";
 import { FRAGMENT, VERTEX } from "./shaders.js";
 
 const LIGHT = unit([0.45, 0.35, 1]);
 const GROUND = { points: [-9, -9, 0, 0, 0, 1, 9, -9, 0, 0, 0, 1, 9, 9, 0, 0, 0, 1, -9, 9, 0, 0, 0, 1], indices: [0, 1, 2, 0, 2, 3] };
-const UNMOVED = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
-const ANGLE = 0.65;
+const IDENTITY = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
+const VIEW_ANGLE = 0.65;
+const KIND = { body: 0, ground: 1, plain: 2 };  // as the fragment shader has them
 
-/** Whether the canvas can be drawn on so; asked of a canvas that nothing else was asked of. */
+/** @typedef {{ array: WebGLVertexArrayObject, count: number }} Uploaded */
+
+/**
+ * Return the context of a canvas that has none yet; null without WebGL 2.
+ *
+ * @param {HTMLCanvasElement} canvas
+ */
 export const context = (canvas) => canvas.getContext("webgl2", { antialias: true, stencil: true, alpha: false });
 
 /**
- * Draws shapes on a canvas with such a context: `draw(models, down, camera, palette, trail)`, where `models` has a matrix
- * for each shape, and `down` the bodies that are on the ground.
+ * Return a painter of shapes on a canvas.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {WebGL2RenderingContext} gl
+ * @param {Api.Shape[]} shapes
+ * @returns {Page.Painter}
  */
 export function painter(canvas, gl, shapes) {
-  const program = linked(gl);
-  const place = (name) => gl.getUniformLocation(program, name);
-  const at = Object.fromEntries(["view", "model", "kind", "colour", "other", "sky", "light", "around"].map((name) => [name, place(name)]));
-  const solids = shapes.filter((each) => each.kind !== "plane");
-  const uploaded = solids.map((each) => upload(gl, program, mesh(each)));
+  const program = link(gl);
+  const uniform = Object.fromEntries(
+    ["view", "model", "kind", "colour", "other", "sky", "light", "around"].map((name) => [name, gl.getUniformLocation(program, name)]));
+  const solids = solidsOf(shapes);
+  const uploaded = solids.map((shape) => upload(gl, program, mesh(shape)));
   const ground = upload(gl, program, GROUND);
   const line = gl.createBuffer();
 
-  function solid(number, model, kind, colour) {
-    gl.uniform1i(at.kind, kind);
-    gl.uniform4fv(at.colour, colour);
-    gl.uniformMatrix4fv(at.model, false, model);
-    gl.bindVertexArray(uploaded[number].array);
-    gl.drawElements(gl.TRIANGLES, uploaded[number].count, gl.UNSIGNED_SHORT, 0);
+  /** @type {(mesh: Uploaded, model: Page.Matrix, kind: number, colour: Page.Colour) => void} */
+  function drawMesh({ array, count }, model, kind, colour) {
+    gl.uniform1i(uniform.kind, kind);
+    gl.uniform4fv(uniform.colour, colour);
+    gl.uniformMatrix4fv(uniform.model, false, model);
+    gl.bindVertexArray(array);
+    gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_SHORT, 0);
   }
 
-  function floor(palette, around) {
-    gl.uniform1i(at.kind, 1);
-    gl.uniform4fv(at.colour, palette.floor);
-    gl.uniform4fv(at.other, palette["floor-other"]);
-    const model = UNMOVED.slice();
-    model.set([Math.round(around[0]), Math.round(around[1])], 12);
-    gl.uniformMatrix4fv(at.model, false, model);
-    gl.bindVertexArray(ground.array);
-    gl.drawElements(gl.TRIANGLES, ground.count, gl.UNSIGNED_SHORT, 0);
+  /** @type {(palette: Page.Palette, target: Page.Vector) => void} */
+  function drawGround(palette, target) {
+    gl.uniform4fv(uniform.other, palette["floor-other"]);
+    const model = IDENTITY.slice();
+    model.set([Math.round(target[0]), Math.round(target[1])], 12);
+    drawMesh(ground, model, KIND.ground, palette.floor);
   }
 
-  /** Each spot of the ground is darkened once, however many bodies are above it. */
-  function shadows(models, palette) {
-    const flat = flattened(LIGHT, 0.001);
+  /**
+   * Darken each spot of the ground once, however many bodies are above it.
+   *
+   * @type {(models: Page.Matrix[], palette: Page.Palette) => void}
+   */
+  function drawShadows(models, palette) {
+    const projection = shadowOnto(LIGHT, 0.001);
     gl.enable(gl.STENCIL_TEST);
     gl.stencilFunc(gl.EQUAL, 0, 1);
     gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
     gl.depthMask(false);
-    models.forEach((model, number) => solid(number, times(flat, model), 2, palette.shadow));
+    models.forEach((model, index) => drawMesh(uploaded[index], product(projection, model), KIND.plain, palette.shadow));
     gl.depthMask(true);
     gl.disable(gl.STENCIL_TEST);
   }
 
-  function trailed(points, palette) {
+  /** @type {(path: Page.Vector[], palette: Page.Palette) => void} */
+  function drawPath(path, palette) {
     gl.bindVertexArray(null);
     gl.bindBuffer(gl.ARRAY_BUFFER, line);
-    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(points.flatMap(([x, y]) => [x, y, 0.003])), gl.DYNAMIC_DRAW);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(path.flatMap(([x, y]) => [x, y, 0.003])), gl.DYNAMIC_DRAW);
     const attribute = gl.getAttribLocation(program, "place");
     gl.enableVertexAttribArray(attribute);
     gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, 0, 0);
-    gl.uniform1i(at.kind, 2);
-    gl.uniform4fv(at.colour, palette.trail);
-    gl.uniformMatrix4fv(at.model, false, UNMOVED);
-    gl.drawArrays(gl.LINE_STRIP, 0, points.length);
+    gl.uniform1i(uniform.kind, KIND.plain);
+    gl.uniform4fv(uniform.colour, palette.trail);
+    gl.uniformMatrix4fv(uniform.model, false, IDENTITY);
+    gl.drawArrays(gl.LINE_STRIP, 0, path.length);
   }
 
-  return function draw(models, down, camera, palette, trail) {
+  return (models, grounded, camera, palette, path) => {
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(...palette.sky);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
@@ -78,22 +94,24 @@ export function painter(canvas, gl, shapes) {
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     gl.useProgram(program);
-    const lens = perspective(ANGLE, canvas.width / canvas.height, 0.05, 40);
-    gl.uniformMatrix4fv(at.view, false, times(lens, look(camera.eye, camera.target)));
-    gl.uniform3fv(at.light, LIGHT);
-    gl.uniform3fv(at.around, camera.target);
-    gl.uniform4fv(at.sky, palette.sky);
-    floor(palette, camera.target);
-    shadows(models, palette);
-    if (trail.length > 1) trailed(trail, palette);
-    solids.forEach((shape, number) => solid(number, models[number], 0, colourOf(shape, palette, down.has(shape.body))));
+    const lens = perspective(VIEW_ANGLE, canvas.width / canvas.height, 0.05, 40);
+    gl.uniformMatrix4fv(uniform.view, false, product(lens, viewFrom(camera.eye, camera.target)));
+    gl.uniform3fv(uniform.light, LIGHT);
+    gl.uniform3fv(uniform.around, camera.target);
+    gl.uniform4fv(uniform.sky, palette.sky);
+    drawGround(palette, camera.target);
+    drawShadows(models, palette);
+    if (path.length > 1) drawPath(path, palette);
+    solids.forEach((shape, index) =>
+      drawMesh(uploaded[index], models[index], KIND.body, colourOf(shape, palette, grounded.has(shape.body))));
   };
 }
 
-function linked(gl) {
+/** @param {WebGL2RenderingContext} gl */
+function link(gl) {
   const program = gl.createProgram();
-  for (const [kind, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
-    const shader = gl.createShader(kind);
+  for (const { kind, source } of [{ kind: gl.VERTEX_SHADER, source: VERTEX }, { kind: gl.FRAGMENT_SHADER, source: FRAGMENT }]) {
+    const shader = /** @type {WebGLShader} */ (gl.createShader(kind));
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
     gl.attachShader(program, shader);
@@ -103,15 +121,21 @@ function linked(gl) {
   return program;
 }
 
+/**
+ * @param {WebGL2RenderingContext} gl
+ * @param {WebGLProgram} program
+ * @param {import("./meshes.js").Mesh} mesh
+ * @returns {Uploaded}
+ */
 function upload(gl, program, { points, indices }) {
   const array = gl.createVertexArray();
   gl.bindVertexArray(array);
   gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
   gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(points), gl.STATIC_DRAW);
-  ["place", "normal"].forEach((name, number) => {
+  ["place", "normal"].forEach((name, index) => {
     const attribute = gl.getAttribLocation(program, name);
     gl.enableVertexAttribArray(attribute);
-    gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, 24, 12 * number);
+    gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, 24, 12 * index);
   });
   gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
   gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint16Array(indices), gl.STATIC_DRAW);

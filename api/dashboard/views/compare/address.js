@@ -1,51 +1,79 @@
+// @ts-check
 /** A comparison as an address, so that it can be shared. */
 
-import { BANDS } from "../../lib/bands.js";
+import { BANDS } from "../../lib/curve_options.js";
 
+/** @type {Record<string, string>} */
 export const AXES = { evaluations: "Real-world evaluations", rollouts: "Rollouts", time: "Time" };
-export const TESTS = { student: "Student’s t, as in the paper", welch: "Welch’s t", mann_whitney: "Mann–Whitney" };
+
+/** @type {Record<Page.Comparison["test"], { label: string, short: string }>} */
+export const TESTS = {
+  student: { label: "Student’s t, as in the paper", short: "Student" },
+  welch: { label: "Welch’s t", short: "Welch" },
+  mann_whitney: { label: "Mann–Whitney", short: "Mann–Whitney" },
+};
 
 const COST_S = 60;
 
-/** What the address asks for; what it has wrong is as if it were left out. */
-export function chosen(parameters) {
-  const among = (name, permitted, otherwise) => (parameters.get(name) in permitted ? parameters.get(name) : otherwise);
+/**
+ * Return the comparison at an address; an invalid value is replaced by its default.
+ *
+ * @param {URLSearchParams} parameters
+ * @returns {Page.Comparison & { studies: string[] }}
+ */
+export function comparisonOf(parameters) {
+  /** @type {(name: string, permitted: object, otherwise: string) => any} */
+  const among = (name, permitted, otherwise) => (Object.hasOwn(permitted, parameters.get(name) ?? "") ? parameters.get(name) ?? "" : otherwise);
   return {
     experiments: ids(parameters.get("experiments")),
     studies: ids(parameters.get("studies")),
     x: among("x", AXES, "evaluations"),
-    cost_s: positive(parameters.get("cost_s")) ?? COST_S,
+    cost_s: nonNegative(parameters.get("cost_s")) ?? COST_S,
     band: among("band", BANDS, ""),
     each: parameters.get("each") === "true",
     test: among("test", TESTS, "student"),
-    from: whole(parameters.get("from")),
-    to: whole(parameters.get("to")),
+    from: wholeNumber(parameters.get("from")),
+    to: wholeNumber(parameters.get("to")),
   };
 }
 
-/** The address of a comparison, as short as it can be. */
-export function address({ experiments, x, cost_s: cost, band, each, test, from, to }) {
-  const parts = [
-    experiments.length ? ["experiments", experiments.join(",")] : null,
-    x === "evaluations" ? null : ["x", x],
-    x === "time" ? ["cost_s", cost] : null,
-    band ? ["band", band] : null,
-    each ? ["each", "true"] : null,
-    test === "student" ? null : ["test", test],
-    from === null ? null : ["from", from],
-    to === null ? null : ["to", to],
-  ].filter(Boolean);
+/**
+ * Return the shortest address of a comparison.
+ *
+ * @param {Page.Comparison} comparison
+ */
+export function addressOf({ experiments, x, cost_s: cost, band, each, test, from, to }) {
+  const parts = Object.entries({
+    experiments: experiments.join(","),
+    x: x === "evaluations" ? "" : x,
+    cost_s: x === "time" ? cost : "",
+    band,
+    each: each || "",
+    test: test === "student" ? "" : test,
+    from: from ?? "",
+    to: to ?? "",
+  }).filter(([, value]) => value !== "");
   return `#/compare${parts.length ? "?" : ""}${parts.map(([name, value]) => `${name}=${value}`).join("&")}`;
 }
 
-/** What the figure is asked for with. */
-export const drawing = ({ experiments, x, cost_s: cost, band, each }) => ({
+/**
+ * Return the query of the figure.
+ *
+ * @param {Page.Comparison} comparison
+ */
+export const figureQuery = ({ experiments, x, cost_s: cost, band, each }) => ({
   experiment: experiments, x: x === "evaluations" ? null : x, cost_s: x === "time" ? cost : null, band, each: each || null,
 });
 
-const ids = (text) => [...new Set((text ?? "").split(",").filter((each) => /^[\w-]{1,64}$/.test(each)))];
+/** @param {string | null} text */
+const ids = (text) => [...new Set((text ?? "").split(",").filter((id) => /^[\w-]{1,64}$/.test(id)))];
 
-const positive = (text) => (text !== null && Number.isFinite(Number(text)) && Number(text) >= 0 && text !== "" ? Number(text) : null);
+/** @param {string | null} text */
+const nonNegative = (text) => (text && Number.isFinite(Number(text)) && Number(text) >= 0 ? Number(text) : null);
 
-/** A whole number from 0, or nothing. */
-export const whole = (text) => (/^\d{1,4}$/.test(text ?? "") ? Number(text) : null);
+/**
+ * Return the whole number from 0 to 9999 that a text is, or null.
+ *
+ * @param {string | null} text
+ */
+export const wholeNumber = (text) => (/^\d{1,4}$/.test(text ?? "") ? Number(text) : null);

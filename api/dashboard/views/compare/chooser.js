@@ -1,24 +1,34 @@
-/** Search as you type over experiments and studies: a combobox, as the ARIA practices have it. */
+// @ts-check
+/** Search as you type over experiments and studies: a combobox by the ARIA practices. */
 
 import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
-import { age, count, spoken } from "../../lib/format.js";
+import { age, count, readableName } from "../../lib/format.js";
 
 const PAUSE_MS = 150;
 const STUDIES = 5;
 const EXPERIMENTS = 12;
-const MOST = 100;  // that the service draws in one figure
+const MOST = 100;  // the service's limit for one figure
 
-/** The field with its list of what was found. */
+/** @typedef {{ name: string, description: string, item: Api.StudyRead | Api.ExperimentRead, ids: string[] }} Match */
+
+/**
+ * Return the field with the list of matches.
+ *
+ * @param {Page.CompareView} view
+ * @returns {Page.ComparePart}
+ */
 export function chooser(view) {
   const options = h("ul", { id: "found", role: "listbox", "aria-label": "Found", class: "found", hidden: true });
-  const said = h("p", { class: "said", role: "status" });
+  const message = h("p", { class: "said", role: "status" });
   const field = h("input", {
     id: "chooser", type: "search", role: "combobox", autocomplete: "off", placeholder: "name or id of an experiment or a study",
     "aria-expanded": "false", "aria-controls": "found", "aria-autocomplete": "list", maxlength: 200,
   });
-  let asked = null;
-  let timer = null;
+  /** @type {AbortController | null} */
+  let searching = null;
+  /** @type {number | undefined} */
+  let timer;
   let active = -1;
 
   const close = () => {
@@ -26,82 +36,99 @@ export function chooser(view) {
     activate(-1);
     field.setAttribute("aria-expanded", "false");
   };
-  const activate = (at) => {
-    active = at;
-    [...options.children].forEach((each, index) => each.setAttribute("aria-selected", String(index === at)));
-    const now = options.children[at];
-    if (now) field.setAttribute("aria-activedescendant", now.id);
+  const activate = (/** @type {number} */ index) => {
+    active = index;
+    [...options.children].forEach((option, place) => option.setAttribute("aria-selected", String(place === index)));
+    const option = options.children[index];
+    if (option) field.setAttribute("aria-activedescendant", option.id);
     else field.removeAttribute("aria-activedescendant");
-    now?.scrollIntoView({ block: "nearest" });
+    option?.scrollIntoView({ block: "nearest" });
   };
-  const take = (ids) => {
+  const choose = (/** @type {string[]} */ ids) => {
     const { experiments } = view.choice;
     const wanted = [...new Set([...experiments, ...ids])];
-    said.textContent = wanted.length > MOST ? `${MOST} experiments are shown at most.` : "";
+    message.textContent = wanted.length > MOST ? `At most ${MOST} experiments can be compared.` : "";
     close();
     field.value = "";
     if (wanted.length > experiments.length) view.change({ experiments: wanted.slice(0, MOST) });
   };
-  const look = async () => {
-    asked?.abort();
-    asked = new AbortController();
-    const { signal } = asked;
+  const showMatches = async () => {
+    searching?.abort();
+    searching = new AbortController();
+    const { signal } = searching;
     try {
-      const found = await search(view, field.value.trim(), signal);
-      options.replaceChildren(...found.map((each, at) => option(each, at, take)));
-      if (!found.length) options.replaceChildren(nothing());
+      const matches = await search(view, field.value.trim(), signal);
+      options.replaceChildren(...(matches.length ? matches.map((match, index) => matchOption(match, index, choose)) : [noMatch()]));
       options.hidden = document.activeElement !== field;
       field.setAttribute("aria-expanded", String(!options.hidden));
       activate(-1);
     } catch (error) {
-      if (!signal.aborted) said.textContent = error.message;
+      if (!signal.aborted) message.textContent = error.message;
     }
   };
-  const soon = () => {
+  const showSoon = () => {
     clearTimeout(timer);
-    timer = setTimeout(look, PAUSE_MS);
+    timer = setTimeout(showMatches, PAUSE_MS);
   };
-  const keys = (event) => {
-    const steps = { ArrowDown: 1, ArrowUp: -1 };
-    const many = options.children.length;
+  const keys = (/** @type {KeyboardEvent} */ event) => {
+    const steps = /** @type {Record<string, number>} */ ({ ArrowDown: 1, ArrowUp: -1 });
+    const { length } = options.children;
     if (event.key === "Escape") close();
     if (event.key in steps) {
       event.preventDefault();
-      if (options.hidden) look();
-      else activate((active + steps[event.key] + many) % many);
+      if (options.hidden) showMatches();
+      else activate((active + steps[event.key] + length) % length);
     }
-    if (event.key === "Enter" && !options.hidden) options.children[Math.max(active, 0)]?.click();
+    if (event.key === "Enter" && !options.hidden) /** @type {HTMLElement | undefined} */ (options.children[Math.max(active, 0)])?.click();
   };
-  field.addEventListener("input", soon);
-  field.addEventListener("focus", look);
+  field.addEventListener("input", showSoon);
+  field.addEventListener("focus", showMatches);
   field.addEventListener("keydown", keys);
   field.addEventListener("blur", close);
-  view.signal.addEventListener("abort", () => { clearTimeout(timer); asked?.abort(); });
-  const element = h("div", { class: "chooser" }, h("label", { for: "chooser" }, "Add experiments"), h("div", { class: "combobox" }, field, options), said);
+  view.signal.addEventListener("abort", () => {
+    clearTimeout(timer);
+    searching?.abort();
+  });
+  const element = h("div", { class: "chooser" }, h("label", { for: "chooser" }, "Add experiments"), h("div", { class: "combobox" }, field, options), message);
   return { element, update: () => {} };
 }
 
-/** The studies and the experiments that have the text in their name or id, the newest first. */
-async function search({ books, choice }, text, signal) {
+/**
+ * Return the studies and the experiments that have a text in their name or id, the newest first.
+ *
+ * @param {Page.CompareView} view
+ * @param {string} text
+ * @param {AbortSignal} signal
+ * @returns {Promise<Match[]>}
+ */
+async function search({ cache, choice }, text, signal) {
+  /** @type {[Api.Page_StudyRead_, Api.Page_ExperimentRead_]} */
   const [studies, experiments] = await Promise.all([
     get("/studies", { text, limit: STUDIES }, signal), get("/experiments", { text, limit: EXPERIMENTS }, signal)]);
-  studies.items.forEach(books.shelve);
-  experiments.items.forEach(books.keep);
-  const left = experiments.items.filter((each) => !choice.experiments.includes(each.id));
+  studies.items.forEach(cache.addStudy);
+  experiments.items.forEach(cache.addExperiment);
+  const left = experiments.items.filter(({ id }) => !choice.experiments.includes(id));
   return [
-    ...studies.items.map((each) => ({
-      name: each.name, what: `study, all ${count(each.experiments.length)} experiments`, of: each, ids: each.experiments.map(({ id }) => id),
+    ...studies.items.map((study) => ({
+      name: study.name, description: `study, all ${count(study.experiments.length)} experiments`, item: study, ids: study.experiments.map(({ id }) => id),
     })),
-    ...left.map((each) => ({ name: spoken(each.name), what: books.place(each.id) ?? each.id, of: each, ids: [each.id] })),
+    ...left.map((experiment) => ({
+      name: readableName(experiment.name), description: cache.studyName(experiment.id) ?? experiment.id, item: experiment, ids: [experiment.id],
+    })),
   ];
 }
 
-const nothing = () =>
-  h("li", { class: "none", role: "option", "aria-disabled": "true", id: "found-none" }, "Nothing has that in its name or id.");
+const noMatch = () =>
+  h("li", { class: "none", role: "option", "aria-disabled": "true", id: "found-none" }, "No name or id contains this.");
 
-function option({ name, what, of, ids }, at, take) {
+/**
+ * @param {Match} match
+ * @param {number} index
+ * @param {(ids: string[]) => void} choose
+ */
+function matchOption({ name, description, item, ids }, index, choose) {
   return h("li", {
-    id: `found-${at}`, role: "option", "aria-selected": "false", onclick: () => take(ids),
+    id: `found-${index}`, role: "option", "aria-selected": "false", onclick: () => choose(ids),
     onmousedown: (event) => event.preventDefault(),  // the field keeps the focus
-  }, h("span", {}, name), h("small", {}, `${what} · ${of.state.toLowerCase()} · ${age(of.created_at)}`));
+  }, h("span", {}, name), h("small", {}, `${description} · ${item.state.toLowerCase()} · ${age(item.created_at)}`));
 }

@@ -1,26 +1,34 @@
-/** How the figure is drawn: against what, with which band. */
+// @ts-check
+/** How the figure is drawn: against what, and with which band. */
 
-import { bandChoice } from "../../lib/bands.js";
+import { bandSelect } from "../../lib/curve_options.js";
 import { h } from "../../lib/dom.js";
 import { AXES } from "./address.js";
 
-/** The controls; a change is in the address at once. */
+/**
+ * Return the controls; each change is in the address at once.
+ *
+ * @param {Page.CompareView} view
+ * @returns {Page.ComparePart}
+ */
 export function controls(view) {
-  const axes = Object.entries(AXES).map(([value, words]) =>
-    h("label", {}, h("input", { type: "radio", name: "x", value, onchange: () => view.change({ x: value }) }), words));
-  const spend = () => cost.checkValidity() && cost.value !== "" && view.change({ cost_s: Number(cost.value) });
-  const cost = h("input", { type: "number", min: 0, step: "any", class: "short", onchange: spend });
-  const costs = h("label", {}, "each real evaluation costs ", cost, " s");
-  const band = bandChoice({ onchange: () => view.change({ band: band.value }) });
-  const each = h("input", { type: "checkbox", onchange: () => view.change({ each: each.checked }) });
+  const radios = Object.keys(AXES).map((value) => h("input", { type: "radio", name: "x", value, onchange: () => { view.change({ x: value }); } }));
+  const axes = radios.map((radio) => h("label", {}, radio, AXES[radio.value]));
+  const changeCost = () => {
+    if (cost.checkValidity() && cost.value !== "") view.change({ cost_s: Number(cost.value) });
+  };
+  const cost = h("input", { type: "number", min: 0, step: "any", class: "short", onchange: changeCost });
+  const costLabel = h("label", {}, "each real evaluation costs ", cost, " s");
+  const band = bandSelect({ onchange: () => { view.change({ band: band.value }); } });
+  const each = h("input", { type: "checkbox", onchange: () => { view.change({ each: each.checked }); } });
   const element = h("div", { class: "controls" },
-    h("fieldset", {}, h("legend", {}, "Against"), ...axes, costs),
+    h("fieldset", {}, h("legend", {}, "Against"), ...axes, costLabel),
     h("label", {}, "Band ", band), h("label", {}, each, " Each repetition"));
   const update = () => {
     const { choice } = view;
-    for (const radio of element.querySelectorAll("[type=radio]")) radio.checked = radio.value === choice.x;
-    costs.hidden = choice.x !== "time";
-    if (document.activeElement !== cost) cost.value = choice.cost_s;
+    for (const radio of radios) radio.checked = radio.value === choice.x;
+    costLabel.hidden = choice.x !== "time";
+    if (document.activeElement !== cost) cost.value = String(choice.cost_s);
     band.value = choice.band;
     each.checked = choice.each;
   };

@@ -1,85 +1,144 @@
-/** What one must know before one believes a comparison: different robots, different realities. */
+// @ts-check
+/** What a reader must know before believing a comparison: different robots, different realities, other settings. */
 
 import { h, refill } from "../../lib/dom.js";
-import { letter } from "./list.js";
+import { letter } from "./ranges.js";
 
-const OTHERS = { engine: "engine", tunables: "tunables", budget: "budget", optimizer: "optimizer", iterations: "number of iterations" };
+/** @type {Record<string, string>} */
+const SETTINGS = { engine: "engine", tunables: "tunables", budget: "budget", optimizer: "optimizer", iterations: "number of iterations" };
 
-/** Warnings in words, and what else differs. */
+/** @typedef {{ id: string, study: string | null, direct: boolean, spec: Record<string, any> }} Experiment */
+/** @typedef {[letter: string, experiment: Experiment]} Lettered */
+/** @typedef {{ name: string, options?: Record<string, unknown> }} Plugin */
+
+/**
+ * Return the remarks on the chosen experiments.
+ *
+ * @param {Page.CompareView} view
+ * @returns {Page.ComparePart}
+ */
 export function remarks(view) {
   const element = h("div", { class: "remarks", role: "status" });
   const update = () => {
-    const found = view.choice.experiments.map((id, at) => [letter(at), view.books.get(id)]).filter(([, each]) => each);
-    const said = warnings(found);
-    const also = others(found);
-    refill(element, JSON.stringify([said, also]), () => [
-      said.length ? h("div", { class: "remark warned" }, ...said.map((each) => h("p", {}, each))) : "",
-      also.length ? h("p", { class: "note" }, `They also differ in: ${also.join(", ")}.`) : "",
+    const lettered = view.choice.experiments.flatMap((id, index) => {
+      const experiment = view.cache.get(id);
+      return experiment ? [/** @type {Lettered} */ ([letter(index), experiment])] : [];
+    });
+    const texts = warnings(lettered);
+    const settings = differentSettings(lettered);
+    refill(element, JSON.stringify([texts, settings]), () => [
+      texts.length ? h("div", { class: "remark warned" }, ...texts.map((text) => h("p", {}, text))) : null,
+      settings.length ? h("p", { class: "note" }, `They also differ in: ${settings.join(", ")}.`) : null,
     ]);
   };
   return { element, update };
 }
 
-/** Sentences about experiments that should not be compared; each is `[letter, experiment]`. */
-export function warnings(found) {
-  const robots = groups(found, (each) => text(each.spec.robot));
-  const realities = groups(found, reality(found));
-  const said = [];
+/**
+ * Return a warning for each reason why experiments should not be compared.
+ *
+ * @param {Lettered[]} experiments
+ */
+export function warnings(experiments) {
+  const robots = groups(experiments, ({ spec }) => canonicalText(spec.robot));
+  const realities = groups(experiments, realityKeys(experiments));
+  const texts = [];
   if (robots.length > 1) {
-    const which = named(robots, ({ spec }) => plugin(spec.robot, found.map(([, each]) => each.spec.robot)));
-    said.push(`⚠ Different robots: ${which}. Their fitness does not mean the same, and differences between them say nothing.`);
+    const all = experiments.map(([, { spec }]) => spec.robot);
+    const which = groupTexts(robots, ({ spec }) => pluginText(spec.robot, all));
+    texts.push(`⚠ Different robots: ${which}. Their fitness does not mean the same, and differences between them say nothing.`);
   }
   if (realities.length > 1 && realities.some(({ key }) => key.startsWith("hidden"))) {
-    said.push("⚠ Some realities are hidden until their experiments have ended: whether all of these have the same cannot be said yet.");
+    texts.push("⚠ Some realities are hidden until their experiments have ended, so it is not known yet whether all realities are the same.");
   } else if (realities.length > 1) {
-    said.push(`⚠ Different realities: ${named(realities, (each) => told(each, found))}. A difference may come from the reality, not from the strategy.`);
+    const which = groupTexts(realities, (experiment) => realityText(experiment, experiments));
+    texts.push(`⚠ Different realities: ${which}. A difference may come from the reality, not from the strategy.`);
   }
-  return said;
+  return texts;
 }
 
-/** Which other settings are not the same. */
-export function others(found) {
-  const iterative = found.filter(([, each]) => each.strategy !== "direct");
-  return Object.keys(OTHERS).filter((key) => groups(iterative, ({ spec }) => text(spec[key])).length > 1).map((key) => OTHERS[key]);
+/**
+ * Return the names of the other settings that are not the same; those of the direct baseline mean nothing.
+ *
+ * @param {Lettered[]} experiments
+ */
+export function differentSettings(experiments) {
+  const iterative = experiments.filter(([, { direct }]) => !direct);
+  const differ = (/** @type {string} */ setting) => groups(iterative, ({ spec }) => canonicalText(spec[setting])).length > 1;
+  return Object.keys(SETTINGS).filter(differ).map((setting) => SETTINGS[setting]);
 }
 
-function groups(found, keyOf) {
-  const kept = new Map();
-  for (const [short, each] of found) {
-    const key = keyOf(each);
-    kept.set(key, [...(kept.get(key) ?? []), [short, each]]);
+/**
+ * Return the experiments that have the same key together.
+ *
+ * @param {Lettered[]} experiments
+ * @param {(experiment: Experiment) => string} keyOf
+ */
+function groups(experiments, keyOf) {
+  /** @type {Map<string, Lettered[]>} */
+  const members = new Map();
+  for (const lettered of experiments) {
+    const key = keyOf(lettered[1]);
+    members.set(key, [...(members.get(key) ?? []), lettered]);
   }
-  return [...kept].map(([key, members]) => ({ key, members }));
+  return [...members].map(([key, group]) => ({ key, group }));
 }
 
-/** What tells realities apart: all experiments of a study have one, also where it is hidden. */
-function reality(found) {
-  const shown = found.map(([, each]) => each).filter((each) => each.study && !hidden(each));
-  const known = new Map(shown.map((each) => [each.study, text(each.spec.reality)]));
-  const unknown = (each) => `hidden ${each.study ?? each.id} ${text(each.spec.reality.engine)}`;
-  return (each) => (hidden(each) ? known.get(each.study) ?? unknown(each) : text(each.spec.reality));
+/**
+ * Return a function that gives the same key for the same reality. A study has one reality, also while it is hidden in some experiments.
+ *
+ * @param {Lettered[]} experiments
+ */
+function realityKeys(experiments) {
+  const shown = experiments.map(([, experiment]) => experiment).filter((experiment) => experiment.study && !isHidden(experiment));
+  const byStudy = new Map(shown.map(({ study, spec }) => [study, canonicalText(spec.reality)]));
+  return (/** @type {Experiment} */ experiment) => {
+    const { id, study, spec } = experiment;
+    if (!isHidden(experiment)) return canonicalText(spec.reality);
+    return byStudy.get(study) ?? `hidden ${study ?? id} ${canonicalText(spec.reality.engine)}`;
+  };
 }
 
-const hidden = ({ spec }) => Object.values(spec.reality.parameters ?? {}).some((each) => each === null) || !spec.reality.parameters;
+/** @param {Experiment} experiment */
+const isHidden = ({ spec }) => !spec.reality.parameters || Object.values(spec.reality.parameters).includes(null);
 
-function told({ spec: { reality: { engine, parameters } } }, found) {
-  const engines = found.map(([, { spec }]) => spec.reality.engine).filter(Boolean);
-  return [engine && plugin(engine, engines), ...Object.entries(parameters).map(valued)].filter(Boolean).join(", ");
+/**
+ * @param {Experiment} experiment
+ * @param {Lettered[]} experiments
+ */
+function realityText({ spec: { reality: { engine, parameters } } }, experiments) {
+  const engines = experiments.map(([, { spec }]) => spec.reality.engine).filter(Boolean);
+  return [engine && pluginText(engine, engines), ...Object.entries(parameters).map(optionText)].filter(Boolean).join(", ");
 }
 
-/** Its name, with the options in which it differs from others of that name. */
-function plugin({ name, options = {} }, all) {
-  const others = all.filter((each) => each.name === name).map((each) => each.options ?? {});
-  const own = Object.entries(options).filter(([key, value]) => others.some((each) => text(each[key]) !== text(value)));
-  return own.length ? `${name} (${own.map(valued).join(", ")})` : name;
+/**
+ * Return a plug-in's name, with the options in which it differs from others of that name.
+ *
+ * @param {Plugin} plugin
+ * @param {Plugin[]} all
+ */
+function pluginText({ name, options = {} }, all) {
+  const others = all.filter((other) => other.name === name).map((other) => other.options ?? {});
+  const differing = Object.entries(options).filter(([key, value]) => others.some((other) => canonicalText(other[key]) !== canonicalText(value)));
+  return differing.length ? `${name} (${differing.map(optionText).join(", ")})` : name;
 }
 
-const valued = ([name, value]) => `${name.replaceAll("_", " ")} ${text(value)}`;
+/** @type {(option: [string, unknown]) => string} */
+const optionText = ([name, value]) => `${name.replaceAll("_", " ")} ${canonicalText(value)}`;
 
-const named = (all, say) => all.map(({ members }) => `${members.map(([short]) => short).join(", ")}: ${say(members[0][1])}`).join("; ");
+/**
+ * @param {ReturnType<typeof groups>} all
+ * @param {(experiment: Experiment) => string} textOf
+ */
+const groupTexts = (all, textOf) => all.map(({ group }) => `${group.map(([short]) => short).join(", ")}: ${textOf(group[0][1])}`).join("; ");
 
-/** The same text for equal values, whatever the order of their keys. */
-function text(value) {
-  return JSON.stringify(value, (_, each) => (each && typeof each === "object" && !Array.isArray(each)
-    ? Object.fromEntries(Object.entries(each).sort(([a], [b]) => (a < b ? -1 : 1))) : each)) ?? "";
+/**
+ * Return the same text for equal values, whatever the order of their keys.
+ *
+ * @param {unknown} value
+ * @returns {string}
+ */
+function canonicalText(value) {
+  return JSON.stringify(value, (_, item) => (item && typeof item === "object" && !Array.isArray(item)
+    ? Object.fromEntries(Object.entries(item).sort(([a], [b]) => (a < b ? -1 : 1))) : item)) ?? "";
 }

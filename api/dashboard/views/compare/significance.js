@@ -1,85 +1,106 @@
+// @ts-check
 /** Which pairs differ, and at which numbers of real-world evaluations. */
 
 import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
-import { failed, loading } from "../../lib/states.js";
-import { TESTS, whole } from "./address.js";
+import { failed, loading } from "../../lib/placeholders.js";
+import { TESTS, wholeNumber } from "./address.js";
 import { matrix } from "./matrix.js";
-import { pairs } from "./pairs.js";
+import { pairsTable } from "./pairs.js";
+import { paperRanges, rangeText } from "./ranges.js";
 
 const MOST = 20;  // experiments in one table: 190 pairs
-const NOTE = "p after Holm’s correction over all pairs; a pair differs where it is below 0.05, and is not significantly different " +
-  "(n. s.) elsewhere. d is Cohen’s effect size. Values of one repetition at several counts depend on each other, so p over a " +
-  "range is smaller than it should be: it is as in the paper, and safe at a single count only.";
+const NOTE = "p is corrected by Holm’s method over all pairs. A pair differs where p is below 0.05; elsewhere it is not significantly " +
+  "different (n. s.). d is Cohen’s effect size. Over a range, the values of one repetition depend on each other, which makes p too small: " +
+  "such a p is as in the paper, but only a p at a single number of evaluations is safe.";
 
-/** The tests over a range that is chosen, as a matrix, and over the paper's ranges, pair by pair. */
+/**
+ * Return the tests over a chosen range as a matrix, and over the paper's ranges pair by pair.
+ *
+ * @param {Page.CompareView} view
+ * @returns {Page.ComparePart}
+ */
 export function significance(view) {
   const buttons = h("div", { class: "ranges", role: "group", "aria-label": "Range of real-world evaluations" });
-  const from = h("input", { type: "number", min: 0, max: 1000, step: 1, class: "short" });
-  const to = h("input", { type: "number", min: 0, max: 1000, step: 1, class: "short" });
-  const tests = Object.entries(TESTS).map(([value, words]) => h("option", { value }, words));
-  const test = h("select", { onchange: () => view.change({ test: test.value }) }, ...tests);
-  const typed = () => view.change({ from: whole(from.value), to: whole(to.value) });
-  from.addEventListener("change", typed);
-  to.addEventListener("change", typed);
+  const changeRange = () => { view.change({ from: wholeNumber(from.value), to: wholeNumber(to.value) }); };
+  const from = h("input", { type: "number", min: 0, max: 1000, step: 1, class: "short", onchange: changeRange });
+  const to = h("input", { type: "number", min: 0, max: 1000, step: 1, class: "short", onchange: changeRange });
+  const tests = Object.entries(TESTS).map(([value, { label }]) => h("option", { value }, label));
+  const changeTest = () => { view.change({ test: /** @type {Page.Comparison["test"]} */ (test.value) }); };
+  const test = h("select", { onchange: changeTest }, ...tests);
   const place = h("div");
   const element = h("section", { class: "card significance", "aria-labelledby": "differ" },
     h("div", { class: "titled" }, h("h2", { id: "differ" }, "Which differ"), h("p", { class: "options" }, h("label", {}, "Test ", test))),
     h("div", { class: "controls" }, buttons, h("label", {}, "from ", from), h("label", {}, "to ", to)), place, h("p", { class: "note" }, NOTE));
-  let key = null;
-  let turn = 0;
-  const update = (events) => {
-    const ids = view.choice.experiments.filter((each) => view.books.get(each));
-    element.hidden = ids.length < 2;
-    if (ids.length < 2) return;
-    const last = Math.max(1, ...ids.map((each) => lastOf(view.books.get(each))));
+  let lastKey = "";
+  let requests = 0;
+  const update = (/** @type {unknown[]} */ events) => {
+    const ids = view.cache.known(view.choice.experiments);
+    const last = Math.max(1, ...ids.map((id) => lastEvaluation(view.cache.get(id))));
+    /** @type {Page.Range} */
     const range = [view.choice.from ?? 1, view.choice.to ?? last];
     test.value = view.choice.test;
-    if (document.activeElement !== from) from.value = range[0];
-    if (document.activeElement !== to) to.value = range[1];
-    buttons.replaceChildren(...ranges(last).map((each) => button(each, range, view)));
-    const now = JSON.stringify([ids, range, view.choice.test]);
-    if (key === now && !events.length) return;
-    const anew = key !== now;
-    key = now;
-    const mine = ++turn;
-    fill(place, view, { ids, range, last, anew }, () => mine === turn);
+    if (document.activeElement !== from) from.value = String(range[0]);
+    if (document.activeElement !== to) to.value = String(range[1]);
+    buttons.replaceChildren(...paperRanges(last).map((paperRange) => rangeButton(paperRange, range, view)));
+    const key = JSON.stringify([ids, range, view.choice.test]);
+    const isNew = key !== lastKey;
+    if (!isNew && !events.length) return;
+    lastKey = key;
+    const request = ++requests;
+    fill(place, view, { ids, range, last, isNew, isCurrent: () => request === requests && !view.signal.aborted });
   };
   return { element, update };
 }
 
-/** The last count that the experiment can have; the baseline has none. */
-const lastOf = ({ strategy, spec }) => (strategy === "direct" ? 0 : spec.iterations);
+/** @param {Api.ExperimentRead | null} experiment */
+const lastEvaluation = (experiment) => (!experiment || experiment.direct ? 0 : experiment.spec.iterations);
 
-/** The paper's ranges, as far as these experiments go. */
-export const ranges = (last) => [[1, 1], [3, last], [6, last], ...(last > 1 ? [[1, last]] : [])].filter(([from]) => from <= last);
-
-/** A range in words. */
-export const spoken = ([from, to]) => (from === to ? `${from}` : `${from}–${to}`);
-
-function button(range, now, view) {
-  const pressed = spoken(range) === spoken(now);
+/**
+ * @param {Page.Range} range
+ * @param {Page.Range} chosen
+ * @param {Page.CompareView} view
+ */
+function rangeButton(range, chosen, view) {
   const [from, to] = range;
+  const isChosen = rangeText(range) === rangeText(chosen);
   const press = () => view.change({ from, to });
-  const words = from === to ? `at ${from}` : spoken(range);
-  return h("button", { type: "button", class: "quiet small", "aria-pressed": String(pressed), onclick: press }, words);
+  return h("button", { type: "button", class: "quiet small", "aria-pressed": String(isChosen), onclick: press },
+    from === to ? `at ${from}` : rangeText(range));
 }
 
-async function fill(place, view, { ids, range, last, anew }, wanted) {
+/**
+ * @typedef {object} Request
+ * @property {string[]} ids
+ * @property {Page.Range} range
+ * @property {number} last
+ * @property {boolean} isNew whether it asks for something else than the request before
+ * @property {() => boolean} isCurrent whether no later request has replaced it
+ */
+
+/**
+ * Load the tests and show them; if that fails, what is shown for the same request stays.
+ *
+ * @param {HTMLElement} place
+ * @param {Page.CompareView} view
+ * @param {Request} request
+ */
+async function fill(place, view, request) {
+  const { ids, range, last, isNew, isCurrent } = request;
   if (ids.length > MOST) {
     place.replaceChildren(h("p", {}, `Pairs are tested for up to ${MOST} experiments; these are ${ids.length}.`));
     return;
   }
-  if (anew && !place.hasChildNodes()) place.replaceChildren(loading());
-  const asked = [...ranges(last).filter((each) => spoken(each) !== spoken(range)), range];
+  if (isNew && !place.hasChildNodes()) place.replaceChildren(loading());
+  const ranges = [...paperRanges(last).filter((paperRange) => rangeText(paperRange) !== rangeText(range)), range];
   try {
-    const found = await Promise.all(asked.map(([from, to]) => get("/comparisons", { experiment: ids, from, to }, view.signal)));
-    if (!wanted()) return;
-    const results = asked.map((each, at) => ({ range: each, pairs: found[at] }));
-    const open = place.querySelector("details")?.open ?? false;
-    place.replaceChildren(...matrix(view, ids, results.at(-1)), pairs(view, ids, results, open));
+    const answers = await Promise.all(ranges.map(([from, to]) => get("/comparisons", { experiment: ids, from, to }, view.signal)));
+    if (!isCurrent()) return;
+    const results = ranges.map((each, index) => ({ range: each, pairs: answers[index] }));
+    const isOpen = place.querySelector("details")?.open ?? false;
+    place.replaceChildren(...matrix(view, ids, results[results.length - 1]), pairsTable(view, results, isOpen));
   } catch (error) {
-    const kept = !anew && place.querySelector("table");  // as of before, until the service is back
-    if (wanted() && !kept && !view.signal.aborted) place.replaceChildren(failed(error, () => fill(place, view, { ids, range, last, anew }, wanted), "h3"));
+    const stays = !isNew && place.querySelector("table");
+    if (isCurrent() && !stays) place.replaceChildren(failed(error, () => fill(place, view, request), "h3"));
   }
 }

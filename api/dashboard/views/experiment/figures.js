@@ -1,55 +1,76 @@
-/** The figures of an experiment: drawn when they come into sight, and anew as it goes on. */
+// @ts-check
+/** The figures of an experiment: drawn when they come into sight, and again as it continues. */
 
 import { get } from "../../lib/api.js";
-import { bandChoice } from "../../lib/bands.js";
+import { curveOptions } from "../../lib/curve_options.js";
 import { h } from "../../lib/dom.js";
-import { figureFiles } from "../../lib/downloads.js";
+import { figureDownloads } from "../../lib/downloads.js";
 import { plot } from "../../lib/plot.js";
 
 const ENDS = ["completed", "failed", "cancelled", "stopped", "extended"];
+
+/**
+ * @typedef {object} Figure
+ * @property {string} kind
+ * @property {string} title
+ * @property {string[]} events the kinds of events that change it
+ * @property {(page: Page.ExperimentPage) => Promise<boolean>} [isPending] whether the service is still computing it
+ */
+
+/** @type {Figure} */
+const CURVE = { kind: "curves", title: "Fitness in reality", events: ["transferred", "probed", "repetition_completed", ...ENDS] };
+
+/** @type {Figure[]} */
 const OTHERS = [
-  ["predictions", "Simulation against reality", ["measured", "tuned", ...ENDS]],
-  ["squared-error", "Squared error", ["tuned", ...ENDS]],
-  ["simulators", "Tuned simulators", ["tuned", ...ENDS]],
+  { kind: "predictions", title: "Simulation against reality", events: ["measured", "tuned", ...ENDS], isPending: arePredictionsPending },
+  { kind: "squared-error", title: "Squared error", events: ["tuned", ...ENDS] },
+  { kind: "simulators", title: "Tuned simulators", events: ["tuned", ...ENDS] },
 ];
 
-/** Whether it is the baseline, which evolves in reality itself: it has no simulators. */
-export const isDirect = (experiment) => experiment.strategy === "direct";
-
-/** The curve, and the other figures that such an experiment has. */
-export function figures(page) {
-  const query = { experiment: page.id };
-  const others = isDirect(page.experiment) ? [] : OTHERS.map(([kind, title, kinds]) => card(page, kind, title, kinds, query));
-  return { curve: curve(page), others: others.length ? [h("div", { class: "figures" }, ...others)] : [] };
+/**
+ * Return the curve with its options.
+ *
+ * @param {Page.ExperimentPage} page
+ */
+export function curve(page) {
+  return card(page, CURVE, curveOptions(), ["CSV", `/experiments/${page.id}/curve`, { format: "csv" }, `gaplab-${page.id}-curve.csv`]);
 }
 
-function curve(page) {
-  const each = h("input", { type: "checkbox" });
-  const band = bandChoice();
-  const query = () => ({ experiment: page.id, band: band.value, each: each.checked || null });
-  const options = h("p", { class: "options" }, h("label", {}, each, " Each repetition"), h("label", {}, "Band ", band));
-  const kinds = ["transferred", "probed", "repetition_completed", ...ENDS];
-  const csv = ["CSV", `/experiments/${page.id}/curve`, { format: "csv" }, `gaplab-${page.id}-curve.csv`];
-  return card(page, "curves", "Fitness in reality", kinds, query, options, csv);
-}
+/**
+ * Return the figures about simulators; the direct baseline has none.
+ *
+ * @param {Page.ExperimentPage} page
+ */
+export const otherFigures = (page) =>
+  (page.experiment.direct ? [] : [h("div", { class: "figures" }, ...OTHERS.map((figure) => card(page, figure)))]);
 
-function card(page, kind, title, kinds, query, options = null, ...files) {
-  const asked = typeof query === "function" ? query : () => query;
+/**
+ * @param {Page.ExperimentPage} page
+ * @param {Figure} figure
+ * @param {{ element: HTMLElement, query: () => Page.Query } | null} [options]
+ * @param {...Parameters<typeof import("../../lib/downloads.js").downloadLink>} files
+ */
+function card(page, { kind, title, events, isPending }, options = null, ...files) {
   const place = h("div");
-  const saved = h("div");
-  let refresh = null;
+  const downloads = h("div");
+  const drawPlot = plot(place, kind, page.signal);
   const draw = async () => {
-    saved.replaceChildren(figureFiles(kind, asked(), `gaplab-${page.id}-${kind}`, ...files));
-    const isNew = await (refresh ? refresh(asked()) : (refresh = plot(place, kind, asked(), page.signal)).drawn);
-    return !isNew || (kind === "predictions" && await isPending(page));
+    const query = { experiment: page.id, ...options?.query() };
+    downloads.replaceChildren(figureDownloads(kind, query, `gaplab-${page.id}-${kind}`, ...files));
+    const isCurrent = await drawPlot(query);
+    return !isCurrent || (await isPending?.(page)) === true;
   };
-  options?.addEventListener("change", draw);
-  page.parts.add(place, kinds, draw);
+  options?.element.addEventListener("change", draw);
+  page.sections.add(place, events, draw);
   return h("section", { class: `card figure-${kind}`, "aria-labelledby": `title-${kind}` },
-    h("div", { class: "titled" }, h("h2", { id: `title-${kind}` }, title), options), place, saved);
+    h("div", { class: "titled" }, h("h2", { id: `title-${kind}` }, title), options?.element), place, downloads);
 }
 
-/** Whether predictions are still computed: they are physics, and go on with each question. */
-async function isPending({ id, signal }) {
+/**
+ * Return whether predictions are still computed: they are physics, and each question continues them.
+ *
+ * @param {Page.ExperimentPage} page
+ */
+async function arePredictionsPending({ id, signal }) {
   return (await get(`/experiments/${id}/predictions`, {}, signal)).pending > 0;
 }

@@ -1,17 +1,24 @@
-/** The head of an experiment: what it is, how far it is, and what may be asked of it. */
+// @ts-check
+/** The head of an experiment: what it is, its progress, and the actions on it. */
 
 import { get } from "../../lib/api.js";
-import { h, refill } from "../../lib/dom.js";
-import { download } from "../../lib/downloads.js";
-import { edit } from "../../lib/editing.js";
-import { age, count, duration, spoken } from "../../lib/format.js";
-import { pill } from "../../lib/pill.js";
-import { fraction } from "../../lib/progress.js";
-import { verbs } from "./verbs.js";
+import { h, refill, setText } from "../../lib/dom.js";
+import { downloadLink } from "../../lib/downloads.js";
+import { editNameAndNotes } from "../../lib/edit_dialog.js";
+import { age, count, percent, readableName, timeBetween } from "../../lib/format.js";
+import { factItems, remarkBlocks } from "../../lib/head_parts.js";
+import { fraction, repetitionsDone, timeLeftFact } from "../../lib/progress.js";
+import { ENDED, stateBadge } from "../../lib/state_badge.js";
+import { actions } from "./actions.js";
 
-const ENDED = ["COMPLETED", "FAILED", "CANCELLED"];
+/** @typedef {import("../../lib/head_parts.js").Fact} Fact */
 
-/** The head's element, and `update()` for when `page.experiment` is another. */
+/**
+ * Return the head, which is updated when `page.experiment` has changed.
+ *
+ * @param {Page.ExperimentPage} page
+ * @returns {Page.Updatable}
+ */
 export function head(page) {
   const title = h("h1");
   const state = h("span", { class: "state-now", role: "status" });
@@ -19,89 +26,92 @@ export function head(page) {
   const bar = h("progress", { max: 1, "aria-label": "Progress" });
   const facts = h("dl", { class: "facts" });
   const remarks = h("div", { class: "remarks" });
-  const asked = verbs(page);
+  const buttons = actions(page);
   const update = () => {
     const { experiment } = page;
-    title.textContent = spoken(experiment.name);
-    const far = ENDED.includes(experiment.state) ? "" : `${percent(experiment.progress)} · `;
-    document.title = `${far}${title.textContent} · gaplab`;
-    notes.textContent = experiment.notes ?? "";
+    const { progress, warnings, reasons } = experiment;
+    setText(title, readableName(experiment.name));
+    const done = ENDED.includes(experiment.state) ? "" : `${percent(fraction(progress))} · `;
+    document.title = `${done}${title.textContent} · gaplab`;
+    setText(notes, experiment.notes ?? "");
     notes.hidden = !experiment.notes;
-    refill(state, experiment.state, () => pill(experiment.state));
-    bar.value = fraction(experiment.progress);
-    const { progress, priority, max_parallel: most } = experiment;
-    refill(facts, JSON.stringify([progress, priority, most, experiment.state, minute()]), () => factsOf(experiment));
-    refill(remarks, JSON.stringify([experiment.warnings, experiment.reasons]), () => remarksOf(experiment));
-    asked.update();
+    refill(state, experiment.state, () => stateBadge(experiment.state));
+    bar.value = fraction(progress);
+    const known = factsOf(experiment);
+    refill(facts, JSON.stringify(known), () => factItems(known));
+    refill(remarks, JSON.stringify([warnings, reasons]), () =>
+      remarkBlocks(warnings.map((text) => ({ text })), reasons.map((text) => ({ text }))));
+    buttons.update();
   };
-  const change = () => edit(page, `/experiments/${page.id}`, () => page.experiment);
-  const pen = h("button", { type: "button", class: "quiet small", onclick: change }, "Edit name and notes");
+  const edit = () => editNameAndNotes(page, `/experiments/${page.id}`, () => page.experiment);
+  const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name and notes");
   update();
-  const element = h("header", { class: "experiment-head" }, trail(page),
-    h("div", { class: "titled" }, title, state, pen), h("p", { class: "what" }, what(page.experiment)), notes, bar, facts, remarks, asked.element, links(page));
+  const element = h("header", { class: "experiment-head" }, trail(page), h("div", { class: "titled" }, title, state, editButton),
+    h("p", { class: "what" }, summary(page.experiment)), notes, bar, facts, remarks, buttons.element, links(page));
   return { element, update };
 }
 
-const percent = (progress) => `${Math.floor(100 * fraction(progress))} %`;
-
-/** What it is, in a line: strategy, robot, engines, what is tuned. */
-function what({ strategy, spec }) {
-  const own = spec.engine?.name;
-  const other = spec.reality?.engine?.name;
-  const engines = own && other && own !== other ? `${own}, reality in ${other}` : own;
-  const tuned = (spec.tunables ?? []).map((each) => each.name.replaceAll("_", " ")).join(", ");
-  const tunes = tuned && strategy !== "direct" ? `tunes ${tuned}` : null;
-  return [spoken(strategy), spec.robot?.name.replaceAll("_", " "), engines, tunes].filter(Boolean).join(" · ");
+/**
+ * Return strategy, robot, engines and tunables in a line.
+ *
+ * @param {Api.ExperimentRead} experiment
+ */
+function summary({ strategy, direct, spec }) {
+  const engine = spec.engine?.name;
+  const realEngine = spec.reality?.engine?.name;
+  const engines = engine && realEngine && engine !== realEngine ? `${engine}, reality in ${realEngine}` : engine;
+  const tunables = (/** @type {{ name: string }[]} */ (spec.tunables ?? [])).map(({ name }) => name.replaceAll("_", " ")).join(", ");
+  const tunes = tunables && !direct ? `tunes ${tunables}` : null;
+  return [readableName(strategy), spec.robot?.name.replaceAll("_", " "), engines, tunes].filter(Boolean).join(" · ");
 }
 
-/** Times are told in minutes and hours: what they say is put right each minute. */
-const minute = () => Math.floor(Date.now() / 60_000);
-
-function trail({ experiment, signal }) {
-  if (!experiment.study) return h("nav", { "aria-label": "Place", class: "trail" }, h("a", { href: "#/" }, "Experiments"));
-  const study = h("a", { href: `#/studies/${experiment.study}` }, `study ${experiment.study}`);
-  get(`/studies/${experiment.study}`, {}, signal).then(({ name }) => { study.textContent = name; }, () => {});
-  return h("nav", { "aria-label": "Place", class: "trail" }, h("a", { href: "#/" }, "Experiments"), " / ", study);
+/** @param {Page.ExperimentPage} page */
+function trail({ experiment: { study }, signal }) {
+  const place = h("nav", { "aria-label": "Place", class: "trail" }, h("a", { href: "#/" }, "Experiments"));
+  if (study) {
+    const link = h("a", { href: `#/studies/${study}` }, `study ${study}`);
+    get(`/studies/${study}`, {}, signal).then(({ name }) => { link.textContent = name; }, () => {});
+    place.append(" / ", link);
+  }
+  return place;
 }
 
+/**
+ * @param {Api.ExperimentRead} experiment
+ * @returns {Fact[]}
+ */
 function factsOf(experiment) {
-  const { progress } = experiment;
-  const failed = progress.failed ? `, ${count(progress.failed)} failed` : "";
+  const { progress, max_parallel: maxParallel } = experiment;
   const saved = progress.rollouts_saved ? `, ${count(progress.rollouts_saved)} not needed` : "";
   const broken = progress.rollouts_failed ? `, physics failed in ${count(progress.rollouts_failed)}` : "";
   return [
-    ["Done", percent(progress)],
-    ["Repetitions", `${count(progress.completed)} of ${count(progress.repetitions)}${failed}`],
+    ["Done", percent(fraction(progress))],
+    ["Repetitions", repetitionsDone(progress)],
     ["Iterations", `${count(progress.iterations_done)} of ${count(progress.iterations)}`],
     ["Rollouts", `${count(progress.rollouts_done)} of ${count(progress.rollouts)}${saved}${broken}`],
     ...times(experiment),
     ["Priority", experiment.priority],
-    ["At once", experiment.max_parallel === null ? "any number" : `at most ${count(experiment.max_parallel)}`],
-  ].map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, String(value))));
-}
-
-function times({ state, progress, created_at: created, started_at: started, ended_at: ended }) {
-  if (ENDED.includes(state) && ended) {
-    const took = started ? [["Took", duration((Date.parse(ended) - Date.parse(started)) / 1000)]] : [];
-    return [["Ended", age(ended)], ...took];
-  }
-  const left = progress.seconds_left === null ? "not known yet" : duration(progress.seconds_left);
-  return [["Time left", state === "RUNNING" ? left : "–"], started ? ["Began", age(started)] : ["Submitted", age(created)]];
-}
-
-function remarksOf({ warnings, reasons }) {
-  const list = (words, each, kind) =>
-    h("div", { class: `remark ${kind}` }, h("strong", {}, words), h("ul", {}, ...each.map((one) => h("li", {}, one))));
-  return [
-    ...(warnings.length ? [list("Warnings", warnings, "warned")] : []),
-    ...(reasons.length ? [list("Why repetitions failed", reasons, "broken")] : []),
+    ["At once", maxParallel === null ? "any number" : `at most ${count(maxParallel)}`],
   ];
 }
 
-function links({ id, experiment }) {
-  const toy = experiment.spec.robot?.name === "toy_function";
-  return h("p", { class: "links" },
-    h("a", { href: `#/compare?experiments=${id}` }, "Compare with others"), " ",
-    toy ? h("a", { href: `#/toy?experiment=${id}` }, "Step through the function") : h("a", { href: `#/replay?experiment=${id}` }, "Replay a controller"), " ",
-    download("Archive of everything (.zip)", `/experiments/${id}/export`, {}, `gaplab-${id}.zip`));
+/**
+ * @param {Api.ExperimentRead} experiment
+ * @returns {Fact[]}
+ */
+function times({ state, progress, created_at: created, started_at: started, ended_at: ended }) {
+  if (ENDED.includes(state) && ended) {
+    const took = started ? [/** @type {Fact} */ (["Took", timeBetween(started, ended)])] : [];
+    return [["Ended", age(ended)], ...took];
+  }
+  return [["Time left", timeLeftFact({ state, progress })], started ? ["Began", age(started)] : ["Submitted", age(created)]];
+}
+
+/** @param {Page.ExperimentPage} page */
+function links({ id, isFunction }) {
+  const replay = isFunction
+    ? h("a", { href: `#/toy?experiment=${id}` }, "Step through the function")
+    : h("a", { href: `#/replay?experiment=${id}` }, "Replay a controller");
+  return h("p", { class: "links" }, h("a", { href: `#/compare?experiments=${id}` }, "Compare with others"), " ", replay, " ",
+    downloadLink("Archive of everything (.zip)", `/experiments/${id}/export`, {}, `gaplab-${id}.zip`));
 }

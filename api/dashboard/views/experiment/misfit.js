@@ -1,38 +1,48 @@
+// @ts-check
 /** How far tuned simulators are from reality, and from each other when tuning is repeated. */
 
 import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
-import { spoken } from "../../lib/format.js";
-import { empty } from "../../lib/states.js";
+import { readableName } from "../../lib/format.js";
+import { empty } from "../../lib/placeholders.js";
 import { table } from "../../lib/table.js";
 
 const KINDS = ["tuned", "probed"];
+const NOTE = "Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound. Iteration 0 is not tuned.";
 
-/** What the service remarks on it, and a line for each iteration. */
+/**
+ * Return the service's remarks, and a table with a row for each iteration.
+ *
+ * @param {Page.ExperimentPage} page
+ */
 export function misfit(page) {
   const place = h("div");
-  page.parts.add(place, KINDS, async () => {
+  page.sections.add(place, KINDS, async () => {
+    /** @type {Api.MisfitRead} */
     const { points, remarks, unit } = await get(`/experiments/${page.id}/misfit`, {}, page.signal);
     if (!points.length) {
-      place.replaceChildren(empty("Nothing was tuned yet."));
+      place.replaceChildren(empty("Nothing is tuned yet."));
       return;
     }
-    const names = points[0].tunables.map((each) => each.name);
-    const note = "Mean ± SD over repetitions. ⊣ and ⊢: a share of them is stuck at the lower or the upper bound. Iteration 0 is not tuned.";
-    const columns = ["Iteration", `Error on its samples (${unit})`, `Gap of what it evolved (${unit})`, ...names.map(spoken), "n"];
-    place.replaceChildren(h("ul", { class: "said-of-it" }, ...remarks.map((each) => h("li", {}, each))),
-      table("Misfit by iteration", columns, points.map(row)), h("p", { class: "note" }, note));
+    const tunables = points[0].tunables.map(({ name }) => readableName(name));
+    const columns = ["Iteration", `Error on its samples (${unit})`, `Gap of what it evolved (${unit})`, ...tunables, "n"];
+    place.replaceChildren(h("ul", { class: "said-of-it" }, ...remarks.map((remark) => h("li", {}, remark))),
+      table("Misfit by iteration", columns, points.map(row)), h("p", { class: "note" }, NOTE));
   });
   return [place];
 }
 
-function row(point) {
-  const tuned = point.tunables.map((each) => `${spread(each)}${bound(each.at_lower, "⊣")}${bound(each.at_upper, "⊢")}`);
-  return [String(point.iteration), spread(point.error), spread(point.gap), ...tuned, String(point.gap.n)];
+/** @param {Api.MisfitPoint} point */
+function row({ iteration, error, gap, tunables }) {
+  const tuned = tunables.map((tunable) => `${meanAndSd(tunable)}${boundShare(tunable.at_lower, "⊣")}${boundShare(tunable.at_upper, "⊢")}`);
+  return [iteration, meanAndSd(error), meanAndSd(gap), ...tuned, gap.n];
 }
 
-const spread = ({ mean, sd }) => (mean === null ? "–" : `${small(mean)}${sd === null ? "" : ` ± ${small(sd)}`}`);
+/** @param {Api.Spread} spread */
+const meanAndSd = ({ mean, sd }) => (mean === null ? "–" : `${threeDigits(mean)}${sd === null ? "" : ` ± ${threeDigits(sd)}`}`);
 
-const bound = (share, sign) => (share ? ` ${sign} ${Math.round(100 * share)} %` : "");
+/** @type {(share: number | null, sign: string) => string} */
+const boundShare = (share, sign) => (share ? ` ${sign} ${Math.round(100 * share)} %` : "");
 
-const small = (value) => String(Number(value.toPrecision(3))).replace("-", "−");
+/** @param {number} value */
+const threeDigits = (value) => String(Number(value.toPrecision(3))).replace("-", "−");

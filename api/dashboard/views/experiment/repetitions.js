@@ -1,58 +1,69 @@
-/** The repetitions, and on demand every attempt at one of them. */
+// @ts-check
+/** The repetitions of an experiment, and every attempt at one of them on demand. */
 
 import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
-import { age, count, duration } from "../../lib/format.js";
-import { pill } from "../../lib/pill.js";
+import { age, count, timeBetween } from "../../lib/format.js";
+import { stateBadge } from "../../lib/state_badge.js";
 import { table } from "../../lib/table.js";
 
 const KINDS = ["transferred", "probed", "extended", "cancelled", "paused", "completed",
-  ...["claimed", "completed", "failed", "lost", "handed_back", "paused", "stopped", "cancelled"].map((each) => `repetition_${each}`)];
+  ...["claimed", "completed", "failed", "lost", "handed_back", "paused", "stopped", "cancelled"].map((kind) => `repetition_${kind}`)];
+const COLUMNS = ["Repetition", "State", "Iterations", "Rollouts", "Attempts", "Began", "Took", "Why it failed"];
+const ATTEMPT_COLUMNS = ["Attempt", "Supervisor", "Began", "Took", "How it ended", "Reason"];
 
-const MANY = 50;
+const AT_FIRST = 50;
 
-/** A line for each repetition, the first of them at first. */
+/**
+ * Return a table with a row for each repetition, only the first ones at first.
+ *
+ * @param {Page.ExperimentPage} page
+ */
 export function repetitions(page) {
   const place = h("div");
   const attempts = h("div", { role: "status" });
-  const show = async (number) => {
-    const found = await get(`/experiments/${page.id}/repetitions/${number}/attempts`, {}, page.signal);
-    attempts.replaceChildren(h("h3", {}, `Attempts at repetition ${number}`), attemptsTable(number, found));
+  const showAttempts = async (/** @type {number} */ number) => {
+    const loaded = await get(`/experiments/${page.id}/repetitions/${number}/attempts`, {}, page.signal);
+    attempts.replaceChildren(h("h3", {}, `Attempts at repetition ${number}`), attemptsTable(number, loaded));
     attempts.scrollIntoView({ block: "nearest" });
   };
-  let shown = MANY;
+  let shown = AT_FIRST;
   const load = async () => {
-    const found = await get(`/experiments/${page.id}/repetitions`, {}, page.signal);
-    const focused = place.contains(document.activeElement) ? document.activeElement.dataset.repetition : null;
-    const columns = ["Repetition", "State", "Iterations", "Rollouts", "Attempts", "Began", "Took", "Why it failed"];
-    place.replaceChildren(table("Repetitions", columns, found.slice(0, shown).map((each) => row(each, show))));
-    more.hidden = found.length <= shown;
-    more.textContent = `Show more of ${count(found.length)}`;
-    if (focused) place.querySelector(`[data-repetition="${focused}"]`)?.focus();
+    /** @type {Api.RepetitionRead[]} */
+    const loaded = await get(`/experiments/${page.id}/repetitions`, {}, page.signal);
+    const focused = place.contains(document.activeElement) ? /** @type {HTMLElement} */ (document.activeElement).dataset.repetition : null;
+    place.replaceChildren(table("Repetitions", COLUMNS, loaded.slice(0, shown).map((repetition) => row(repetition, showAttempts))));
+    more.hidden = loaded.length <= shown;
+    more.textContent = `Show more of ${count(loaded.length)}`;
+    if (focused) /** @type {HTMLElement | null} */ (place.querySelector(`[data-repetition="${focused}"]`))?.focus();
   };
   const more = h("button", { type: "button", class: "quiet small", hidden: true, onclick: () => {
     shown *= 4;
     load().catch(() => {});
   } });
-  page.parts.add(place, KINDS, load);
+  page.sections.add(place, KINDS, load);
   return [place, h("p", { class: "pages" }, more), attempts];
 }
 
-function row(each, show) {
+/**
+ * @param {Api.RepetitionRead} repetition
+ * @param {(number: number) => Promise<void>} showAttempts
+ */
+function row({ number, state, attempts, started_at: started, ended_at: ended, ...others }, showAttempts) {
   const button = h("button", {
-    type: "button", class: "link", dataset: { repetition: each.number }, "aria-label": `Attempts at repetition ${each.number}: ${each.attempts}`,
-    onclick: () => show(each.number).catch(() => {}),
-  }, String(each.attempts));
-  return [String(each.number), pill(each.state), count(each.iterations_done), count(each.rollouts_done),
-    each.attempts ? button : "0", each.started_at ? age(each.started_at) : "–", took(each), each.error ?? ""];
+    type: "button", class: "link", dataset: { repetition: number }, "aria-label": `Attempts at repetition ${number}: ${attempts}`,
+    onclick: () => showAttempts(number).catch(() => {}),
+  }, attempts);
+  return [number, stateBadge(state), count(others.iterations_done), count(others.rollouts_done),
+    attempts ? button : "0", started ? age(started) : "–", timeBetween(started, ended), others.error];
 }
 
-function attemptsTable(number, found) {
-  const columns = ["Attempt", "Supervisor", "Began", "Took", "How it ended", "Reason"];
-  return table(`Attempts at repetition ${number}`, columns, found.map((each) =>
-    [String(each.number), each.owner, age(each.started_at), took(each), each.ending ?? "goes on", each.reason ?? ""]));
-}
-
-function took({ started_at: began, ended_at: ended }) {
-  return began && ended ? duration((Date.parse(ended) - Date.parse(began)) / 1000) : "–";
+/**
+ * @param {number} repetition
+ * @param {Api.AttemptRead[]} attempts
+ */
+function attemptsTable(repetition, attempts) {
+  const rows = attempts.map(({ number, owner, started_at: started, ended_at: ended, ending, reason }) =>
+    [number, owner, age(started), timeBetween(started, ended), ending ?? "still running", reason]);
+  return table(`Attempts at repetition ${repetition}`, ATTEMPT_COLUMNS, rows);
 }

@@ -1,70 +1,79 @@
-/** Every real-world evaluation, page by page, each with the way to its replay. */
+// @ts-check
+/** Every real-world evaluation of an experiment, page by page, each with a link to its replay. */
 
-import { get, search } from "../../lib/api.js";
+import { get, queryString } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
 import { number } from "../../lib/format.js";
-import { empty } from "../../lib/states.js";
+import { empty } from "../../lib/placeholders.js";
 import { table } from "../../lib/table.js";
 
-const MANY = 25;
-const KIND = [["", "samples and probes"], ["sample", "samples, which are learned from"], ["probe", "probes, which are only looked at"]];
+const PAGE_SIZE = 25;
+const CHOICES = [["", "samples and probes"], ["sample", "samples, which are learned from"], ["probe", "probes, which are only looked at"]];
 const KINDS = ["measured", "probed"];
-const COLUMNS = ["Repetition", "Iteration", "What for", "Fitness in reality", "Measured by", "When", "Look"];
+const COLUMNS = ["Repetition", "Iteration", "Kind", "Fitness in reality", "Measured by", "When", "Replay"];
 
-/** The table, with what it is limited to above and its pages beneath. */
+/**
+ * Return the table, with its filters above and the way to its other pages below.
+ *
+ * @param {Page.ExperimentPage} page
+ */
 export function samples(page) {
   const place = h("div");
-  const kind = h("select", {}, ...KIND.map(([value, words]) => h("option", { value }, words)));
+  const kind = h("select", {}, ...CHOICES.map(([value, label]) => h("option", { value }, label)));
   const repetition = h("input", { type: "number", min: 0, max: 1000000, step: 1, placeholder: "all", class: "short" });
-  let cursors = [null];  // of this page and those before it
+  /** @type {(string | null)[]} */
+  let cursors = [null];  // of this page and of those before it
+  /** @type {string | null} */
   let next = null;
-  let asked = 0;
-  let turning = false;
+  let requests = 0;
+  let isTurning = false;
   const load = async () => {
-    const query = { limit: MANY, cursor: cursors.at(-1), kind: kind.value, repetition: repetition.value };
-    const mine = ++asked;
-    const found = await get(`/experiments/${page.id}/samples`, query, page.signal);
-    if (mine !== asked) return;  // another page has overtaken it
-    next = found.next;
-    const rows = found.items.map((each) => row(page, each));
+    const query = { limit: PAGE_SIZE, cursor: cursors.at(-1), kind: kind.value, repetition: repetition.value };
+    const request = ++requests;
+    const loaded = await get(`/experiments/${page.id}/samples`, query, page.signal);
+    if (request !== requests) return;  // a later request has replaced this one
+    next = loaded.next;
+    const rows = (/** @type {Api.SampleRead[]} */ (loaded.items)).map((sample) => row(page, sample));
     place.replaceChildren(rows.length ? table("Real-world evaluations", COLUMNS, rows) : empty("Nothing was tried in reality yet."));
     back.disabled = cursors.length < 2;
-    on.disabled = !next;
-    where.textContent = `Page ${cursors.length}`;
+    forward.disabled = !next;
+    status.textContent = `Page ${cursors.length}`;
   };
-  const say = (error) => { where.textContent = error.message; };
-  const turn = async (to) => {
-    if (turning) return;
+  const showError = (/** @type {Error} */ error) => { status.textContent = error.message; };
+  const turnTo = async (/** @type {(string | null)[]} */ newCursors) => {
+    if (isTurning) return;
     const before = cursors;
-    turning = true;
-    cursors = to;
+    isTurning = true;
+    cursors = newCursors;
     try {
       await load();
     } catch (error) {
-      if (cursors === to) cursors = before;
-      say(error);
+      if (cursors === newCursors) cursors = before;
+      showError(error);
     }
-    turning = false;
+    isTurning = false;
   };
-  const limit = () => {
+  const filter = () => {
     cursors = [null];
-    load().catch(say);
+    load().catch(showError);
   };
-  const back = h("button", { type: "button", class: "quiet small", disabled: true, onclick: () => turn(cursors.slice(0, -1)) }, "Before");
-  const on = h("button", { type: "button", class: "quiet small", disabled: true, onclick: () => turn([...cursors, next]) }, "After");
-  const where = h("span", { role: "status" });
-  const limited = h("p", { class: "options", onchange: limit },
-    h("label", {}, "Show ", kind), h("label", {}, "Repetition ", repetition));
-  page.parts.add(place, KINDS, load);
-  return [limited, place, h("p", { class: "pages" }, back, where, on)];
+  const back = h("button", { type: "button", class: "quiet small", disabled: true, onclick: () => turnTo(cursors.slice(0, -1)) }, "Previous");
+  const forward = h("button", { type: "button", class: "quiet small", disabled: true, onclick: () => turnTo([...cursors, next]) }, "Next");
+  const status = h("span", { role: "status" });
+  const filters = h("p", { class: "options", onchange: filter }, h("label", {}, "Show ", kind), h("label", {}, "Repetition ", repetition));
+  page.sections.add(place, KINDS, load);
+  return [filters, place, h("p", { class: "pages" }, back, status, forward)];
 }
 
-function row({ id, experiment }, each) {
-  const kind = each.kind === "sample" ? "sample" : "transfer";
-  const at = { experiment: id, repetition: each.repetition, iteration: each.iteration };
-  const toy = experiment.spec.robot?.name === "toy_function";
-  const words = `${toy ? "Step" : "Replay"}, repetition ${each.repetition}, iteration ${each.iteration}`;
-  const link = h("a", { href: toy ? `#/toy${search(at)}` : `#/replay${search({ ...at, kind })}`, "aria-label": words }, toy ? "Step" : "Replay");
-  return [String(each.repetition), String(each.iteration), each.kind, each.fitness === null ? "physics failed" : number(each.fitness),
-    each.measured_by, new Date(each.measured_at).toLocaleString(), link];
+/**
+ * @param {Page.ExperimentPage} page
+ * @param {Api.SampleRead} sample
+ */
+function row({ id, isFunction }, { repetition, iteration, kind, ...sample }) {
+  const query = { experiment: id, repetition, iteration };
+  const address = isFunction ? `#/toy${queryString(query)}` : `#/replay${queryString({ ...query, kind: kind === "sample" ? "sample" : "transfer" })}`;
+  const label = isFunction ? "Step" : "Replay";
+  const link = h("a", { href: address, "aria-label": `${label}, repetition ${repetition}, iteration ${iteration}` }, label);
+  return [repetition, iteration, kind, sample.fitness === null ? "physics failed" : number(sample.fitness),
+    sample.measured_by, new Date(sample.measured_at).toLocaleString(), link];
 }

@@ -1,19 +1,25 @@
-/** The resolved spec, to read and to submit again. */
+// @ts-check
+/** The resolved spec of an experiment, to read and to submit again. */
 
 import { copyButton } from "../../lib/copy.js";
 import { h } from "../../lib/dom.js";
-import { written } from "../../lib/json.js";
+import { stringify } from "../../lib/json.js";
 import { framed } from "../../lib/table.js";
 
-/** The spec as JSON; reality's parameters are null in it until the experiment has ended. */
+const NOTE = "The complete spec. Reality’s parameters are null until the experiment has ended.";
+
+/**
+ * Return the spec as JSON, with a button that copies it.
+ *
+ * @param {Page.ExperimentPage} page
+ */
 export function spec(page) {
-  const text = () => written(page.experiment.spec, 2);
+  const text = () => stringify(page.experiment.spec, 2);
   const code = h("code");
   const place = framed("Spec as JSON", h("pre", {}, code));
-  page.parts.add(place, ["extended", "completed", "failed", "cancelled"], async () => {
-    await page.look();
+  page.sections.add(place, ["extended", "completed", "failed", "cancelled"], async () => {
+    await page.reload();
     code.textContent = text();
   });
-  const note = h("p", { class: "note" }, "Nothing is left out of it. Reality’s parameters are null until the experiment has ended.");
-  return [h("p", {}, copyButton("Copy the spec", text)), note, place];
+  return [h("p", {}, copyButton("Copy the spec", text)), h("p", { class: "note" }, NOTE), place];
 }

@@ -1,57 +1,94 @@
-/** What is listed: studies or experiments, in which state, with which strategy, with which words, in which order. */
+// @ts-check
+/** The filters of the list: studies or experiments, in which state, with which strategy and words, in which order. */
 
 import { h } from "../../lib/dom.js";
-import { spoken } from "../../lib/format.js";
+import { readableName } from "../../lib/format.js";
+import { STATES } from "../../lib/state_badge.js";
 
-const STATES = ["QUEUED", "RUNNING", "PAUSING", "PAUSED", "STOPPING", "COMPLETED", "FAILED", "CANCELLED"];
-const ORDERS = {
-  studies: [["-created_at", "Newest first"], ["created_at", "Oldest first"], ["name", "By name"]],
-  experiments: [["-created_at", "Newest first"], ["created_at", "Oldest first"], ["name", "By name"], ["strategy", "By strategy"], ["state", "By state"]],
-};
+/** @typedef {{ show: "studies" | "experiments", sort: string, state: string, strategy: string, text: string }} Filters */
+/** @typedef {[value: string, label: string][]} Choices */
+
+/** @type {Choices} */
+const STUDY_ORDERS = [["-created_at", "Newest first"], ["created_at", "Oldest first"], ["name", "By name"]];
+const ORDERS = { studies: STUDY_ORDERS, experiments: /** @type {Choices} */ ([...STUDY_ORDERS, ["strategy", "By strategy"], ["state", "By state"]]) };
+const NEWEST_FIRST = "-created_at";
 const TYPING_MS = 250;
 
-/** What the address asks for. */
-export function wantedBy(parameters) {
+/**
+ * Return the filters in an address.
+ *
+ * @param {URLSearchParams} parameters
+ * @returns {Filters}
+ */
+export function filtersOf(parameters) {
   const show = parameters.get("show") === "experiments" ? "experiments" : "studies";
-  const sort = ORDERS[show].some(([name]) => name === parameters.get("sort")) ? parameters.get("sort") : "-created_at";
-  return { show, sort, state: parameters.get("state") ?? "", strategy: parameters.get("strategy") ?? "", text: parameters.get("text") ?? "" };
+  const order = ORDERS[show].find(([name]) => name === parameters.get("sort"));
+  const value = (/** @type {string} */ name) => parameters.get(name) ?? "";
+  return { show, sort: order ? order[0] : NEWEST_FIRST, state: value("state"), strategy: value("strategy"), text: value("text") };
 }
 
-/** The same as an address, without what goes without saying. */
-export function addressOf({ show, ...wanted }) {
-  const said = Object.entries({ ...wanted, show: show === "studies" ? "" : show, sort: wanted.sort === "-created_at" ? "" : wanted.sort });
-  const query = new URLSearchParams(said.filter(([, value]) => value)).toString();
+/**
+ * Return the address of filters, without those that have their default.
+ *
+ * @param {Filters} filters
+ */
+export function addressOf({ show, sort, ...others }) {
+  const values = { ...others, show: show === "studies" ? "" : show, sort: sort === NEWEST_FIRST ? "" : sort };
+  const query = new URLSearchParams(Object.entries(values).filter(([, value]) => value)).toString();
   return query ? `#/?${query}` : "#/";
 }
 
-/** Whether something is left out of the list. */
+/**
+ * Return whether the filters leave something out of the list.
+ *
+ * @param {Filters} filters
+ */
 export const isFiltered = ({ state, strategy, text }) => Boolean(state || strategy || text);
 
-/** The form; `changed(wanted)` is told of every change. */
-export function filters(wanted, strategies, changed) {
-  let typing = null;
-  const now = (change) => {
-    Object.assign(wanted, change);
-    changed(wanted);
+/**
+ * Return the form of the filters.
+ *
+ * @param {Filters} filters changed in place
+ * @param {string[]} strategies
+ * @param {(filters: Filters) => void} changed
+ */
+export function filterForm(filters, strategies, changed) {
+  /** @type {number | undefined} */
+  let typing;
+  const change = (/** @type {Partial<Filters>} */ changes) => {
+    Object.assign(filters, changes);
+    changed(filters);
   };
-  const kinds = ["studies", "experiments"].map((show) =>
-    h("button", { type: "button", "aria-pressed": String(wanted.show === show), onclick: () => now({ show, sort: "-created_at" }) }, spoken(show)));
-  const type = (event) => {
+  const kinds = /** @type {const} */ (["studies", "experiments"]).map((show) => {
+    const press = () => change({ show, sort: NEWEST_FIRST });
+    return h("button", { type: "button", "aria-pressed": String(filters.show === show), onclick: press }, readableName(show));
+  });
+  const type = () => {
     clearTimeout(typing);
-    typing = setTimeout(() => now({ text: event.target.value.trim() }), TYPING_MS);
+    typing = setTimeout(() => change({ text: search.value.trim() }), TYPING_MS);
   };
   const search = h("input", { type: "search", placeholder: "Name or id", "aria-label": "Search by name or id", maxlength: 200, oninput: type });
-  search.value = wanted.text;
+  search.value = filters.text;
+  /** @type {Choices} */
+  const states = STATES.map((state) => [state, readableName(state.toLowerCase())]);
+  /** @type {Choices} */
+  const names = strategies.map((name) => [name, readableName(name)]);
   return h("form", { class: "filters", role: "search", onsubmit: (event) => event.preventDefault() },
-    h("div", { class: "segments", role: "group", "aria-label": "What is listed" }, ...kinds), search,
-    picker("State", wanted.state, [["", "Any state"], ...STATES.map((each) => [each, spoken(each.toLowerCase())])], (state) => now({ state })),
-    picker("Strategy", wanted.strategy, [["", "Any strategy"], ...strategies.map((each) => [each, spoken(each)])], (strategy) => now({ strategy })),
-    picker("Order", wanted.sort, ORDERS[wanted.show], (sort) => now({ sort })));
+    h("div", { class: "segments", role: "group", "aria-label": "Studies or experiments" }, ...kinds), search,
+    select("State", filters.state, [["", "Any state"], ...states], (state) => change({ state })),
+    select("Strategy", filters.strategy, [["", "Any strategy"], ...names], (strategy) => change({ strategy })),
+    select("Order", filters.sort, ORDERS[filters.show], (sort) => change({ sort })));
 }
 
-function picker(label, value, choices, changed) {
-  const field = h("select", { "aria-label": label, onchange: () => changed(field.value) },
-    ...choices.map(([name, words]) => h("option", { value: name }, words)));
+/**
+ * @param {string} label
+ * @param {string} value
+ * @param {Choices} choices
+ * @param {(value: string) => void} changed
+ */
+function select(label, value, choices, changed) {
+  const options = choices.map(([name, words]) => h("option", { value: name }, words));
+  const field = h("select", { "aria-label": label, onchange: () => { changed(field.value); } }, ...options);
   field.value = value;
   return field;
 }

@@ -1,90 +1,136 @@
-/** Rows of the list: a study, which can be opened, and an experiment, by itself or below its study. */
+// @ts-check
+/** Rows of the list: a study, which can be unfolded, and an experiment, by itself or below its study. */
 
-import { h, refill } from "../../lib/dom.js";
-import { age, fixed, spoken } from "../../lib/format.js";
-import { pill } from "../../lib/pill.js";
+import { h, refill, setText } from "../../lib/dom.js";
+import { age, fixed, readableName } from "../../lib/format.js";
 import { progressBar, timeLeft } from "../../lib/progress.js";
-import { say } from "../../lib/rows.js";
-import { tick } from "./selection.js";
+import { stateBadge } from "../../lib/state_badge.js";
+import { tickBox } from "./selection.js";
 
-/** The columns, with what a narrow window leaves out. */
+/**
+ * @typedef {object} List what the rows need of their list
+ * @property {(experiment: Api.ExperimentRead | undefined) => string} unit of fitness
+ * @property {() => void} ticked
+ */
+
+/** @typedef {List & { unfolded: Set<string>, toggle: (id: string) => void }} StudyList */
+
+/** @typedef {{ value: Api.ExperimentRead, isNested?: boolean }} ExperimentItem */
+
+/** The columns; a narrow window leaves out those that are wide. */
 const COLUMNS = [
-  ["", "ticks"], ["Name", "name"], ["State", "stands"], ["Progress", "progress"],
-  ["Time left", "left wide"], ["Best fitness", "best"], ["Submitted", "age wide"],
+  { label: "", key: "ticks" }, { label: "Name", key: "name" }, { label: "State", key: "stands" }, { label: "Progress", key: "progress" },
+  { label: "Time left", key: "left", wide: true },
+  { label: "Best fitness", key: "best", title: "Best recorded fitness so far, on average over repetitions; of a study, that of its best experiment" },
+  { label: "Submitted", key: "age", wide: true },
 ];
 
-/** The head of the list. */
-export const heads = () => COLUMNS.map(([words, key]) =>
-  h("th", { scope: "col", class: key, title: TOLD[key] ?? null }, words || h("span", { class: "away" }, "Select")));
+/** @param {{ key: string, wide?: boolean }} column */
+const classOf = ({ key, wide }) => (wide ? `${key} wide` : key);
 
-const TOLD = { best: "The best recorded fitness of each repetition so far, on average; of a study, its best experiment’s" };
+/** Return the cells of the list's head. */
+export const headCells = () => COLUMNS.map((column) =>
+  h("th", { scope: "col", class: classOf(column), title: column.title }, column.label || h("span", { class: "away" }, "Select")));
 
-/** What every row has; `title` is the link of its name, `sub` the words below. */
-function row(kind, name, page, before = null) {
-  const box = tick(`Select ${name}`, page.ticked);
-  const title = h("a", {});
-  const sub = h("span", { class: "sub" });
+/**
+ * @typedef {object} Content what a row shows besides state and progress
+ * @property {string} title
+ * @property {string} link
+ * @property {string} subtitle
+ * @property {string[]} ids of the experiments that its box ticks
+ * @property {number | null} best
+ * @property {string} unit
+ */
+
+/**
+ * Return what the rows of studies and of experiments have in common.
+ *
+ * @param {string} cssClass
+ * @param {string} name
+ * @param {List} list
+ * @param {HTMLElement | null} [toggle]
+ */
+function baseRow(cssClass, name, list, toggle = null) {
+  const box = tickBox(`Select ${name}`, list.ticked);
+  const link = h("a", {});
+  const subtitle = h("span", { class: "sub" });
   const bar = progressBar(`Progress of ${name}`);
-  const cells = Object.fromEntries(COLUMNS.map(([, key]) => [key.split(" ")[0], h("td", { class: key })]));
+  const cells = Object.fromEntries(COLUMNS.map((column) => [column.key, h("td", { class: classOf(column) })]));
   cells.ticks.append(box.element);
-  cells.name.append(h("div", { class: "named" }, before, h("span", {}, title, sub)));
+  cells.name.append(h("div", { class: "named" }, toggle, h("span", {}, link, subtitle)));
   cells.progress.append(bar.element);
-  const element = h("tr", { class: kind }, ...Object.values(cells));
-  const update = (item, { words, link, below, ids, best, unit }) => {
-    say(title, words);
-    title.href = link;
-    say(sub, below);
+  const element = h("tr", { class: cssClass }, ...Object.values(cells));
+  /** @type {(item: Api.StudyRead | Api.ExperimentRead, content: Content) => void} */
+  const update = (item, { title, link: address, subtitle: words, ids, best, unit }) => {
+    setText(link, title);
+    link.href = address;
+    setText(subtitle, words);
     box.update(ids);
     bar.update(item.progress);
-    refill(cells.stands, item.state, () => pill(item.state));
-    say(cells.left, timeLeft(item));
+    refill(cells.stands, item.state, () => stateBadge(item.state));
+    setText(cells.left, timeLeft(item));
     refill(cells.best, `${best} ${unit}`, () => (best === null ? "–" : [fixed(best), h("span", { class: "unit" }, ` ${unit}`)]));
-    say(cells.age, age(item.created_at));
+    setText(cells.age, age(item.created_at));
     cells.age.title = new Date(item.created_at).toLocaleString();
   };
   return { element, update };
 }
 
-/** A study's row: its experiments follow it while it is open. */
-export function studyRow({ value: first }, page) {
-  const toggle = h("button", { type: "button", class: "toggle", onclick: () => page.toggle(first.id) });
-  const made = row("study", first.name, page, toggle);
-  const update = ({ value: study }) => {
-    const isOpen = page.open.has(study.id);
-    toggle.setAttribute("aria-expanded", String(isOpen));
+/**
+ * Return the row of a study; its experiments follow it while it is unfolded.
+ *
+ * @param {Api.StudyRead} first the study as it is when the row is made
+ * @param {StudyList} list
+ * @returns {Page.Updatable<{ value: Api.StudyRead }>}
+ */
+export function studyRow(first, list) {
+  const toggle = h("button", { type: "button", class: "toggle", onclick: () => list.toggle(first.id) });
+  const row = baseRow("study", first.name, list, toggle);
+  const update = (/** @type {{ value: Api.StudyRead }} */ { value: study }) => {
+    toggle.setAttribute("aria-expanded", String(list.unfolded.has(study.id)));
     toggle.setAttribute("aria-label", `Experiments of ${study.name}`);
-    const found = study.experiments.map((each) => each.best_fitness).filter((each) => each !== null);
+    const fitnesses = study.experiments.map(({ best_fitness: best }) => best).filter((best) => best !== null);
     const count = study.experiments.length;
-    made.update(study, {
-      words: study.name,
+    row.update(study, {
+      title: study.name,
       link: `#/studies/${study.id}`,
-      below: `${count} ${count === 1 ? "experiment" : "experiments"}${about(study.experiments[0])}`,
-      ids: study.experiments.map((each) => each.id),
-      best: found.length ? Math.max(...found) : null,
-      unit: page.unit(study.experiments[0]),
+      subtitle: `${count} ${count === 1 ? "experiment" : "experiments"}${worlds(study.experiments[0])}`,
+      ids: study.experiments.map(({ id }) => id),
+      best: fitnesses.length ? Math.max(...fitnesses) : null,
+      unit: list.unit(study.experiments[0]),
     });
   };
-  return { element: made.element, update };
+  return { element: row.element, update };
 }
 
-/** An experiment's row. */
-export function experimentRow({ value: first, nested }, page) {
-  const made = row(nested ? "experiment nested" : "experiment", first.name, page);
-  const update = ({ value: experiment }) => made.update(experiment, {
-    words: spoken(experiment.name),
+/**
+ * Return the row of an experiment.
+ *
+ * @param {ExperimentItem} first the experiment as it is when the row is made
+ * @param {List} list
+ * @returns {Page.Updatable<ExperimentItem>}
+ */
+export function experimentRow({ value: first, isNested = false }, list) {
+  const row = baseRow(isNested ? "experiment nested" : "experiment", first.name, list);
+  const update = (/** @type {ExperimentItem} */ { value: experiment }) => row.update(experiment, {
+    title: readableName(experiment.name),
     link: `#/experiments/${experiment.id}`,
-    below: nested ? "" : `${spoken(experiment.strategy)}${about(experiment)}`,
+    subtitle: isNested ? "" : `${readableName(experiment.strategy)}${worlds(experiment)}`,
     ids: [experiment.id],
     best: experiment.best_fitness,
-    unit: page.unit(experiment),
+    unit: list.unit(experiment),
   });
-  return { element: made.element, update };
+  return { element: row.element, update };
 }
 
-/** Robot and engines, in few words. */
-function about(experiment) {
+/**
+ * Return robot and engines in a few words.
+ *
+ * @param {Api.ExperimentRead | undefined} experiment
+ */
+function worlds(experiment) {
   if (!experiment) return "";
   const { robot, engine, reality } = experiment.spec;
-  const real = reality?.engine?.name;
-  return ` · ${spoken(robot.name)} · ${engine.name}${real && real !== engine.name ? ` for ${real}` : ""}`;
+  const realEngine = reality?.engine?.name;
+  return ` · ${readableName(robot.name)} · ${engine.name}${realEngine && realEngine !== engine.name ? `, reality in ${realEngine}` : ""}`;
 }

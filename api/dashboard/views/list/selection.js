@@ -1,41 +1,56 @@
-/** The experiments that were ticked, to be compared; they stay ticked while one looks at other pages of the list. */
+// @ts-check
+/** The experiments that are ticked for a comparison; they stay ticked while the reader visits other parts of the page. */
 
 import { h } from "../../lib/dom.js";
 
-const chosen = new Set();
+/** @type {Set<string>} */
+const ticked = new Set();
 
-/** Whether it is ticked. */
-export const isChosen = (id) => chosen.has(id);
-
-/** Tick these, or not. */
-export function choose(ids, on) {
-  for (const id of ids) chosen[on ? "add" : "delete"](id);
-}
-
-/** The bar that leads to the comparison, and `update()` for when others are ticked; `changed()` is called when it unticks all. */
-export function selectionBar(changed) {
-  const words = h("span", { role: "status" });
-  const go = h("a", { class: "button" }, "Compare");
-  const clear = h("button", { type: "button", class: "quiet", onclick: () => { chosen.clear(); update(); changed(); } }, "Clear");
-  const element = h("div", { class: "selection", role: "region", "aria-label": "Selected experiments", hidden: true }, words, go, clear);
+/**
+ * Return the bar that leads to the comparison.
+ *
+ * @param {() => void} cleared called when the bar has unticked all
+ * @returns {Page.Updatable}
+ */
+export function selectionBar(cleared) {
+  const text = h("span", { role: "status" });
+  const compare = h("a", { class: "button" }, "Compare");
+  const clear = () => {
+    ticked.clear();
+    update();
+    cleared();
+  };
+  const button = h("button", { type: "button", class: "quiet", onclick: clear }, "Clear");
+  const element = h("div", { class: "selection", role: "region", "aria-label": "Selected experiments", hidden: true }, text, compare, button);
   const update = () => {
-    element.hidden = chosen.size === 0;
-    words.textContent = chosen.size ? `${chosen.size} selected` : "";
-    go.href = `#/compare?experiments=${[...chosen].join(",")}`;
+    element.hidden = ticked.size === 0;
+    text.textContent = ticked.size ? `${ticked.size} selected` : "";
+    compare.href = `#/compare?experiments=${[...ticked].join(",")}`;
   };
   update();
   return { element, update };
 }
 
-/** A tick box for these experiments: of some of them it is half ticked. */
-export function tick(label, changed) {
+/**
+ * Return a box that ticks several experiments; it is half ticked while only some of them are.
+ *
+ * @param {string} label
+ * @param {() => void} changed
+ * @returns {Page.Updatable<string[]>}
+ */
+export function tickBox(label, changed) {
+  /** @type {string[]} */
   let ids = [];
-  const box = h("input", { type: "checkbox", "aria-label": label, onchange: () => { choose(ids, box.checked); changed(); } });
-  const update = (now) => {
-    ids = now;
-    const on = ids.filter(isChosen).length;
-    box.checked = ids.length > 0 && on === ids.length;
-    box.indeterminate = on > 0 && on < ids.length;
+  const tick = () => {
+    for (const id of ids) ticked[box.checked ? "add" : "delete"](id);
+    changed();
+  };
+  const box = h("input", { type: "checkbox", "aria-label": label, onchange: tick });
+  const update = (/** @type {string[]} */ newIds) => {
+    ids = newIds;
+    const tickedCount = ids.filter((id) => ticked.has(id)).length;
+    box.checked = ids.length > 0 && tickedCount === ids.length;
+    box.indeterminate = tickedCount > 0 && tickedCount < ids.length;
   };
   return { element: box, update };
 }

@@ -1,87 +1,144 @@
-/** What the form holds, and the spec that it makes of it: only what was said, for what is left out is the service's own. */
+// @ts-check
+/** The content of the form, and the spec that it makes: what the form leaves out, the service fills in. */
 
-import { numberOf } from "../../lib/json.js";
+import { parseNumber } from "../../lib/json.js";
 
 const COUNTS = ["iterations", "repetitions", "direct_repetitions", "seed", "priority", "max_parallel"];
-const EVALUATIONS = ["controller_evaluations", "selection_evaluations", "simulator_evaluations"];
-const USUAL_TUNABLES = ["static_friction", "dynamic_friction", "restitution"];
+export const EVALUATIONS = ["controller_evaluations", "selection_evaluations", "simulator_evaluations"];
 
-/** A plug-in as the form has it, of a name or of `{ name, options }`. */
-const plugin = (given, name = "") => {
-  const ref = typeof given === "string" ? { name: given } : given ?? { name };
-  return { name: ref.name, options: { ...ref.options } };
-};
+/** @typedef {Record<string, any>} Spec */
 
-/** The form's content for a spec, with everything that the catalogue has to choose from. */
+/**
+ * Return a plug-in as the form has it.
+ *
+ * @param {Page.PluginName} [given]
+ * @returns {Page.PluginDraft}
+ */
+function pluginDraft(given = "") {
+  const { name, options } = typeof given === "string" ? { name: given, options: {} } : given;
+  return { name, options: { ...options } };
+}
+
+/**
+ * Return the form's content for a spec, with everything that the catalogue has to choose from.
+ *
+ * @param {Spec} spec
+ * @param {Api.Catalogue} catalogue
+ * @returns {Page.Draft}
+ */
 export function draftOf(spec, catalogue) {
+  const { defaults } = catalogue;
   const budget = typeof spec.budget === "string" ? { preset: spec.budget } : spec.budget ?? {};
   return {
     name: spec.name ?? "",
-    ...Object.fromEntries(COUNTS.map((each) => [each, spec[each] ?? ""])),
-    strategies: strategiesOf(spec.strategies?.map((each) => plugin(each)), catalogue),
-    robot: plugin(spec.robot, "quadruped"),
-    engine: plugin(spec.engine),
-    optimizer: plugin(spec.optimizer, "steady_state"),
-    tunables: tunablesOf((spec.tunables ?? USUAL_TUNABLES).map((each) => (typeof each === "string" ? { name: each } : each)), catalogue),
-    real: plugin(spec.reality?.engine),
-    truth: { ...spec.reality?.parameters },
+    ...Object.fromEntries(COUNTS.map((name) => [name, spec[name] ?? ""])),
+    strategies: strategyDrafts(spec.strategies ?? defaults.strategies, catalogue),
+    robot: pluginDraft(spec.robot ?? defaults.robot),
+    engine: pluginDraft(spec.engine),
+    optimizer: pluginDraft(spec.optimizer ?? defaults.optimizer),
+    tunables: tunableDrafts(spec.tunables ?? defaults.tunables, catalogue),
+    realityEngine: pluginDraft(spec.reality?.engine),
+    realityParameters: { ...spec.reality?.parameters },
     budget: {
-      preset: budget.preset ?? "paper",
-      reuse_transfer: budget.reuse_transfer ?? true,
-      ...Object.fromEntries(EVALUATIONS.map((each) => [each, budget[each] ?? ""])),
+      preset: budget.preset ?? defaults.budget.preset,
+      reuse_transfer: budget.reuse_transfer ?? defaults.budget.reuse_transfer,
+      ...Object.fromEntries(EVALUATIONS.map((name) => [name, budget[name] ?? ""])),
     },
   };
 }
 
-/** Those that were named, ticked and in their order, one that was named twice twice; then the others of the catalogue. */
-function strategiesOf(named, catalogue) {
-  const all = catalogue.strategies.map(({ name }) => ({ name, options: {} }));
-  const others = named ? all.filter(({ name }) => !named.some((each) => each.name === name)) : [];
-  return [...(named ?? all).map((each) => ({ ...each, on: true })), ...others.map((each) => ({ ...each, on: false }))];
+/**
+ * Return the named strategies, ticked and in their order, then the others of the catalogue.
+ *
+ * @param {Page.PluginName[]} given a strategy may be there several times
+ * @param {Api.Catalogue} catalogue
+ * @returns {Page.PluginDraft[]}
+ */
+function strategyDrafts(given, catalogue) {
+  const named = given.map((plugin) => ({ ...pluginDraft(plugin), on: true }));
+  const others = catalogue.strategies.filter(({ name }) => !named.some((plugin) => plugin.name === name));
+  return [...named, ...others.map(({ name }) => ({ name, options: {}, on: false }))];
 }
 
-function tunablesOf(named, catalogue) {
+/**
+ * @param {(string | { name: string, lower?: number, upper?: number })[]} given
+ * @param {Api.Catalogue} catalogue
+ * @returns {Page.TunableDraft[]}
+ */
+function tunableDrafts(given, catalogue) {
+  const named = given.map((tunable) => (typeof tunable === "string" ? { name: tunable } : tunable));
   return catalogue.tunables.map(({ name }) => {
-    const found = named.find((each) => each.name === name);
-    return { name, on: Boolean(found), lower: found?.lower ?? "", upper: found?.upper ?? "" };
+    const tunable = named.find((other) => other.name === name);
+    return { name, on: Boolean(tunable), lower: tunable?.lower ?? "", upper: tunable?.upper ?? "" };
   });
 }
 
-/** The strategies and tunables that are ticked, in their order in the spec. */
-export const ticked = (list) => list.filter((each) => each.on);
+/**
+ * Return the strategies or tunables that are ticked, in their order in the spec.
+ *
+ * @template {{ on?: boolean }} Ticked
+ * @param {Ticked[]} list
+ */
+export const ticked = (list) => list.filter(({ on }) => on);
 
-/** The spec of the form. */
+/**
+ * Return the spec of a form.
+ *
+ * @param {Page.Draft} draft
+ * @returns {Spec}
+ */
 export function specOf(draft) {
-  return without({
+  const { strategies, robot, engine, optimizer, tunables, realityEngine, realityParameters, budget } = draft;
+  return withoutEmpty({
     name: draft.name.trim(),
-    strategies: ticked(draft.strategies).map(named),
-    robot: named(draft.robot),
-    engine: draft.engine.name ? named(draft.engine) : "",
-    optimizer: named(draft.optimizer),
-    tunables: ticked(draft.tunables).map(({ name, lower, upper }) => brief({ name, ...without({ lower: given(lower), upper: given(upper) }) })),
-    reality: without({ engine: draft.real.name ? named(draft.real) : "", parameters: without(mapped(draft.truth, given)) }),
-    budget: budgetOf(draft.budget),
-    ...mapped(Object.fromEntries(COUNTS.map((each) => [each, draft[each]])), given),
+    strategies: ticked(strategies).map(pluginName),
+    robot: pluginName(robot),
+    engine: engine.name ? pluginName(engine) : "",
+    optimizer: pluginName(optimizer),
+    tunables: ticked(tunables).map(({ name, lower, upper }) => shortest({ name, ...withoutEmpty(typedValues({ lower, upper })) })),
+    reality: withoutEmpty({ engine: realityEngine.name ? pluginName(realityEngine) : "", parameters: withoutEmpty(typedValues(realityParameters)) }),
+    budget: budgetOf(budget),
+    ...typedValues(Object.fromEntries(COUNTS.map((name) => [name, draft[name]]))),
   }, ["strategies", "tunables"]);
 }
 
-function budgetOf({ preset, reuse_transfer: reuse, ...evaluations }) {
-  const said = without({ ...mapped(evaluations, given), ...(reuse ? {} : { reuse_transfer: false }) });
-  return Object.keys(said).length ? { preset, ...said } : preset;
+/** @param {Page.Draft["budget"]} budget */
+function budgetOf({ preset, reuse_transfer: isReused, ...evaluations }) {
+  const changes = withoutEmpty({ ...typedValues(evaluations), ...(isReused ? {} : { reuse_transfer: false }) });
+  return Object.keys(changes).length ? { preset, ...changes } : preset;
 }
 
-const named = ({ name, options }) => brief({ name, ...without({ options: without(mapped(options, given)) }) });
-const brief = (ref) => (Object.keys(ref).length === 1 ? ref.name : ref);
-const mapped = (object, way) => Object.fromEntries(Object.entries(object).map(([key, value]) => [key, way(value)]));
+/** @param {Page.PluginDraft} plugin */
+const pluginName = ({ name, options }) => shortest({ name, ...withoutEmpty({ options: withoutEmpty(typedValues(options)) }) });
 
-/** A number where one was typed; else what was typed, which the service says something about. */
-function given(value) {
-  if (typeof value !== "string" || !value.trim()) return typeof value === "string" ? "" : value;
-  return numberOf(value.trim().replace("−", "-")) ?? value.trim();
+/** @param {Spec} plugin a bare name stands for a plug-in that has nothing but its name */
+const shortest = (plugin) => (Object.keys(plugin).length === 1 ? plugin.name : plugin);
+
+/** @param {Spec} values */
+const typedValues = (values) => Object.fromEntries(Object.entries(values).map(([name, value]) => [name, typedValue(value)]));
+
+/**
+ * Return the number that was typed, or else the text, which the service then refuses with a reason.
+ *
+ * @param {unknown} value
+ */
+function typedValue(value) {
+  if (typeof value !== "string") return value;
+  const text = value.trim();
+  return text && (parseNumber(text.replace("−", "-")) ?? text);
 }
 
-/** The object without what says nothing. */
-function without(object, kept = []) {
-  const isEmpty = (value) => value === "" || value === null || value === undefined || (typeof value === "object" && !Object.keys(value).length);
-  return Object.fromEntries(Object.entries(object).filter(([key, value]) => kept.includes(key) || !isEmpty(value)));
+/**
+ * Return an object without empty values, except those whose names are kept.
+ *
+ * @param {Spec} values
+ * @param {string[]} [kept]
+ * @returns {Spec}
+ */
+function withoutEmpty(values, kept = []) {
+  return Object.fromEntries(Object.entries(values).filter(([name, value]) => kept.includes(name) || !isEmpty(value)));
 }
+
+/** @param {unknown} value */
+const isEmpty = (value) =>
+  value === "" || value === null || value === undefined || (typeof value === "object" && !Object.keys(value).length);

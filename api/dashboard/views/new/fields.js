@@ -1,87 +1,147 @@
-/** Fields of the form: each with its label, what it means, and room for what the service finds wrong with it. */
+// @ts-check
+/** Fields of the form: each with its label, its meaning, and room for the service's errors. */
 
-import { h } from "../../lib/dom.js";
-import { spoken } from "../../lib/format.js";
+import { h, setText } from "../../lib/dom.js";
+import { readableName } from "../../lib/format.js";
 
-let made = 0;
+/** @typedef {() => string | null} Pointer where a value stands in the spec now; null if it is not in it */
+/** @typedef {{ pointer: Pointer, element: Element, room: HTMLElement }} Place */
+/** @typedef {{ pointer: string, message: string }} FieldError */
+/** @typedef {[value: string, label: string, disabled?: boolean][]} Choices */
 
-/** All places of a form that an error can stand at; `pointer()` of each says where its value is in the spec now. */
-export class Places {
+let rooms = 0;
+
+/** The places of a form at which an error can stand. */
+export class ErrorPlaces {
   constructor() {
-    this.all = [];
+    /** @type {Place[]} */
+    this.places = [];
   }
 
-  /** Let `element` be the place of what is at the pointer; `trouble` shows what is wrong there. */
-  add(pointer, element, trouble) {
-    this.all.push({ pointer, element, trouble });
+  /**
+   * Let errors of the value at a pointer mark an element and be shown in a room.
+   *
+   * @param {Pointer} pointer
+   * @param {Element} element
+   * @param {HTMLElement} room
+   */
+  add(pointer, element, room) {
+    this.places.push({ pointer, element, room });
   }
 
-  /** Show the errors beside their fields; returns those that have none. */
+  /**
+   * Show errors at their nearest places, and return those that have none.
+   *
+   * @param {FieldError[]} errors
+   */
   show(errors) {
-    const here = this.all.filter(({ element }) => element.isConnected);
-    this.all = here;
-    const found = new Map(here.map((each) => [each, []]));
-    const others = errors.filter((error) => {
-      const near = here.map((each) => [each, each.pointer()]).filter(([, pointer]) => within(error.pointer, pointer));
-      near.sort(([, one], [, other]) => other.length - one.length);
-      if (near.length) found.get(near[0][0]).push(error.message);
-      return !near.length;
-    });
-    for (const [{ element, trouble }, messages] of found) {
-      const words = messages.join(" ");
-      if (trouble.textContent !== words) trouble.textContent = words;
-      if (words) element.setAttribute("aria-invalid", "true");
+    this.places = this.places.filter(({ element }) => element.isConnected);
+    const pointers = this.places.map(({ pointer }) => pointer());
+    const nearest = errors.map((error) => nearestPlace(error.pointer, pointers));
+    this.places.forEach(({ element, room }, index) => {
+      const messages = errors.filter((_, error) => nearest[error] === index).map(({ message }) => message);
+      setText(room, messages.join(" "));
+      if (messages.length) element.setAttribute("aria-invalid", "true");
       else element.removeAttribute("aria-invalid");
-    }
-    return others;
+    });
+    return errors.filter((_, error) => nearest[error] === -1);
   }
 }
 
-const within = (pointer, place) => place !== null && (pointer === place || pointer.startsWith(`${place}/`));
-
-/** Room for an error, and the id that a field refers to it by. */
-export function troubleRoom() {
-  return h("span", { class: "trouble", id: `trouble-${++made}`, "aria-live": "polite" });
+/**
+ * Return the index of the longest place that contains a pointer, or -1.
+ *
+ * @param {string} pointer
+ * @param {(string | null)[]} places
+ */
+export function nearestPlace(pointer, places) {
+  let nearest = -1;
+  places.forEach((place, index) => {
+    if (place === null || (pointer !== place && !pointer.startsWith(`${place}/`))) return;
+    if (nearest === -1 || place.length > (places[nearest] ?? "").length) nearest = index;
+  });
+  return nearest;
 }
 
-/** A field: `{ label, hint, value, set, pointer, places, choices, ...attributes }`; with choices it is a list to choose from. */
+/** Return room for an error, whose id a field can refer to. */
+export function errorRoom() {
+  return h("span", { class: "trouble", id: `trouble-${++rooms}`, "aria-live": "polite" });
+}
+
+/**
+ * @typedef {object} FieldOptions
+ * @property {string} label
+ * @property {string} [hint]
+ * @property {any} value
+ * @property {(value: string) => void} set
+ * @property {Pointer | string} pointer
+ * @property {ErrorPlaces} places
+ * @property {Choices | null} [choices] makes the field a list to choose from
+ */
+
+/**
+ * Return a field; other options are attributes of its input.
+ *
+ * @param {FieldOptions & Page.Attributes} options
+ */
 export function field({ label, hint = "", value, set, pointer, places, choices = null, ...attributes }) {
-  const trouble = troubleRoom();
-  const id = `field-${made}`;
-  const common = { id, "aria-describedby": `${trouble.id}${hint ? ` ${id}-hint` : ""}`, ...attributes };
-  const input = choices
-    ? h("select", { ...common, onchange: () => set(input.value) }, ...choices.map(([name, words, off]) => h("option", { value: name, disabled: off }, words)))
-    : h("input", { autocomplete: "off", ...common, oninput: () => set(input.value) });
-  input.value = value ?? "";
-  places.add(typeof pointer === "function" ? pointer : () => pointer, input, trouble);
+  const room = errorRoom();
+  const id = `field-${rooms}`;
+  const common = { id, "aria-describedby": `${room.id}${hint ? ` ${id}-hint` : ""}`, ...attributes };
+  const options = choices?.map(([name, words, disabled]) => h("option", { value: name, disabled }, words));
+  const input = options
+    ? h("select", { ...common, onchange: () => { set(input.value); } }, ...options)
+    : h("input", { autocomplete: "off", ...common, oninput: () => { set(input.value); } });
+  input.value = String(value ?? "");
+  places.add(typeof pointer === "function" ? pointer : () => pointer, input, room);
   return h("p", { class: "field" }, h("label", { for: id }, label), input,
-    hint ? h("small", { id: `${id}-hint` }, hint) : null, trouble);
+    hint ? h("small", { id: `${id}-hint` }, hint) : null, room);
 }
 
-/** A number; it is a text field, so that what is no number can be said to be none. */
+/**
+ * Return a field for a number. It takes any text, so that the service can say what is wrong with it.
+ *
+ * @param {FieldOptions & Page.Attributes} options
+ */
 export const numberField = (options) => field({ inputmode: "decimal", ...options });
 
-/** A box to tick, with its words. */
-export function tickField(words, on, set, attributes = {}) {
-  const box = h("input", { type: "checkbox", onchange: () => set(box.checked), ...attributes });
-  box.checked = on;
-  return h("label", { class: "tick" }, box, h("span", {}, words));
+/**
+ * Return a box to tick, with its label.
+ *
+ * @param {Page.Child} label
+ * @param {boolean} isOn
+ * @param {(isOn: boolean) => void} set
+ */
+export function tickField(label, isOn, set) {
+  const box = h("input", { type: "checkbox", onchange: () => { set(box.checked); } });
+  box.checked = isOn;
+  return { box, element: h("label", { class: "tick" }, box, h("span", {}, label)) };
 }
 
-/** A field for each option of a plug-in, from their JSON Schema; `pointer()` is that of the plug-in. */
+/**
+ * Return fields for the options of a plug-in, made from their JSON Schema; null if it has none.
+ *
+ * @param {Api.PluginRead | undefined} plugin
+ * @param {Record<string, any>} options
+ * @param {Pointer} pointer of the plug-in
+ * @param {{ places: ErrorPlaces, changed: () => void }} form
+ */
 export function optionFields(plugin, options, pointer, { places, changed }) {
-  const fields = Object.entries(plugin?.options.properties ?? {}).map(([name, schema]) => {
-    const usual = schema.default === null || schema.default === undefined ? "" : String(schema.default);
-    const set = (value) => {
+  const schemas = /** @type {Record<string, any>} */ (plugin?.options.properties ?? {});
+  const fields = Object.entries(schemas).map(([name, schema]) => {
+    const set = (/** @type {unknown} */ value) => {
       options[name] = value;
       changed();
     };
-    if (schema.type === "boolean") return h("p", { class: "field" }, tickField(`${spoken(name)}: ${schema.description}`, options[name] ?? schema.default, set));
-    const hint = schema.description ?? "";
-    const choices = schema.enum ? [["", `${spoken(usual)}, as usual`], ...schema.enum.map((each) => [each, spoken(each)])] : null;
+    const label = readableName(name);
+    if (schema.type === "boolean") return h("p", { class: "field" }, tickField(`${label}: ${schema.description}`, options[name] ?? schema.default, set).element);
+    const usual = String(schema.default ?? "");
+    const values = /** @type {string[] | undefined} */ (schema.enum);
+    /** @type {Choices | null} */
+    const choices = values ? [["", `${readableName(usual)}, the default`], ...values.map((value) => /** @type {[string, string]} */ ([value, readableName(value)]))] : null;
     const attributes = choices ? {} : { placeholder: usual, inputmode: "decimal" };
-    const at = () => (pointer() === null ? null : `${pointer()}/options/${name}`);
-    return field({ label: spoken(name), hint, value: options[name], set, places, choices, pointer: at, ...attributes });
+    const optionPointer = () => (pointer() === null ? null : `${pointer()}/options/${name}`);
+    return field({ label, hint: schema.description, value: options[name], set, places, choices, pointer: optionPointer, ...attributes });
   });
   return fields.length ? h("div", { class: "fields" }, ...fields) : null;
 }

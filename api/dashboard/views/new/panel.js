@@ -1,63 +1,95 @@
-/** What the study would cost, the button, and the spec in every form to copy. */
+// @ts-check
+/** The panel beside the form: what the study costs, the button, and the spec to copy in every form. */
 
 import { copyButton } from "../../lib/copy.js";
 import { h } from "../../lib/dom.js";
-import { count, duration, spoken } from "../../lib/format.js";
-import { written } from "../../lib/json.js";
-import { framed } from "../../lib/table.js";
+import { count, duration, readableName } from "../../lib/format.js";
+import { stringify } from "../../lib/json.js";
+import { framed, table } from "../../lib/table.js";
 import { tabs } from "../../lib/tabs.js";
 
-const quoted = (text) => `'${text.replaceAll("'", "'\\''")}'`;
+const SUBMIT = "Submit the study";
+const NO_WORKERS = "No worker is running now. The study will wait until one does (gaplab serve, or python -m workers).";
 
-/** The panel's element, and what the form tells it. */
+/** Return the panel's element, and the functions by which the form fills it. */
 export function panel() {
   const cost = h("div", { class: "cost", role: "status" }, "Checking…");
-  const trouble = h("div", { class: "failed", role: "alert" });
-  const button = h("button", { type: "submit", class: "submit" }, "Submit the study");
+  const errorList = h("div", { class: "failed", role: "alert" });
+  const button = h("button", { type: "submit", class: "submit" }, SUBMIT);
   const code = { json: h("code"), curl: h("code"), python: h("code") };
-  const text = (name) => h("div", {}, copyButton("Copy", () => code[name].textContent), framed(`The spec as ${name}`, h("pre", {}, code[name])));
-  const forms = tabs("The spec", [["json", "JSON", text("json")], ["curl", "curl", text("curl")], ["python", "Python", text("python")]], "json", () => {});
-  const element = h("aside", { class: "panel card", "aria-label": "Cost and spec" }, h("h2", {}, "What it costs"), cost, trouble, button, forms);
-  const show = (spec) => {
-    const base = new URL(".", location.href).href;
-    const json = written(spec, 2);
-    code.json.textContent = json;
-    code.curl.textContent = `curl -X POST ${base}studies \\\n  -H 'Content-Type: application/json' \\\n  -d ${quoted(written(spec))}`;
-    code.python.textContent = [
-      "import json", "", "from gaplab import Client", "", `spec = json.loads(${pythonText(json)})`,
-      `with Client("${base.replace(/\/$/, "")}") as gaplab:`, "    study = gaplab.submit(spec)",
-    ].join("\n");
+  const snippet = (/** @type {keyof typeof code} */ name) =>
+    h("div", {}, copyButton("Copy", () => code[name].textContent), framed(`The spec as ${name}`, h("pre", {}, code[name])));
+  const forms = tabs("The spec", [
+    ["json", "JSON", snippet("json")], ["curl", "curl", snippet("curl")], ["python", "Python", snippet("python")]], "json", () => {});
+  const element = h("aside", { class: "panel card", "aria-label": "Cost and spec" }, h("h2", {}, "What it costs"), cost, errorList, button, forms);
+  return {
+    element,
+    /** @param {Record<string, any>} spec */
+    showSpec(spec) {
+      const base = new URL(".", location.href).href;
+      const json = stringify(spec, 2);
+      code.json.textContent = json;
+      code.curl.textContent = curlLines(base, stringify(spec));
+      code.python.textContent = pythonLines(base, json);
+    },
+    /** @param {Api.EstimateRead} estimate */
+    showCost: (estimate) => cost.replaceChildren(...costBlocks(estimate)),
+    /**
+     * Show errors that have no place in the form, and words instead of the cost.
+     *
+     * @param {{ pointer: string, message: string }[]} errors
+     * @param {string | null} [words]
+     */
+    showErrors(errors, words = null) {
+      errorList.replaceChildren(...errors.map(({ pointer, message }) => h("p", {}, h("code", {}, pointer || "spec"), ` ${message}`)));
+      if (words) cost.replaceChildren(h("p", {}, words));
+    },
+    /** @param {boolean} isBusy */
+    setBusy(isBusy) {
+      button.disabled = isBusy;
+      button.textContent = isBusy ? "Submitting…" : SUBMIT;
+    },
   };
-  const estimate = (found) => cost.replaceChildren(...costs(found));
-  const refuse = (errors, words) => {
-    trouble.replaceChildren(...errors.map((each) => h("p", {}, h("code", {}, each.pointer || "spec"), ` ${each.message}`)));
-    if (words) cost.replaceChildren(h("p", {}, words));
-  };
-  const busy = (is) => {
-    button.disabled = is;
-    button.textContent = is ? "Submitting…" : "Submit the study";
-  };
-  return { element, show, estimate, refuse, busy };
 }
 
-/** A raw text of Python, which JSON fits into unless it has three quotes in a row. */
-const pythonText = (json) => (json.includes("'''") ? JSON.stringify(json) : `r'''${json}'''`);
+/**
+ * Return the submission as a line for a shell.
+ *
+ * @param {string} base
+ * @param {string} json
+ */
+export const curlLines = (base, json) =>
+  `curl -X POST ${base}studies \\\n  -H 'Content-Type: application/json' \\\n  -d '${json.replaceAll("'", "'\\''")}'`;
 
-function costs({ rollouts, seconds, cores, core_seconds: coreSeconds, engines, experiments, supervisors }) {
-  const big = h("p", { class: "big" }, h("strong", {}, duration(seconds)), ` on ${count(cores)} ${cores === 1 ? "core" : "cores"}`);
-  const work = h("p", {}, `${count(rollouts)} rollouts at most, ${duration(coreSeconds)} of one core, if nothing else is waiting.`);
+/**
+ * Return the submission as a program. A raw text of Python holds any JSON without three quotes in a row.
+ *
+ * @param {string} base
+ * @param {string} json
+ */
+export function pythonLines(base, json) {
+  const text = json.includes("'''") ? JSON.stringify(json) : `r'''${json}'''`;
+  return [
+    "import json", "", "from gaplab import Client", "", `spec = json.loads(${text})`,
+    `with Client("${base.replace(/\/$/, "")}") as gaplab:`, "    study = gaplab.submit(spec)",
+  ].join("\n");
+}
+
+/** @param {Api.EstimateRead} estimate */
+function costBlocks({ rollouts, seconds, cores, core_seconds: coreSeconds, engines, experiments, supervisors }) {
+  const time = h("p", { class: "big" }, h("strong", {}, duration(seconds)), ` on ${count(cores)} ${cores === 1 ? "core" : "cores"}`);
+  const work = h("p", {}, `${count(rollouts)} rollouts at most: ${duration(coreSeconds)} of one core, if nothing else is waiting.`);
   const paces = engines.map(({ engine, seconds_per_rollout: pace, measured }) =>
-    h("p", { class: "note" }, `${spoken(engine)}: ${milliseconds(pace)} a rollout, ${measured ? "as measured here" : "as usual; not measured here yet"}.`));
-  const idle = supervisors ? null : h("p", { class: "remark" }, "No worker is running now: it will wait until one does (gaplab serve, or python -m workers).");
-  const rows = experiments.map((each) => h("tr", {}, h("th", { scope: "row" }, spoken(each.name)),
-    h("td", {}, `${count(each.repetitions)} ×`), h("td", {}, count(each.rollouts)), h("td", {}, duration(each.core_seconds))));
-  const heads = ["Experiment", "Repetitions", "Rollouts", "One core"].map((each) => h("th", { scope: "col" }, each));
-  const table = h("table", {}, h("caption", { class: "away" }, "Cost of each experiment"),
-    h("thead", {}, h("tr", {}, ...heads)), h("tbody", {}, ...rows));
-  return [big, work, idle, ...paces, h("details", {}, h("summary", {}, "By experiment"), framed("Cost of each experiment", table))].filter(Boolean);
+    h("p", { class: "note" }, `${readableName(engine)}: ${milliseconds(pace)} a rollout, ${measured ? "measured here" : "the usual time; not measured here yet"}.`));
+  const waiting = supervisors ? [] : [h("p", { class: "remark" }, NO_WORKERS)];
+  const rows = experiments.map((experiment) => [readableName(experiment.name),
+    `${count(experiment.repetitions)} ×`, count(experiment.rollouts), duration(experiment.core_seconds)]);
+  const costs = table("Cost of each experiment", ["Experiment", "Repetitions", "Rollouts", "One core"], rows);
+  return [time, work, ...waiting, ...paces, h("details", {}, h("summary", {}, "By experiment"), costs)];
 }
 
+/** @param {number} seconds */
 function milliseconds(seconds) {
-  const found = seconds * 1000;
-  return `${found < 10 ? found.toPrecision(2) : Math.round(found)} ms`;
+  const value = seconds * 1000;
+  return `${value < 10 ? value.toPrecision(2) : Math.round(value)} ms`;
 }

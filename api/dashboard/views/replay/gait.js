@@ -1,34 +1,44 @@
-/** The gait: footfalls, height and speed over time, under a cursor that goes with the replay. */
+// @ts-check
+/** The gait: footfalls, height and speed over time, under a cursor that moves with the replay. */
 
 import { h } from "../../lib/dom.js";
-import { figureFiles } from "../../lib/downloads.js";
+import { figureDownloads } from "../../lib/downloads.js";
 import { plot } from "../../lib/plot.js";
 
-/** The figure as `element`, whose `cursor(time)` is where the replay is; a click goes `to` a time. */
-export function gait(asked, replay, to, signal) {
-  const line = h("div", { class: "cursor", "aria-hidden": "true", hidden: true });
+/**
+ * Return the figure, and `moveCursor(time)`; a click on the figure calls `goTo` with its time.
+ *
+ * @param {Page.ReplayChoice} choice
+ * @param {(time: number) => void} goTo
+ * @param {AbortSignal} signal
+ */
+export function gait(choice, goTo, signal) {
+  const cursor = h("div", { class: "cursor", "aria-hidden": "true", hidden: true });
   const place = h("div");
-  const framed = h("div", { class: "gait" }, place, line);
-  let now = 0;
-  const layout = () => place.querySelector(".js-plotly-plot")?._fullLayout;
+  const frame = h("div", { class: "gait" }, place, cursor);
+  let lastTime = 0;
+  const canvas = () => /** @type {HTMLElement} */ (place.querySelector(".plot"));
+  /** Plotly's layout, whose axis knows where a time is; it has no public name. */
+  const layout = () => /** @type {any} */ (place.querySelector(".js-plotly-plot"))?._fullLayout;
 
-  function cursor(time) {
-    now = time;
-    const { xaxis: x, _size: size } = layout() ?? {};
-    const drawn = place.querySelector(".plot");
-    line.hidden = !x?._length;
-    if (line.hidden) return;
-    const [frame, canvas] = [framed.getBoundingClientRect(), drawn.getBoundingClientRect()];
-    line.style.left = `${canvas.left - frame.left + x._offset + x.l2p(time)}px`;
-    line.style.top = `${canvas.top - frame.top + size.t}px`;
-    line.style.height = `${size.h}px`;
+  /** @param {number} time */
+  function moveCursor(time) {
+    lastTime = time;
+    const { xaxis: axis, _size: size } = layout() ?? {};
+    cursor.hidden = !axis?._length;
+    if (cursor.hidden) return;
+    const [outer, inner] = [frame.getBoundingClientRect(), canvas().getBoundingClientRect()];
+    cursor.style.left = `${inner.left - outer.left + axis._offset + axis.l2p(time)}px`;
+    cursor.style.top = `${inner.top - outer.top + size.t}px`;
+    cursor.style.height = `${size.h}px`;
   }
 
   place.addEventListener("click", (event) => {
-    const x = layout()?.xaxis;
-    if (x?._length) to(x.p2l(event.clientX - place.querySelector(".plot").getBoundingClientRect().left - x._offset));
+    const axis = layout()?.xaxis;
+    if (axis?._length) goTo(axis.p2l(event.clientX - canvas().getBoundingClientRect().left - axis._offset));
   });
-  place.addEventListener("painted", () => cursor(now));
-  plot(place, "gait", asked, signal);
-  return { element: h("section", { class: "card" }, h("h2", {}, "Gait"), framed, figureFiles("gait", asked, `gaplab-${asked.experiment}-gait`)), cursor };
+  place.addEventListener("drawn", () => moveCursor(lastTime));
+  plot(place, "gait", signal)(choice);
+  const downloads = figureDownloads("gait", choice, `gaplab-${choice.experiment}-gait`);
+  return { element: h("section", { class: "card" }, h("h2", {}, "Gait"), frame, downloads), moveCursor };
 }

@@ -1,56 +1,78 @@
+// @ts-check
 /** The two worlds of a replay side by side, seen by one camera. */
 
 import { h } from "../../lib/dom.js";
 import { number } from "../../lib/format.js";
+import { empty } from "../../lib/placeholders.js";
 import { camera } from "../../lib/replay/camera.js";
-import { between } from "../../lib/replay/motion.js";
+import { frameAt } from "../../lib/replay/motion.js";
 import { stage } from "../../lib/replay/stage.js";
-import { empty } from "../../lib/states.js";
 
-const SMOOTH = 12;  // frames to each side over which the camera's way is levelled
+const SMOOTHING = 12;  // frames to each side over which the camera's path is averaged
+const TARGET_HEIGHT_M = 0.12;
 
-/** Both stages in one `element`, and `draw(time)` for both. */
+/**
+ * Return both stages in one element, and `draw(time)` for both.
+ *
+ * @param {Api.Replay} replay
+ * @param {AbortSignal} signal
+ */
 export function worlds(replay, signal) {
-  const moving = [replay.simulation, replay.reality].filter((each) => each?.positions_m.length);
-  const paths = moving.map((world) => level(world.positions_m));
-  const looked = (time) => middle(paths, replay.times_s, time);
+  const moving = [replay.simulation, replay.reality].filter((world) => world !== null && world.positions_m.length > 0);
+  const paths = moving.map((world) => smoothed(/** @type {Api.ReplayWorld} */ (world).positions_m));
+  /** @type {ReturnType<typeof stage>[]} */
   const stages = [];
-  const draw = (time) => stages.forEach((each) => each.draw(time));
-  const shared = { camera: camera(() => stages.forEach((each) => each.draw())), looked, signal };
-  const place = (world, title, absent) => {
-    if (!world) return panel(title, null, empty(absent));
-    if (!world.positions_m.length) return panel(title, world, empty("The physics failed: there is nothing to be seen."));
-    const made = stage(world, replay.times_s, `${title}: ${words(world, replay.unit)}`, shared);
+  const draw = (/** @type {number | undefined} */ time = undefined) => stages.forEach((each) => each.draw(time));
+  const shared = { camera: camera(() => draw()), lookAt: (/** @type {number} */ time) => between(paths, replay.times_s, time), signal };
+  /** @type {(world: Api.ReplayWorld | null, title: string, absent: string) => HTMLElement} */
+  const worldPanel = (world, title, absent) => {
+    if (!world) return panel(title, "", empty(absent));
+    const summary = `${world.fitness === null ? "no fitness" : `${number(world.fitness)} ${replay.unit}`}, ${world.engine}`;
+    if (!world.positions_m.length) return panel(title, summary, empty("The physics failed, so there is nothing to see."));
+    const made = stage(world, replay.times_s, `${title}: ${summary}`, shared);
     stages.push(made);
-    return panel(title, world, made.canvas, replay.unit);
+    return panel(title, summary, made.canvas);
   };
-  const tuned = replay.simulator === null ? "In its simulator" : `In the simulator of iteration ${replay.simulator}`;
+  const simulated = replay.simulator === null ? "In its simulator" : `In the simulator of iteration ${replay.simulator}`;
   const element = h("div", { class: "worlds" },
-    place(replay.simulation, tuned, "This controller evolved in reality itself."),
-    place(replay.reality, "In reality", "Reality's parameters are not in the archive that this experiment came from."));
+    worldPanel(replay.simulation, simulated, "This controller evolved in reality itself."),
+    worldPanel(replay.reality, "In reality", "The archive of this experiment does not contain reality's parameters."));
   return { element, draw };
 }
 
-function panel(title, world, content, unit = "") {
-  return h("section", { class: "world" },
-    h("h2", {}, title, world ? h("span", { class: "note" }, ` ${words(world, unit)}`) : null), content);
+/**
+ * @param {string} title
+ * @param {string} summary
+ * @param {HTMLElement} content
+ */
+function panel(title, summary, content) {
+  return h("section", { class: "world" }, h("h2", {}, title, summary ? h("span", { class: "note" }, ` ${summary}`) : null), content);
 }
 
-const words = ({ engine, fitness }, unit) => `${fitness === null ? "no fitness" : `${number(fitness)} ${unit}`}, ${engine}`;
-
-/** The way of a base over the ground, without its sway. */
-function level(positions) {
+/**
+ * Return the path of a base over the ground without its sway.
+ *
+ * @param {number[][]} positions
+ * @returns {Page.Vector[]}
+ */
+export function smoothed(positions) {
   return positions.map((_, frame) => {
-    const around = positions.slice(Math.max(0, frame - SMOOTH), frame + SMOOTH + 1);
-    return [0, 1].map((k) => around.reduce((sum, each) => sum + each[k], 0) / around.length);
+    const around = positions.slice(Math.max(0, frame - SMOOTHING), frame + SMOOTHING + 1);
+    return [0, 1].map((k) => around.reduce((sum, position) => sum + position[k], 0) / around.length);
   });
 }
 
-/** The point between the bases, and how much farther away the camera must be to see all of them. */
-function middle(paths, timesS, time) {
-  const [frame, share] = between(timesS, time);
-  const at = paths.map((path) => [0, 1].map((k) => path[frame][k] * (1 - share) + (path[frame + 1] ?? path[frame])[k] * share));
-  const [x, y] = [0, 1].map((k) => at.reduce((sum, each) => sum + each[k], 0) / (at.length || 1));
-  const apart = Math.max(0, ...at.map((each) => Math.hypot(each[0] - x, each[1] - y)));
-  return { target: [x, y, 0.12], further: 2.2 * apart };
+/**
+ * Return the point between the bases, and how much farther away the camera must be to see them all.
+ *
+ * @param {Page.Vector[][]} paths
+ * @param {number[]} timesS
+ * @param {number} time
+ */
+function between(paths, timesS, time) {
+  const [frame, share] = frameAt(timesS, time);
+  const bases = paths.map((path) => [0, 1].map((k) => path[frame][k] * (1 - share) + (path[frame + 1] ?? path[frame])[k] * share));
+  const [x, y] = [0, 1].map((k) => bases.reduce((sum, base) => sum + base[k], 0) / (bases.length || 1));
+  const apart = Math.max(0, ...bases.map((base) => Math.hypot(base[0] - x, base[1] - y)));
+  return { target: [x, y, TARGET_HEIGHT_M], further: 2.2 * apart };
 }

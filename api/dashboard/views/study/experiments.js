@@ -1,18 +1,31 @@
-/** The experiments of a study, as rows of the same list as on the first page. */
+// @ts-check
+/** The experiments of a study, in rows like those of the list. */
 
 import { h } from "../../lib/dom.js";
-import { rows } from "../../lib/rows.js";
-import { experimentRow, heads } from "../list/rows.js";
+import { keyedRows } from "../../lib/keyed_rows.js";
+import { experimentRow, headCells } from "../list/rows.js";
 import { selectionBar } from "../list/selection.js";
 
-/** The table, and `update()` for when `page.study` is another. */
+/** @typedef {import("../list/rows.js").ExperimentItem} ExperimentItem */
+
+/**
+ * Return the table of the experiments.
+ *
+ * @param {Page.StudyPage} page
+ * @returns {Page.Updatable}
+ */
 export function experiments(page) {
   const body = h("tbody");
   const bar = selectionBar(() => update());
-  const list = { unit: page.unit, ticked: () => { bar.update(); update(); } };
-  const fill = rows(body, (each) => each.value.id, (each) => experimentRow(each, list));
-  const update = () => fill(page.study.experiments.map((value) => ({ value, nested: true })));
-  const table = h("table", { class: "list flat" }, h("caption", { class: "away" }, "Experiments"), h("thead", {}, h("tr", {}, ...heads())), body);
+  const ticked = () => {
+    bar.update();
+    update();
+  };
+  const makeRow = (/** @type {ExperimentItem} */ item) => experimentRow(item, { unit: page.unit, ticked });
+  const fill = keyedRows(body, (/** @type {ExperimentItem} */ { value }) => value.id, makeRow);
+  const update = () => fill(page.study.experiments.map((value) => ({ value, isNested: true })));
+  const table = h("table", { class: "list flat" }, h("caption", { class: "away" }, "Experiments"), h("thead", {}, h("tr", {}, ...headCells())), body);
   update();
-  return { element: h("section", { "aria-labelledby": "experiments-of" }, h("h2", { id: "experiments-of" }, "Experiments"), bar.element, table), update };
+  const title = h("h2", { id: "experiments-title" }, "Experiments");
+  return { element: h("section", { "aria-labelledby": "experiments-title" }, title, bar.element, table), update };
 }

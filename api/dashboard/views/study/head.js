@@ -1,15 +1,23 @@
-/** The head of a study: its name and notes, how far it is, and what may be asked of it. */
+// @ts-check
+/** The head of a study: its name and notes, its progress, and the actions on it. */
 
-import { h, refill } from "../../lib/dom.js";
-import { download } from "../../lib/downloads.js";
-import { edit } from "../../lib/editing.js";
-import { age, count, duration, fixed, spoken } from "../../lib/format.js";
-import { pill } from "../../lib/pill.js";
-import { progressBar } from "../../lib/progress.js";
-import { say } from "../../lib/rows.js";
-import { verbs } from "./verbs.js";
+import { h, refill, setText } from "../../lib/dom.js";
+import { downloadLink } from "../../lib/downloads.js";
+import { editNameAndNotes } from "../../lib/edit_dialog.js";
+import { age, count, fixed, readableName } from "../../lib/format.js";
+import { factItems, remarkBlocks } from "../../lib/head_parts.js";
+import { progressBar, repetitionsDone, timeLeftFact } from "../../lib/progress.js";
+import { stateBadge } from "../../lib/state_badge.js";
+import { actions } from "./actions.js";
 
-/** The head's element, and `update()` for when `page.study` is another. */
+/** @typedef {import("../../lib/head_parts.js").Fact} Fact */
+
+/**
+ * Return the head, which is updated when `page.study` has changed.
+ *
+ * @param {Page.StudyPage} page
+ * @returns {Page.Updatable}
+ */
 export function head(page) {
   const title = h("h1");
   const state = h("span", { class: "state-now", role: "status" });
@@ -17,69 +25,80 @@ export function head(page) {
   const bar = progressBar("Progress");
   const facts = h("dl", { class: "facts" });
   const remarks = h("div", { class: "remarks" });
-  const asked = verbs(page);
+  const buttons = actions(page);
   const update = () => {
     const { study } = page;
-    say(title, study.name);
+    setText(title, study.name);
     document.title = `${study.name} · gaplab`;
-    say(notes, study.notes ?? "");
+    setText(notes, study.notes ?? "");
     notes.hidden = !study.notes;
-    refill(state, study.state, () => pill(study.state));
+    refill(state, study.state, () => stateBadge(study.state));
     bar.update(study.progress);
     const known = factsOf(page);
-    refill(facts, JSON.stringify(known), () => known.map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, value))));
-    const found = remarksOf(study);
-    refill(remarks, JSON.stringify(found), () => found.map(remark));
-    asked.update();
+    refill(facts, JSON.stringify(known), () => factItems(known));
+    const warnings = gathered(study, ({ warnings }) => warnings);
+    const reasons = gathered(study, ({ reasons }) => reasons);
+    refill(remarks, JSON.stringify([warnings, reasons]), () => remarkBlocks(warnings, reasons));
+    buttons.update();
   };
-  const change = () => edit(page, `/studies/${page.id}`, () => page.study);
-  const pen = h("button", { type: "button", class: "quiet small", onclick: change }, "Edit name and notes");
+  const edit = () => editNameAndNotes(page, `/studies/${page.id}`, () => page.study);
   update();
   const trail = h("nav", { "aria-label": "Place", class: "trail" }, h("a", { href: "#/" }, "Studies"));
-  const element = h("header", { class: "experiment-head" }, trail, h("div", { class: "titled" }, title, state, pen),
-    notes, h("div", { class: "whole" }, bar.element), facts, remarks, asked.element, links(page));
+  const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name and notes");
+  const element = h("header", { class: "experiment-head" }, trail, h("div", { class: "titled" }, title, state, editButton),
+    notes, h("div", { class: "whole" }, bar.element), facts, remarks, buttons.element, links(page));
   return { element, update };
 }
 
+/**
+ * @param {Page.StudyPage} page
+ * @returns {Fact[]}
+ */
 function factsOf({ study, unit }) {
   const { progress, experiments } = study;
-  const best = experiments.filter((each) => each.best_fitness !== null).sort((a, b) => b.best_fitness - a.best_fitness)[0];
-  const ended = experiments.filter((each) => each.ended_at).length;
-  const failed = progress.failed ? `, ${count(progress.failed)} failed` : "";
+  const [best] = experiments.filter(hasFitness).sort((a, b) => b.best_fitness - a.best_fitness);
+  const ended = experiments.filter(({ ended_at: endedAt }) => endedAt).length;
   return [
     ["Experiments", `${count(ended)} of ${count(experiments.length)} ended`],
-    ["Repetitions", `${count(progress.completed)} of ${count(progress.repetitions)}${failed}`],
-    ["Rollouts", `${count(progress.rollouts_done)}, ${count(progress.rollouts_saved)} saved, of ${count(progress.rollouts)}`],
-    ...(best ? [["Best fitness", `${fixed(best.best_fitness)} ${unit(best)} by ${spoken(best.name)}`]] : []),
+    ["Repetitions", repetitionsDone(progress)],
+    ["Rollouts", `${count(progress.rollouts_done)} of ${count(progress.rollouts)}, ${count(progress.rollouts_saved)} not needed`],
+    ...(best ? [/** @type {Fact} */ (["Best fitness", `${fixed(best.best_fitness)} ${unit(best)} by ${readableName(best.name)}`])] : []),
     ...times(study),
   ];
 }
 
-function times({ state, progress, experiments, created_at: created }) {
-  const ends = experiments.map((each) => each.ended_at);
-  if (ends.every(Boolean)) return [["Ended", age(ends.sort().at(-1))]];
-  const left = progress.seconds_left === null ? "not known yet" : duration(progress.seconds_left);
-  return [["Time left", state === "RUNNING" ? left : "–"], ["Submitted", age(created)]];
+/** @type {(experiment: Api.ExperimentRead) => experiment is Api.ExperimentRead & { best_fitness: number }} */
+const hasFitness = (experiment) => experiment.best_fitness !== null;
+
+/**
+ * @param {Api.StudyRead} study
+ * @returns {Fact[]}
+ */
+function times(study) {
+  const ends = study.experiments.map(({ ended_at: endedAt }) => endedAt).filter((endedAt) => endedAt !== null);
+  const last = ends.sort().at(-1);
+  if (last && ends.length === study.experiments.length) return [["Ended", age(last)]];
+  return [["Time left", timeLeftFact(study)], ["Submitted", age(study.created_at)]];
 }
 
-/** Warnings and failures, each once, with the experiments that have them. */
-function remarksOf({ experiments }) {
-  const gather = (of) => {
-    const found = new Map();
-    for (const each of experiments) for (const words of of(each)) found.set(words, [...(found.get(words) ?? []), each.name]);
-    return [...found].map(([words, names]) => [words, names.length === experiments.length ? "" : names.join(", ")]);
-  };
-  const kinds = [["Warnings", "warned", gather((each) => each.warnings)], ["Why repetitions failed", "broken", gather((each) => each.reasons)]];
-  return kinds.filter(([, , list]) => list.length);
+/**
+ * Return the texts of all experiments, each text once, with the experiments that have it unless all have.
+ *
+ * @param {Api.StudyRead} study
+ * @param {(experiment: Api.ExperimentRead) => string[]} textsOf
+ */
+export function gathered({ experiments }, textsOf) {
+  /** @type {Map<string, string[]>} */
+  const namesByText = new Map();
+  for (const experiment of experiments) {
+    for (const text of textsOf(experiment)) namesByText.set(text, [...(namesByText.get(text) ?? []), experiment.name]);
+  }
+  return [...namesByText].map(([text, names]) => ({ text, note: names.length === experiments.length ? "" : names.join(", ") }));
 }
 
-function remark([title, kind, list]) {
-  const items = list.map(([words, names]) => h("li", {}, words, names ? h("span", { class: "note" }, ` (${names})`) : null));
-  return h("div", { class: `remark ${kind}` }, h("strong", {}, title), h("ul", {}, ...items));
-}
-
+/** @param {Page.StudyPage} page */
 function links({ id, study }) {
-  const ids = study.experiments.map((each) => each.id).join(",");
+  const ids = study.experiments.map((experiment) => experiment.id).join(",");
   return h("p", { class: "links" }, h("a", { href: `#/compare?experiments=${ids}` }, "Compare its experiments"),
-    download("Archive of everything (.zip)", `/studies/${id}/export`, {}, `gaplab-${id}.zip`));
+    downloadLink("Archive of everything (.zip)", `/studies/${id}/export`, {}, `gaplab-${id}.zip`));
 }

@@ -1,0 +1,74 @@
+// @ts-check
+/** A world drawn flat from the side, where there is no WebGL. */
+
+import { colourOf, css } from "./colours.js";
+import { transformed } from "./matrix.js";
+import { solidsOf } from "./motion.js";
+
+const HEIGHT_M = 0.6;
+
+/**
+ * Return a painter that draws outlines without depth, from the horizontal direction of the camera.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {Api.Shape[]} shapes
+ * @returns {Page.Painter}
+ */
+export function painter(canvas, shapes) {
+  const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  const solids = solidsOf(shapes);
+  return (models, grounded, camera, palette) => {
+    const scale = (canvas.height / HEIGHT_M) * (1.6 / camera.distance);
+    const direction = Math.atan2(camera.eye[1] - camera.target[1], camera.eye[0] - camera.target[0]);
+    /** @type {(point: Page.Vector) => [x: number, y: number]} */
+    const flat = ([x, y, z]) => [
+      canvas.width / 2 + scale * (-(x - camera.target[0]) * Math.sin(direction) + (y - camera.target[1]) * Math.cos(direction)),
+      0.8 * canvas.height - scale * z,
+    ];
+    pen.fillStyle = css(palette.sky);
+    pen.fillRect(0, 0, canvas.width, canvas.height);
+    pen.fillStyle = css(palette.floor);
+    pen.fillRect(0, 0.8 * canvas.height, canvas.width, canvas.height);
+    solids.forEach((shape, index) => {
+      pen.strokeStyle = pen.fillStyle = css(colourOf(shape, palette, grounded.has(shape.body)));
+      outline(pen, shape, (point) => flat(transformed(models[index], point)), scale);
+    });
+  };
+}
+
+/**
+ * @param {CanvasRenderingContext2D} pen
+ * @param {Api.Shape} shape
+ * @param {(point: Page.Vector) => [x: number, y: number]} toCanvas
+ * @param {number} scale
+ */
+function outline(pen, { kind, size_m: size }, toCanvas, scale) {
+  pen.beginPath();
+  pen.lineCap = "round";
+  if (kind === "box") {
+    pen.lineWidth = 2;
+    for (const [from, to] of edges(size)) {
+      pen.moveTo(...toCanvas(from));
+      pen.lineTo(...toCanvas(to));
+    }
+    pen.stroke();
+  } else if (kind === "sphere") {
+    pen.arc(...toCanvas([0, 0, 0]), scale * size[0], 0, 2 * Math.PI);
+    pen.fill();
+  } else {
+    pen.lineWidth = 2 * scale * size[0];
+    pen.moveTo(...toCanvas([0, 0, size[1] / 2]));
+    pen.lineTo(...toCanvas([0, 0, -size[1] / 2]));
+    pen.stroke();
+  }
+}
+
+/**
+ * Return the twelve edges of a box.
+ *
+ * @param {number[]} size
+ */
+function edges(size) {
+  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((bits) => size.map((edge, k) => ((bits >> k) & 1 ? edge : -edge) / 2));
+  return corners.flatMap((from, bits) => [1, 2, 4].filter((bit) => !(bits & bit)).map((bit) => [from, corners[bits | bit]]));
+}

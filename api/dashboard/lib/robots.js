@@ -1,0 +1,22 @@
+// @ts-check
+/** What the catalogue says of the robots of experiments. */
+
+/** @typedef {Api.ExperimentRead | undefined} Experiment */
+
+/**
+ * Return a function that gives the unit of an experiment's fitness; the empty text if its robot is not installed.
+ *
+ * @param {Api.Catalogue} catalogue
+ */
+export function unitsOf({ robots }) {
+  const units = new Map(robots.map(({ name, details }) => [name, details.unit]));
+  return (/** @type {Experiment} */ experiment) => /** @type {string} */ (units.get(experiment?.spec.robot.name) ?? "");
+}
+
+/**
+ * Return whether an experiment's robot is a function, whose curve is stepped through instead of a motion that is replayed.
+ *
+ * @param {Api.Catalogue} catalogue
+ * @param {Api.ExperimentRead} experiment
+ */
+export const isFunction = ({ robots }, { spec }) => robots.some(({ name, details }) => name === spec.robot.name && details.function === true);

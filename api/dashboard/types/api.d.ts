@@ -1,0 +1,446 @@
+/* Made by `make docs` from the OpenAPI document; what is changed here is lost. */
+
+declare namespace Api {
+  interface AttemptRead {
+    number: number;
+    owner: string;
+    started_at: string;
+    ended_at: string | null;
+    ending: Ending | null;
+    reason: string | null;
+  }
+  interface BudgetRead {
+    name: string;
+    iterations: number;
+    repetitions: number;
+    controller_evaluations: number;
+    selection_evaluations: number;
+    simulator_evaluations: number;
+  }
+  interface BudgetSpec {
+    preset: "smoke" | "desk" | "paper";
+    controller_evaluations: number | null;
+    selection_evaluations: number | null;
+    simulator_evaluations: number | null;
+    reuse_transfer: boolean;
+  }
+  interface Catalogue {
+    strategies: Array<PluginRead>;
+    robots: Array<PluginRead>;
+    engines: Array<PluginRead>;
+    tunables: Array<PluginRead>;
+    optimizers: Array<PluginRead>;
+    budgets: Array<BudgetRead>;
+    defaults: Record<string, any>;
+  }
+  interface Chart {
+    data: Array<Record<string, any>>;
+    layout: Record<string, any>;
+  }
+  interface Checked {
+    robot: PluginRef;
+    engine: PluginRef;
+    tunables: Array<TunableRef>;
+    points: number;
+    evaluations: number;
+  }
+  interface Comparison {
+    first: string;
+    second: string;
+    from_evaluations: number;
+    to_evaluations: number;
+    n_first: number;
+    n_second: number;
+    difference: number | null;
+    effect_size: number | null;
+    student: Test;
+    welch: Test;
+    mann_whitney: Test;
+  }
+  type ControllerKind = "sample" | "transfer";
+  interface Curve {
+    experiment: string;
+    name: string;
+    strategy: string;
+    state: State;
+    unit: string;
+    direct: boolean;
+    points: Array<CurvePoint>;
+  }
+  interface CurvePoint {
+    evaluations: number;
+    n: number;
+    mean: number | null;
+    sd: number | null;
+    lower: number | null;
+    upper: number | null;
+    values: Array<number | null>;
+  }
+  interface Edit {
+    name: string | null;
+    notes: string | null;
+  }
+  type Ending = "completed" | "paused" | "stopped" | "cancelled" | "handed back" | "lost" | "failed";
+  interface EngineCost {
+    engine: string;
+    seconds_per_rollout: number;
+    measured: boolean;
+  }
+  interface EstimateRead {
+    experiments: Array<ExperimentCost>;
+    engines: Array<EngineCost>;
+    rollouts: number;
+    core_seconds: number;
+    cores: number;
+    seconds: number;
+    supervisors: number;
+  }
+  type EventKind = "submitted" | "imported" | "started" | "pausing" | "paused" | "resumed" | "stopping" | "extended" | "completed" | "failed" | "cancelled" | "sensitivity_ended" | "versions_refused" | "versions_accepted" | "repetition_claimed" | "repetition_completed" | "repetition_failed" | "repetition_lost" | "repetition_handed_back" | "repetition_paused" | "repetition_stopped" | "repetition_cancelled" | "selected" | "measured" | "tuned" | "transferred" | "probed";
+  interface EventPage {
+    items: Array<EventRead>;
+    last: number;
+    latest: number;
+  }
+  interface EventRead {
+    number: number;
+    kind: EventKind;
+    experiment: string;
+    study: string | null;
+    repetition: number | null;
+    body: Record<string, any>;
+    at: string;
+  }
+  interface ExperimentCost {
+    name: string;
+    strategy: string;
+    engine: string;
+    repetitions: number;
+    iterations: number;
+    rollouts: number;
+    core_seconds: number;
+  }
+  interface ExperimentRead {
+    id: string;
+    study: string | null;
+    name: string;
+    notes: string | null;
+    edits: number;
+    strategy: string;
+    direct: boolean;
+    state: State;
+    spec: Record<string, any>;
+    priority: number;
+    max_parallel: number | null;
+    progress: Progress;
+    best_fitness: number | null;
+    reasons: Array<string>;
+    sensitivity: string | null;
+    warnings: Array<string>;
+    created_at: string;
+    started_at: string | null;
+    ended_at: string | null;
+  }
+  interface ExperimentSpec {
+    priority: number;
+    max_parallel: number | null;
+    iterations: number | null;
+    repetitions: number | null;
+    robot: PluginRef;
+    engine: PluginRef | null;
+    optimizer: PluginRef;
+    tunables: Array<TunableRef>;
+    reality: RealitySpec;
+    budget: BudgetSpec;
+    seed: number;
+    name: string | null;
+    strategy: PluginRef;
+  }
+  interface ExtensionSpec {
+    iterations: number | null;
+    repetitions: number | null;
+  }
+  interface FigureRead {
+    figure: Chart;
+    title: string;
+    caption: string;
+    alt: string;
+    empty: boolean;
+    table: TableRead | null;
+  }
+  interface Health {
+    status: string;
+  }
+  interface ImportRead {
+    study: string | null;
+    experiments: Array<string>;
+    renamed: Record<string, string>;
+    called_off: Array<string>;
+  }
+  type MeasurementKind = "sample" | "probe";
+  interface MisfitPoint {
+    iteration: number;
+    error: Spread;
+    gap: Spread;
+    tunables: Array<TunedSpread>;
+  }
+  interface MisfitRead {
+    experiment: string;
+    unit: string;
+    points: Array<MisfitPoint>;
+    remarks: Array<string>;
+  }
+  interface Page_ExperimentRead_ {
+    items: Array<ExperimentRead>;
+    next: string | null;
+  }
+  interface Page_SampleRead_ {
+    items: Array<SampleRead>;
+    next: string | null;
+  }
+  interface Page_SimulatorRead_ {
+    items: Array<SimulatorRead>;
+    next: string | null;
+  }
+  interface Page_StudyRead_ {
+    items: Array<StudyRead>;
+    next: string | null;
+  }
+  interface PluginRead {
+    name: string;
+    summary: string;
+    source: string;
+    options: Record<string, any>;
+    available: boolean;
+    note: string | null;
+    details: Record<string, any>;
+  }
+  type PluginRef = string | Record<string, any>;
+  interface Prediction {
+    repetition: number;
+    iteration: number;
+    simulated_before: number | null;
+    simulated_after: number | null;
+    fitness: number | null;
+  }
+  interface Predictions {
+    experiment: string;
+    unit: string;
+    items: Array<Prediction>;
+    pending: number;
+    left_out: number;
+  }
+  interface Problem {
+    type: string;
+    title: string;
+    status: number;
+    detail: string;
+    errors: Array<SpecError>;
+  }
+  interface Progress {
+    repetitions: number;
+    completed: number;
+    failed: number;
+    iterations: number;
+    iterations_done: number;
+    rollouts: number;
+    rollouts_done: number;
+    rollouts_failed: number;
+    rollouts_saved: number;
+    seconds_left: number | null;
+  }
+  interface Provenance {
+    gaplab: string;
+    code: string;
+    commit: string | null;
+    dirty: boolean | null;
+    python: string;
+    libraries: Record<string, string>;
+    engines: Record<string, string>;
+    architecture: string;
+    processor: string;
+    system: string;
+    spec_version: number;
+    plugins: Record<string, string>;
+    outside: Record<string, string>;
+  }
+  interface ProvenanceRead {
+    computed_with: string | null;
+    refused_by: string | null;
+    uses: Array<ProvenanceUse>;
+  }
+  interface ProvenanceUse {
+    id: string;
+    since: string;
+    repetitions: number;
+    provenance: Provenance;
+  }
+  interface RealitySpec {
+    engine: PluginRef | null;
+    parameters: Record<string, number>;
+  }
+  interface RepetitionRead {
+    number: number;
+    state: State;
+    iterations_done: number;
+    rollouts_done: number;
+    attempts: number;
+    error: string | null;
+    started_at: string | null;
+    ended_at: string | null;
+  }
+  interface Replay {
+    experiment: string;
+    repetition: number;
+    iteration: number;
+    kind: ControllerKind;
+    simulator: number | null;
+    robot: string;
+    unit: string;
+    bodies: Array<string>;
+    feet: Array<string>;
+    times_s: Array<number>;
+    counted_s: [number, number];
+    simulation: ReplayWorld | null;
+    reality: ReplayWorld | null;
+  }
+  interface ReplayWorld {
+    engine: string;
+    shapes: Array<Shape>;
+    fitness: number | null;
+    recorded: number | null;
+    positions_m: Array<Array<number>>;
+    orientations: Array<Array<number>>;
+    heights_m: Array<number>;
+    speeds_m_s: Array<number>;
+    contacts: Array<Array<[number, number]>>;
+  }
+  interface SampleRead {
+    repetition: number;
+    iteration: number;
+    kind: MeasurementKind;
+    genome: Array<number>;
+    fitness: number | null;
+    measured_by: string;
+    measured_at: string;
+  }
+  interface ScheduleChange {
+    priority: number;
+    max_parallel: number | null;
+  }
+  interface Sensitivity {
+    name: string;
+    effect: number | null;
+    relative_effect: number | null;
+    roughness: number | null;
+    failures: number;
+    verdict: Verdict;
+    values: Array<number>;
+    fitness: Array<Array<number | null>>;
+  }
+  interface SensitivityRead {
+    id: string;
+    state: State;
+    spec: Checked;
+    rollouts: number;
+    unit: string;
+    tunables: Array<Sensitivity>;
+    warnings: Array<string>;
+    reason: string | null;
+    created_at: string;
+    started_at: string | null;
+    ended_at: string | null;
+  }
+  interface SensitivitySpec {
+    iterations: number | null;
+    repetitions: number | null;
+    robot: PluginRef;
+    engine: PluginRef | null;
+    optimizer: PluginRef;
+    tunables: Array<TunableRef>;
+    reality: RealitySpec;
+    budget: BudgetSpec;
+    seed: number;
+    points: number;
+    evaluations: number;
+  }
+  interface Shape {
+    kind: "box" | "sphere" | "capsule" | "plane";
+    size_m: Array<number>;
+    position_m: [number, number, number];
+    orientation: [number, number, number, number];
+    role: "trunk" | "limb" | "foot" | "ground";
+    body: number | null;
+  }
+  interface SimulatorRead {
+    repetition: number;
+    iteration: number;
+    rank: number;
+    parameters: Record<string, number>;
+    squared_error: number | null;
+  }
+  interface SpecError {
+    pointer: string;
+    value: any;
+    message: string;
+    permitted: Array<string> | string | null;
+    nearest: string | null;
+  }
+  interface Spread {
+    n: number;
+    mean: number | null;
+    sd: number | null;
+    least: number | null;
+    greatest: number | null;
+  }
+  type State = "QUEUED" | "RUNNING" | "PAUSING" | "PAUSED" | "STOPPING" | "COMPLETED" | "FAILED" | "CANCELLED";
+  interface StudyRead {
+    id: string;
+    name: string;
+    notes: string | null;
+    edits: number;
+    state: State;
+    experiments: Array<ExperimentRead>;
+    progress: Progress;
+    created_at: string;
+  }
+  interface StudySpec {
+    priority: number;
+    max_parallel: number | null;
+    iterations: number | null;
+    repetitions: number | null;
+    robot: PluginRef;
+    engine: PluginRef | null;
+    optimizer: PluginRef;
+    tunables: Array<TunableRef>;
+    reality: RealitySpec;
+    budget: BudgetSpec;
+    seed: number;
+    name: string | null;
+    strategies: Array<PluginRef>;
+    direct_repetitions: number | null;
+  }
+  interface TableRead {
+    head: Array<string>;
+    rows: Array<Array<string>>;
+  }
+  interface Test {
+    statistic: number | null;
+    p: number | null;
+    p_holm: number | null;
+    degrees_of_freedom: number | null;
+  }
+  type TunableRef = string | Record<string, any>;
+  interface TunedSpread {
+    n: number;
+    mean: number | null;
+    sd: number | null;
+    least: number | null;
+    greatest: number | null;
+    name: string;
+    lower: number;
+    upper: number;
+    at_lower: number | null;
+    at_upper: number | null;
+  }
+  type Verdict = "nothing" | "rough" | "smooth" | "unknown";
+}

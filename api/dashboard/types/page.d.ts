@@ -1,0 +1,154 @@
+/* Types that the page's scripts share; the JSON of the service is declared in api.d.ts. */
+
+declare namespace Page {
+  /** What `h` takes as content; null, undefined and false are left out. */
+  type Child = Node | string | number | boolean | null | undefined | Child[];
+
+  interface Attributes {
+    onclick?: (event: MouseEvent) => unknown;
+    onmousedown?: (event: MouseEvent) => unknown;
+    onkeydown?: (event: KeyboardEvent) => unknown;
+    onsubmit?: (event: SubmitEvent) => unknown;
+    dataset?: Record<string, string | number>;
+    [name: string]: unknown;
+  }
+
+  type QueryValue = string | number | boolean | null | undefined;
+  type Query = Record<string, QueryValue | QueryValue[]>;
+
+  /** An answer with the tag that a later change of the same thing must name. */
+  interface Tagged<Value> {
+    value: Value;
+    tag: string | null;
+  }
+
+  interface ServerEvent {
+    kind: string;
+    id: string | null;
+    data: Api.EventRead;
+  }
+
+  /** An element with a function that brings it up to date. */
+  interface Updatable<Value = void> {
+    element: HTMLElement;
+    update: (value: Value) => void;
+  }
+
+  /** A name as the API takes it: a plug-in without options is its bare name. */
+  type PluginName = string | { name: string; options?: Record<string, any> };
+
+  interface Sections {
+    add(element: HTMLElement, kinds: string[], load: () => Promise<unknown>): void;
+    reload(events: ServerEvent[]): void;
+  }
+
+  /** What the parts of a view of one study or experiment share. */
+  interface Editable {
+    signal: AbortSignal;
+    tag: string | null;
+    take(tagged: Tagged<any>): void;
+    reload(): Promise<void>;
+  }
+
+  interface ExperimentPage extends Editable {
+    id: string;
+    latest: number;
+    experiment: Api.ExperimentRead;
+    isFunction: boolean;
+    sections: Sections;
+  }
+
+  interface StudyPage extends Editable {
+    id: string;
+    study: Api.StudyRead;
+    unit(experiment: Api.ExperimentRead | undefined): string;
+  }
+
+  /** What the address of a comparison says. */
+  interface Comparison {
+    experiments: string[];
+    x: string;
+    cost_s: number;
+    band: string;
+    each: boolean;
+    test: "student" | "welch" | "mann_whitney";
+    from: number | null;
+    to: number | null;
+  }
+
+  interface CompareView {
+    choice: Comparison;
+    cache: ReturnType<typeof import("../views/compare/cache.js").experimentCache>;
+    signal: AbortSignal;
+    change(changes: Partial<Comparison>): Promise<void>;
+  }
+
+  interface ComparePart {
+    element: HTMLElement;
+    update(events: unknown[]): void;
+  }
+
+  /** The first and the last number of real-world evaluations. */
+  type Range = [number, number];
+
+  interface RangeResult {
+    range: Range;
+    pairs: Api.Comparison[];
+  }
+
+  /** A plug-in in the form for a new study; `on` is whether it is ticked. */
+  interface PluginDraft {
+    name: string;
+    options: Record<string, any>;
+    on?: boolean;
+  }
+
+  interface TunableDraft {
+    name: string;
+    on: boolean;
+    lower: string | number;
+    upper: string | number;
+  }
+
+  /** The content of the form for a new study; the empty text stands for a value that is left out. */
+  interface Draft {
+    [count: string]: any;
+    name: string;
+    strategies: PluginDraft[];
+    robot: PluginDraft;
+    engine: PluginDraft;
+    optimizer: PluginDraft;
+    tunables: TunableDraft[];
+    realityEngine: PluginDraft;
+    realityParameters: Record<string, any>;
+    budget: { [evaluations: string]: any; preset: string; reuse_transfer: boolean };
+  }
+
+  /** Which controller is replayed: the query of `/experiments/{id}/replay`. */
+  type ReplayChoice = {
+    experiment: string;
+    repetition: number;
+    iteration: number;
+    kind: string;
+    simulator: number | string | null;
+  };
+
+  type Vector = number[];
+  type Matrix = Float32Array<ArrayBuffer>;
+  type Colour = [number, number, number, number];
+  type Palette = Record<string, Colour>;
+
+  interface Viewpoint {
+    eye: Vector;
+    target: Vector;
+    distance: number;
+  }
+
+  /** Draws one frame: a matrix for each solid shape, the bodies on the ground, the camera, the colours and the path so far. */
+  type Painter = (models: Matrix[], grounded: Set<number | null>, camera: Viewpoint, palette: Palette, path: Vector[]) => void;
+}
+
+/** Plotly, once its script is loaded. */
+declare var Plotly:
+  | { react(element: Element, data: unknown, layout: unknown, options: unknown): Promise<void>; purge(element: Element): void }
+  | undefined;

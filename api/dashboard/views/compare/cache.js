@@ -1,0 +1,108 @@
+// @ts-check
+/** The experiments and studies that are chosen or found, each loaded once. */
+
+import { get } from "../../lib/api.js";
+import { readableName } from "../../lib/format.js";
+
+const NOT_FOUND = 404;
+
+/**
+ * Return an empty cache, which loads until `signal`.
+ *
+ * @param {AbortSignal} signal
+ */
+export function experimentCache(signal) {
+  /** @type {Map<string, Api.ExperimentRead | null>} */
+  const experiments = new Map();
+  /** @type {Map<string, string>} */
+  const studyNames = new Map();
+
+  const addExperiment = (/** @type {Api.ExperimentRead} */ experiment) => { experiments.set(experiment.id, experiment); };
+
+  /** @param {Api.StudyRead} study */
+  function addStudy(study) {
+    studyNames.set(study.id, study.name);
+    study.experiments.forEach(addExperiment);
+  }
+
+  /**
+   * Load a study, and return the ids of its experiments; none if there is no such study.
+   *
+   * @param {string} id
+   */
+  async function loadStudy(id) {
+    /** @type {Api.StudyRead | null} */
+    const study = await orNull(get(`/studies/${id}`, {}, signal));
+    if (study) addStudy(study);
+    return study?.experiments.map((experiment) => experiment.id) ?? [];
+  }
+
+  /**
+   * Load experiments, also those that are known.
+   *
+   * @param {string[]} ids
+   */
+  async function reload(ids) {
+    const loaded = await Promise.all(ids.map((id) => orNull(get(`/experiments/${id}`, {}, signal))));
+    ids.forEach((id, index) => experiments.set(id, loaded[index]));
+  }
+
+  /**
+   * Load the experiments that are not known yet, and the studies that they belong to.
+   *
+   * @param {string[]} ids
+   */
+  async function load(ids) {
+    const unknown = () => ids.filter((id) => !experiments.has(id));
+    for (let left = unknown(); left.length; left = unknown()) {
+      await reload(left.slice(0, 1));
+      const study = experiments.get(left[0])?.study;
+      await (study ? loadStudy(study) : reload(left.slice(1)));
+    }
+    const studies = new Set(ids.map((id) => experiments.get(id)?.study));
+    await Promise.all([...studies].map((study) => (study && !studyNames.has(study) ? loadStudy(study) : null)));
+  }
+
+  /** @param {string} id */
+  const nameOf = (id) => readableName(experiments.get(id)?.name ?? id);
+
+  return {
+    addExperiment, addStudy, loadStudy, reload, load, nameOf,
+    /** @param {string} id of an experiment; null if it is not known, or there is none */
+    get: (id) => experiments.get(id) ?? null,
+    /** @param {string} id of an experiment that does not exist */
+    isMissing: (id) => experiments.get(id) === null,
+    /** @param {string} id of an experiment whose study is named */
+    studyName: (id) => studyNames.get(experiments.get(id)?.study ?? "") ?? null,
+    /**
+     * Return names by id, as the figure has them: names that are alike are followed by their ids.
+     *
+     * @param {string[]} ids
+     */
+    namesOf(ids) {
+      const names = ids.map(nameOf);
+      const isUnique = (/** @type {string} */ name) => names.indexOf(name) === names.lastIndexOf(name);
+      return new Map(ids.map((id, index) => [id, isUnique(names[index]) ? names[index] : `${names[index]} (${id.slice(0, 8)})`]));
+    },
+    /**
+     * Return the chosen experiments that exist.
+     *
+     * @param {string[]} ids
+     */
+    known: (ids) => ids.filter((id) => experiments.get(id)),
+  };
+}
+
+/**
+ * Return what a request answers; null if there is no such thing.
+ *
+ * @param {Promise<any>} request
+ */
+async function orNull(request) {
+  try {
+    return await request;
+  } catch (error) {
+    if (error.status === NOT_FOUND) return null;
+    throw error;
+  }
+}

@@ -1,0 +1,98 @@
+// @ts-check
+/** The actions on an experiment; those that its state forbids say why. */
+
+import { patch, post } from "../../lib/api.js";
+import { openDialog } from "../../lib/dialog.js";
+import { actionButtons, isPermitted, PARTICIPLES, permittedStates } from "../../lib/life_cycle.js";
+
+/** @typedef {import("../../lib/life_cycle.js").Action} Action */
+
+/**
+ * Return why an action is refused in a state, or the empty text.
+ *
+ * @param {Action} action
+ * @param {Api.State} state
+ */
+export function refusal(action, state) {
+  if (isPermitted(action, state)) return "";
+  return `An experiment that is ${state.toLowerCase()} cannot be ${PARTICIPLES[action]}, only one that is ${permittedStates(action)}.`;
+}
+
+/**
+ * Return the buttons, which are updated when `page.experiment` has changed.
+ *
+ * @param {Page.ExperimentPage} page
+ */
+export const actions = (page) => actionButtons("Actions on this experiment", (action) => refusal(action, page.experiment.state), {
+  pause: () => send(page, "pause"),
+  resume: () => send(page, "resume"),
+  stop: () => stop(page),
+  cancel: () => cancel(page),
+  extend: () => extend(page),
+}, [{ label: "Change schedule…", press: () => { schedule(page); } }]);
+
+/**
+ * @param {Page.ExperimentPage} page
+ * @param {Action} action
+ * @param {unknown} [body]
+ */
+async function send(page, action, body = undefined) {
+  await post(`/experiments/${page.id}/${action}`, body);
+  await page.reload();
+}
+
+/** @param {Page.ExperimentPage} page */
+function stop(page) {
+  openDialog({
+    title: "Stop this experiment?",
+    text: "Running repetitions finish their step, and the experiment is completed with the results it has. " +
+      "If its curve has no point yet, it is cancelled instead.",
+    action: "Stop it", danger: true, act: () => send(page, "stop"),
+  }, page.signal);
+}
+
+/** @param {Page.ExperimentPage} page */
+function cancel(page) {
+  openDialog({
+    title: "Cancel this experiment?",
+    text: "It ends at once, and loses the steps under way. Stored results stay, but it can never go on.",
+    action: "Cancel it", danger: true, act: () => send(page, "cancel"),
+  }, page.signal);
+}
+
+/** @param {Page.ExperimentPage} page */
+function extend(page) {
+  const { iterations, repetitions } = page.experiment.spec;
+  const whole = { type: "number", required: true, step: 1 };
+  openDialog({
+    title: "Extend this experiment",
+    text: "Enter totals, not what to add. Results so far stay, and the experiment is then as if it had been submitted with these totals. " +
+      "To finish an experiment that was stopped, keep the totals as they are.",
+    fields: [
+      { name: "iterations", label: "Iterations in all", value: iterations, min: iterations, max: 1000, ...whole },
+      { name: "repetitions", label: "Repetitions in all", value: repetitions, min: repetitions, max: 10000, ...whole },
+    ],
+    action: "Extend it",
+    act: (values) => send(page, "extend", { iterations: Number(values.iterations), repetitions: Number(values.repetitions) }),
+  }, page.signal);
+}
+
+/** @param {Page.ExperimentPage} page */
+function schedule(page) {
+  const { priority, max_parallel: maxParallel } = page.experiment;
+  const whole = { type: "number", step: 1 };
+  openDialog({
+    title: "Change the schedule",
+    text: "This changes no result, and stops nothing that runs.",
+    fields: [
+      { name: "priority", label: "Priority", value: priority, min: -10, max: 10, required: true, hint: "−10 to 10; the highest is computed first", ...whole },
+      { name: "max_parallel", label: "Repetitions at once", value: maxParallel, min: 1, max: 10000, hint: "empty: one on every free core", ...whole },
+    ],
+    action: "Change it",
+    act: async (values) => {
+      const change = { priority: Number(values.priority), max_parallel: values.max_parallel ? Number(values.max_parallel) : null };
+      await patch(`/experiments/${page.id}/schedule`, change);
+      await page.reload();
+    },
+  }, page.signal);
+}

@@ -1,0 +1,66 @@
+// @ts-check
+/** Events in words. */
+
+import { count, number } from "../../lib/format.js";
+
+/** @typedef {(event: Api.EventRead) => string} Words */
+
+/** @type {Words} */
+const which = ({ repetition }) => `Repetition ${repetition}`;
+
+/** @type {Words} */
+const step = ({ repetition, body }) => `Repetition ${repetition}, iteration ${body.iteration}`;
+
+/** @type {Words} */
+const reason = ({ body }) => (body.reason ? `: ${body.reason}` : "");
+
+/** @param {number | null | undefined} value */
+const fitness = (value) => (value === null || value === undefined ? "physics failed" : number(value));
+
+/** @type {Record<string, Words>} */
+const WORDS = {
+  submitted: ({ body }) => `Submitted, with ${count(body.repetitions)} repetitions`,
+  imported: () => "Imported from an archive",
+  started: () => "Started",
+  pausing: () => "Pausing: running repetitions finish their step",
+  paused: () => "Paused",
+  resumed: () => "Resumed",
+  stopping: () => "Stopping: running repetitions finish their step",
+  extended: ({ body }) => `Extended to ${count(body.iterations)} iterations, ${count(body.repetitions)} repetitions`,
+  completed: () => "Completed",
+  failed: () => "Failed",
+  cancelled: () => "Cancelled",
+  sensitivity_ended: ({ body }) =>
+    `Sensitivity check ${String(body.state).toLowerCase()}${body.warnings?.length ? `: ${body.warnings.join(" ")}` : ""}`,
+  versions_refused: ({ body }) => `Refused by a supervisor with other versions: ${body.refused_by}, not ${body.computed_with}`,
+  versions_accepted: () => "Other versions were accepted: it continues under them",
+  repetition_claimed: (event) => `${which(event)} ${event.body.steps ? `continues after ${count(event.body.steps)} steps` : "begins"}`,
+  repetition_completed: (event) => `${which(event)} completed`,
+  repetition_failed: (event) => `${which(event)} failed${reason(event)}`,
+  repetition_lost: (event) => `${which(event)} lost its worker, and is queued again${reason(event)}`,
+  repetition_handed_back: (event) => `${which(event)} was handed back${reason(event)}`,
+  repetition_paused: (event) => `${which(event)} paused`,
+  repetition_stopped: (event) => `${which(event)} stopped`,
+  repetition_cancelled: (event) => `${which(event)} cancelled`,
+  selected: (event) => `${step(event)}: selected a controller to try in reality`,
+  measured: (event) => `${step(event)}: measured in reality, ${fitness(event.body.fitness)}`,
+  tuned: (event) => `${step(event)}: simulators tuned, squared error ${squaredError(event.body.squared_error)}`,
+  transferred: (event) => `${step(event)}: controller evolved, ${fitness(event.body.simulated_fitness)} in simulation`,
+  probed: (event) => `${step(event)}: the controller reaches ${fitness(event.body.fitness)} in reality`,
+};
+
+/** @param {number | null | undefined} value */
+function squaredError(value) {
+  if (value === null || value === undefined) return "unknown";
+  return value && value < 0.001 ? value.toExponential(1) : number(value);
+}
+
+/** Every kind of event that has words here. */
+export const KINDS = Object.keys(WORDS);
+
+/**
+ * Return an event in words; a kind that is newer than this page is called by its name.
+ *
+ * @type {Words}
+ */
+export const eventText = (event) => (WORDS[event.kind] ?? (({ kind }) => kind.replaceAll("_", " ")))(event);

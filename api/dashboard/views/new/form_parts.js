@@ -1,0 +1,213 @@
+// @ts-check
+/** The parts of the form for a new study, made from the catalogue. */
+
+import { h } from "../../lib/dom.js";
+import { count, readableName } from "../../lib/format.js";
+import { EVALUATIONS, ticked } from "./draft.js";
+import { errorRoom, field, numberField, optionFields, tickField } from "./fields.js";
+
+/** @typedef {import("../new.js").Form} Form */
+/** @typedef {import("./fields.js").Choices} Choices */
+
+/**
+ * @param {string} title
+ * @param {...Page.Child} content
+ */
+const part = (title, ...content) => h("fieldset", { class: "part" }, h("legend", {}, title), ...content);
+
+/**
+ * Return the name, the sizes and the schedule of the study.
+ *
+ * @param {Form} form
+ */
+export function studyPart(form) {
+  const { draft, places, catalogue } = form;
+  const preset = catalogue.budgets.find(({ name }) => name === draft.budget.preset);
+  /** @type {(name: string, label: string, hint: string, placeholder?: string) => HTMLElement} */
+  const countField = (name, label, hint, placeholder = "") =>
+    numberField({ label, hint, value: draft[name], set: form.setter(draft, name), pointer: `/${name}`, places, placeholder });
+  return part("Study",
+    field({ label: "Name", value: draft.name, set: form.setter(draft, "name"), pointer: "/name", places, maxlength: 200, placeholder: "study" }),
+    h("div", { class: "fields" },
+      countField("iterations", "Iterations", "real-world evaluations of a repetition", preset && count(preset.iterations)),
+      countField("repetitions", "Repetitions", "of each strategy", preset && count(preset.repetitions)),
+      countField("direct_repetitions", "Repetitions of the direct baseline", "", "as the strategies"),
+      countField("seed", "Seed", "the same seed gives the same numbers", "0"),
+      countField("priority", "Priority", "−10 to 10; the highest is computed first", "0"),
+      countField("max_parallel", "Repetitions at once", "of an experiment", "any number")));
+}
+
+/**
+ * Return the strategies that are compared, each with its options; one can be there several times.
+ *
+ * @param {Form} form
+ */
+export function strategiesPart(form) {
+  const { draft, places } = form;
+  const room = errorRoom();
+  const list = h("div", { class: "strategies" }, ...draft.strategies.map((strategy) => strategyField(form, strategy)));
+  places.add(() => "/strategies", list, room);
+  const tickAll = (/** @type {boolean} */ on) => () => {
+    for (const strategy of draft.strategies) strategy.on = on;
+    form.remake();
+  };
+  return part("Strategies", h("p", { class: "note" }, "One experiment for each; all else is equal. ",
+    linkButton("All", tickAll(true)), " ", linkButton("None", tickAll(false))), room, list);
+}
+
+/**
+ * @param {string} label
+ * @param {() => void} press
+ */
+const linkButton = (label, press) => h("button", { type: "button", class: "link", onclick: press }, label);
+
+/**
+ * @param {Form} form
+ * @param {Page.PluginDraft} strategy
+ */
+function strategyField(form, strategy) {
+  const { catalogue, draft: { strategies }, places } = form;
+  const plugin = catalogue.strategies.find(({ name }) => name === strategy.name);
+  const room = errorRoom();
+  const pointer = () => (strategy.on ? `/strategies/${ticked(strategies).indexOf(strategy)}` : null);
+  const splice = (/** @type {Parameters<typeof strategies.splice>} */ ...change) => {
+    strategies.splice(...change);
+    form.remake();
+  };
+  const add = linkButton("Add again, with other options", () =>
+    splice(strategies.indexOf(strategy) + 1, 0, { name: strategy.name, options: { ...strategy.options }, on: true }));
+  const isRepeated = strategies.filter(({ name }) => name === strategy.name).length > 1;
+  const remove = isRepeated ? linkButton("Remove", () => splice(strategies.indexOf(strategy), 1)) : null;
+  const options = optionFields(plugin, strategy.options, pointer, form);
+  const tick = (/** @type {boolean} */ on) => {
+    strategy.on = on;
+    form.remake();
+  };
+  const { box, element } = tickField([readableName(strategy.name), h("small", {}, plugin?.summary)], Boolean(strategy.on), tick);
+  places.add(pointer, box, room);
+  const open = Object.keys(strategy.options).length > 0;
+  const more = options && strategy.on ? h("details", { open }, h("summary", {}, "Options"), options, h("p", {}, add, " ", remove)) : null;
+  return h("div", { class: "strategy" }, element, room, more);
+}
+
+/**
+ * Return the robot, the engine of the simulators, and the optimizer.
+ *
+ * @param {Form} form
+ */
+export function simulationPart(form) {
+  const { draft, catalogue } = form;
+  const robot = catalogue.robots.find(({ name }) => name === draft.robot.name);
+  const robotEngine = `The robot’s own${robot ? `: ${robot.details.engine}` : ""}`;
+  return part("Simulation",
+    pluginField(form, "Robot", draft.robot, catalogue.robots, "/robot"),
+    pluginField(form, "Engine of the simulators", draft.engine, catalogue.engines, "/engine", robotEngine),
+    pluginField(form, "Optimizer", draft.optimizer, catalogue.optimizers, "/optimizer"));
+}
+
+/**
+ * Return a list of plug-ins to choose from, and the options of the chosen one. Plug-ins that are not installed say how to install them.
+ *
+ * @param {Form} form
+ * @param {string} label
+ * @param {Page.PluginDraft} draft
+ * @param {Api.PluginRead[]} plugins
+ * @param {string} pointer
+ * @param {string | null} [none] label of the choice of none
+ */
+function pluginField(form, label, draft, plugins, pointer, none = null) {
+  const chosen = plugins.find(({ name }) => name === draft.name);
+  /** @type {Choices} */
+  const choices = plugins.map(({ name, available }) => [name, `${readableName(name)}${available ? "" : ": not installed"}`, !available]);
+  const set = (/** @type {string} */ name) => {
+    Object.assign(draft, { name, options: {} });
+    form.remake();
+  };
+  const options = optionFields(chosen, draft.options, () => pointer, form);
+  const missing = plugins.filter(({ available }) => !available).map(({ name, note }) =>
+    h("p", { class: "note" }, `${readableName(name)} is not installed: `, h("code", {}, note)));
+  return [
+    field({ label, hint: chosen?.summary, value: draft.name, set, pointer, places: form.places, choices: none === null ? choices : [["", none], ...choices] }),
+    ...missing,
+    options ? h("details", { open: Object.keys(draft.options).length > 0 }, h("summary", {}, `Options of ${readableName(draft.name)}`), options) : null];
+}
+
+/**
+ * Return what is tuned, and between which bounds.
+ *
+ * @param {Form} form
+ */
+export function tunablesPart(form) {
+  const room = errorRoom();
+  const list = h("div", {}, ...form.draft.tunables.map((tunable) => tunableField(form, tunable)));
+  form.places.add(() => "/tunables", list, room);
+  return part("What is tuned", room, list);
+}
+
+/**
+ * @param {Form} form
+ * @param {Page.TunableDraft} tunable
+ */
+function tunableField(form, tunable) {
+  const { draft, places, catalogue } = form;
+  const { name, on } = tunable;
+  const plugin = catalogue.tunables.find((other) => other.name === name);
+  const pointer = () => (tunable.on ? `/tunables/${ticked(draft.tunables).indexOf(tunable)}` : null);
+  const tick = (/** @type {boolean} */ isOn) => {
+    tunable.on = isOn;
+    form.remake();
+  };
+  const { box, element } = tickField([readableName(name), h("small", {}, plugin?.summary)], on, tick);
+  const room = errorRoom();
+  places.add(pointer, box, room);
+  const bound = (/** @type {"lower" | "upper"} */ side, /** @type {string} */ label) => numberField({
+    label, "aria-label": `${readableName(name)} ${label.toLowerCase()}`, class: "short", placeholder: String(plugin?.details[side]),
+    value: tunable[side], set: form.setter(tunable, side), places, pointer: () => (pointer() === null ? null : `${pointer()}/${side}`),
+  });
+  const unit = plugin?.details.unit === "1" ? "" : plugin?.details.unit;
+  const bounds = on ? h("div", { class: "bounds" }, bound("lower", "From"), bound("upper", "To"), h("span", { class: "note" }, unit)) : null;
+  return h("div", { class: "tunable" }, element, bounds, room);
+}
+
+/**
+ * Return the engine and the hidden parameters of reality.
+ *
+ * @param {Form} form
+ */
+export function realityPart(form) {
+  const { draft: { realityEngine, realityParameters }, places, catalogue } = form;
+  const fields = catalogue.tunables.map(({ name, details }) => numberField({
+    label: readableName(name), value: realityParameters[name], set: form.setter(realityParameters, name), places, placeholder: "the robot’s own",
+    pointer: `/reality/parameters/${name}`, hint: `${details.least} to ${details.greatest}` }));
+  return part("Reality",
+    h("p", { class: "note" }, "Hidden from the strategies, and from everybody until the study has ended."),
+    pluginField(form, "Engine of reality", realityEngine, catalogue.engines, "/reality/engine", "The engine of the simulators"),
+    h("div", { class: "fields" }, ...fields));
+}
+
+const SEARCHES = ["Search for the transferred controller", "Search for the next sample", "Search for a simulator"];
+
+/**
+ * Return how much is computed.
+ *
+ * @param {Form} form
+ */
+export function budgetPart(form) {
+  const { draft: { budget }, places, catalogue: { budgets } } = form;
+  const preset = /** @type {Record<string, any> | undefined} */ (budgets.find(({ name }) => name === budget.preset));
+  /** @type {Choices} */
+  const choices = budgets.map(({ name }) => [name, readableName(name)]);
+  const set = (/** @type {string} */ name) => {
+    budget.preset = name;
+    form.remake();
+  };
+  const numbers = EVALUATIONS.map((name, index) => numberField({
+    label: SEARCHES[index], hint: "evaluations", placeholder: count(preset?.[name]), value: budget[name],
+    set: form.setter(budget, name), places, pointer: `/budget/${name}`,
+  }));
+  return part("Budget",
+    field({ label: "Preset", value: budget.preset, set, pointer: "/budget", places, choices }),
+    h("div", { class: "fields" }, ...numbers),
+    tickField("Reuse the transferred controller as the next sample, where a strategy would only search for it again",
+      budget.reuse_transfer, form.setter(budget, "reuse_transfer")).element);
+}

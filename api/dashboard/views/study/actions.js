@@ -1,0 +1,121 @@
+// @ts-check
+/** The actions on a study: each goes to all of its experiments whose state permits it. */
+
+import { post } from "../../lib/api.js";
+import { openDialog } from "../../lib/dialog.js";
+import { count } from "../../lib/format.js";
+import { actionButtons, isPermitted, PARTICIPLES, permittedStates } from "../../lib/life_cycle.js";
+
+/** @typedef {import("../../lib/life_cycle.js").Action} Action */
+
+const CONFLICT = 409;
+
+/**
+ * Return the buttons, which are updated when `page.study` has changed.
+ *
+ * @param {Page.StudyPage} page
+ */
+export const actions = (page) => actionButtons("Actions on this study", (action) => refusal(page.study, action), {
+  pause: () => send(page, "pause"),
+  resume: () => send(page, "resume"),
+  stop: () => stop(page),
+  cancel: () => cancel(page),
+  extend: () => extend(page),
+});
+
+/**
+ * @param {Api.StudyRead} study
+ * @param {Action} action
+ */
+const permitting = (study, action) => study.experiments.filter(({ state }) => isPermitted(action, state));
+
+/**
+ * @param {Api.StudyRead} study
+ * @param {Action} action
+ */
+function refusal(study, action) {
+  if (permitting(study, action).length) return "";
+  return `None of its experiments can be ${PARTICIPLES[action]} now: only one that is ${permittedStates(action)} can.`;
+}
+
+/**
+ * @param {Page.StudyPage} page
+ * @param {Action} action
+ */
+async function send(page, action) {
+  await post(`/studies/${page.id}/${action}`);
+  await page.reload();
+}
+
+/**
+ * Return how many experiments an action goes to, as the subject of a sentence.
+ *
+ * @param {Page.StudyPage} page
+ * @param {Action} action
+ */
+function subject({ study }, action) {
+  const some = permitting(study, action).length;
+  return some === study.experiments.length ? "All of its experiments" : `${count(some)} of its ${count(study.experiments.length)} experiments`;
+}
+
+/** @param {Page.StudyPage} page */
+function stop(page) {
+  openDialog({
+    title: "Stop this study?",
+    text: `${subject(page, "stop")} end: running repetitions finish their step, and each experiment is completed with the results it has. `
+      + "An experiment whose curve has no point yet is cancelled instead.",
+    action: "Stop it", danger: true, act: () => send(page, "stop"),
+  }, page.signal);
+}
+
+/** @param {Page.StudyPage} page */
+function cancel(page) {
+  openDialog({
+    title: "Cancel this study?",
+    text: `${subject(page, "cancel")} end at once, and lose the steps under way. Stored results stay, but the experiments can never go on.`,
+    action: "Cancel it", danger: true, act: () => send(page, "cancel"),
+  }, page.signal);
+}
+
+/** @param {Page.StudyPage} page */
+function extend(page) {
+  const experiments = permitting(page.study, "extend");
+  const iterations = Math.max(...experiments.map(({ spec }) => spec.iterations));
+  const repetitions = Math.max(...experiments.map(({ spec }) => spec.repetitions));
+  const whole = { type: "number", required: true, step: 1 };
+  openDialog({
+    title: "Extend this study",
+    text: `${subject(page, "extend")} grow to these totals. Results so far stay, and the study is then as if it had been submitted `
+      + "with these totals. An experiment that is larger already stays as it is.",
+    fields: [
+      { name: "iterations", label: "Iterations in all", value: iterations, min: 1, max: 1000, ...whole },
+      { name: "repetitions", label: "Repetitions in all", value: repetitions, min: 1, max: 10000, ...whole },
+    ],
+    action: "Extend it",
+    act: async (values) => {
+      await enlarge(experiments, Number(values.iterations), Number(values.repetitions));
+      await page.reload();
+    },
+  }, page.signal);
+}
+
+/**
+ * Extend experiments one by one; one that is large enough refuses, and is left alone. The direct baseline has no iterations to add.
+ *
+ * @param {Api.ExperimentRead[]} experiments
+ * @param {number} iterations
+ * @param {number} repetitions
+ */
+async function enlarge(experiments, iterations, repetitions) {
+  const refusals = [];
+  for (const { id, direct, spec } of experiments) {
+    const totals = { repetitions: Math.max(spec.repetitions, repetitions), ...(direct ? {} : { iterations: Math.max(spec.iterations, iterations) }) };
+    try {
+      await post(`/experiments/${id}/extend`, totals);
+    } catch (error) {
+      if (error.status !== CONFLICT) throw error;
+      refusals.push(error);
+    }
+  }
+  if (refusals.length === experiments.length) throw refusals[0];
+}

@@ -1,0 +1,173 @@
+"""Sensitivity checks as people ask for them: submitted, read, and summed up for the experiments that they belong to.
+
+Supervisors run them by `gaplab.services.running.sensitivity`. Use cases raise StoreUnavailable while the database
+cannot be used.
+"""
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.sensitivity import Checked, Sensitivity, SensitivityRead, SensitivitySpec
+from gaplab.services.core.errors import NotFound
+from gaplab.services.core.sensitivity import VERSION, Effort, warning
+from gaplab.services.experiments.limits import FREELY, Admission, Once, once
+from gaplab.services.experiments.states import move
+from gaplab.services.plugins.external import external_plugins
+from gaplab.services.specs.resolution import resolve_sensitivity, unit
+from gaplab.services.store.clock import moment
+from gaplab.services.store.models import ExperimentRow, SensitivityRow
+from gaplab.services.store.queries.events import note
+from gaplab.services.store.session import Store, snapshot
+from gaplab.services.store.statements import insert_new, storable
+from gaplab.services.store.stored_specs import checked
+
+
+@dataclass(frozen=True)
+class CheckSummary:
+    """What an experiment shows of its check.
+
+    Attributes:
+        id: of the check; None if there is none.
+        warnings: as sentences; none before the check has ended.
+    """
+
+    id: str | None = None
+    warnings: tuple[str, ...] = ()
+
+
+def submit(store: Store, spec: SensitivitySpec) -> SensitivityRead:
+    """Queue the check of these settings, unless it is there already and has not FAILED.
+
+    Raises:
+        InvalidSpec: with everything that is wrong with them.
+    """
+    return admit(store, spec, FREELY).answer
+
+
+def admit(store: Store, spec: SensitivitySpec, admitted: Admission) -> Once[SensitivityRead]:
+    """Submit the check, once for each idempotency key.
+
+    Raises:
+        InvalidSpec: with everything that is wrong with them.
+        KeyReused: the key stands for another request.
+    """
+    resolved = resolve_sensitivity(spec)
+    return once(store, admitted, spec, SensitivityRead, lambda session: _view(queue(session, resolved)))
+
+
+@snapshot
+def read(session: Session, id: str) -> SensitivityRead:  # noqa: A002 - as the API says
+    """Return the check, with its findings once it is COMPLETED.
+
+    Raises:
+        NotFound: no such check.
+    """
+    return _view(get(session, id))
+
+
+def queue(session: Session, spec: Checked) -> SensitivityRow:
+    """Return the check of this spec, QUEUED if it is new or had FAILED.
+
+    The row stays locked until the transaction ends: a check that ended meanwhile would not tell the experiments that
+    are being submitted with it.
+    """
+    row, id_ = SensitivityRow, id_of(spec)
+    values = {"id": id_, "spec": spec.model_dump(mode="json"), "created_at": moment(session)}
+    session.execute(insert_new(session, row).values(values))
+    move(session, row, (row.id == id_) & (row.state == State.FAILED), State.QUEUED, losses=0, error=None)
+    return session.get_one(row, id_, populate_existing=True, with_for_update={"read": True})
+
+
+def queue_for(session: Session, experiments: Iterable[ExperimentRow]) -> None:
+    """Queue the one check of what these experiments tune; those that tune nothing have none."""
+    tuning = [row for row in experiments if row.iterations > 1]
+    if not tuning:
+        return
+    check = queue(session, checked(tuning[0].spec))
+    for row in tuning:
+        row.sensitivity_id = check.id
+    session.flush()
+    if check.state.ended:
+        tell(session, check, [row.id for row in tuning])
+
+
+def get(session: Session, id_: str) -> SensitivityRow:
+    """Return the check of that id.
+
+    Raises:
+        NotFound: there is none.
+    """
+    if (check := session.get(SensitivityRow, storable(id_), populate_existing=True)) is None:
+        msg = f"there is no sensitivity check {id_!r}"
+        raise NotFound(msg)
+    return check
+
+
+def tell(session: Session, check: SensitivityRow, experiments: Iterable[str]) -> None:
+    """Note for these experiments that their check has ended, and what it warns of."""
+    body = {"sensitivity": check.id, "state": check.state.value, "warnings": list(warnings(check))}
+    for experiment in experiments:
+        note(session, EventKind.SENSITIVITY_ENDED, experiment, **body)
+
+
+def summaries(session: Session, experiments: Iterable[ExperimentRow]) -> dict[str, CheckSummary]:
+    """Return the summary of each experiment's check; experiments without a check are left out.
+
+    An imported experiment names no check: it has the check of the same tunables, if there is one.
+    """
+    ids = {
+        row.id: row.sensitivity_id or id_of(checked(row.spec), external={}) for row in experiments if row.iterations > 1
+    }
+    rows = session.scalars(select(SensitivityRow).where(SensitivityRow.id.in_(ids.values())))
+    found = {row.id: CheckSummary(row.id, warnings(row)) for row in rows}
+    return {experiment: found[check] for experiment, check in ids.items() if check in found}
+
+
+def warnings(check: SensitivityRow) -> tuple[str, ...]:
+    """Return what a person who tunes this should know, as sentences."""
+    if check.state is State.FAILED:
+        return (f"the sensitivity check failed, so that nothing is known of the tunables: {check.error}",)
+    return tuple(sentence for finding in _findings(check) if (sentence := warning(finding)))
+
+
+def id_of(spec: Checked, external: Mapping[str, str] | None = None) -> str:
+    """Return the id of the check: it follows from the spec, the version of the method, and external plug-ins.
+
+    Args:
+        spec: what is checked.
+        external: versions of external plug-ins by kind and name, so that an edited one is checked again; those of this
+            process if left out.
+    """
+    versions = external_plugins() if external is None else external
+    names = (f"robot {spec.robot.name}", f"engine {spec.engine.name}", *(f"tunable {t.name}" for t in spec.tunables))
+    files = [versions[name] for name in names if name in versions]
+    text = json.dumps([VERSION, spec.model_dump(mode="json"), *files], sort_keys=True)
+    return sha256(text.encode()).hexdigest()[:16]
+
+
+def _findings(check: SensitivityRow) -> tuple[Sensitivity, ...]:
+    return tuple(map(Sensitivity.model_validate, check.found or ()))
+
+
+def _view(check: SensitivityRow) -> SensitivityRead:
+    spec = Checked.model_validate(check.spec)
+    return SensitivityRead(
+        id=check.id,
+        state=check.state,
+        spec=spec,
+        rollouts=Effort(spec.points, spec.evaluations).rollouts(len(spec.tunables)),
+        unit=unit(spec),
+        tunables=_findings(check),
+        warnings=warnings(check),
+        reason=check.error,
+        created_at=check.created_at,
+        started_at=check.started_at,
+        ended_at=check.ended_at,
+    )

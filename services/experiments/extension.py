@@ -1,0 +1,82 @@
+"""Extension: a COMPLETED experiment becomes as large as one that was submitted with larger totals."""
+
+from collections.abc import Iterator
+
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.lifecycle import State, Verb
+from gaplab.schemas.records import ExperimentRead
+from gaplab.schemas.schedule import ExtensionSpec
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
+from gaplab.services.experiments.lifecycle import get_permitting
+from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
+from gaplab.services.experiments.states import move, settle
+from gaplab.services.experiments.submission import extent_of
+from gaplab.services.experiments.views import view_experiments
+from gaplab.services.specs.resolution import is_direct
+from gaplab.services.store.models import RepetitionRow
+from gaplab.services.store.queries.events import note
+from gaplab.services.store.queries.experiments import insert_repetitions, repetitions_of
+from gaplab.services.store.queries.progress import tallies
+from gaplab.services.store.session import Session, transaction
+
+
+@transaction
+def extend_experiment(
+    session: Session, experiment_id: str, extension: ExtensionSpec, admitted: Admission = FREELY
+) -> ExperimentRead:
+    """Queue a COMPLETED experiment again with larger totals; its results so far stay.
+
+    With its present totals, an experiment that was stopped is computed to its end. Raises StoreUnavailable while the
+    database cannot be used.
+
+    Raises:
+        NotFound: no such experiment.
+        Conflict: it is not COMPLETED, nothing would be left to run, or its reality is not known here.
+        InvalidSpec: less than there is, more than a limit permits, or iterations for the direct baseline.
+        LimitReached: there is no room for it now.
+    """
+    experiment, row = get_permitting(session, experiment_id, Verb.EXTEND), RepetitionRow
+    if None in experiment.spec["reality"]["parameters"].values():
+        msg = f"experiment {experiment_id!r} was imported before its reality was shown, so it cannot be extended"
+        raise Conflict(msg)
+    spec = _extended(ExperimentSpec.model_validate(experiment.spec), extension)
+    check_extent([spec], admitted.limits)
+    tally = tallies(session, [experiment_id])[experiment_id]
+    check_load(session, [spec], admitted, done=tally.rollouts_done + tally.rollouts_saved)
+    extent, total = extent_of(spec), spec.repetitions or 0
+    present = len(repetitions_of(session, experiment_id))
+    unfinished = (row.experiment_id == experiment_id) & (row.iterations_done < extent.iterations)
+    if not move(session, row, unfinished, State.QUEUED, losses=0) and total == present:
+        msg = f"experiment {experiment_id!r} has {spec.iterations} iterations and {total} repetitions already"
+        raise Conflict(f"{msg}, and none of them is left to run; larger totals extend it")
+    insert_repetitions(session, experiment_id, range(present, total))
+    experiment.spec = experiment.spec | {"iterations": spec.iterations, "repetitions": total}
+    experiment.iterations, experiment.rollouts = extent.iterations, extent.rollouts
+    session.flush()
+    note(session, EventKind.EXTENDED, experiment_id, iterations=spec.iterations, repetitions=total)
+    settle(session, [experiment_id], State.QUEUED)
+    session.refresh(experiment)
+    return view_experiments(session, [experiment])[0]
+
+
+def _extended(spec: ExperimentSpec, extension: ExtensionSpec) -> ExperimentSpec:
+    if violations := list(_violations(spec, extension)):
+        raise InvalidSpec(violations)
+    return spec.model_copy(update=extension.model_dump(exclude_none=True))
+
+
+def _violations(spec: ExperimentSpec, extension: ExtensionSpec) -> Iterator[Violation]:
+    totals = extension.model_dump(exclude_none=True)
+    if not totals:
+        yield Violation(
+            "", {}, "name the total of iterations, of repetitions, or of both", ["iterations", "repetitions"]
+        )
+    if extension.iterations is not None and is_direct(spec):
+        message = "the direct baseline has no iterations: it evolves in reality itself; extend its repetitions"
+        yield Violation("/iterations", extension.iterations, message)
+    for name, total in totals.items():
+        present = getattr(spec, name)
+        if total < present:
+            message = f"it has {present} {name} already, and {total} is a total, not what is added"
+            yield Violation(f"/{name}", total, message, f"at least {present}")

@@ -1,0 +1,135 @@
+"""What people ask of experiments and studies: pause, resume, stop, cancel and another schedule.
+
+`gaplab.schemas.lifecycle` says what each verb means and which states permit it. Each function is one transaction, and
+raises StoreUnavailable while the database cannot be used.
+"""
+
+from collections.abc import Callable
+
+from sqlalchemy import update
+
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.lifecycle import PERMITTED, Ending, State, Verb
+from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.schemas.schedule import ScheduleChange
+from gaplab.services.core.errors import Conflict
+from gaplab.services.experiments.states import move, settle
+from gaplab.services.experiments.views import view_experiments, view_studies
+from gaplab.services.store.models import ExperimentRow, RepetitionRow
+from gaplab.services.store.queries import attempts, checkpoints
+from gaplab.services.store.queries.events import note
+from gaplab.services.store.queries.experiments import experiments_of, get_experiment, get_study, lock
+from gaplab.services.store.session import Session, transaction
+
+_EVENTS = {
+    Verb.PAUSE: EventKind.PAUSING,
+    Verb.RESUME: EventKind.RESUMED,
+    Verb.STOP: EventKind.STOPPING,
+    Verb.CANCEL: EventKind.CANCELLED,
+}
+
+_PARTICIPLES = {
+    Verb.PAUSE: "paused",
+    Verb.RESUME: "resumed",
+    Verb.STOP: "stopped",
+    Verb.CANCEL: "cancelled",
+    Verb.EXTEND: "extended",
+}
+
+
+@transaction
+def ask_experiment(session: Session, experiment_id: str, verb: Verb) -> ExperimentRead:
+    """Pause, resume, stop or cancel an experiment.
+
+    Raises:
+        NotFound: no such experiment.
+        Conflict: its state does not permit the verb.
+    """
+    experiment = get_permitting(session, experiment_id, verb)
+    _obey(session, experiment, verb)
+    return view_experiments(session, [experiment])[0]
+
+
+@transaction
+def ask_study(session: Session, study_id: str, verb: Verb) -> StudyRead:
+    """Pause, resume, stop or cancel the experiments of a study that permit it.
+
+    Raises:
+        NotFound: no such study.
+        Conflict: none of its experiments permits it.
+    """
+    study, experiments = get_study(session, study_id), experiments_of(session, [study_id])
+    lock(session, [experiment.id for experiment in experiments])
+    for experiment in experiments:
+        session.refresh(experiment)
+    permitting = [experiment for experiment in experiments if experiment.state in PERMITTED[verb]]
+    if not permitting:
+        states = ", ".join(sorted({experiment.state for experiment in experiments}))
+        permitted = ", ".join(PERMITTED[verb])
+        msg = f"no experiment of study {study_id!r} can be {_PARTICIPLES[verb]}: "
+        raise Conflict(msg + f"they are {states}; permitted is {permitted}")
+    for experiment in permitting:
+        _obey(session, experiment, verb)
+    return view_studies(session, [study])[0]
+
+
+@transaction
+def schedule_experiment(session: Session, experiment_id: str, change: ScheduleChange) -> ExperimentRead:
+    """Change the priority or the number of repetitions that run at once; what is not named stays.
+
+    Raises:
+        NotFound: no such experiment.
+    """
+    experiment, row = get_experiment(session, experiment_id), ExperimentRow
+    lock(session, [experiment.id])
+    values = change.model_dump(exclude_unset=True)
+    if "priority" in values:
+        values["precedence"] = -(values.pop("priority") or 0)
+    if values:
+        session.execute(update(row).where(row.id == experiment.id).values(values))
+    settle(session, [experiment.id])
+    session.refresh(experiment)
+    return view_experiments(session, [experiment])[0]
+
+
+def get_permitting(session: Session, experiment_id: str, verb: Verb) -> ExperimentRow:
+    """Return the experiment, locked in a state that permits the verb.
+
+    Raises:
+        NotFound: no such experiment.
+        Conflict: its state does not permit the verb.
+    """
+    experiment = get_experiment(session, experiment_id)
+    lock(session, [experiment.id])
+    session.refresh(experiment)
+    if experiment.state not in PERMITTED[verb]:
+        able = [other.value for other in Verb if experiment.state in PERMITTED[other]]
+        msg = (
+            f"experiment {experiment_id!r} is {experiment.state} and cannot be {_PARTICIPLES[verb]}; "
+            f"what can be done with it: {', '.join(able) or 'nothing'}"
+        )
+        raise Conflict(msg)
+    return experiment
+
+
+def _obey(session: Session, experiment: ExperimentRow, verb: Verb) -> None:
+    note(session, _EVENTS[verb], experiment.id)
+    if verb is Verb.CANCEL:
+        _end_repetitions(session, experiment.id)
+    settle(session, [experiment.id], _REQUESTED[verb](experiment))
+    session.refresh(experiment)
+
+
+def _end_repetitions(session: Session, experiment: str) -> None:
+    """Cancel all repetitions that have not ended: queued ones never start, and running ones can no longer write."""
+    cancelled = move(session, RepetitionRow, RepetitionRow.experiment_id == experiment, State.CANCELLED)
+    attempts.end(session, cancelled, Ending.CANCELLED)
+    checkpoints.forget(session, cancelled)
+
+
+_REQUESTED: dict[Verb, Callable[[ExperimentRow], State]] = {
+    Verb.PAUSE: lambda _: State.PAUSING,
+    Verb.RESUME: lambda experiment: State.RUNNING if experiment.running else State.QUEUED,
+    Verb.STOP: lambda _: State.STOPPING,
+    Verb.CANCEL: lambda _: State.CANCELLED,
+}

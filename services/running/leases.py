@@ -1,0 +1,154 @@
+"""The lease of a supervisor on a piece of work: claim, heartbeat, complete, fail, release, hand back.
+
+A holder sends a heartbeat every few seconds, and counts as lost after `STALE_AFTER_S` without one. The next lease has
+the next epoch. Every write carries the lease, and changes nothing once it has ended; the caller learns this from the
+answer, and drops the work. Work that was lost is queued again, and fails after `MAX_LOSSES` losses without progress.
+
+All use cases raise StoreUnavailable while the database cannot be used; each may then be tried again.
+"""
+
+from collections.abc import Iterable, Sequence
+from datetime import timedelta
+from typing import Any, ClassVar, Generic, TypeVar
+
+from sqlalchemy import ColumnElement, func, tuple_, update
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.lifecycle import Ending, State
+from gaplab.services.experiments.states import move
+from gaplab.services.store.clock import moment, now
+from gaplab.services.store.lease import Lease
+from gaplab.services.store.models import LeasedRow
+from gaplab.services.store.session import Store
+from gaplab.services.store.statements import storable
+
+STALE_AFTER_S = 30.0
+
+MAX_LOSSES = 5
+"""Work that loses as many workers in a row without getting on is what kills them."""
+
+L = TypeVar("L", bound=Lease)
+
+
+class Leases(Generic[L]):
+    """Leases on the rows of one table; a subclass says what else follows when one ends.
+
+    Attributes:
+        table: of the work.
+    """
+
+    table: ClassVar[type[LeasedRow]]
+
+    def heartbeat(self, store: Store, leases: Iterable[L]) -> tuple[L, ...]:
+        """Prolong leases, and return those that still hold."""
+        held = tuple(leases)
+        return store.write(self._heartbeat, held) if held else ()
+
+    def complete(self, store: Store, *leases: L, **results: Any) -> tuple[L, ...]:  # noqa: ANN401 - columns of any type
+        """End work as COMPLETED, and return the leases that held.
+
+        Args:
+            store: of the work.
+            leases: of the work that is done.
+            results: columns to set.
+        """
+        if not leases:
+            return ()
+        ended = store.write(
+            self.end, self._of(leases), State.COMPLETED, Ending.COMPLETED, **(results | {"error": None})
+        )
+        return tuple(lease for lease in leases if lease.id in ended)
+
+    def fail(self, store: Store, lease: L, reason: str) -> bool:
+        """End work as FAILED; return False if the lease no longer holds."""
+        why = storable(reason)
+        return bool(store.write(self.end, self._of([lease]), State.FAILED, Ending.FAILED, why, error=why))
+
+    def release(self, store: Store, lease: L, reason: str) -> bool:
+        """Queue work again whose worker was lost; return False if the lease no longer holds."""
+        return bool(store.write(self._release, self._of([lease]), storable(reason)))
+
+    def hand_back(self, store: Store, *leases: L) -> tuple[L, ...]:
+        """Queue work again as if it had not been claimed, and return the leases that held."""
+        given = store.write(self._hand_back, self._of(leases)) if leases else ()
+        return tuple(lease for lease in leases if lease.id in given)
+
+    def hand_back_unheard(self, store: Store, owner: str, known: Iterable[L]) -> int:
+        """Hand back claims whose reply never reached their owner, and return their number.
+
+        Args:
+            store: of the work.
+            owner: the supervisor.
+            known: all leases that it knows of.
+        """
+        ids = [lease.id for lease in known]
+        return len(store.write(self._hand_back, (self.table.owner == owner) & self.table.id.not_in(ids)))
+
+    def requeue_lost(self, store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:
+        """Queue work again whose holder was silent for too long, and return how many pieces there were."""
+        return len(store.write(self._requeue_lost, stale_after_s))
+
+    def take(self, session: Session, ids: Sequence[int | str], owner: str) -> list[Any]:
+        """Begin a lease on each of these queued rows, and return the ids of those that were still free."""
+        row = self.table
+        return move(
+            session,
+            row,
+            row.id.in_(ids) & (row.state == State.QUEUED),
+            State.RUNNING,
+            owner=owner,
+            epoch=row.epoch + 1,
+            attempts=row.attempts + 1,
+            heartbeat_at=now(),
+            started_at=func.coalesce(row.started_at, now()),
+        )
+
+    def end(
+        self,
+        session: Session,
+        /,
+        which: ColumnElement[bool],
+        to: State,
+        ending: Ending,
+        reason: str | None = None,
+        **values: Any,  # noqa: ANN401 - columns of any type
+    ) -> list[Any]:
+        """End leases that hold, and return the ids of their rows.
+
+        Args:
+            session: of a transaction that writes.
+            which: condition on the rows; rows that nobody holds are left alone.
+            to: their next state.
+            ending: how the leases end.
+            reason: why they end, for the history.
+            values: further columns to set.
+        """
+        del ending, reason  # for subclasses that keep a history
+        return move(session, self.table, which & (self.table.state == State.RUNNING), to, **values)
+
+    def _heartbeat(self, session: Session, leases: Sequence[L]) -> tuple[L, ...]:
+        row = self.table
+        beaten = update(row).where(self._of(leases), row.state == State.RUNNING).values(heartbeat_at=now())
+        held = {(id_, epoch) for id_, epoch in session.execute(beaten.returning(row.id, row.epoch))}
+        return tuple(lease for lease in leases if (lease.id, lease.epoch) in held)
+
+    def _release(self, session: Session, which: ColumnElement[bool], reason: str) -> list[Any]:
+        losses = self.table.losses + 1
+        changes = {"losses": losses, "owner": None}
+        last = f"lost {MAX_LOSSES} times without progress; the last time {reason}"
+        hopeless = which & (losses >= MAX_LOSSES)
+        failed = self.end(session, hopeless, State.FAILED, Ending.LOST, reason, error=last, **changes)
+        queued = self.end(session, which, State.QUEUED, Ending.LOST, reason, error=reason, **changes)
+        return failed + queued
+
+    def _hand_back(self, session: Session, which: ColumnElement[bool]) -> list[Any]:
+        attempts = self.table.attempts - 1
+        return self.end(session, which, State.QUEUED, Ending.HANDED_BACK, owner=None, attempts=attempts)
+
+    def _requeue_lost(self, session: Session, stale_after_s: float) -> list[Any]:
+        stale = self.table.heartbeat_at < moment(session) - timedelta(seconds=stale_after_s)
+        return self._release(session, stale, f"its worker was not heard of for {stale_after_s:g} s")
+
+    def _of(self, leases: Sequence[L]) -> ColumnElement[bool]:
+        """Return the condition that a row's lease is one of these."""
+        return tuple_(self.table.id, self.table.epoch).in_([(lease.id, lease.epoch) for lease in leases])

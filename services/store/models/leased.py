@@ -1,0 +1,36 @@
+"""Work under a lease: what a repetition, a sensitivity check and whatever supervisors run next have in common."""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import String, Text
+from sqlalchemy.orm import Mapped, mapped_column
+
+from gaplab.schemas.lifecycle import State
+from gaplab.services.store.models.base import Base
+
+
+class LeasedRow(Base):
+    """A piece of work that one supervisor at a time may hold.
+
+    Attributes:
+        owner: the supervisor that holds the lease, or held it last.
+        epoch: of the lease; every write of a holder carries it, and a write with an old one changes nothing.
+        heartbeat_at: the holder's latest sign of life.
+        attempts: number of claims, those that were handed back left out.
+        losses: number of workers lost since the work last got on.
+        error: why it FAILED or was last queued again.
+    """
+
+    __abstract__ = True
+
+    id: Mapped[Any]
+    state: Mapped[State] = mapped_column(default=State.QUEUED)
+    owner: Mapped[str | None] = mapped_column(String(200))
+    epoch: Mapped[int] = mapped_column(default=0)
+    heartbeat_at: Mapped[datetime | None]
+    attempts: Mapped[int] = mapped_column(default=0)
+    losses: Mapped[int] = mapped_column(default=0)
+    error: Mapped[str | None] = mapped_column(Text)
+    started_at: Mapped[datetime | None]
+    ended_at: Mapped[datetime | None]

@@ -1,0 +1,184 @@
+"""The rows of many steps of many repetitions, written by as few statements as there are kinds of rows."""
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from functools import cache
+from math import isfinite
+from typing import Any, cast
+
+from sqlalchemy import Connection, Table, Update, bindparam, insert, select, tuple_, update
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.records import MeasurementKind
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.types import Cost, Measured, Probed, Selected, Step, Transferred, Tuned
+from gaplab.services.store.clock import now
+from gaplab.services.store.lease import Claim, TimedStep
+from gaplab.services.store.models import IterationRow, MeasurementRow, SimulatorRow
+
+_ITERATION, _MEASUREMENT, _SIMULATOR = (
+    cast("Table", each.__table__) for each in (IterationRow, MeasurementRow, SimulatorRow)
+)
+
+_ORDER: tuple[type[Step], ...] = (Selected, Measured, Tuned, Transferred, Probed)
+
+Row = dict[str, Any]
+Key = tuple[int, int]
+"""A repetition's id and the number of one of its iterations."""
+
+
+class StepRows:
+    """Collects what steps say; `write` adds it to the log of their repetitions.
+
+    Each step may be added once, and only if it is the next one: the batch trusts its caller that this was checked.
+    """
+
+    def __init__(self) -> None:
+        self._columns: dict[Key, Row] = defaultdict(lambda: {"seconds": 0.0})
+        self._opened: set[Key] = set()
+        self._ended: set[Key] = set()
+        self._simulators: list[Row] = []
+        self._measurements: dict[tuple[Key, MeasurementKind], Row] = {}
+
+    def add(self, claim: Claim, timed: TimedStep) -> None:
+        """One step of the claim's repetition."""
+        step, key = timed.step, (claim.id, timed.step.iteration)
+        columns = self._columns[key]
+        columns.update(iteration_columns(step))
+        columns["seconds"] += timed.seconds
+        if _opens_iteration(step):
+            self._opened.add(key)
+        if isinstance(step, Probed):
+            self._ended.add(key)
+        if isinstance(step, Tuned):
+            self._simulators += [_named(key) | each for each in simulator_columns(step)]
+        if isinstance(step, Measured | Probed):
+            self._measurements[key, _kind(step)] = measurement_columns(step, _measured_by(claim))
+
+    def write(self, session: Session) -> None:
+        """Everything that was added, in the session's transaction."""
+        connection = session.connection()
+        self._write_iterations(connection)
+        if self._simulators:
+            connection.execute(insert(_SIMULATOR), self._simulators)
+        if self._measurements:
+            connection.execute(insert(_MEASUREMENT), self._measured(connection))
+
+    def _write_iterations(self, connection: Connection) -> None:
+        """One statement for the iterations that begin or go on alike: there are hardly ever more than three kinds."""
+        alike: dict[tuple[bool, bool, tuple[str, ...]], list[Key]] = defaultdict(list)
+        for key, columns in self._columns.items():
+            alike[key in self._opened, key in self._ended, tuple(columns)].append(key)
+        for (opened, ended, names), keys in alike.items():
+            if opened:
+                rows = [self._row(key) for key in keys]
+                connection.execute(insert(_ITERATION).values({"ended_at": now()} if ended else {}), rows)
+            else:
+                rows = [{f"of_{name}": value for name, value in self._row(key).items()} for key in keys]
+                connection.execute(_fill(names, ended=ended), rows)
+
+    def _row(self, key: Key) -> Row:
+        return _named(key, "number") | self._columns[key]
+
+    def _measured(self, connection: Connection) -> list[Row]:
+        """A probe is of the genome that its iteration transferred, which may have been stored long before."""
+        probed = [key for key, kind in self._measurements if kind is MeasurementKind.PROBE]
+        known = {key: self._columns[key].get("transferred_genome") for key in probed}
+        known |= _transferred(connection, [key for key in probed if known[key] is None])
+        return [
+            _named(key) | {"kind": kind, "genome": known.get(key)} | columns
+            for (key, kind), columns in self._measurements.items()
+        ]
+
+
+def position(step: Step) -> int:
+    """The step's place in the log of its repetition, from 0; iteration 0 has no Selected and no Measured."""
+    return len(_ORDER) * step.iteration + _ORDER.index(type(step)) - _ORDER.index(Tuned)
+
+
+def vector(values: FloatArray) -> list[float]:
+    """A JSON array; its numbers read back exactly."""
+    return [float(each) for each in values]
+
+
+def finite(value: float) -> float | None:
+    """NULL for nan and the infinities."""
+    return float(value) if isfinite(value) else None
+
+
+def iteration_columns(step: Step) -> dict[str, Any]:
+    """The columns of its iteration that the step fills."""
+    match step:
+        case Selected():
+            return {"selected_genome": vector(step.genome), **_phase("selection", step.cost)}
+        case Tuned():
+            return _phase("tuning", step.cost)
+        case Transferred():
+            found = {"transferred_genome": vector(step.genome), "simulated_fitness": finite(step.fitness)}
+            return found | _phase("transfer", step.cost)
+        case Probed():
+            return {"recorded_fitness": finite(step.recorded)}
+        case Measured():
+            return {}
+
+
+def simulator_columns(step: Tuned) -> list[dict[str, Any]]:
+    """One row for each simulator of the step."""
+    return [
+        {"rank": rank, "parameters": vector(each.parameters), "squared_error": finite(each.squared_error)}
+        for rank, each in enumerate(step.simulators)
+    ]
+
+
+def measurement_columns(step: Measured | Probed, measured_by: str) -> dict[str, Any]:
+    """One row; a probe's genome is the one that was transferred, which its step does not repeat."""
+    if isinstance(step, Probed):
+        return {"fitness": finite(step.fitness), "measured_by": measured_by}
+    genome, fitness = vector(step.sample.genome), finite(step.sample.fitness)
+    return {"genome": genome, "fitness": fitness, "measured_by": measured_by}
+
+
+def _opens_iteration(step: Step) -> bool:
+    """Whether the step is the first of its iteration."""
+    return isinstance(step, Selected) or (isinstance(step, Tuned) and step.iteration == 0)
+
+
+def _phase(name: str, cost: Cost) -> dict[str, int]:
+    return {f"{name}_{count}": int(getattr(cost, count)) for count in ("rollouts", "failures", "saved")}
+
+
+def _named(key: Key, number: str = "iteration") -> Row:
+    return {"repetition_id": key[0], number: key[1]}
+
+
+def _kind(step: Step) -> MeasurementKind:
+    return MeasurementKind.SAMPLE if isinstance(step, Measured) else MeasurementKind.PROBE
+
+
+def _measured_by(claim: Claim) -> str:
+    engine = claim.spec.reality.engine
+    return engine.name if engine else "unknown"
+
+
+@cache
+def _fill(names: tuple[str, ...], *, ended: bool) -> Update:
+    """Columns of an iteration that is there already; its seconds add up."""
+    columns = _ITERATION.c
+    values: Mapping[str, Any] = {name: bindparam(f"of_{name}") for name in names} | {
+        "seconds": columns.seconds + bindparam("of_seconds"),
+        **({"ended_at": now()} if ended else {}),
+    }
+    of_key = (columns.repetition_id == bindparam("of_repetition_id"), columns.number == bindparam("of_number"))
+    return update(_ITERATION).where(*of_key).values(values)
+
+
+def _transferred(connection: Connection, keys: Iterable[Key]) -> dict[Key, list[float]]:
+    wanted, columns = list(keys), _ITERATION.c
+    if not wanted:
+        return {}
+    found = connection.execute(
+        select(columns.repetition_id, columns.number, columns.transferred_genome).where(
+            tuple_(columns.repetition_id, columns.number).in_(wanted)
+        )
+    )
+    return {(repetition, number): genome or [] for repetition, number, genome in found}

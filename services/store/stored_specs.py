@@ -1,0 +1,17 @@
+"""Resolved specs as they are stored: plain JSON."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from gaplab.schemas.sensitivity import Checked
+
+
+def checked(spec: Mapping[str, Any]) -> Checked:
+    """What a sensitivity check of this resolved spec looks at."""
+    return Checked.model_validate({name: spec[name] for name in ("robot", "engine", "tunables")})
+
+
+def without_truth(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the spec with null in place of each of reality's parameters."""
+    reality = spec["reality"]
+    return {**spec, "reality": reality | {"parameters": dict.fromkeys(reality["parameters"])}}

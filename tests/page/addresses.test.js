@@ -1,0 +1,43 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { addressOf as comparisonAddress, comparisonOf, figureQuery, wholeNumber } from "../../api/dashboard/views/compare/address.js";
+import { addressOf as listAddress, filtersOf, isFiltered } from "../../api/dashboard/views/list/filters.js";
+
+const parametersOf = (address) => new URLSearchParams(address.split("?")[1] ?? "");
+
+test("an address of a comparison says everything, and comes back as it was", () => {
+  const address = "#/compare?experiments=b,a&x=time&cost_s=90&band=sd&each=true&test=welch&from=2&to=4";
+  assert.equal(comparisonAddress(comparisonOf(parametersOf(address))), address);
+  assert.equal(comparisonAddress(comparisonOf(new URLSearchParams())), "#/compare");
+  assert.equal(comparisonAddress(comparisonOf(new URLSearchParams("from=0&to=0"))), "#/compare?from=0&to=0");
+});
+
+test("what is wrong in an address of a comparison is as if it were left out", () => {
+  const wrong = "experiments=a,a,../b,&studies=s&x=toString&cost_s=-1&band=constructor&each=yes&test=guess&from=x&to=99999";
+  const { experiments, studies, ...others } = comparisonOf(new URLSearchParams(wrong));
+  assert.deepEqual([experiments, studies], [["a"], ["s"]]);
+  assert.deepEqual(others, { x: "evaluations", cost_s: 60, band: "", each: false, test: "student", from: null, to: null });
+});
+
+test("the figure is asked only for what differs from its defaults", () => {
+  const choice = comparisonOf(new URLSearchParams("experiments=a"));
+  assert.deepEqual(figureQuery(choice), { experiment: ["a"], x: null, cost_s: null, band: "", each: null });
+  assert.deepEqual(figureQuery({ ...choice, x: "time", each: true }), { experiment: ["a"], x: "time", cost_s: 60, band: "", each: true });
+  assert.deepEqual([wholeNumber("0"), wholeNumber(""), wholeNumber(null), wholeNumber("1.5")], [0, null, null, null]);
+});
+
+test("an address of the list holds its filters, and nothing that is usual", () => {
+  const address = "#/?state=FAILED&strategy=random&text=a+b&show=experiments&sort=name";
+  assert.equal(listAddress(filtersOf(parametersOf(address))), address);
+  assert.equal(listAddress(filtersOf(new URLSearchParams())), "#/");
+});
+
+test("a list of studies is not sorted by what only experiments have", () => {
+  assert.equal(filtersOf(new URLSearchParams("sort=strategy")).sort, "-created_at");
+  assert.equal(filtersOf(new URLSearchParams("sort=strategy&show=experiments")).sort, "strategy");
+});
+
+test("a list is filtered by state, strategy or words, and not by its order", () => {
+  assert.equal(isFiltered(filtersOf(new URLSearchParams("sort=name&show=experiments"))), false);
+  for (const filter of ["state=FAILED", "strategy=random", "text=a"]) assert.ok(isFiltered(filtersOf(new URLSearchParams(filter))));
+});

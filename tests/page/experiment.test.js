@@ -1,0 +1,55 @@
+import "./fakes.js";
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { isFunction, unitsOf } from "../../api/dashboard/lib/robots.js";
+
+const { refusal } = await import("../../api/dashboard/views/experiment/actions.js");
+const { pastEvents } = await import("../../api/dashboard/views/experiment/event_list.js");
+const { eventText } = await import("../../api/dashboard/views/experiment/event_words.js");
+const { lastIteration } = await import("../../api/dashboard/views/replay.js");
+const { gathered } = await import("../../api/dashboard/views/study/head.js");
+
+test("an action that a state forbids says what would permit it", () => {
+  assert.equal(refusal("pause", "RUNNING"), "");
+  assert.equal(refusal("resume", "QUEUED"), "An experiment that is queued cannot be resumed, only one that is pausing or paused.");
+  assert.equal(refusal("extend", "FAILED"), "An experiment that is failed cannot be extended, only one that is completed.");
+});
+
+test("events are sentences, and a kind that is newer than the page has its name", () => {
+  const event = { kind: "repetition_failed", repetition: 3, body: { reason: "a foot fell off" } };
+  assert.equal(eventText(event), "Repetition 3 failed: a foot fell off");
+  assert.equal(eventText({ kind: "measured", repetition: 0, body: { iteration: 2, fitness: null } }), "Repetition 0, iteration 2: measured in reality, physics failed");
+  assert.match(eventText({ kind: "tuned", repetition: 0, body: { iteration: 1, squared_error: 0.00001 } }), /squared error 1\.0e-5$/);
+  assert.equal(eventText({ kind: "something_new" }), "something new");
+});
+
+/** A service with these numbers of an experiment's events, `size` a page. */
+const service = (numbers, size) => (query) => {
+  const items = numbers.filter((number) => number > query.after).slice(0, size).map((number) => ({ number }));
+  return Promise.resolve({ items, last: items.length === size ? items.at(-1).number : Infinity });
+};
+
+test("past events come from the newest to the oldest, each once, however they are spread", async () => {
+  const numbers = [1, 2, 3, 500, 501, 1200, ...Array.from({ length: 300 }, (_, index) => 2000 + index), 2500];
+  const past = pastEvents(service(numbers, 1000), 2300);
+  const found = [];
+  while (!past.isOver()) found.push(...(await past.next(60)).map(({ number }) => number));
+  assert.deepEqual(found, numbers.filter((number) => number <= 2300).reverse());
+});
+
+test("texts of several experiments come once, with the experiments unless all have them", () => {
+  const study = { experiments: [{ name: "a", warnings: ["all", "some"] }, { name: "b", warnings: ["all"] }] };
+  assert.deepEqual(gathered(study, ({ warnings }) => warnings), [{ text: "all", note: "" }, { text: "some", note: "a" }]);
+});
+
+test("a replay begins with the last iteration that the first repetition is sure to have", () => {
+  const at = (done, direct = false) => lastIteration({ direct, progress: { iterations_done: done, repetitions: 4 }, spec: { iterations: 10 } });
+  assert.deepEqual([at(0), at(4), at(19), at(44), at(44, true)], [0, 0, 3, 10, 0]);
+});
+
+test("the catalogue tells units, and functions from robots that move", () => {
+  const catalogue = { robots: [{ name: "legs", details: { unit: "m/s", function: false } }, { name: "curve", details: { unit: "1", function: true } }] };
+  const of = (name) => ({ spec: { robot: { name } } });
+  assert.deepEqual(["legs", "curve", "gone"].map((name) => isFunction(catalogue, of(name))), [false, true, false]);
+  assert.deepEqual([unitsOf(catalogue)(of("legs")), unitsOf(catalogue)(of("gone")), unitsOf(catalogue)(undefined)], ["m/s", "", ""]);
+});

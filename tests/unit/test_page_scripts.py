@@ -1,0 +1,104 @@
+"""The page's scripts: their own tests, what they know of the service, and what they must not know."""
+
+import json
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from deno import find_deno_bin
+
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.lifecycle import PERMITTED, State
+from gaplab.services.core.optimizers import optimizers
+from gaplab.services.core.robots import robots
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.tunables import tunables
+from gaplab.services.engines import engines
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "api" / "dashboard"
+SCRIPTS = sorted(PAGE.rglob("*.js"))
+TESTS = sorted((ROOT / "tests" / "page").glob("*.test.js"))
+PLUGINS = sorted({name for registry in (strategies, robots, engines, optimizers, tunables) for name in registry})
+IMPORT = re.compile(r'^(?:import|export)\b[^;]*?"(\.[^"]+)";', re.MULTILINE)
+
+
+def deno(folder: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"DENO_DIR": str(folder), "DENO_NO_UPDATE_CHECK": "1", "NO_COLOR": "1"}
+    return subprocess.run(
+        [find_deno_bin(), *arguments], cwd=ROOT, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+def exported(folder: Path, script: str, name: str) -> object:
+    """A constant of a script."""
+    program = f"import {{ {name} }} from './api/dashboard/{script}'; console.log(JSON.stringify({name}));"
+    done = deno(folder, "eval", program)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def named_plugins(text: str) -> list[str]:
+    """The plug-ins that a script names: as a whole text, or anywhere if no English word is written so."""
+    return [
+        name
+        for name in PLUGINS
+        if re.search(rf"([\"'`]){name}\1", text) or ("_" in name and re.search(rf"\b{name}\b", text))
+    ]
+
+
+def imported(path: Path) -> list[Path]:
+    return [(path.parent / found).resolve() for found in IMPORT.findall(path.read_text())]
+
+
+@pytest.mark.parametrize("path", TESTS, ids=lambda path: path.name)
+def test_scripts_pass_their_tests(path: Path, tmp_path: Path):
+    done = deno(tmp_path, "test", "--no-check", path)
+
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.search(r"ok \| [1-9]\d* passed \| 0 failed", done.stdout)
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.relative_to(PAGE).as_posix())
+def test_no_script_names_a_plugin(path: Path):
+    assert named_plugins(path.read_text()) == []
+
+
+def test_names_of_plugins_would_be_found():
+    text = "strategy === \"direct\"; // `known_fit`\nnames = ['toy_function', random]"
+
+    assert named_plugins(text) == ["direct", "known_fit", "toy_function"]
+
+
+def test_scripts_import_each_other_in_no_circle():
+    left = {path: imported(path) for path in SCRIPTS}
+    assert left[PAGE / "views" / "compare" / "pairs.js"]
+
+    while left:
+        free = [path for path, others in left.items() if not any(other in left for other in others)]
+        assert free, f"among these is a circle: {sorted(path.relative_to(PAGE).as_posix() for path in left)}"
+        for path in free:
+            del left[path]
+
+
+def test_the_page_permits_the_actions_that_the_service_permits(tmp_path: Path):
+    permitted = exported(tmp_path, "lib/life_cycle.js", "PERMITTED")
+
+    assert isinstance(permitted, dict)
+    assert {action: set(states) for action, states in permitted.items()} == {
+        action.value: {state.value for state in states} for action, states in PERMITTED.items()
+    }
+
+
+def test_the_page_knows_every_state(tmp_path: Path):
+    assert exported(tmp_path, "lib/state_badge.js", "STATES") == [state.value for state in State]
+    assert exported(tmp_path, "lib/state_badge.js", "ENDED") == [state.value for state in State if state.ended]
+
+
+def test_the_page_has_words_for_every_event(tmp_path: Path):
+    kinds = exported(tmp_path, "views/experiment/event_words.js", "KINDS")
+
+    assert isinstance(kinds, list)
+    assert set(kinds) == {kind.value for kind in EventKind}
