@@ -1,8 +1,8 @@
-"""The API alone, as a container runs it: `python -m api`. It neither migrates the database nor runs anything."""
+"""The API alone, as a container runs it: `python -m api`. It neither migrates the database nor runs experiments."""
 
 import sys
 
-from gaplab.api.commands.exit_codes import CommandError
+from gaplab.api.process.errors import CommandError
 from gaplab.api.process.server import listen, serve_api
 from gaplab.services import logs
 from gaplab.services.core.errors import GaplabError
@@ -10,7 +10,7 @@ from gaplab.services.settings import Settings
 
 
 def main() -> None:
-    """Serve by the settings of the environment."""
+    """Serve with the settings of the environment."""
     try:
         settings = Settings.from_environment()
         logs.configure()

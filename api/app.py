@@ -1,4 +1,4 @@
-"""The application: routes, problems, limits and the pages that document them, put together."""
+"""The application: routes, problems, limits and documentation, put together."""
 
 import os
 from importlib.metadata import version
@@ -8,11 +8,11 @@ from fastapi.middleware.gzip import GZipMiddleware
 
 from gaplab.api.http import documentation, problems
 from gaplab.api.http.access import Access
-from gaplab.api.http.dependencies import refuse_doubles
-from gaplab.api.http.event_feed import Feed
+from gaplab.api.http.dependencies import refuse_repeated_parameters
+from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.http.limits import BodyLimit, Streams
-from gaplab.api.http.metrics import Measured, Metrics
-from gaplab.api.http.security_headers import Headers
+from gaplab.api.http.metrics import Metrics, RequestCounter
+from gaplab.api.http.security_headers import SecurityHeaders
 from gaplab.api.routes import (
     archives,
     catalogue,
@@ -23,7 +23,7 @@ from gaplab.api.routes import (
     experiments,
     figures,
     health,
-    life_cycle,
+    lifecycle,
     metrics,
     provenance,
     replay_figures,
@@ -39,29 +39,29 @@ DESCRIPTION = """
 Closes the *reality gap*: tunes a robot simulator from a handful of real-world evaluations, and compares the strategies
 that choose them.
 
-Submit a **study** (`POST /studies`), watch it (`GET /studies/{id}`), read its **curves** (`GET /studies/{id}/curves`).
-Whatever a spec leaves out is the paper's. Errors are problem details (RFC 9457); those about a spec say where, what is
-permitted, and the nearest name.
+Submit a **study** (`POST /studies`), follow it (`GET /studies/{id}`), read its **curves** (`GET /studies/{id}/curves`).
+Whatever a spec leaves out has the paper's value. Errors are problem details (RFC 9457); for an invalid spec they name
+each place, what is permitted there, and the nearest valid name.
 """
 
 TAGS = [
-    {"name": "studies", "description": "experiments that belong together to be compared"},
-    {"name": "experiments", "description": "one strategy under one setting, repeated"},
+    {"name": "studies", "description": "experiments to be compared"},
+    {"name": "experiments", "description": "one strategy with one set of settings, repeated"},
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
-    {"name": "replays", "description": "what controllers do, computed when it is asked for"},
-    {"name": "figures", "description": "to look at, and to put into papers"},
+    {"name": "replays", "description": "the motion of controllers, computed on request"},
+    {"name": "figures", "description": "for the browser, for notebooks and for papers"},
     {"name": "events", "description": "what happens to experiments, as it happens"},
-    {"name": "archives", "description": "everything of an experiment or a study as one file, and back"},
-    {"name": "sensitivity", "description": "what tunables do to fitness, checked before anything is tuned"},
+    {"name": "archives", "description": "an experiment or a study with everything in it as one file"},
+    {"name": "sensitivity", "description": "the effect of each tunable on fitness, checked before tuning"},
     {"name": "catalogue", "description": "the plug-ins that a spec may name"},
-    {"name": "health", "description": "for whoever keeps the service alive"},
+    {"name": "health", "description": "for monitoring the service"},
 ]
 
 MODULES = (
     studies,
     estimates,
     experiments,
-    life_cycle,
+    lifecycle,
     provenance,
     events,
     curves,
@@ -74,18 +74,16 @@ MODULES = (
     health,
     metrics,
 )
-"""In the order in which their routes are documented."""
+"""The modules of the API, in the order of the documentation."""
 
 
 def create_app(store: Store, settings: Settings | None = None, limits: Limits | None = None) -> FastAPI:
-    """The application over a database, which it neither migrates nor closes.
-
-    It never touches Ray: it inserts what is asked for and reads what there is.
+    """Return the application over a database, which it neither migrates nor closes; it needs no Ray.
 
     Args:
         store: the database.
-        settings: of the process that serves; left out where the app is asked within this process.
-        limits: left out: as they are by default.
+        settings: of the process that serves; None for a program that calls the app directly.
+        limits: left out: the defaults.
     """
     app = FastAPI(
         title="gaplab",
@@ -99,18 +97,18 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     )
     limits = limits or Limits()
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
-    app.state.feed = Feed(store)
+    app.state.feed = EventFeed(store)
     app.state.rollout_process = RolloutProcess()
     app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
     app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(GZipMiddleware, minimum_size=20_000, compresslevel=4)
     app.add_middleware(BodyLimit, most_bytes=limits.body_bytes)
     app.add_middleware(Access, settings=settings)
-    app.add_middleware(Headers)
-    app.add_middleware(Measured, metrics=app.state.metrics)
+    app.add_middleware(SecurityHeaders)
+    app.add_middleware(RequestCounter, metrics=app.state.metrics)
     problems.install(app)
     for module in MODULES:
-        app.include_router(module.router, dependencies=[Depends(refuse_doubles)])
+        app.include_router(module.router, dependencies=[Depends(refuse_repeated_parameters)])
     figures.install(app)
     dashboard.install(app)
     documentation.install(app)

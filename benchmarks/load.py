@@ -20,7 +20,7 @@ from rich.table import Table
 
 from benchmarks.clients import FOLLOW, READERS, READS, SUBMIT, SUBMITTERS, Clients, RequestTimes
 from gaplab import migrations
-from gaplab.api.process.local_service import own_service
+from gaplab.api.process.local_service import start_service
 from gaplab.services.store.session import Store
 from tests.filling import IN_A_STUDY, REPETITIONS, SAMPLES, fill
 from tests.postgres import running
@@ -40,7 +40,7 @@ def measure(url: str, folder: Path, experiments: int, options: argparse.Namespac
     fill(store, experiments)
     store.dispose()
     print(f"  {experiments:,} experiments stored in {time.monotonic() - begun:.0f} s", flush=True)
-    with own_service(url, folder / "api.log", workers=False) as client:
+    with start_service(url, folder / "api.log", workers=False) as client:
         Clients(client.url, experiments, min(3.0, options.seconds), options.pause).run()  # warms up
         return Clients(client.url, experiments, options.seconds, options.pause).run()
 

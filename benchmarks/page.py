@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.table import Table
 
 from gaplab import migrations
-from gaplab.api.process.local_service import own_service
+from gaplab.api.process.local_service import start_service
 from gaplab.services.archives import import_archive
 from gaplab.services.store.session import Store
 from tests.filling import fill
@@ -78,7 +78,7 @@ def _served(experiments: int) -> Iterator[tuple[str, dict[str, str]]]:
         with PUBLISHED.open("rb") as archive:
             stored = import_archive(store, archive)
         store.dispose()
-        with own_service(database_url, Path(folder) / "api.log", workers=False) as client:
+        with start_service(database_url, Path(folder) / "api.log", workers=False) as client:
             yield client.url, {"study": stored.study or "", "experiment": stored.experiments[0]}
 
 

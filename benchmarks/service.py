@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks import naive
 from benchmarks.measure import Row, rates, ratio
-from gaplab.api.process.local_service import own_service
+from gaplab.api.process.local_service import start_service
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Selected, Transferred, Tuned
@@ -36,7 +36,7 @@ def service() -> Iterator[Callable[[], int]]:
     """Start a real service; yield work that runs the experiment and returns its rollouts."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        with own_service(f"sqlite:///{folder / 'bench.db'}", folder / "service.log") as client:
+        with start_service(f"sqlite:///{folder / 'bench.db'}", folder / "service.log") as client:
             client.check({})  # the sensitivity check would run with the first experiment, and is not measured
 
             def work() -> int:

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from gaplab.api.clients.client import ServiceError as ServiceError
     from gaplab.api.clients.client import ServiceUnreachable as ServiceUnreachable
     from gaplab.api.clients.figures import Figure as Figure
-    from gaplab.api.commands.exit_codes import CommandError as CommandError
+    from gaplab.api.process.errors import CommandError as CommandError
     from gaplab.api.process.local_service import local_service as local_service
 
 _MODULES = {
     "Client": "gaplab.api.clients.client",
-    "CommandError": "gaplab.api.commands.exit_codes",
+    "CommandError": "gaplab.api.process.errors",
     "ExperimentFailed": "gaplab.api.clients.client",
     "ExtraMissing": "gaplab.api.clients.client",
     "Figure": "gaplab.api.clients.figures",

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Id
 
 FORMAT = 1
 """Version of the archive format: exports write it, and imports read it and all before it."""
@@ -35,12 +35,12 @@ class Manifest(Frozen):
 class ImportRead(Frozen):
     """The result of an import."""
 
-    study: str | None = Field(default=None, description="id of the study; null for the archive of a single experiment")
-    experiments: tuple[str, ...] = Field(
-        description="ids of the experiments in this service, in the order of the study"
-    )
+    study: Id | None = Field(default=None, description="id of the study; null for the archive of a single experiment")
+    experiments: tuple[Id, ...] = Field(description="ids of the experiments in this service, in the order of the study")
     renamed: dict[str, str] = Field(
-        default_factory=dict, description="new ids, by those in the archive that were taken in this service"
+        default_factory=dict,
+        description="new ids, by those in the archive that were taken in this service",
+        examples=[{"kx3t9vbm2q": "01f2e3d4c5"}],
     )
     called_off: tuple[str, ...] = Field(
         default=(), description="ids of experiments that had not ended: they are CANCELLED here, and never run"

@@ -1,6 +1,7 @@
 """The base of every schema, and the bounded numbers they share."""
 
-from typing import Annotated
+from datetime import datetime
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -27,3 +28,25 @@ Priority = Annotated[int, Field(strict=True, ge=-10, le=10)]
 
 Label = Annotated[str, Field(min_length=1, max_length=200)]
 """A name that a person gives to a study or an experiment."""
+
+Id = Annotated[str, Field(examples=["01f2e3d4c5b6"])]
+"""The id of a study, an experiment or a sensitivity check."""
+
+Moment = Annotated[datetime, Field(examples=["2012-11-05T09:00:00Z"])]
+"""A time in UTC."""
+
+Unit = Annotated[str, Field(examples=["m/s"])]
+"""A unit of fitness."""
+
+Name = Annotated[str, Field(examples=["simulated_fit"])]
+"""The name of a strategy, or of an experiment, which by default is that of its strategy."""
+
+RobotName = Annotated[str, Field(examples=["quadruped"])]
+EngineName = Annotated[str, Field(examples=["pybullet"])]
+TunableName = Annotated[str, Field(examples=["restitution"])]
+
+Examples = dict[str, Any]
+"""Requests that `/docs` offers to send, by name, as OpenAPI has them."""
+
+Statistic = Annotated[float | None, Field(examples=[0.93])]
+"""A fitness or a number computed from fitnesses; null where it is undefined."""

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Id, Name, Statistic, Unit
 from gaplab.schemas.lifecycle import State
 
 
@@ -14,11 +14,11 @@ class CurvePoint(Frozen):
 
     evaluations: int
     n: int
-    mean: float | None
-    sd: float | None = Field(description="sample standard deviation")
-    lower: float | None = Field(description="lower end of the 95 % interval of the mean, by Student's t")
-    upper: float | None = Field(description="upper end of that interval")
-    values: tuple[float | None, ...] = Field(description="fitness by repetition; null: not reached yet, or failed")
+    mean: Statistic
+    sd: Statistic = Field(description="sample standard deviation")
+    lower: Statistic = Field(description="lower end of the 95 % interval of the mean, by Student's t")
+    upper: Statistic = Field(description="upper end of that interval")
+    values: tuple[Statistic, ...] = Field(description="fitness by repetition; null: not reached yet, or failed")
 
 
 class Curve(Frozen):
@@ -27,11 +27,11 @@ class Curve(Frozen):
     The direct baseline has a single point, at 0: it has no samples, because its controllers evolve in reality itself.
     """
 
-    experiment: str
-    name: str
-    strategy: str
+    experiment: Id
+    name: Name
+    strategy: Name
     state: State
-    unit: str
+    unit: Unit
     direct: bool = False
     points: tuple[CurvePoint, ...]
 
@@ -41,10 +41,10 @@ class Test(Frozen):
 
     __test__ = False
 
-    statistic: float | None
-    p: float | None = Field(description="two-sided p-value; null if undefined")
-    p_holm: float | None = Field(default=None, description="p-value with Holm's correction over all pairs")
-    degrees_of_freedom: float | None = None
+    statistic: Statistic
+    p: Statistic = Field(description="two-sided p-value; null if undefined")
+    p_holm: Statistic = Field(default=None, description="p-value with Holm's correction over all pairs")
+    degrees_of_freedom: Statistic = None
 
 
 class Comparison(Frozen):
@@ -53,14 +53,14 @@ class Comparison(Frozen):
     Differences are `first` minus `second`.
     """
 
-    first: str
-    second: str
+    first: Id
+    second: Id
     from_evaluations: int
     to_evaluations: int
     n_first: int
     n_second: int
-    difference: float | None = Field(description="difference of the means")
-    effect_size: float | None = Field(description="Cohen's d: the difference divided by the pooled standard deviation")
+    difference: Statistic = Field(description="difference of the means")
+    effect_size: Statistic = Field(description="Cohen's d: the difference divided by the pooled standard deviation")
     student: Test = Field(description="Student's t-test, which the paper uses")
     welch: Test
     mann_whitney: Test

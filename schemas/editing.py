@@ -1,14 +1,19 @@
 """Changes to a submitted study or experiment."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field, model_validator
 
-from gaplab.schemas.base import Frozen, Label
+from gaplab.schemas.base import Examples, Frozen, Label
 
 
 class Edit(Frozen):
     """A new name, new notes, or both; a missing field stays unchanged."""
+
+    EXAMPLES: ClassVar[Examples] = {
+        "another name": {"summary": "Rename it", "value": {"name": "half the weight"}},
+        "notes": {"summary": "Tell others about it", "value": {"notes": "stopped early: the bounds were wrong"}},
+    }
 
     name: Label | None = Field(default=None, description="a new name")
     notes: Annotated[str, Field(max_length=10_000)] | None = Field(

@@ -2,14 +2,14 @@
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import EngineName, Frozen, Name
 
 
 class EngineCost(Frozen):
     """Cost of one rollout of the robot in an engine."""
 
-    engine: str
-    seconds_per_rollout: float = Field(description="seconds of one core")
+    engine: EngineName
+    seconds_per_rollout: float = Field(description="seconds of one core", examples=[0.013])
     measured: bool = Field(
         description="true: measured by this service on earlier experiments; false: usual for the engine"
     )
@@ -18,15 +18,15 @@ class EngineCost(Frozen):
 class ExperimentCost(Frozen):
     """Cost of one experiment of the study."""
 
-    name: str
-    strategy: str
-    engine: str = Field(description="engine of the simulators; for the direct baseline, the engine of reality")
+    name: Name
+    strategy: Name
+    engine: EngineName = Field(description="engine of the simulators; for the direct baseline, the engine of reality")
     repetitions: int
     iterations: int = Field(description="real-world evaluations of a repetition; 0 for the direct baseline")
     rollouts: int = Field(
         description="upper bound over all repetitions; rollouts that cannot change a number are saved"
     )
-    core_seconds: float
+    core_seconds: float = Field(examples=[166_400.0])
 
 
 class EstimateRead(Frozen):
@@ -35,9 +35,9 @@ class EstimateRead(Frozen):
     experiments: tuple[ExperimentCost, ...]
     engines: tuple[EngineCost, ...]
     rollouts: int
-    core_seconds: float
+    core_seconds: float = Field(examples=[166_400.0])
     cores: int = Field(
         description="cores that would share the work: `GAPLAB_WORKERS`, or all cores of the API's machine"
     )
-    seconds: float = Field(description="expected duration if nothing else is waiting")
+    seconds: float = Field(description="expected duration if nothing else is waiting", examples=[10_400.0])
     supervisors: int = Field(description="supervisors that run now; with 0, nothing starts")

@@ -4,13 +4,12 @@ Events are numbered from 1 without gaps, in commit order: when a number is visib
 reveals anything hidden about reality.
 """
 
-from datetime import datetime
 from enum import StrEnum
 from typing import Any
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Id, Moment
 
 
 class EventKind(StrEnum):
@@ -53,13 +52,15 @@ class EventRead(Frozen):
 
     number: int = Field(description="number of the event, from 1 without gaps; a reader resumes after it")
     kind: EventKind
-    experiment: str
-    study: str | None = None
+    experiment: Id
+    study: Id | None = None
     repetition: int | None = Field(
         default=None, description="number of the repetition; null for an event of the experiment"
     )
-    body: dict[str, Any] = Field(description="details, such as iteration, fitness or reason")
-    at: datetime
+    body: dict[str, Any] = Field(
+        description="details, such as iteration, fitness or reason", examples=[{"iteration": 1, "fitness": 1.31}]
+    )
+    at: Moment
 
 
 class EventPage(Frozen):

@@ -2,27 +2,27 @@
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Id, Statistic, TunableName, Unit
 
 
 class Spread(Frozen):
     """Statistics of a number over repetitions; null if too few repetitions have it."""
 
     n: int
-    mean: float | None
-    sd: float | None = Field(description="sample standard deviation")
-    least: float | None
-    greatest: float | None
+    mean: Statistic
+    sd: Statistic = Field(description="sample standard deviation")
+    least: Statistic
+    greatest: Statistic
 
 
 class TunedSpread(Spread):
     """Statistics of the tuned value of one tunable."""
 
-    name: str
-    lower: float = Field(description="lower bound of tuning")
-    upper: float = Field(description="upper bound of tuning")
-    at_lower: float | None = Field(description="share of repetitions at the lower bound, within 1 % of the range")
-    at_upper: float | None = Field(description="share of repetitions at the upper bound, within 1 % of the range")
+    name: TunableName
+    lower: float = Field(description="lower bound of tuning", examples=[0.0])
+    upper: float = Field(description="upper bound of tuning", examples=[0.6])
+    at_lower: Statistic = Field(description="share of repetitions at the lower bound, within 1 % of the range")
+    at_upper: Statistic = Field(description="share of repetitions at the upper bound, within 1 % of the range")
 
 
 class MisfitPoint(Frozen):
@@ -39,7 +39,9 @@ class MisfitPoint(Frozen):
 class MisfitRead(Frozen):
     """Misfit of an experiment, by iteration. The direct baseline tunes nothing, so it has none."""
 
-    experiment: str
-    unit: str = Field(description="unit of fitness, error and gap")
+    experiment: Id
+    unit: Unit = Field(description="unit of fitness, error and gap")
     points: tuple[MisfitPoint, ...]
-    remarks: tuple[str, ...] = Field(description="sentences about the latest iteration")
+    remarks: tuple[str, ...] = Field(
+        description="sentences about the latest iteration", examples=[("restitution is at its lower bound, 0",)]
+    )

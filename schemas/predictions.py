@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Id, Statistic, Unit
 
 
 class Prediction(Frozen):
@@ -10,11 +10,11 @@ class Prediction(Frozen):
 
     repetition: int
     iteration: int = Field(description="iteration in which the sample was measured, from 1")
-    simulated_before: float | None = Field(description="fitness in the best simulator before the measurement")
-    simulated_after: float | None = Field(
+    simulated_before: Statistic = Field(description="fitness in the best simulator before the measurement")
+    simulated_after: Statistic = Field(
         description="fitness in the best simulator tuned on this sample and all before it"
     )
-    fitness: float | None = Field(description="fitness in reality; null: the measurement failed")
+    fitness: Statistic = Field(description="fitness in reality; null: the measurement failed")
 
 
 class Predictions(Frozen):
@@ -23,8 +23,8 @@ class Predictions(Frozen):
     Each request computes more: repeat it while some are pending.
     """
 
-    experiment: str
-    unit: str
+    experiment: Id
+    unit: Unit
     items: tuple[Prediction, ...]
     pending: int = Field(description="number of samples whose predictions are not computed yet")
     left_out: int = Field(

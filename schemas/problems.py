@@ -10,9 +10,11 @@ from gaplab.schemas.base import Frozen
 class SpecError(Frozen):
     """One error in a request."""
 
-    pointer: str = Field(description="JSON pointer into the body, or the name of a query or path parameter")
+    pointer: str = Field(
+        description="JSON pointer into the body, or the name of a query or path parameter", examples=["/robot"]
+    )
     value: Any = Field(default=None, description="the offending value, as sent")
-    message: str
+    message: str = Field(examples=["there is no robot 'quadrupet' (did you mean 'quadruped'?)"])
     permitted: tuple[str, ...] | str | None = None
     nearest: str | None = None
 
@@ -20,8 +22,8 @@ class SpecError(Frozen):
 class Problem(Frozen):
     """The reason why a request failed, sent as `application/problem+json`."""
 
-    type: str
-    title: str
-    status: int
-    detail: str
+    type: str = Field(examples=["urn:gaplab:problem:not-found"])
+    title: str = Field(examples=["Not found"])
+    status: int = Field(examples=[404])
+    detail: str = Field(examples=["there is nothing with the id 'x'"])
     errors: tuple[SpecError, ...] = ()

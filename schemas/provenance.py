@@ -1,25 +1,27 @@
 """Provenance: the software and machines that computed an experiment."""
 
-from datetime import datetime
-
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Moment
 
 
 class Provenance(Frozen):
     """Software and machine of a supervisor; all its nodes have the same software."""
 
-    gaplab: str
-    code: str = Field(description="hash of the code that numbers depend on")
-    commit: str | None = Field(default=None, description="git commit, if the code runs from a clone")
+    gaplab: str = Field(examples=["0.1.0"])
+    code: str = Field(description="hash of the code that numbers depend on", examples=["a1b2c3d4"])
+    commit: str | None = Field(
+        default=None, description="git commit, if the code runs from a clone", examples=["3b875b0d"]
+    )
     dirty: bool | None = Field(default=None, description="whether the clone has changes since that commit")
-    python: str
-    libraries: dict[str, str]
-    engines: dict[str, str] = Field(description="library of each engine, with its version")
-    architecture: str
-    processor: str
-    system: str
+    python: str = Field(examples=["3.11.14"])
+    libraries: dict[str, str] = Field(examples=[{"numpy": "2.4.6", "scipy": "1.17.1"}])
+    engines: dict[str, str] = Field(
+        description="library of each engine, with its version", examples=[{"pybullet": "pybullet 3.2.7"}]
+    )
+    architecture: str = Field(examples=["x86_64"])
+    processor: str = Field(examples=["AMD EPYC 9555"])
+    system: str = Field(examples=["Linux-6.8.0-x86_64-with-glibc2.36"])
     spec_version: int
     plugins: dict[str, str] = Field(
         default={}, description="files of external plug-in folders, including data in packages, each with its hash"
@@ -30,8 +32,8 @@ class Provenance(Frozen):
 class ProvenanceUse(Frozen):
     """One provenance under which repetitions of an experiment were claimed, and when first."""
 
-    id: str
-    since: datetime
+    id: str = Field(examples=["5f1d8a7b0c3e2946"])
+    since: Moment
     repetitions: int = Field(description="number of repetitions whose latest claim was under this provenance")
     provenance: Provenance
 
@@ -42,8 +44,11 @@ class ProvenanceRead(Frozen):
     computed_with: str | None = Field(
         default=None,
         description="decisive versions: engines, architecture, spec, external plug-ins; others cannot continue it",
+        examples=["pybullet (pybullet 3.2.7), x86_64, spec 1"],
     )
     refused_by: str | None = Field(
-        default=None, description="versions of a supervisor that did not claim the experiment because they differ"
+        default=None,
+        description="versions of a supervisor that did not claim the experiment because they differ",
+        examples=["pybullet (pybullet 3.3.0), x86_64, spec 1"],
     )
     uses: tuple[ProvenanceUse, ...] = ()

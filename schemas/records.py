@@ -3,13 +3,12 @@
 Times are UTC. A fitness of null means failed physics or a failed measurement; JSON has no nan.
 """
 
-from datetime import datetime
 from enum import StrEnum
 from typing import Any, Generic, TypeVar
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import Frozen, Id, Moment, Name, Statistic
 from gaplab.schemas.lifecycle import Ending, State
 
 T = TypeVar("T")
@@ -19,71 +18,75 @@ class Page(Frozen, Generic[T]):
     """A part of a list."""
 
     items: tuple[T, ...]
-    next: str | None = Field(default=None, description="pass it as `cursor` for the next page; null on the last")
+    next: str | None = Field(
+        default=None, description="pass it as `cursor` for the next page; null on the last", examples=["WyIyMDEyIl0"]
+    )
 
 
 class Progress(Frozen):
     """Completed and remaining work."""
 
-    repetitions: int
-    completed: int
+    repetitions: int = Field(examples=[40])
+    completed: int = Field(examples=[12])
     failed: int
-    iterations: int = Field(description="iterations of all repetitions, including number 0")
-    iterations_done: int
+    iterations: int = Field(description="iterations of all repetitions, including number 0", examples=[440])
+    iterations_done: int = Field(examples=[150])
     rollouts: int = Field(description="budgeted rollouts; at the end, done plus saved, unless stopped")
-    rollouts_done: int
+    rollouts_done: int = Field(examples=[4_363_000])
     rollouts_failed: int = Field(description="rollouts done whose physics failed (nan); they never win")
     rollouts_saved: int = Field(
         description="budgeted rollouts that were not simulated, because they cannot change a number"
     )
     seconds_left: float | None = Field(
-        default=None, description="expected remaining time; null while unknown, 0 at the end"
+        default=None, description="expected remaining time; null while unknown, 0 at the end", examples=[3120.0]
     )
 
 
 class ExperimentRead(Frozen):
     """An experiment with its resolved spec. Reality's parameters are null until it and its study have ended."""
 
-    id: str
-    study: str | None = None
-    name: str
-    notes: str | None = Field(default=None, description="free text by people")
+    id: Id
+    study: Id | None = None
+    name: Name
+    notes: str | None = Field(default=None, description="free text by people", examples=["the bounds were too wide"])
     edits: int = Field(default=0, description="number of changes to the name or notes")
-    strategy: str
+    strategy: Name
     direct: bool = Field(
         default=False,
         description="true for the direct baseline: controllers evolve in reality itself, without simulators and "
         "samples, so iteration 0 is the only one",
     )
     state: State
-    spec: dict[str, Any]
+    spec: dict[str, Any] = Field(
+        examples=[{"strategy": {"name": "simulated_fit"}, "iterations": 10, "repetitions": 40}]
+    )
     priority: int = Field(default=0, description="higher is computed first")
     max_parallel: int | None = Field(default=None, description="largest number of repetitions at once; null: no limit")
     progress: Progress
-    best_fitness: float | None = Field(
+    best_fitness: Statistic = Field(
         default=None, description="best recorded fitness of each repetition so far, averaged over repetitions"
     )
     reasons: tuple[str, ...] = Field(default=(), description="distinct reasons of failed repetitions")
-    sensitivity: str | None = Field(default=None, description="id of the sensitivity check")
+    sensitivity: Id | None = Field(default=None, description="id of the sensitivity check")
     warnings: tuple[str, ...] = Field(
         default=(), description="findings of the sensitivity check, and versions that prevent continuing"
     )
-    created_at: datetime
-    started_at: datetime | None = None
-    ended_at: datetime | None = None
+    created_at: Moment
+    started_at: Moment | None = None
+    ended_at: Moment | None = None
 
 
 class StudyRead(Frozen):
     """A study; its state combines those of its experiments."""
 
-    id: str
-    name: str
-    notes: str | None = Field(default=None, description="free text by people")
+    id: Id
+    name: Name
+    notes: str | None = Field(default=None, description="free text by people", examples=["the bounds were too wide"])
     edits: int = Field(default=0, description="number of changes to the name or notes")
     state: State
     experiments: tuple[ExperimentRead, ...]
     progress: Progress
-    created_at: datetime
+    created_at: Moment
 
 
 class RepetitionRead(Frozen):
@@ -94,20 +97,22 @@ class RepetitionRead(Frozen):
     iterations_done: int
     rollouts_done: int
     attempts: int
-    error: str | None = None
-    started_at: datetime | None = None
-    ended_at: datetime | None = None
+    error: str | None = Field(default=None, examples=["the engine pybullet is not installed"])
+    started_at: Moment | None = None
+    ended_at: Moment | None = None
 
 
 class AttemptRead(Frozen):
     """One attempt at a repetition: its supervisor, times and ending."""
 
     number: int = Field(description="from 1; every write of the attempt carries it as the epoch of its lease")
-    owner: str = Field(description="supervisor of the attempt")
-    started_at: datetime
-    ended_at: datetime | None = Field(default=None, description="null while it runs or waits for a core")
+    owner: str = Field(description="supervisor of the attempt", examples=["lab-3:4711:9f2c61d0"])
+    started_at: Moment
+    ended_at: Moment | None = Field(default=None, description="null while it runs or waits for a core")
     ending: Ending | None = None
-    reason: str | None = Field(default=None, description="reason of failure or loss")
+    reason: str | None = Field(
+        default=None, description="reason of failure or loss", examples=["no heartbeat for 30 s"]
+    )
 
 
 class MeasurementKind(StrEnum):
@@ -123,10 +128,10 @@ class SampleRead(Frozen):
     repetition: int
     iteration: int
     kind: MeasurementKind
-    genome: tuple[float, ...]
-    fitness: float | None
-    measured_by: str
-    measured_at: datetime
+    genome: tuple[float, ...] = Field(examples=[(0.12, 0.55, 0.83, 0.31)])
+    fitness: Statistic
+    measured_by: str = Field(examples=["pybullet"])
+    measured_at: Moment
 
 
 class SimulatorRead(Frozen):
@@ -135,5 +140,5 @@ class SimulatorRead(Frozen):
     repetition: int
     iteration: int
     rank: int
-    parameters: dict[str, float]
-    squared_error: float | None = Field(description="sum over the samples so far; null if the physics failed on one")
+    parameters: dict[str, float] = Field(examples=[{"static_friction": 1.04, "restitution": 0.02}])
+    squared_error: Statistic = Field(description="sum over the samples so far; null if the physics failed on one")

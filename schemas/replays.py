@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from gaplab.schemas.base import Frozen
+from gaplab.schemas.base import EngineName, Frozen, Id, RobotName, Statistic, Unit
 
 Position = tuple[float, float, float]
 Orientation = tuple[float, float, float, float]
@@ -27,7 +27,7 @@ class Shape(Frozen):
     """
 
     kind: Literal["box", "sphere", "capsule", "plane"]
-    size_m: tuple[float, ...]
+    size_m: tuple[float, ...] = Field(examples=[(0.3, 0.2, 0.06)])
     position_m: Position = Field(default=(0.0, 0.0, 0.0), description="position of the centre")
     orientation: Orientation = Field(default=(0.0, 0.0, 0.0, 1.0), description="quaternion x, y, z, w")
     role: Literal["trunk", "limb", "foot", "ground"] = Field(description="role, which determines the colour")
@@ -37,10 +37,10 @@ class Shape(Frozen):
 class ReplayWorld(Frozen):
     """The motion in one world. If the physics failed, it is empty and its fitness is null."""
 
-    engine: str
+    engine: EngineName
     shapes: tuple[Shape, ...]
-    fitness: float | None = Field(description="fitness in this replay")
-    recorded: float | None = Field(description="stored fitness of the same controller; null: not computed, or failed")
+    fitness: Statistic = Field(description="fitness in this replay")
+    recorded: Statistic = Field(description="stored fitness of the same controller; null: not computed, or failed")
     positions_m: tuple[tuple[float, ...], ...] = Field(default=(), description="by frame: x, y, z of each body in turn")
     orientations: tuple[tuple[float, ...], ...] = Field(
         default=(), description="by frame: x, y, z, w of each body in turn"
@@ -58,16 +58,20 @@ class ReplayWorld(Frozen):
 class Replay(Frozen):
     """One controller in its simulator and in reality, from the same start."""
 
-    experiment: str
+    experiment: Id
     repetition: int
     iteration: int
     kind: ControllerKind
     simulator: int | None = Field(description="iteration of the simulator, its best; null: no simulator")
-    robot: str
-    unit: str = Field(description="unit of fitness")
-    bodies: tuple[str, ...] = Field(description="names of the bodies, the base first")
-    feet: tuple[str, ...] = Field(description="bodies other than the base that collide with the ground")
-    times_s: tuple[float, ...] = Field(description="times of the frames, up to 20 s")
-    counted_s: Interval = Field(description="interval in which movement counts for fitness")
+    robot: RobotName
+    unit: Unit = Field(description="unit of fitness")
+    bodies: tuple[str, ...] = Field(
+        description="names of the bodies, the base first", examples=[("trunk", "front_left_shin")]
+    )
+    feet: tuple[str, ...] = Field(
+        description="bodies other than the base that collide with the ground", examples=[("front left",)]
+    )
+    times_s: tuple[float, ...] = Field(description="times of the frames, up to 20 s", examples=[(0.0, 0.02)])
+    counted_s: Interval = Field(description="interval in which movement counts for fitness", examples=[(0.5, 3.0)])
     simulation: ReplayWorld | None = Field(description="null: the controller evolved in reality itself")
     reality: ReplayWorld | None = Field(description="null: reality's parameters are unknown here")

@@ -1,12 +1,11 @@
 """The sensitivity check: the effect of each tunable on fitness, before tuning."""
 
-from datetime import datetime
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from gaplab.schemas.base import Count, Frozen
+from gaplab.schemas.base import Count, Examples, Frozen, Id, Moment, Statistic, TunableName, Unit
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.spec import SharedSettings
@@ -26,6 +25,14 @@ class Verdict(StrEnum):
 class SensitivitySpec(SharedSettings):
     """The settings of an experiment. The check uses its robot, engine and tunables."""
 
+    EXAMPLES: ClassVar[Examples] = {
+        "the least": {"summary": "The quadruped and the paper's three coefficients; about 800 rollouts", "value": {}},
+        "finer": {
+            "summary": "One coefficient between your own bounds, at more values",
+            "value": {"tunables": [{"name": "restitution", "lower": 0.0, "upper": 0.3}], "points": 33},
+        },
+    }
+
     points: Annotated[Count, Field(ge=5, le=1_001)] = Field(
         default=POINTS, description="number of values of each tunable; eight controllers are simulated at each"
     )
@@ -37,9 +44,9 @@ class SensitivitySpec(SharedSettings):
 class Checked(Frozen):
     """The complete subject of a check."""
 
-    robot: PluginRef
-    engine: PluginRef
-    tunables: tuple[TunableRef, ...]
+    robot: PluginRef = Field(examples=["quadruped"])
+    engine: PluginRef = Field(examples=["pybullet"])
+    tunables: tuple[TunableRef, ...] = Field(examples=[("restitution",)])
     points: int = POINTS
     evaluations: int = EVALUATIONS
 
@@ -47,35 +54,40 @@ class Checked(Frozen):
 class Sensitivity(Frozen):
     """Effect of one tunable on fitness between its bounds, with the others in the middle of theirs."""
 
-    name: str
-    effect: float | None = Field(
+    name: TunableName
+    effect: Statistic = Field(
         description="standard deviation of fitness along the profile; null if the physics failed too often"
     )
-    relative_effect: float | None = Field(
+    relative_effect: Statistic = Field(
         description="effect divided by the standard deviation of fitness between controllers"
     )
-    roughness: float | None = Field(
+    roughness: Statistic = Field(
         description="share of the effect that is noise between neighbouring values: 0 smooth, 1 noise"
     )
     failures: int = Field(description="number of rollouts along the profile whose physics failed (nan)")
     verdict: Verdict
-    values: tuple[float, ...] = Field(description="checked values of the tunable")
+    values: tuple[float, ...] = Field(description="checked values of the tunable", examples=[(0.0, 0.3, 0.6)])
     fitness: tuple[tuple[float | None, ...], ...] = Field(
-        description="fitness at each value, one row per controller: hand-designed, random, evolved"
+        description="fitness at each value, one row per controller: hand-designed, random, evolved",
+        examples=[((0.31, 0.33, 0.28), (0.11, 0.12, 0.09))],
     )
 
 
 class SensitivityRead(Frozen):
     """A sensitivity check. Its id is a hash of its subject, so equal subjects are checked once."""
 
-    id: str
+    id: Id
     state: State
     spec: Checked
     rollouts: int = Field(description="upper bound on the rollouts of the check")
-    unit: str = Field(description="unit of fitness")
+    unit: Unit = Field(description="unit of fitness")
     tunables: tuple[Sensitivity, ...] = Field(default=(), description="results, once the check is COMPLETED")
     warnings: tuple[str, ...] = ()
-    reason: str | None = Field(default=None, description="reason of failure, or of the last return to the queue")
-    created_at: datetime
-    started_at: datetime | None = None
-    ended_at: datetime | None = None
+    reason: str | None = Field(
+        default=None,
+        description="reason of failure, or of the last return to the queue",
+        examples=["no heartbeat for 30 s"],
+    )
+    created_at: Moment
+    started_at: Moment | None = None
+    ended_at: Moment | None = None

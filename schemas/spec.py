@@ -4,11 +4,11 @@ Every missing field has a default, and the defaults are the paper's. A *resolved
 service stores, so a later change of a default changes no stored experiment.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from gaplab.schemas.base import Count, Frozen, Label, Priority, Real, Seed
+from gaplab.schemas.base import Count, Examples, Frozen, Label, Priority, Real, Seed
 from gaplab.schemas.plugin import PluginRef, TunableRef
 
 BudgetName = Literal["smoke", "desk", "paper"]
@@ -92,6 +92,30 @@ class Schedule(Frozen):
 class ExperimentSpec(SharedSettings, Schedule):
     """One strategy with one setting, repeated."""
 
+    EXAMPLES: ClassVar[Examples] = {
+        "the least": {
+            "summary": "One strategy at the paper's protocol; every default is the paper's",
+            "value": {"strategy": "simulated_fit", "iterations": 10, "repetitions": 40},
+        },
+        "quick": {
+            "summary": "Seconds: the toy function of the paper's Fig. 3",
+            "value": {"strategy": "simulated_fit_and_informative", "robot": "toy_function", "budget": "smoke"},
+        },
+        "in detail": {
+            "summary": "Your own options, bounds, reality and budget",
+            "value": {
+                "name": "half the weight on information",
+                "strategy": {"name": "simulated_fit_and_informative", "options": {"informative_weight": 0.5}},
+                "iterations": 5,
+                "repetitions": 20,
+                "tunables": ["static_friction", {"name": "dynamic_friction", "lower": 0.2, "upper": 1.2}],
+                "reality": {"parameters": {"static_friction": 0.9, "dynamic_friction": 0.6}},
+                "budget": {"preset": "desk", "simulator_evaluations": 800},
+                "seed": 2012,
+            },
+        },
+    }
+
     name: Label | None = None
     strategy: PluginRef
 
@@ -101,6 +125,17 @@ class StudySpec(SharedSettings, Schedule):
 
     `direct` is the baseline, evolution in reality itself. The paper has 100 repetitions of it, and 40 of each strategy.
     """
+
+    EXAMPLES: ClassVar[Examples] = {
+        "Fig. 4": {
+            "summary": "The paper's whole Fig. 4: six strategies and the direct baseline; 1 500 core-hours",
+            "value": {"name": "Fig. 4", "direct_repetitions": 100},
+        },
+        "quick": {
+            "summary": "The same on the toy function; seconds",
+            "value": {"name": "toy", "robot": "toy_function", "budget": "smoke"},
+        },
+    }
 
     name: Label | None = None
     strategies: tuple[PluginRef, ...] = Field(

@@ -74,7 +74,7 @@ def list_tokens(store: Store) -> tuple[TokenRead, ...]:
         return tuple(map(_read, tokens.listed(session)))
 
 
-def revoke_token(store: Store, id: str) -> TokenRead:  # noqa: A002 - as the command says
+def revoke_token(store: Store, id: str) -> TokenRead:
     """The token, which admits nobody from now on.
 
     Raises:

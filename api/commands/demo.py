@@ -22,7 +22,7 @@ from gaplab.api.clients.findings import findings
 from gaplab.api.clients.watch import follow
 from gaplab.api.commands import demo_size
 from gaplab.api.commands.exit_codes import CommandError, Exit
-from gaplab.api.process.local_service import own_service
+from gaplab.api.process.local_service import start_service
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead, StudyRead
 
@@ -48,7 +48,7 @@ def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
     began = time.monotonic()
     try:
         database, log = _database(folder), folder / "service.log"
-        with _interruptible(), own_service(database, log) as client:
+        with _interruptible(), start_service(database, log) as client:
             _say(f"Service: {client.url}, database {database}, log {log}", console)
             for name, spec in specs.items():
                 _run_study(name, spec, client, folder, console)

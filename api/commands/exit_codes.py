@@ -3,6 +3,7 @@
 from enum import IntEnum
 
 from gaplab.api.clients.client import ServiceError, ServiceUnreachable
+from gaplab.api.process.errors import CommandError as CommandError
 
 
 class Exit(IntEnum):
@@ -49,18 +50,10 @@ BY_STATUS = {
 }
 
 
-class CommandError(Exception):
-    """The command cannot go on; the message is one readable sentence."""
-
-    def __init__(self, message: str, code: Exit) -> None:
-        self.code = code
-        super().__init__(message)
-
-
 def code_of(error: ServiceError | ServiceUnreachable | CommandError) -> Exit:
     """The exit code that tells a script what happened."""
     if isinstance(error, CommandError):
-        return error.code
+        return Exit(error.code)
     if isinstance(error, ServiceUnreachable):
         return Exit.UNREACHABLE
     return BY_STATUS.get(error.problem.status, Exit.FAILED)

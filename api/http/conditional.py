@@ -1,8 +1,7 @@
-"""Entity tags: what is not sent again, and what is not overwritten unseen.
+"""Entity tags, so that clients neither load the same answer twice nor overwrite an edit that they have not seen.
 
-A tag is `"EDITS.DIGEST"`: how often people edited the thing, and a digest of the whole answer. `If-None-Match` compares
-all of it. `If-Match` compares the edits: a change guards against the changes of other people, and an experiment that
-computes meanwhile refuses none.
+A tag is `"EDITS.DIGEST"`: the number of edits by people, and a digest of the whole answer. `If-None-Match` compares the
+whole tag. `If-Match` compares the edits alone, so that the progress of an experiment refuses no edit.
 """
 
 import re
@@ -14,45 +13,45 @@ from fastapi import Header, Request, Response
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel
 
+from gaplab.api.http.problems import Responses
 from gaplab.services.core.errors import ConditionMissing
 
 IfMatch = Annotated[
     str | None,
-    Header(alias="If-Match", max_length=1_000, description="the `ETag` that was looked at, or `*` for whatever it is"),
+    Header(alias="If-Match", max_length=1_000, description="the `ETag` of what you edit, or `*` for any version"),
 ]
 
-HEADERS = {"ETag": {"description": "of what is shown", "schema": {"type": "string"}}}
-NOT_MODIFIED = {304: {"description": "It is what `If-None-Match` names"}}
+TAGGED: Responses = {200: {"headers": {"ETag": {"description": "of the answer", "schema": {"type": "string"}}}}}
+CACHED: Responses = TAGGED | {304: {"description": "The answer is still the one that `If-None-Match` names"}}
 
 _TAG = re.compile(r'(?:W/)?"(\d{1,9})\.[0-9a-f]+"')
 
 
-def tagged(request: Request, shown: BaseModel, edits: int = 0) -> Response:
-    """What is shown, with its tag; only the tag if the reader has it already, or says `*`: whatever there is."""
-    content = shown.model_dump(mode="json")
-    answer = JSONResponse(content)
-    tag = f'"{edits}.{sha256(answer.body).hexdigest()[:16]}"'
+def tagged(request: Request, answer: BaseModel, edits: int = 0) -> Response:
+    """Return the answer with its tag, or 304 without a body if `If-None-Match` has that tag or `*`."""
+    response = JSONResponse(answer.model_dump(mode="json"))
+    tag = f'"{edits}.{sha256(response.body).hexdigest()[:16]}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
     known = _listed(request.headers.get("if-none-match", "")) if request.method == "GET" else []
     if tag in known or known == ["*"]:
         return Response(status_code=304, headers=headers)
-    answer.headers.update(headers)
-    return answer
+    response.headers.update(headers)
+    return response
 
 
 def starting_from(if_match: str | None) -> Collection[int] | None:
-    """The numbers of edits that a change may start from; None for any.
+    """Return the numbers of edits that a change may start from; None for any.
 
     Raises:
-        ConditionMissing: the change does not say.
+        ConditionMissing: the request has no `If-Match`.
     """
     if if_match is None:
-        msg = "a change needs the header If-Match with the ETag that you looked at, or * to change it whatever it is"
+        msg = "an edit needs the header If-Match: the ETag of what you edit, or * for any version"
         raise ConditionMissing(msg)
     if if_match.strip() == "*":
         return None
-    return {int(each[1]) for each in map(_TAG.fullmatch, _listed(if_match)) if each}
+    return {int(match[1]) for match in map(_TAG.fullmatch, _listed(if_match)) if match}
 
 
 def _listed(tags: str) -> list[str]:
-    return [each.strip().removeprefix("W/") for each in tags.split(",")]
+    return [tag.strip().removeprefix("W/") for tag in tags.split(",")]

@@ -1,4 +1,4 @@
-"""What endpoints are given: the store, ids that can be ids, and the query parameters that several share."""
+"""Dependencies of endpoints: the store, the caller, valid ids, and query parameters that several endpoints share."""
 
 import logging
 import re
@@ -9,7 +9,7 @@ from fastapi import Depends, Header, Request, Response
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from starlette.datastructures import URLPath
 
-from gaplab.api.http.violations import given_twice
+from gaplab.api.http.violations import repeated_parameters
 from gaplab.schemas.access import Role
 from gaplab.schemas.base import Frozen
 from gaplab.services.access import Caller, demand
@@ -30,20 +30,20 @@ IdempotencyKey = Annotated[
         min_length=1,
         max_length=255,
         pattern=r"^[!-~]+$",
-        description="any text of the sender's choice: the same request with the same key is done once, within a week",
+        description="any text of your choice: repeating the request with the same key within a week does it only once",
     ),
 ]
 
 
 def _store(request: Request) -> Store:
-    """The app's database, once it is known to answer and to have the schema of this version."""
+    """Return the app's database after checking that it answers and has the schema of this version."""
     store: Store = request.app.state.store
     store.check()
     return store
 
 
 def _plausible(text: str) -> str:
-    """An id as this service gives them; anything else cannot be found, and never reaches the database."""
+    """Return a text that can be an id; any other is not found, and never reaches the database."""
     if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}", text):
         msg = f"there is nothing with the id {text[:64]!r}"
         raise NotFound(msg)
@@ -51,24 +51,24 @@ def _plausible(text: str) -> str:
 
 
 def _caller(request: Request) -> Caller:
-    """Who asks, as `gaplab.api.http.access` found out."""
+    """Return the caller that `gaplab.api.http.access` authenticated."""
     caller: Caller = request.state.caller
     return caller
 
 
 def _rollout_process(request: Request) -> RolloutProcess:
-    """The process of the app that computes what is asked for while somebody waits."""
+    """Return the app's process for replays and predictions."""
     process: RolloutProcess = request.app.state.rollout_process
     return process
 
 
 def _limited(request: Request) -> Admission:
-    """Who submits, and within which limits."""
+    """Return the token of the caller, and the limits that apply."""
     return Admission(_caller(request).token, request.app.state.limits)
 
 
 def _admission(admitted: Annotated[Admission, Depends(_limited)], key: IdempotencyKey = None) -> Admission:
-    """The same, and under which key."""
+    """Return the token, the limits and the idempotency key of the request."""
     return replace(admitted, key=key)
 
 
@@ -80,39 +80,39 @@ AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]
 
 
-async def refuse_doubles(request: Request) -> None:
-    """Of a query parameter that takes one value and is given several, none is chosen.
+async def refuse_repeated_parameters(request: Request) -> None:
+    """Refuse a query that repeats a parameter of one value, rather than choosing one.
 
     Raises:
-        InvalidSpec: there are such.
+        InvalidSpec: a parameter is repeated.
     """
-    if doubles := given_twice(request):
-        raise InvalidSpec(doubles)
+    if repeated := repeated_parameters(request):
+        raise InvalidSpec(repeated)
 
 
 class Parameters(BaseModel):
-    """Query parameters; a misspelt one is an error, not ignored, and so is one that is given twice."""
+    """Query parameters; an unknown one is an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class Paging(Parameters):
-    """Which part of a list."""
+    """The part of a list to return."""
 
-    limit: int = Field(default=50, ge=1, le=500, description="how many at most")
-    cursor: str | None = Field(default=None, max_length=2_000, description="`next` of the part before")
+    limit: int = Field(default=50, ge=1, le=500, description="most items to return")
+    cursor: str | None = Field(default=None, max_length=2_000, description="`next` of the previous part")
 
 
 class Revealing(Parameters):
-    """Whether reality's parameters are shown before the end."""
+    """Whether to show reality's parameters before the experiment ends."""
 
-    reveal: bool = Field(default=False, description="show reality's parameters already; wants an admin's token")
+    reveal: bool = Field(default=False, description="show reality's parameters already; needs an admin's token")
 
     def permitted(self, caller: Caller) -> bool:
-        """What was asked for.
+        """Return `reveal`.
 
         Raises:
-            Forbidden: it is more than the caller may see.
+            Forbidden: the caller may not reveal reality.
         """
         if self.reveal:
             demand(caller, Role.ADMIN, "to reveal reality's parameters")
@@ -121,7 +121,7 @@ class Revealing(Parameters):
 
 
 def created(once: Once[R], response: Response, location: URLPath) -> R:
-    """The answer to what was submitted, with where it is, and whether it was submitted before."""
+    """Return the answer to a submission; headers say where it is, and whether an earlier request submitted it."""
     response.headers["Location"] = str(location)
     if once.replayed:
         response.headers["Idempotent-Replayed"] = "true"

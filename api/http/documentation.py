@@ -1,4 +1,4 @@
-"""The pages that document the API, served from an installed package: they work where there is no internet."""
+"""The pages that document the API, from an installed package: they need no internet."""
 
 from typing import Any
 
@@ -13,6 +13,7 @@ from gaplab.api.http.security_headers import page
 from gaplab.schemas.problems import Problem
 
 ASSETS = "/assets/docs"
+ABOUT_TOKENS = "created by `gaplab token create`; on loopback none is needed until the first exists"
 
 
 def install(app: FastAPI) -> None:
@@ -20,7 +21,15 @@ def install(app: FastAPI) -> None:
     app.mount(ASSETS, Assets(packages=[("fastapi_offline", "static")]), name="docs_assets")
     app.add_api_route("/docs", _docs, include_in_schema=False)
     app.add_api_route("/redoc", _redoc, include_in_schema=False)
-    _describe_problems(app)
+    generate = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            _complete(generate())
+        assert app.openapi_schema is not None
+        return app.openapi_schema
+
+    app.openapi = openapi  # type: ignore[method-assign]
 
 
 def _docs() -> HTMLResponse:
@@ -48,47 +57,29 @@ def _redoc() -> HTMLResponse:
     )
 
 
-def _page(made: HTMLResponse) -> HTMLResponse:
-    return page(bytes(made.body).decode())
+def _page(response: HTMLResponse) -> HTMLResponse:
+    return page(bytes(response.body).decode())
 
 
-def _describe_problems(app: FastAPI) -> None:
-    """Put the problem's schema where the answers refer to it, and drop the framework's own shape of errors."""
-    generate = app.openapi
-
-    def openapi() -> dict[str, Any]:
-        if app.openapi_schema is None:
-            document = generate()
-            schemas = document["components"]["schemas"]
-            problem = Problem.model_json_schema(ref_template="#/components/schemas/{model}", mode="serialization")
-            schemas |= problem.pop("$defs") | {"Problem": problem}
-            _drop_foreign_errors(document)
-            _describe_access(document)
-        assert app.openapi_schema is not None
-        return app.openapi_schema
-
-    app.openapi = openapi  # type: ignore[method-assign]
-
-
-def _describe_access(document: dict[str, Any]) -> None:
-    """Say which token each endpoint wants, and what happens without."""
-    about = "made by `gaplab token create`; on loopback none is needed until the first is made"
-    document["components"]["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer", "description": about}}
+def _complete(document: dict[str, Any]) -> None:
+    """Add the schema of problems, and the token and the problems of each endpoint, in place of FastAPI's errors."""
+    components = document["components"]
+    problem = Problem.model_json_schema(ref_template="#/components/schemas/{model}", mode="serialization")
+    components["schemas"] |= problem.pop("$defs") | {"Problem": problem}
+    for foreign in ("HTTPValidationError", "ValidationError"):
+        components["schemas"].pop(foreign, None)
+    components["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer", "description": ABOUT_TOKENS}}
     for path, operations in document["paths"].items():
         for operation in operations.values():
             operation["security"] = [] if path in OPEN else [{"token": []}, {}]
-            if path not in OPEN:
-                operation["responses"] |= {str(status): each for status, each in documented(401, 403).items()}
+            responses = operation["responses"]
+            if "application/json" in responses.get("422", {}).get("content", {}):
+                del responses["422"]
+            statuses = [*([] if path in OPEN else [401, 403]), *([422] if _can_be_invalid(operation) else [])]
+            if statuses:
+                responses |= {str(status): each for status, each in documented(*statuses).items()}
 
 
-def _drop_foreign_errors(document: dict[str, Any]) -> None:
-    """Say 422 where a query, a header or a body can be wrong, in our own shape; an id is never wrong, only unknown."""
-    for foreign in ("HTTPValidationError", "ValidationError"):
-        document["components"]["schemas"].pop(foreign, None)
-    for operations in document["paths"].values():
-        for operation in operations.values():
-            answers = operation["responses"]
-            if "application/json" in answers.get("422", {}).get("content", {}):
-                del answers["422"]
-            if "requestBody" in operation or any(each["in"] != "path" for each in operation.get("parameters", ())):
-                answers |= {str(status): each for status, each in documented(422).items()}
+def _can_be_invalid(operation: dict[str, Any]) -> bool:
+    """Return whether a body, a query or a header can be invalid; an id cannot be, only unknown."""
+    return "requestBody" in operation or any(each["in"] != "path" for each in operation.get("parameters", ()))

@@ -1,4 +1,4 @@
-"""The one reader of events in this process, for all streams together."""
+"""The one reader of events in a process, for all streams together."""
 
 import asyncio
 import logging
@@ -14,26 +14,26 @@ from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.events import WantedEvents
 from gaplab.services.store.session import Store
 
-EVERY_S = 0.25
-"""Between looks at the database, as long as there is a stream."""
+POLL_S = 0.25
+"""Interval between queries while a stream is open."""
 
 RETRY_S = 1.0
-"""Before the next look at a database that cannot be used now."""
+"""Interval between queries while the database does not answer."""
 
 PAGE = 500
 KEPT = 2_000
-"""Latest events, from which streams are served; one that is further behind reads pages of its own until it is not."""
+"""Latest events in memory; a stream that is further behind reads pages from the database until it has caught up."""
 
 log = logging.getLogger("gaplab.api")
 
 
-class Feed:
-    """Events as they are stored, to any number of streams, at one query a look; without a stream nothing is read.
+class EventFeed:
+    """Newly stored events for any number of streams, from one query per interval; without streams it reads nothing.
 
     It lives in one event loop, and holds no transaction while it waits.
     """
 
-    def __init__(self, store: Store, *, every_s: float = EVERY_S, kept: int = KEPT) -> None:
+    def __init__(self, store: Store, *, every_s: float = POLL_S, kept: int = KEPT) -> None:
         self._store = store
         self._every_s = every_s
         self._recent: deque[EventRead] = deque(maxlen=kept)
@@ -45,36 +45,37 @@ class Feed:
 
     @property
     def open(self) -> int:
-        """How many streams there are now."""
+        """The number of open streams."""
         return self._open
 
     async def follow(self, after: int, which: WantedEvents) -> AsyncIterator[EventRead]:
-        """These events, in order and each once, from the first after that number; until the feed is closed."""
+        """Yield the selected events after that number, in order and each once, until the feed is closed."""
         with self._counted():
             while not (self._closed or self._reader is None or self._reader.done()):
-                news, found = self._news, self._after(after)
-                if found is None:
+                news, recent = self._news, self._after(after)
+                if recent is None:
                     page = await self._page(after, which)
-                    found, after = page.items, max(after, page.last)
-                elif found:
-                    after = found[-1].number
+                    recent, after = page.items, max(after, page.last)
+                elif recent:
+                    after = recent[-1].number
                 else:
                     await news.wait()
-                for each in found:
-                    if which.has(each):
-                        yield each
+                for event in recent:
+                    if which.has(event):
+                        yield event
 
     def close(self) -> None:
-        """End every stream, and any that is opened from now on: the service stops."""
+        """End every stream, now and from now on."""
         self._closed = True
         self._news.set()
 
     @contextmanager
     def _counted(self) -> Iterator[None]:
+        """Count an open stream; the first starts the reader, the last ends it."""
         self._open += 1
         if not self._closed and (self._reader is None or self._reader.done()):
             self._reader = asyncio.get_running_loop().create_task(self._read())
-            self._reader.add_done_callback(self._give_up)
+            self._reader.add_done_callback(self._end_streams)
         try:
             yield
         finally:
@@ -85,15 +86,15 @@ class Feed:
                 self._recent.clear()
 
     def _after(self, number: int) -> tuple[EventRead, ...] | None:
-        """The latest events after that number; None if some of them are not among those that are kept."""
+        """Return the events after that number; None if some of them are no longer in memory."""
         if self._head is None or number >= self._head:
             return ()
         if not self._recent or number < self._recent[0].number - 1:
             return None
-        return tuple(each for each in self._recent if each.number > number)
+        return tuple(event for event in self._recent if event.number > number)
 
     async def _page(self, after: int, which: WantedEvents) -> EventPage:
-        """What follows for one stream that is behind; nothing new while the database cannot be used."""
+        """Return the next events for a stream that is behind; none while the database does not answer."""
         try:
             return await run_sync(lambda: events.page(self._store, after, which, limit=PAGE))
         except StoreUnavailable:
@@ -103,30 +104,30 @@ class Feed:
     async def _read(self) -> None:
         while not self._closed:
             try:
-                await self._look()
+                await self._read_once()
                 await asyncio.sleep(self._every_s)
             except StoreUnavailable as error:
                 log.warning("event streams wait: %s", error)
                 await asyncio.sleep(RETRY_S)
 
-    def _give_up(self, reader: "asyncio.Task[None]") -> None:
-        """A reader that failed ends all streams that wait: whoever resumes his gets a new one."""
+    def _end_streams(self, reader: "asyncio.Task[None]") -> None:
+        """End all waiting streams if the reader failed; a client that resumes its stream starts a new reader."""
         if not reader.cancelled() and (error := reader.exception()) is not None:
             log.error("event streams end: their reader failed", exc_info=error)
-            self._tell()
+            self._wake()
 
-    async def _look(self) -> None:
+    async def _read_once(self) -> None:
         if self._head is None:
             self._head = await run_sync(lambda: events.latest(self._store))
-            self._tell()
+            self._wake()
         head = self._head
         page = await run_sync(lambda: events.page(self._store, head, WantedEvents(), limit=PAGE))
         if page.items:
             self._recent.extend(page.items)
             self._head = page.items[-1].number
-            self._tell()
+            self._wake()
 
-    def _tell(self) -> None:
-        """Wake whoever waits, once."""
-        told, self._news = self._news, asyncio.Event()
-        told.set()
+    def _wake(self) -> None:
+        """Wake all waiting streams once."""
+        news, self._news = self._news, asyncio.Event()
+        news.set()

@@ -1,12 +1,12 @@
-"""How every figure is asked for, and answered in the format that is wanted."""
+"""The query parameters that all figures share, and the answer in the requested format."""
 
-from typing import Any, Literal
+from typing import Literal
 
 from fastapi import Response
 from pydantic import Field
 
 from gaplab.api.http.dependencies import Parameters
-from gaplab.api.http.problems import documented
+from gaplab.api.http.problems import Responses, documented
 from gaplab.api.http.security_headers import page
 from gaplab.schemas.figures import Chart, FigureRead, TableRead
 from gaplab.services.figures.marks import Figure
@@ -23,20 +23,20 @@ MEDIA_TYPES = {
     "pdf": "application/pdf",
 }
 
+_FORMATS = "a self-contained page, JSON for Plotly, or a file for a paper"
+
 
 class Drawing(Parameters):
-    """How a figure is wanted; each kind adds what it draws."""
+    """How to draw a figure; each kind of figure adds what to draw."""
 
-    format: Literal["html", "json", "svg", "png", "pdf"] = Field(
-        default="html", description="a page that needs nothing else, data for Plotly, or a file for a paper"
-    )
-    title: str | None = Field(default=None, max_length=TITLE, description="above it; left out: what it is of")
-    width: float = Field(default=3.5, ge=2.5, le=20, description="of a file, in inches: a column has 3.5, a page 7.2")
-    caption: bool = Field(default=True, description="of a file: whether the caption is drawn beneath")
+    format: Literal["html", "json", "svg", "png", "pdf"] = Field(default="html", description=_FORMATS)
+    title: str | None = Field(default=None, max_length=TITLE, description="above the figure; left out: what it shows")
+    width: float = Field(default=3.5, ge=2.5, le=20, description="of a file, in inches; a column has 3.5, a page 7.2")
+    caption: bool = Field(default=True, description="whether a file has its caption beneath")
 
 
 def answer(figure: Figure, query: Drawing) -> Response:
-    """The figure in the format that was asked for."""
+    """Return the figure in the requested format."""
     if query.format == "html":
         return page(render_html(figure))
     media_type = MEDIA_TYPES[query.format]
@@ -48,7 +48,7 @@ def answer(figure: Figure, query: Drawing) -> Response:
 
 
 def read(figure: Figure) -> FigureRead:
-    """The figure as JSON has it."""
+    """Return the figure as the schema of the API."""
     table = figure.table and TableRead(head=figure.table.head, rows=figure.table.rows)
     return FigureRead(
         figure=Chart.model_validate(chart(figure)),
@@ -60,30 +60,13 @@ def read(figure: Figure) -> FigureRead:
     )
 
 
-_EXAMPLE = FigureRead(
-    figure=Chart(
-        data=({"type": "scatter", "name": "Simulated fit", "x": [0, 1], "y": [0.9, 1.2]},),
-        layout={"xaxis": {"title": {"text": "Number of real-world evaluations"}}},
-    ),
-    title="Fig. 4",
-    caption="Mean over 40 repetitions; bands: 95 % interval of the mean.",
-    alt="Fitness in reality (m/s) against number of real-world evaluations: Simulated fit goes from 0.9 to 1.2.",
-    empty=False,
-)
-
-
-def responses() -> dict[int | str, dict[str, Any]]:
-    """What an endpoint of a figure says in the documentation about its answers."""
+def responses(*statuses: int) -> Responses:
+    """Return the documented responses of a figure's endpoint; `statuses` are its problems, by default 404 and 422."""
     text, binary = {"type": "string"}, {"type": "string", "format": "binary"}
     content = {
-        "application/json": {"example": _EXAMPLE.model_dump(mode="json")},
         "text/html": {"schema": text, "example": "<!doctype html><html lang='en'>…"},
         "image/svg+xml": {"schema": text, "example": "<svg xmlns='http://www.w3.org/2000/svg'>…"},
         "image/png": {"schema": binary, "example": "PNG…"},
         "application/pdf": {"schema": binary, "example": "%PDF…"},
     }
-    about = {
-        "description": "A page that needs nothing else, data for Plotly, or a file for a paper",
-        "content": content,
-    }
-    return {200: about, **documented(404, 422)}
+    return {200: {"description": _FORMATS.capitalize(), "content": content}, **documented(*(statuses or (404, 422)))}

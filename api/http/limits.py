@@ -1,4 +1,4 @@
-"""How much a client may send, and how many streams it may hold open."""
+"""Limits on the size of a request, and on the number of open streams."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -14,14 +14,14 @@ from gaplab.services.core.errors import LimitReached
 from gaplab.services.settings import Limits, variable_of
 
 RETRY_AFTER_S = 10
-"""Streams come and go with the pages that show them."""
+"""Streams end when the pages that show them are closed."""
 
 MOST_BYTES_OF = {"/import": 64 * 2**20}
-"""Of the addresses that take more than a spec."""
+"""Limits of the addresses that take more than a spec."""
 
 
 class BodyLimit:
-    """Refuses a body over what its address takes with 413: by what its header announces, and by what really arrives."""
+    """Middleware that refuses a body over the limit with 413, by its announced length and by what arrives."""
 
     def __init__(self, app: ASGIApp, most_bytes: int) -> None:
         self.app = app
@@ -41,11 +41,11 @@ class BodyLimit:
         await self.app(scope, _counted(receive, most, detail), send)
 
     def _limit_of(self, path: str) -> tuple[int, str]:
-        """In bytes, and in words."""
+        """Return the limit in bytes, and the detail of its problem."""
         if path in MOST_BYTES_OF:
             return MOST_BYTES_OF[path], f"The body has more than {MOST_BYTES_OF[path]:,} bytes."
-        which = variable_of("body_bytes")
-        return self._most, f"The body has more than {self._most:,} bytes ({which}); a spec has a few hundred."
+        variable = variable_of("body_bytes")
+        return self._most, f"The body has more than {self._most:,} bytes ({variable}); a spec has a few hundred."
 
 
 def _counted(receive: Receive, most: int, detail: str) -> Receive:
@@ -63,7 +63,7 @@ def _counted(receive: Receive, most: int, detail: str) -> Receive:
 
 
 class Streams:
-    """Streams that are open at this process, within limits for a token and for all.
+    """Counts the open streams of this process, and limits them for each token and in all.
 
     with streams.open(caller.token):
         ...
@@ -76,10 +76,10 @@ class Streams:
 
     @contextmanager
     def open(self, token: str | None) -> Iterator[None]:
-        """Hold one of this token's streams open for as long as the context lasts.
+        """Count one more stream of this token while the context lasts.
 
         Raises:
-            LimitReached: too many are; the message names the limit.
+            LimitReached: too many are open; the message names the limit.
         """
         with self._lock:
             self._check("streams_per_token", self._open[token], "of this token ")
@@ -93,5 +93,5 @@ class Streams:
 
     def _check(self, name: str, present: int, whose: str) -> None:
         if present >= (limit := getattr(self._limits, name)):
-            msg = f"{present} streams {whose}are open, and more than {limit} may not be ({variable_of(name)})"
+            msg = f"{present} streams {whose}are open; at most {limit} may be ({variable_of(name)})"
             raise LimitReached(msg, RETRY_AFTER_S)

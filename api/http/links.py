@@ -1,4 +1,4 @@
-"""Where an answer leads, as links of the OpenAPI document: generated clients and tests follow them."""
+"""Links from an answer to further operations, in the OpenAPI document: generated clients and tests follow them."""
 
 from typing import Any
 
@@ -32,7 +32,7 @@ FROM_CHECK = ("read_sensitivity",)
 
 
 def leading_to(*operations: str) -> dict[str, Any]:
-    """The part of a documented answer that says which operations take its id."""
+    """Return the part of a documented response that links to operations on its id."""
     return {
-        "links": {each: {"operationId": each, "parameters": {"path.id": "$response.body#/id"}} for each in operations}
+        "links": {name: {"operationId": name, "parameters": {"path.id": "$response.body#/id"}} for name in operations}
     }

@@ -1,4 +1,4 @@
-"""What Prometheus reads at `/metrics`: requests as they are counted here, and what the database holds."""
+"""The metrics at `/metrics` for Prometheus: requests of this process, and the contents of the database."""
 
 from collections.abc import Iterator
 from threading import Lock
@@ -9,29 +9,30 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from prometheus_client.registry import Collector
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from gaplab.api.http.event_feed import Feed
+from gaplab.api.http.event_feed import EventFeed
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.results import totals
 from gaplab.services.results.totals import Totals
 from gaplab.services.store.session import Store
 
-KEPT_S = 5.0
-"""For which what was read from the database is shown again, however often it is asked for."""
+CACHED_S = 5.0
+"""Least interval between two readings of the database."""
 
 BUCKETS_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
+METHODS = {"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"}
 
 
 class Metrics:
     """The metrics of one application.
 
     Attributes:
-        registry: of all of them; applications in one process each have their own.
-        requests: by method, route and status.
+        registry: all metrics; applications in one process have separate registries.
+        requests: counted by method, route and status.
         seconds: to the first byte of the answer, by method and route.
     """
 
-    def __init__(self, store: Store, feed: Feed) -> None:
+    def __init__(self, store: Store, feed: EventFeed) -> None:
         self.registry = CollectorRegistry()
         self.requests = Counter(
             "gaplab_http_requests", "Answers", ["method", "route", "status"], registry=self.registry
@@ -43,12 +44,12 @@ class Metrics:
             registry=self.registry,
             buckets=BUCKETS_S,
         )
-        self.registry.register(_OfTheProcess(store, feed))
-        self.registry.register(_OfTheStore(store))
+        self.registry.register(_ProcessCollector(store, feed))
+        self.registry.register(_StoreCollector(store))
 
 
-class Measured:
-    """Counts each request under the route that answered it; what no route has is one of them, whatever was asked."""
+class RequestCounter:
+    """Middleware that counts each request by its route; requests without a route count as route `none`."""
 
     def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
         self._app = app
@@ -75,63 +76,54 @@ class Measured:
         self._metrics.seconds.labels(method, route).observe(seconds)
 
 
-METHODS = {"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"}
+class _ProcessCollector(Collector):
+    """The metrics of this process, except requests."""
 
-
-class _OfTheProcess(Collector):
-    """What this process counts beside requests."""
-
-    def __init__(self, store: Store, feed: Feed) -> None:
+    def __init__(self, store: Store, feed: EventFeed) -> None:
         self._store = store
         self._feed = feed
 
     def collect(self) -> Iterator[Metric]:
-        """Now."""
-        yield GaugeMetricFamily("gaplab_event_streams", "Event streams that are open", value=self._feed.open)
-        yield CounterMetricFamily(
-            "gaplab_database_errors", "Times that the database could not be used", value=self._store.errors
-        )
-        yield CounterMetricFamily(
-            "gaplab_database_retries", "Transactions that were run anew", value=self._store.retries
-        )
+        """Yield the present values."""
+        yield GaugeMetricFamily("gaplab_event_streams", "Open event streams", value=self._feed.open)
+        yield CounterMetricFamily("gaplab_database_errors", "Failed uses of the database", value=self._store.errors)
+        yield CounterMetricFamily("gaplab_database_retries", "Repeated transactions", value=self._store.retries)
 
 
-class _OfTheStore(Collector):
-    """What the database holds; nothing of it while it cannot be used, which `gaplab_database_up` tells."""
+class _StoreCollector(Collector):
+    """The metrics of the database; while it does not answer, only `gaplab_database_up`."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
         self._lock = Lock()
-        self._found: Totals | None = None
-        self._read_at = -KEPT_S
+        self._cached: Totals | None = None
+        self._read_at = -CACHED_S
 
     def collect(self) -> Iterator[Metric]:
-        """As of at most a few seconds ago."""
-        found = self._totals()
-        yield GaugeMetricFamily("gaplab_database_up", "Whether the database can be used", value=found is not None)
-        if found is None:
+        """Yield values that are at most a few seconds old."""
+        stored = self._totals()
+        yield GaugeMetricFamily("gaplab_database_up", "Whether the database answers", value=stored is not None)
+        if stored is None:
             return
-        for name, counts in (("experiments", found.experiments), ("repetitions", found.repetitions)):
+        for name, counts in (("experiments", stored.experiments), ("repetitions", stored.repetitions)):
             family = GaugeMetricFamily(f"gaplab_{name}", f"{name.capitalize()} by state", labels=["state"])
             for state in State:
                 family.add_metric([state.value], counts.get(state, 0))
             yield family
-        yield GaugeMetricFamily("gaplab_rollouts_queued", "Rollouts still to be done", value=found.rollouts_queued)
-        yield CounterMetricFamily("gaplab_rollouts", "Rollouts that are recorded", value=found.rollouts_done)
-        yield CounterMetricFamily("gaplab_steps", "Steps that are recorded", value=found.steps)
-        yield GaugeMetricFamily(
-            "gaplab_supervisors", "Supervisors that did not end in good order", value=len(found.supervisor_ages_s)
-        )
-        if found.supervisor_ages_s:
-            age = min(found.supervisor_ages_s)
-            help_ = "Seconds since a supervisor was last heard of"
-            yield GaugeMetricFamily("gaplab_supervisor_heartbeat_age_seconds", help_, value=age)
+        yield GaugeMetricFamily("gaplab_rollouts_queued", "Rollouts still to be done", value=stored.rollouts_queued)
+        yield CounterMetricFamily("gaplab_rollouts", "Recorded rollouts", value=stored.rollouts_done)
+        yield CounterMetricFamily("gaplab_steps", "Recorded steps", value=stored.steps)
+        ages_s = stored.supervisor_ages_s
+        yield GaugeMetricFamily("gaplab_supervisors", "Supervisors that have not ended in order", value=len(ages_s))
+        if ages_s:
+            about = "Seconds since the latest heartbeat of a supervisor"
+            yield GaugeMetricFamily("gaplab_supervisor_heartbeat_age_seconds", about, value=min(ages_s))
 
     def _totals(self) -> Totals | None:
         with self._lock:
-            if monotonic() - self._read_at >= KEPT_S:
-                self._found, self._read_at = self._read(), monotonic()
-            return self._found
+            if monotonic() - self._read_at >= CACHED_S:
+                self._cached, self._read_at = self._read(), monotonic()
+            return self._cached
 
     def _read(self) -> Totals | None:
         try:

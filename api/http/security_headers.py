@@ -1,4 +1,4 @@
-"""Pages and what surrounds every answer: headers that keep browsers from doing more with it than it is for."""
+"""Security headers on every answer, which keep browsers from using it for more than its purpose."""
 
 import re
 from base64 import b64encode
@@ -9,15 +9,15 @@ from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 NOTHING = "default-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
-"""Of an answer that is no page of ours: whatever a browser takes it for, it loads and runs nothing."""
+"""The policy of an answer that is not a page: a browser that shows it loads and runs nothing."""
 
 DRAWING = f"{NOTHING}; style-src 'unsafe-inline'"
-"""Of an SVG file, which has its style in it."""
+"""The policy of an SVG file, which contains its style."""
 
 ALWAYS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
-    "X-Frame-Options": "DENY",  # what frame-ancestors says, for browsers that do not know it
+    "X-Frame-Options": "DENY",  # for browsers that do not know frame-ancestors
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 
@@ -25,19 +25,17 @@ _SCRIPT = re.compile(r"<script(?![^>]*\bsrc=)[^>]*>(.*?)</script>", re.DOTALL | 
 
 
 def page(html: str) -> HTMLResponse:
-    """A page that runs the scripts in it and those of this service, and no other."""
+    """Return a page that runs its own scripts and those of this service, and no others."""
     return HTMLResponse(html, headers={"Content-Security-Policy": policy(html)})
 
 
 def policy(html: str) -> str:
-    """The policy of a page: scripts by their hashes; styles inline, for figures and documentation have theirs there."""
-    hashes = sorted(
-        {f"'sha256-{b64encode(sha256(each.encode()).digest()).decode()}'" for each in _SCRIPT.findall(html)}
-    )
+    """Return the policy of a page: scripts by their hashes; inline styles, which figures and documentation need."""
+    hashes = {f"'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'" for script in _SCRIPT.findall(html)}
     return "; ".join(
         (
             "default-src 'none'",
-            f"script-src 'self' {' '.join(hashes)}".rstrip(),
+            " ".join(("script-src 'self'", *sorted(hashes))),
             "style-src 'self' 'unsafe-inline'",
             "img-src 'self' data: blob:",
             "font-src 'self' data:",
@@ -50,8 +48,8 @@ def policy(html: str) -> str:
     )
 
 
-class Headers:
-    """Puts the headers on every answer; one that brought a policy of its own keeps it."""
+class SecurityHeaders:
+    """Middleware that adds the headers to every answer; an answer with a policy of its own keeps it."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -59,15 +57,12 @@ class Headers:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
 
-        async def guarded(message: Message) -> None:
+        async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
-                for name, value in (ALWAYS | {"Content-Security-Policy": _default(headers)}).items():
+                drawn = headers.get("content-type", "").startswith("image/svg")
+                for name, value in (ALWAYS | {"Content-Security-Policy": DRAWING if drawn else NOTHING}).items():
                     headers.setdefault(name, value)
             await send(message)
 
-        await self.app(scope, receive, guarded if scope["type"] == "http" else send)
-
-
-def _default(headers: MutableHeaders) -> str:
-    return DRAWING if headers.get("content-type", "").startswith("image/svg") else NOTHING
+        await self.app(scope, receive, send_with_headers if scope["type"] == "http" else send)

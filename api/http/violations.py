@@ -1,4 +1,4 @@
-"""What is wrong with a request, in words: the place, the value, what is permitted, and the nearest name that exists."""
+"""Explanations of invalid requests: the place, the value, what is permitted, and the nearest valid name."""
 
 import math
 import re
@@ -15,7 +15,7 @@ from gaplab.schemas.problems import SpecError
 from gaplab.services.core.errors import Violation
 
 MOST_ERRORS = 50
-"""Errors that one answer carries; nobody reads more, and a hostile body could cause thousands."""
+"""Most errors in one answer: a hostile body could cause thousands."""
 
 PERMITTED = {
     "int_type": "a whole number",
@@ -24,7 +24,7 @@ PERMITTED = {
     "float_type": "a finite number",
     "float_parsing": "a finite number",
     "finite_number": "a finite number",
-    "string_type": "a text",
+    "string_type": "text",
     "bool_parsing": "true or false",
     "bool_type": "true or false",
     "dict_type": "an object",
@@ -44,18 +44,18 @@ PERMITTED = {
 
 
 def without_consequences(errors: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """The errors without those that only follow from others: a list is not too short because of what is wrong in it."""
-    longer = {each["loc"][:depth] for each in errors for depth in range(len(each["loc"]))}
-    return [each for each in errors if each["type"] != "too_short" or each["loc"] not in longer]
+    """Return the errors without consequences of others: pydantic calls a list too short if its items are invalid."""
+    parents = {error["loc"][:depth] for error in errors for depth in range(len(error["loc"]))}
+    return [error for error in errors if error["type"] != "too_short" or error["loc"] not in parents]
 
 
 def explain(error: Mapping[str, Any], body: object, request: Request) -> SpecError:
-    """One error of pydantic's, as a reader wants it.
+    """Return an error of pydantic in the words of the API.
 
     Args:
-        error: an item of `ValidationError.errors()`, its place first in `loc`.
-        body: that was sent.
-        request: that it came with; its route knows what would have been right.
+        error: an item of `ValidationError.errors()`; its `loc` begins with body, query, path or header.
+        body: the body that was sent.
+        request: its route knows the valid fields and parameters.
     """
     place, *path = error["loc"]
     path = path[: _depth(body, path)] if place == "body" else path
@@ -63,7 +63,7 @@ def explain(error: Mapping[str, Any], body: object, request: Request) -> SpecErr
         return _unknown_field(str(place), path, error["input"], request)
     permitted, message = _permitted(error), str(error["msg"])
     if error["type"] == "model_attributes_type" and isinstance(error["input"], bytes):
-        message = "The body must be sent as JSON, with the header `Content-Type: application/json`"
+        message = "send the body as JSON, with the header `Content-Type: application/json`"
     absent = error["type"] == "missing" or isinstance(error["input"], bytes)
     return SpecError(
         pointer=_pointer(str(place), path),
@@ -75,7 +75,7 @@ def explain(error: Mapping[str, Any], body: object, request: Request) -> SpecErr
 
 
 def finite(value: object, depth: int = 6) -> object:
-    """The value as JSON can carry it: nan and infinities as text, texts in valid Unicode; what is too large is cut."""
+    """Return the value as valid JSON: nan and infinities as text, invalid Unicode replaced, large values cut."""
     if isinstance(value, bool | int | None):
         return value if not isinstance(value, int) or abs(value) < 2**1024 else "a huge number"
     if isinstance(value, float):
@@ -84,14 +84,14 @@ def finite(value: object, depth: int = 6) -> object:
         text = value.encode("utf-8", "replace").decode()
         return text if len(text) <= 1000 else f"{text[:1000]}…"
     if isinstance(value, Mapping) and depth:
-        return {str(finite(str(key))): finite(each, depth - 1) for key, each in islice(value.items(), MOST_ERRORS)}
+        return {_text(key): finite(item, depth - 1) for key, item in islice(value.items(), MOST_ERRORS)}
     if isinstance(value, Sequence) and not isinstance(value, bytes) and depth:
-        return [finite(each, depth - 1) for each in islice(value, MOST_ERRORS)]
+        return [finite(item, depth - 1) for item in islice(value, MOST_ERRORS)]
     return "…"
 
 
 def _depth(body: object, path: Sequence[str | int]) -> int:
-    """How far the path leads in what was sent: where `"smoke"` is short for `{"preset": "smoke"}`, no further."""
+    """Return how much of the path exists in the body, where `"smoke"` may be short for `{"preset": "smoke"}`."""
     for depth, part in enumerate(path):
         if isinstance(body, dict):
             body = body.get(part)
@@ -103,7 +103,7 @@ def _depth(body: object, path: Sequence[str | int]) -> int:
 
 
 def _pointer(place: str, path: Sequence[str | int]) -> str:
-    """RFC 6901 into the body; the bare name of a query or path parameter."""
+    """Return a JSON pointer (RFC 6901) into the body, or the name of a query or path parameter."""
     if place != "body":
         return "/".join(str(part) for part in path)
     return "".join("/" + _text(part).replace("~", "~0").replace("/", "~1") for part in path)
@@ -133,14 +133,14 @@ def _unknown_field(place: str, path: Sequence[str | int], value: object, request
     nearest = _nearest(name, fields)
     hint = f" (did you mean {nearest!r}?)" if nearest else ""
     kind = "field" if place == "body" else "parameter"
-    message = f"there is no {kind} called {name!r}{hint}; there is {', '.join(fields)}"
+    message = f"there is no {kind} {name!r}{hint}; permitted: {', '.join(fields)}"
     return SpecError(
         pointer=_pointer(place, path), value=finite(value), message=message, permitted=fields, nearest=nearest
     )
 
 
 def _fields(request: Request, path: Sequence[str | int]) -> tuple[str, ...]:
-    """The fields that the model at this place of the body has."""
+    """Return the fields of the model at this place of the body."""
     annotation: Any = request.scope["route"].body_field.field_info.annotation
     for part in path:
         models = _models(annotation)
@@ -151,28 +151,28 @@ def _fields(request: Request, path: Sequence[str | int]) -> tuple[str, ...]:
 
 
 def _models(annotation: object) -> list[type[BaseModel]]:
-    """The model in `Model`, `Model | None` or `tuple[Model, ...]`."""
+    """Return the models in an annotation like `Model`, `Model | None` or `tuple[Model, ...]`."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     if get_origin(annotation) in {Union, UnionType, tuple}:
-        return [model for each in get_args(annotation) for model in _models(each)]
+        return [model for part in get_args(annotation) for model in _models(part)]
     return []
 
 
-def given_twice(request: Request) -> list[Violation]:
-    """The query parameters of which the endpoint takes one value, and the request has several."""
+def repeated_parameters(request: Request) -> list[Violation]:
+    """Return a violation for each query parameter that takes one value and has several."""
     given = {name: request.query_params.getlist(name) for name, several in _parameters(request).items() if not several}
     return [
-        Violation(name, values, f"it is given {len(values)} times, and takes one value", "one value")
+        Violation(name, values, f"it is given {len(values)} times; give it once", "one value")
         for name, values in given.items()
         if len(values) > 1
     ]
 
 
 def _parameters(request: Request) -> dict[str, bool]:
-    """The query parameters that the endpoint takes, and whether each takes several values."""
+    """Return the query parameters of the endpoint, and whether each takes several values."""
     queries = (field.field_info.annotation for field in request.scope["route"].dependant.query_params)
-    models = [model for each in queries for model in _models(each)]
+    models = [model for annotation in queries for model in _models(annotation)]
     return {
         field.alias or name: get_origin(field.annotation) is list
         for model in models

@@ -1,6 +1,6 @@
-"""Start a program that ends with its parent: `python -m gaplab.api.process.child_process PID MODULE ARGUMENT...`.
+"""A process that ends with its parent: `python -m gaplab.api.process.child_process PID MODULE ARGUMENT...`.
 
-A service that is killed outright can end nothing itself; on Linux the kernel then ends what it started.
+A service that is killed cannot end its children itself; on Linux the kernel does it.
 """
 
 import ctypes
@@ -17,13 +17,13 @@ PR_SET_PDEATHSIG = 1  # Source: man 2 prctl
 def start(
     module: str, *arguments: str, environment: Mapping[str, str] | None = None, log: IO[bytes] | None = None
 ) -> "subprocess.Popen[bytes]":
-    """Run a Python module in a process and a session of its own, which gets SIGTERM if the calling thread ends.
+    """Start a Python module in a separate process and session, which gets SIGTERM if the calling thread ends.
 
     Args:
         module: as in `python -m`.
-        arguments: for it.
-        environment: added to the caller's own.
-        log: takes its output; left out: the caller's.
+        arguments: of the module.
+        environment: variables to add to the caller's.
+        log: receives the output; left out: the caller's output.
     """
     command = [sys.executable, "-m", "gaplab.api.process.child_process", str(os.getpid()), module, *arguments]
     return subprocess.Popen(  # noqa: S603 - our own modules
@@ -32,12 +32,12 @@ def start(
         stdin=subprocess.DEVNULL,
         stdout=log,
         stderr=subprocess.STDOUT if log else None,
-        start_new_session=True,  # Ctrl-C is for the caller, who then ends this in order
+        start_new_session=True,  # Ctrl-C reaches the caller alone, which then ends this process in order
     )
 
 
 def end(process: "subprocess.Popen[bytes]", *, patience_s: float = 30.0) -> None:
-    """Ask the process to end, wait for it, and after that kill it."""
+    """Ask the process to end, and kill it if it has not ended after `patience_s`."""
     if process.poll() is None:
         process.terminate()
     try:
@@ -50,7 +50,7 @@ def end(process: "subprocess.Popen[bytes]", *, patience_s: float = 30.0) -> None
 def _become(parent: int, module: str, arguments: list[str]) -> None:
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-    if os.getppid() != parent:  # it died before the kernel was asked
+    if os.getppid() != parent:  # the parent died before the call to prctl
         sys.exit(1)
     os.execv(sys.executable, [sys.executable, "-m", module, *arguments])  # noqa: S606 - our own modules
 

@@ -5,66 +5,61 @@ import socket
 import sys
 
 import uvicorn
+from fastapi import FastAPI
 
 from gaplab.api.app import create_app
-from gaplab.api.commands.exit_codes import CommandError, Exit
+from gaplab.api.process.errors import CommandError
 from gaplab.services.access import demand_token_beyond_loopback
 from gaplab.services.plugins import folders
 from gaplab.services.settings import Limits, Settings
 from gaplab.services.store.session import Store
 
 GRACE_S = 5
-"""How long requests that are under way may take when the service ends."""
+"""Time that requests under way have to finish when the service ends."""
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """The address to serve on, taken.
+    """Return a listening socket.
 
     Raises:
-        CommandError: it cannot be had; most often because a service has it already.
+        CommandError: the address is invalid or taken, most often by a service that already runs.
     """
     if not 0 <= port < 2**16:
         msg = f"cannot serve on {host}:{port}: ports go from 0 to {2**16 - 1}"
-        raise CommandError(msg, Exit.FAILED)
+        raise CommandError(msg)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)
     except OSError as error:
         reason = str(error.strerror or error).split(" (while")[0]
         msg = f"cannot serve on {host}:{port}: {reason.lower()}"
-        raise CommandError(msg, Exit.FAILED) from error
+        raise CommandError(msg) from error
 
 
 def serve_api(settings: Settings, listener: socket.socket) -> None:
-    """Serve until told to stop (SIGINT, SIGTERM); requests under way are answered first. Then the process exits.
+    """Serve until SIGINT or SIGTERM, then finish the requests under way.
 
     Raises:
-        Unauthenticated: the host is more than loopback, and no token lets anyone in.
-        StoreUnavailable: the database cannot tell.
-        PluginBroken: a plug-in from outside cannot be used.
+        Unauthenticated: other machines can reach the host, and no token exists.
+        StoreUnavailable: the database does not answer.
+        PluginBroken: an external plug-in cannot be used.
     """
-    end_in_order()
+    exit_on_signals()
     folders.load()
-    refuse_strangers(settings)
-    store, limits = Store(settings.database_url), Limits.from_environment()
+    require_token(settings)
+    store = Store(settings.database_url)
     try:
-        config = uvicorn.Config(
-            create_app(store, settings, limits),
-            log_config=None,
-            server_header=False,
-            timeout_graceful_shutdown=GRACE_S,
-        )
-        Server(config).run([listener])
+        Server(create_app(store, settings, Limits.from_environment())).run([listener])
     finally:
         store.dispose()
 
 
-def refuse_strangers(settings: Settings) -> None:
-    """Do nothing if only this machine reaches the host, or a token lets someone in.
+def require_token(settings: Settings) -> None:
+    """Check that a token exists if other machines can reach the host.
 
     Raises:
-        Unauthenticated: neither; the message has the command that makes one.
-        StoreUnavailable: the database cannot tell.
+        Unauthenticated: none does; the message has the command that creates one.
+        StoreUnavailable: the database does not answer.
     """
     store = Store(settings.database_url)
     try:
@@ -74,16 +69,21 @@ def refuse_strangers(settings: Settings) -> None:
 
 
 class Server(uvicorn.Server):
-    """Uvicorn, that ends event streams when it is told to stop: it would wait for them for ever."""
+    """Uvicorn that ends event streams at shutdown, rather than waiting for them forever."""
+
+    def __init__(self, app: FastAPI) -> None:
+        config = uvicorn.Config(app, log_config=None, server_header=False, timeout_graceful_shutdown=GRACE_S)
+        super().__init__(config)
+        self._app = app
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """End the streams and the physics, answer the requests under way, and close."""
-        self.config.app.state.feed.close()
-        self.config.app.state.rollout_process.close()
+        """End the streams and the replay process, finish the requests under way, and close."""
+        self._app.state.feed.close()
+        self._app.state.rollout_process.close()
         await super().shutdown(sockets)
 
 
-def end_in_order() -> None:
-    """Let SIGINT and SIGTERM unwind this process, so that what it opened is closed and what it started is ended."""
+def exit_on_signals() -> None:
+    """Turn SIGINT and SIGTERM into SystemExit, so that `finally` blocks close what is open."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: sys.exit(0))

@@ -1,6 +1,6 @@
-"""The whole service as one command: the database migrated, the API answering, and a supervisor running what is queued.
+"""The whole service as one command: it migrates the database, answers over HTTP and runs queued experiments.
 
-The supervisor is a process of its own. The two meet in the database only, so either may die without the other.
+The supervisor that runs them is a separate process. The two meet only in the database, so either can die alone.
 """
 
 import logging
@@ -10,7 +10,7 @@ from threading import Event, Thread
 from time import monotonic
 
 from gaplab.api.process.child_process import end, start
-from gaplab.api.process.server import end_in_order, listen, refuse_strangers, serve_api
+from gaplab.api.process.server import exit_on_signals, listen, require_token, serve_api
 from gaplab.services import logs
 from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.plugins import folders
@@ -19,54 +19,54 @@ from gaplab.services.settings import Settings, address
 log = logging.getLogger("gaplab.service")
 
 LONG_LIFE_S = 15.0
-"""A supervisor that lived so long did not fail at its start; it is started again at once."""
+"""A supervisor that lived longer is restarted after the shortest pause: its start succeeded."""
 
 LONGEST_PAUSE_S = 30.0
-"""With what Ray takes to start, a service is well again within a minute."""
+"""Together with the start of Ray, the service recovers within a minute."""
 
 GRACE_S = 24.0
-"""How long the supervisor may take to end: its repetitions deliver once more, and Ray ends.
+"""Time for the supervisor to store its last steps and stop Ray.
 
-With the time that the API's last requests have, the service is gone half a minute after it was told to be.
+Together with the grace of the API's requests, the service ends within half a minute.
 """
 
 
 def serve(settings: Settings, *, workers: bool = True) -> None:
-    """Serve until told to stop (SIGINT, SIGTERM), then end in order.
+    """Serve until SIGINT or SIGTERM, then end in order.
 
     Args:
-        settings: of the API and of the supervisor.
-        workers: whether experiments are run, or only taken and shown.
+        settings: for the API and the supervisor.
+        workers: whether to run experiments, or only accept and show them.
 
     Raises:
-        CommandError: the address is taken.
+        CommandError: the address is invalid or taken.
         StoreUnavailable: the database cannot be migrated.
-        Unauthenticated: the host is more than loopback, and no token lets anyone in.
-        PluginBroken: a plug-in from outside cannot be used.
+        Unauthenticated: other machines can reach the host, and no token exists.
+        PluginBroken: an external plug-in cannot be used.
     """
     logs.configure()
-    end_in_order()
+    exit_on_signals()
     folders.load()
     listener = listen(settings.host, settings.port)
     migrate(settings.database_url)
-    refuse_strangers(settings)
-    found_at = address(settings.host, settings.port)
-    log.info("gaplab serves on %s (/docs lists what it answers to; Ctrl-C ends it)", found_at)
-    keeper = Keeper(environment_of(settings)) if workers else None
+    require_token(settings)
+    url = address(settings.host, settings.port)
+    log.info("gaplab serves on %s (/docs documents the API; Ctrl-C ends the service)", url)
+    supervisor = SupervisorProcess(environment_of(settings)) if workers else None
     try:
-        if keeper:
-            keeper.start()
+        if supervisor:
+            supervisor.start()
         serve_api(settings, listener)
     finally:
-        if keeper:
-            keeper.stop()
+        if supervisor:
+            supervisor.stop()
 
 
 def migrate(database_url: str) -> None:
-    """Bring the database to the schema of this version.
+    """Migrate the database to the schema of this version.
 
     Raises:
-        StoreUnavailable: it cannot be reached or changed.
+        StoreUnavailable: the database does not answer or cannot be changed.
     """
     from gaplab.migrations import upgrade
 
@@ -74,18 +74,15 @@ def migrate(database_url: str) -> None:
         upgrade(database_url)
     except StoreUnavailable:
         raise
-    except Exception as error:  # of the database driver, whichever it is
+    except Exception as error:  # each database driver has errors of its own
         reason = (str(error).splitlines() or [type(error).__name__])[0]
-        msg = f"the database {_without_password(database_url)} cannot be migrated: {reason}"
+        url = re.sub(r"(://[^:/@]*):[^@]*@", r"\1:…@", database_url)  # without the password
+        msg = f"the database {url} cannot be migrated: {reason}"
         raise StoreUnavailable(msg) from error
 
 
-def _without_password(url: str) -> str:
-    return re.sub(r"(://[^:/@]*):[^@]*@", r"\1:…@", url)
-
-
 def environment_of(settings: Settings) -> dict[str, str]:
-    """The settings as a child process reads them."""
+    """Return the settings as environment variables for a child process."""
     values = {
         "GAPLAB_DATABASE_URL": settings.database_url,
         "GAPLAB_RAY_ADDRESS": settings.ray_address,
@@ -97,37 +94,37 @@ def environment_of(settings: Settings) -> dict[str, str]:
     return {name: str(value) for name, value in values.items() if value is not None}
 
 
-class Keeper:
-    """Keeps a supervisor running: one that dies is started again, after a pause that doubles while it keeps dying."""
+class SupervisorProcess:
+    """A supervisor that is restarted when it dies, after a pause that doubles while it keeps dying."""
 
     def __init__(self, environment: Mapping[str, str], module: str = "gaplab.workers") -> None:
         self._environment = environment
         self._module = module
         self._stopping = Event()
-        self._thread = Thread(target=self._keep, name="keeper", daemon=True)
+        self._thread = Thread(target=self._keep_running, name="supervisor process", daemon=True)
 
     def start(self) -> None:
-        """Start the supervisor and watch over it."""
+        """Start the supervisor, and restart it whenever it dies."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End the supervisor in order, and start no other."""
+        """End the supervisor in order."""
         self._stopping.set()
         self._thread.join()
 
-    def _keep(self) -> None:
+    def _keep_running(self) -> None:
         pause_s = 1.0
         while not self._stopping.is_set():
             began = monotonic()
-            code = self._live()
+            code = self._run_once()
             if self._stopping.is_set():
                 return
             pause_s = 1.0 if monotonic() - began > LONG_LIFE_S else min(2 * pause_s, LONGEST_PAUSE_S)
             log.warning("the supervisor ended by itself (exit code %s); another starts in %.0f s", code, pause_s)
             self._stopping.wait(pause_s)
 
-    def _live(self) -> int:
-        """Run one supervisor until it ends, or until it is to be ended."""
+    def _run_once(self) -> int:
+        """Run one supervisor until it ends or is told to; return its exit code."""
         process = start(self._module, "serve", environment=self._environment)
         while process.poll() is None and not self._stopping.wait(0.2):
             pass

@@ -1,1 +1,1 @@
-"""The endpoints, a module for each noun. Each is a translation: HTTP in, one call of `services`, HTTP out."""
+"""The endpoints, one module for each noun. Each translates: HTTP in, one call of a service, HTTP out."""

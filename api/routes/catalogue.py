@@ -14,8 +14,8 @@ router = APIRouter(tags=["catalogue"])
     "/catalogue",
     summary="List the plug-ins",
     response_model=Catalogue,
-    responses={200: {"headers": conditional.HEADERS}, **conditional.NOT_MODIFIED, **documented()},
+    responses=conditional.CACHED | documented(),
 )
 def read_catalogue(request: Request) -> Response:
-    """Every strategy, robot, engine, tunable and optimizer, with its source and the JSON Schema of its options."""
+    """Return every strategy, robot, engine, tunable and optimizer, with its source and the schema of its options."""
     return conditional.tagged(request, catalogue())

@@ -1,4 +1,4 @@
-"""The page at `/`: static files, open since they hold no data; what they show they ask of the API like any client."""
+"""The page at `/`: static files without data, open to everyone; the page asks the API like any client."""
 
 from functools import cache
 from importlib.metadata import version

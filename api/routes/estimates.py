@@ -1,10 +1,9 @@
-"""What a study would cost, before it is submitted."""
+"""The cost of a study, before it is submitted."""
 
 from typing import Annotated
 
 from fastapi import APIRouter, Body, Request
 
-from gaplab.api.http import estimate_examples, examples
 from gaplab.api.http.dependencies import StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.estimates import EstimateRead
@@ -17,18 +16,16 @@ router = APIRouter(tags=["studies"])
 @router.post(
     "/studies/estimate",
     summary="Estimate a study",
-    responses={
-        200: examples.shown(estimate_examples.ESTIMATE, "What it would take"),
-        **documented(413, 415, 422),
-    },
+    response_description="The expected cost",
+    responses=documented(413, 415, 422),
 )
 def estimate_study(
-    spec: Annotated[StudySpec, Body(openapi_examples=examples.STUDY_SPECS)], store: StoreDep, request: Request
+    spec: Annotated[StudySpec, Body(openapi_examples=StudySpec.EXAMPLES)], store: StoreDep, request: Request
 ) -> EstimateRead:
-    """Check a study as if it were submitted, and tell its rollouts and the time they take here; nothing is stored.
+    """Check a study as on submission, and return its rollouts and the time they take here; nothing is stored.
 
-    A reader may ask it. Seconds a rollout are those that this service measured on its newest experiments with the same
-    robot and engine.
+    A reader's token suffices. The seconds per rollout are those that this service measured in its newest experiments
+    with the same robot and engine.
     """
     state = request.app.state
     return estimates.estimate(store, spec, limits=state.limits, cores=state.cores)

@@ -1,4 +1,4 @@
-"""Health, for whoever keeps the service alive."""
+"""Health checks, for whatever keeps the service alive."""
 
 from fastapi import APIRouter
 from pydantic import Field
@@ -11,18 +11,18 @@ router = APIRouter(tags=["health"])
 
 
 class Health(Frozen):
-    """That all is well; what is not well is a problem."""
+    """The answer of a healthy service; a service that is not healthy answers with a problem."""
 
     status: str = Field(examples=["ok"])
 
 
-@router.get("/livez", summary="Ask whether the process lives")
+@router.get("/livez", summary="Check that the process lives")
 def live() -> Health:
-    """Answers as long as the process does; it needs no database."""
+    """Answer as long as the process lives, with or without a database."""
     return Health(status="ok")
 
 
-@router.get("/readyz", summary="Ask whether requests are served", responses=documented())
-def ready(store: StoreDep) -> Health:  # noqa: ARG001 - that there is a store is the question
-    """Whether the database answers and has the schema of this version."""
+@router.get("/readyz", summary="Check that requests are served", responses=documented())
+def ready(store: StoreDep) -> Health:  # noqa: ARG001 - the dependency is the check
+    """Answer if the database does, and has the schema of this version."""
     return Health(status="ok")

@@ -1,8 +1,7 @@
-"""Under what experiments are computed."""
+"""The software and machines that computed an experiment."""
 
 from fastapi import APIRouter
 
-from gaplab.api.http import event_examples, examples
 from gaplab.api.http.dependencies import Id, StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.provenance import ProvenanceRead
@@ -15,21 +14,23 @@ router = APIRouter(prefix="/experiments", tags=["experiments"])
 @router.get(
     "/{id}/provenance",
     summary="Read an experiment's provenance",
-    responses={200: examples.shown(event_examples.PROVENANCE, "In the order of their beginnings"), **documented(404)},
+    response_description="In chronological order",
+    responses=documented(404),
 )
-def read_provenance(id: Id, store: StoreDep) -> ProvenanceRead:  # noqa: A002 - the address says {id}
-    """The versions of gaplab, Python, engines and libraries, the commit and the machine, as supervisors claimed it."""
+def read_provenance(id: Id, store: StoreDep) -> ProvenanceRead:
+    """Return the versions of gaplab, Python, engines and libraries, the commit and the machine of each supervisor."""
     return provenance.read(store, id)
 
 
 @router.post(
     "/{id}/accept-versions",
-    summary="Go on under other versions",
-    responses={200: examples.shown(examples.EXPERIMENT, "The next supervisor goes on with it"), **documented(404, 409)},
+    summary="Continue with other versions",
+    response_description="The next supervisor continues it",
+    responses=documented(404, 409),
 )
-def accept_versions(id: Id, store: StoreDep) -> ExperimentRead:  # noqa: A002 - the address says {id}
-    """Let an experiment go on under other engines or plug-ins than it was begun with: those of the next supervisor.
+def accept_versions(id: Id, store: StoreDep) -> ExperimentRead:
+    """Let an experiment continue with other engines or plug-ins than it started with: the next supervisor's.
 
-    Its numbers need not be those that the first versions would have given, and which were used is recorded.
+    Its results may differ from those of the first versions. The provenance records which versions were used.
     """
     return provenance.accept_versions(store, id)

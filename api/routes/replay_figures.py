@@ -1,4 +1,4 @@
-"""Figures of one controller and of one iteration: its gait, and the toy of the paper's Fig. 3."""
+"""Figures of one controller or one iteration: its gait, and the toy function of the paper's Fig. 3."""
 
 from typing import Annotated
 
@@ -7,7 +7,6 @@ from pydantic import Field
 
 from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import Drawing, answer, responses
-from gaplab.api.http.problems import documented
 from gaplab.api.routes.replays import ReplayQuery
 from gaplab.schemas.figures import FigureRead
 from gaplab.services.figures.kinds.gait import gait_figure
@@ -20,28 +19,26 @@ router = APIRouter(prefix="/figures", tags=["figures"])
 
 
 class GaitDrawing(Drawing, ReplayQuery):
-    """Whose gait is drawn, and how."""
+    """The controller whose gait to draw, and how."""
 
     experiment: Id
 
 
 class ToyDrawing(Drawing):
-    """Which iterations are drawn, and how."""
+    """The iterations to draw, and how."""
 
     experiment: Id
-    repetition: int = Field(default=0, ge=0, le=1_000_000, description="its number, from 0")
+    repetition: int = Field(default=0, ge=0, le=1_000_000, description="number of the repetition, from 0")
     iteration: list[Annotated[int, Field(ge=0, le=1_000_000)]] = Field(
-        default=[], max_length=12, description="repeat it for more panels; left out: the last"
+        default=[], max_length=12, description="repeat for more panels; left out: the last"
     )
 
 
-@router.get(
-    "/gait", summary="Draw a gait", response_model=FigureRead, responses=responses() | documented(404, 409, 422, 429)
-)
+@router.get("/gait", summary="Draw a gait", response_model=FigureRead, responses=responses(404, 409, 422, 429))
 def draw_gait(store: StoreDep, process: RolloutProcessDep, query: Annotated[GaitDrawing, Query()]) -> Response:
-    """A controller's footfalls, height and speed over time, in its simulator and in reality.
+    """Draw a controller's footfalls, height and speed over time, in its simulator and in reality.
 
-    As of a replay, reality is shown of controllers that were measured there; 409 before they are.
+    Like a replay, it shows reality for controllers that were measured there; before, the answer is 409.
     """
     wanted = ReplayChoice(query.repetition, query.iteration, query.kind, query.simulator)
     return answer(gait_figure(replay(store, process, query.experiment, wanted), title=query.title), query)
@@ -49,9 +46,9 @@ def draw_gait(store: StoreDep, process: RolloutProcessDep, query: Annotated[Gait
 
 @router.get("/toy", summary="Draw the toy function", response_model=FigureRead, responses=responses())
 def draw_toy(store: StoreDep, query: Annotated[ToyDrawing, Query()]) -> Response:
-    """The paper's Fig. 3: the true function, tuned approximations, samples and transfer after some iterations.
+    """Draw the paper's Fig. 3: the true function, its tuned approximations, the samples and the transfer.
 
-    The true function is drawn once the experiment has ended, and with it all others of its study.
+    The true function is drawn once every experiment of the study has ended.
     """
-    found = toys(store, query.experiment, query.repetition, query.iteration)
-    return answer(toy_figure(found, title=query.title), query)
+    iterations = toys(store, query.experiment, query.repetition, query.iteration)
+    return answer(toy_figure(iterations, title=query.title), query)

@@ -1,11 +1,10 @@
-"""Replays and predictions: physics that is computed while somebody waits."""
+"""Replays and predictions: physics that is computed on request."""
 
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
-from gaplab.api.http import examples, replay_examples
 from gaplab.api.http.dependencies import Id, Parameters, RolloutProcessDep, StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.predictions import Predictions
@@ -17,16 +16,18 @@ router = APIRouter(prefix="/experiments", tags=["replays"])
 
 
 class ReplayQuery(Parameters):
-    """Which controller is wanted, and in which simulator."""
+    """The controller to replay, and the simulator to replay it in."""
 
-    repetition: int = Field(default=0, ge=0, le=1_000_000, description="its number, from 0")
-    iteration: int = Field(default=0, ge=0, le=1_000_000, description="that tried or transferred the controller")
+    repetition: int = Field(default=0, ge=0, le=1_000_000, description="number of the repetition, from 0")
+    iteration: int = Field(
+        default=0, ge=0, le=1_000_000, description="iteration that tried or transferred the controller"
+    )
     kind: ControllerKind = ControllerKind.TRANSFER
     simulator: int | None = Field(
         default=None,
         ge=0,
         le=1_000_000,
-        description="the iteration whose best simulator it is shown in; left out: the one that it was chosen in, which "
+        description="iteration whose best simulator replays it; left out: the one that selected the controller, which "
         "for a sample is that of the iteration before",
     )
 
@@ -35,36 +36,30 @@ class ReplayQuery(Parameters):
     "/{id}/replay",
     summary="Replay a controller",
     response_model=Replay,
-    responses={
-        200: examples.shown(replay_examples.REPLAY, "Shapes, and where they are over time, in both worlds"),
-        **documented(404, 409, 422, 429),
-    },
+    response_description="Shapes, and their motion in simulation and in reality",
+    responses=documented(404, 409, 422, 429),
 )
 def read_replay(
-    id: Id,  # noqa: A002 - the address says {id}
-    store: StoreDep,
-    process: RolloutProcessDep,
-    which: Annotated[ReplayQuery, Query()],
+    id: Id, store: StoreDep, process: RolloutProcessDep, query: Annotated[ReplayQuery, Query()]
 ) -> Response:
-    """A sample or a transferred controller in its simulator and in reality, from the same start, computed anew.
+    """Compute the motion of a sample or a transferred controller in its simulator and in reality, from the same start.
 
-    Reality is shown of controllers that were measured there: their motion is not its parameters. 409 before they are.
+    Reality is shown for controllers that were measured there, because their motion does not reveal its parameters.
+    Before they are measured, the answer is 409.
     """
-    shown = replays.replay_json(store, process, id, ReplayChoice(**which.model_dump()))
-    return Response(shown, media_type="application/json")
+    replay = replays.replay_json(store, process, id, ReplayChoice(**query.model_dump()))
+    return Response(replay, media_type="application/json")
 
 
 @router.get(
     "/{id}/predictions",
     summary="Read what simulators predicted",
-    responses={
-        200: examples.shown(replay_examples.PREDICTIONS, "By repetition and iteration"),
-        **documented(404, 422, 429),
-    },
+    response_description="By repetition and iteration",
+    responses=documented(404, 422, 429),
 )
-def read_predictions(id: Id, store: StoreDep, process: RolloutProcessDep) -> Predictions:  # noqa: A002 - the address says {id}
-    """The fitness of each sample in the best simulator before it was measured, and after tuning on it.
+def read_predictions(id: Id, store: StoreDep, process: RolloutProcessDep) -> Predictions:
+    """Return the fitness of each sample in the best simulator before its measurement, and after tuning on it.
 
-    About two seconds are computed for each question; ask again while some are pending.
+    Each request computes for about two seconds; repeat it while some samples are pending.
     """
     return predictions.predictions(store, process, id)

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
-from gaplab.api.http import examples, links
+from gaplab.api.http import links
 from gaplab.api.http.dependencies import AdmissionDep, Id, StoreDep, created
 from gaplab.api.http.problems import documented
 from gaplab.schemas.sensitivity import SensitivityRead, SensitivitySpec
@@ -17,23 +17,20 @@ router = APIRouter(prefix="/sensitivity", tags=["sensitivity"])
     "",
     status_code=202,
     summary="Check what tunables do",
-    responses={
-        202: examples.shown(examples.SENSITIVITY, "It is queued or known, and exists at `Location`")
-        | links.leading_to(*links.FROM_CHECK),
-        **documented(413, 415, 422),
-    },
+    response_description="Queued or already known; its address is in `Location`",
+    responses={202: links.leading_to(*links.FROM_CHECK), **documented(413, 415, 422)},
 )
 def submit_sensitivity(
-    spec: Annotated[SensitivitySpec, Body(openapi_examples=examples.SENSITIVITY_SPECS)],
+    spec: Annotated[SensitivitySpec, Body(openapi_examples=SensitivitySpec.EXAMPLES)],
     store: StoreDep,
     admitted: AdmissionDep,
     request: Request,
     response: Response,
 ) -> SensitivityRead:
-    """Queue a check of these settings: whether each tunable changes fitness, how much, and how smoothly.
+    """Queue a check of whether each tunable changes fitness, how much, and how smoothly.
 
-    Only robot, engine and tunables matter to it, and what was checked once is not checked again. Every experiment has
-    such a check queued with it.
+    It depends on robot, engine and tunables alone, and the same check is computed once. Every submitted experiment
+    queues its check.
     """
     done = checks.admit(store, spec, admitted)
     return created(done, response, request.app.url_path_for("read_sensitivity", id=done.answer.id))
@@ -41,12 +38,10 @@ def submit_sensitivity(
 
 @router.get(
     "/{id}",
-    summary="Look at a sensitivity check",
-    responses={
-        200: examples.shown(examples.SENSITIVITY, "With what it found, once it is COMPLETED"),
-        **documented(404),
-    },
+    summary="Read a sensitivity check",
+    response_description="With its results, once it is COMPLETED",
+    responses=documented(404),
 )
-def read_sensitivity(id: Id, store: StoreDep) -> SensitivityRead:  # noqa: A002 - the address says {id}
-    """The check, with the profile of each tunable once it is COMPLETED."""
+def read_sensitivity(id: Id, store: StoreDep) -> SensitivityRead:
+    """Return the check, with the profile of each tunable once it is COMPLETED."""
     return checks.read(store, id)

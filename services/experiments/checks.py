@@ -63,7 +63,7 @@ def admit(store: Store, spec: SensitivitySpec, admitted: Admission) -> Once[Sens
 
 
 @snapshot
-def read(session: Session, id: str) -> SensitivityRead:  # noqa: A002 - as the API says
+def read(session: Session, id: str) -> SensitivityRead:
     """Return the check, with its findings once it is COMPLETED.
 
     Raises:

@@ -21,7 +21,7 @@ from gaplab.services.store.statements import storable
 @transaction
 def edit_experiment(
     session: Session,
-    id: str,  # noqa: A002 - as the API says
+    id: str,
     edit: Edit,
     *,
     starting_from: Collection[int] | None,
@@ -40,7 +40,7 @@ def edit_experiment(
 @transaction
 def edit_study(
     session: Session,
-    id: str,  # noqa: A002 - as the API says
+    id: str,
     edit: Edit,
     *,
     starting_from: Collection[int] | None,

@@ -14,12 +14,12 @@ from pathlib import Path
 import pytest
 
 from gaplab.api.clients.client import Client
-from gaplab.api.commands.exit_codes import CommandError
 from gaplab.api.process import service
 from gaplab.api.process.child_process import end, start
-from gaplab.api.process.local_service import own_service
-from gaplab.api.process.server import listen, refuse_strangers
-from gaplab.api.process.service import Keeper, environment_of, migrate
+from gaplab.api.process.errors import CommandError
+from gaplab.api.process.local_service import start_service
+from gaplab.api.process.server import listen, require_token
+from gaplab.api.process.service import SupervisorProcess, environment_of, migrate
 from gaplab.schemas.access import Role
 from gaplab.services.access import create_token, revoke_token
 from gaplab.services.core.errors import StoreUnavailable, Unauthenticated
@@ -102,15 +102,15 @@ def test_beyond_loopback_a_service_without_a_token_does_not_start_and_says_how_t
 def test_a_host_is_refused_until_a_token_lets_someone_in(store_url: str):
     store, strangers = Store(store_url), Settings(database_url=store_url, host="0.0.0.0")
     with pytest.raises(Unauthenticated, match="token create"):
-        refuse_strangers(strangers)
+        require_token(strangers)
     token = create_token(store, Role.READER).token.id
 
-    refuse_strangers(strangers)
+    require_token(strangers)
     revoke_token(store, token)
 
     with pytest.raises(Unauthenticated):
-        refuse_strangers(strangers)
-    refuse_strangers(Settings(database_url=store_url))
+        require_token(strangers)
+    require_token(Settings(database_url=store_url))
     store.dispose()
 
 
@@ -147,24 +147,24 @@ def test_a_supervisor_that_dies_is_started_again_and_it_is_said(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ):
     monkeypatch.setattr(service, "LONGEST_PAUSE_S", 0.1)
-    keeper = Keeper({}, module="this")
+    supervisor = SupervisorProcess({}, module="this")
 
-    keeper.start()
+    supervisor.start()
     assert within(20, lambda: caplog.text.count("another starts") >= 2)
-    keeper.stop()
+    supervisor.stop()
     assert "ended by itself (exit code 0)" in caplog.text
 
 
-def test_a_keeper_that_is_stopped_ends_its_supervisor(tmp_path: Path):
-    keeper = Keeper({"PYTHONPATH": str(tmp_path)}, module="sleeper")
+def test_a_supervisor_that_is_stopped_ends_its_supervisor(tmp_path: Path):
+    supervisor = SupervisorProcess({"PYTHONPATH": str(tmp_path)}, module="sleeper")
     note = tmp_path / "pid"
     (tmp_path / "sleeper.py").write_text(
         f"import os, time; open({str(note)!r}, 'w').write(str(os.getpid())); time.sleep(60)"
     )
 
-    keeper.start()
+    supervisor.start()
     assert within(20, lambda: note.exists() and note.read_text())
-    keeper.stop()
+    supervisor.stop()
 
     assert not alive(int(note.read_text()))
 
@@ -216,9 +216,9 @@ def test_the_token_of_another_service_is_not_shown_to_one_of_ones_own(
     sqlite_url: str, sqlite_store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("GAPLAB_TOKEN", f"gaplab_elsewhere_{'0' * 64}")
-    with own_service(sqlite_url, tmp_path / "log", workers=False) as client:
+    with start_service(sqlite_url, tmp_path / "log", workers=False) as client:
         found = client.studies()
 
     monkeypatch.setenv("GAPLAB_TOKEN", create_token(sqlite_store, Role.READER).secret)
-    with own_service(sqlite_url, tmp_path / "log", workers=False) as client:
+    with start_service(sqlite_url, tmp_path / "log", workers=False) as client:
         assert client.studies() == found

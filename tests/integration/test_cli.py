@@ -39,7 +39,7 @@ def submitted(gaplab: Gaplab, spec: str = SMOKE) -> str:
 
 
 def test_submit_prints_the_id_that_show_and_list_know(gaplab: Gaplab):
-    id = submitted(gaplab)  # noqa: A001
+    id = submitted(gaplab)
 
     shown, listed = gaplab("show", id), gaplab("list")
 
@@ -51,7 +51,7 @@ def test_submit_prints_the_id_that_show_and_list_know(gaplab: Gaplab):
 
 
 def test_an_edit_that_is_none_is_a_sentence(gaplab: Gaplab):
-    id = submitted(gaplab)  # noqa: A001
+    id = submitted(gaplab)
 
     nothing, nameless = gaplab("edit", id), gaplab("edit", id, "--name", "")
 
@@ -127,7 +127,7 @@ def test_watching_what_fails_says_why_and_ends_with_1(gaplab: Gaplab, sqlite_sto
 
 def test_curves_are_a_table_values_or_drawings(gaplab: Gaplab, sqlite_store: Store, tmp_path: Path):
     small = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "smoke", "repetitions": 3}
-    id = gaplab("submit", "-", stdin=json.dumps(small)).out.strip()  # noqa: A001
+    id = gaplab("submit", "-", stdin=json.dumps(small)).out.strip()
     finish(sqlite_store)
     svg, html = tmp_path / "new" / "fig.svg", tmp_path / "fig.html"
 
@@ -145,7 +145,7 @@ def test_curves_are_a_table_values_or_drawings(gaplab: Gaplab, sqlite_store: Sto
 
 
 def test_a_cancelled_study_has_no_experiment_left_to_run(gaplab: Gaplab):
-    id = submitted(gaplab, str(EXAMPLES / "toy.json"))  # noqa: A001
+    id = submitted(gaplab, str(EXAMPLES / "toy.json"))
 
     first, second = gaplab("cancel", id), gaplab("cancel", id)
 
@@ -155,7 +155,7 @@ def test_a_cancelled_study_has_no_experiment_left_to_run(gaplab: Gaplab):
 
 
 def test_the_verbs_say_what_it_is_now_and_forbidden_ones_are_a_sentence(gaplab: Gaplab, sqlite_store: Store):
-    id = submitted(gaplab)  # noqa: A001
+    id = submitted(gaplab)
 
     said = [gaplab(verb, id) for verb in ("pause", "resume", "resume")]
     finish(sqlite_store)
@@ -228,7 +228,7 @@ def test_mistakes_in_what_is_to_be_checked_are_sentences(gaplab: Gaplab):
 def test_show_tells_warnings_and_misfit(gaplab: Gaplab, sqlite_store: Store):
     small = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 3}
     tunables = ["static_friction", {"name": "restitution", "lower": 0.3, "upper": 0.3001}]
-    id = gaplab("submit", "-", stdin=json.dumps(small | {"tunables": tunables})).out.strip()  # noqa: A001
+    id = gaplab("submit", "-", stdin=json.dumps(small | {"tunables": tunables})).out.strip()
     checked(sqlite_store)
     before = gaplab("show", id)
     finish(sqlite_store)

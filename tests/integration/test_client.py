@@ -35,7 +35,7 @@ class InProcess(httpx2.BaseTransport):
     def __init__(self, store: Store) -> None:
         app = create_app(store)
         self._client = TestClient(app, raise_server_exceptions=False)
-        self.close = app.state.physics.close
+        self.close = app.state.rollout_process.close
         self.asked: list[str] = []
         self.lost = 0
         self.busy = 0
@@ -173,7 +173,7 @@ def test_nothing_yet_is_an_empty_frame_with_the_same_columns(client: Client, met
 
 
 def test_without_pandas_the_message_is_the_line_that_installs_it(client: Client, monkeypatch: pytest.MonkeyPatch):
-    id = client.submit(SMALL).id  # noqa: A001
+    id = client.submit(SMALL).id
     monkeypatch.setitem(sys.modules, "pandas", None)
 
     with pytest.raises(ExtraMissing, match=r"pip install 'gaplab\[notebook\]'"):
@@ -234,7 +234,7 @@ def test_waiting_for_what_is_cancelled_raises_too(client: Client):
 
 
 def test_waiting_has_an_end_if_asked(client: Client):
-    id = client.submit(SMALL).id  # noqa: A001
+    id = client.submit(SMALL).id
 
     with pytest.raises(TimeoutError, match=r"is QUEUED after 0\.1 s; it goes on"):
         client.wait(id, timeout_s=0.1, every_s=0.1)
@@ -298,7 +298,7 @@ def test_the_client_knows_which_kinds_of_figures_there_are(client: Client):
 
 
 def test_a_figure_of_an_unknown_format_or_kind_or_id_is_a_sentence(client: Client, tmp_path: Any):
-    id = client.submit(SMALL).id  # noqa: A001
+    id = client.submit(SMALL).id
 
     with pytest.raises(ValueError, match="there is no format 'docx' of figures; there is svg, png"):
         client.figure(id).save(tmp_path / "mine.docx")
@@ -315,7 +315,7 @@ def test_what_is_read_is_asked_for_again_if_the_answer_is_lost_or_the_service_bu
     client: Client, network: InProcess, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr(connection, "PAUSES_S", (0.0, 0.0, 0.0))
-    id = client.submit(SMALL).id  # noqa: A001
+    id = client.submit(SMALL).id
     network.asked.clear()
     network.lost, network.busy = 1, 1
 
@@ -339,7 +339,7 @@ def test_what_is_submitted_while_answers_are_lost_exists_once(
 
 
 def test_a_verb_whose_answer_is_lost_is_not_asked_for_again(client: Client, network: InProcess):
-    id = client.submit(SMALL).id  # noqa: A001
+    id = client.submit(SMALL).id
     client.find(id)
     network.asked.clear()
     find = network.handle_request
@@ -372,7 +372,7 @@ def test_with_a_token_it_is_the_same_and_without_one_it_says_so(
     monkeypatch.delenv("GAPLAB_TOKEN", raising=False)
 
     with Client("http://gaplab.example", token=secret, transport=network) as mine:
-        id = mine.submit(SMALL).id  # noqa: A001
+        id = mine.submit(SMALL).id
         assert mine.samples(id).empty
         assert mine.curve(id)["mean"].isna().all()
     with Client("http://gaplab.example", transport=network) as nobody, pytest.raises(ServiceError, match="token") as no:

@@ -106,7 +106,7 @@ def test_every_command_prints_one_document_and_nothing_else(
 
 def live_and_die(ask: Callable[..., Any], finish: Callable[[], None]) -> None:
     study = ask("submit", "-", stdin=json.dumps(STUDY))
-    id, experiment = study["id"], study["experiments"][0]["id"]  # noqa: A001
+    id, experiment = study["id"], study["experiments"][0]["id"]
     assert ask("pause", id)["state"] == "PAUSED"
     assert ask("resume", id)["state"] == "QUEUED"
     assert ask("edit", id, "--name", "another")["name"] == "another"
@@ -119,7 +119,7 @@ def live_and_die(ask: Callable[..., Any], finish: Callable[[], None]) -> None:
     assert [each["id"] for each in ask("list")] == [other, id]
 
 
-def look(ask: Callable[..., Any], id: str, other: str) -> None:  # noqa: A002
+def look(ask: Callable[..., Any], id: str, other: str) -> None:
     assert set(ask("show", id)) == {"study"}
     experiments = [each["id"] for each in ask("show", id)["study"]["experiments"]]
     assert set(ask("show", experiments[0])) == {"experiment", "repetitions", "provenance", "misfit"}
@@ -130,7 +130,7 @@ def look(ask: Callable[..., Any], id: str, other: str) -> None:  # noqa: A002
     assert {each["kind"] for each in ask("events", other)} == {"submitted", "cancelled"}
 
 
-def keep(ask: Callable[..., Any], id: str, folder: Path) -> None:  # noqa: A002
+def keep(ask: Callable[..., Any], id: str, folder: Path) -> None:
     archive, figure, copy = (str(folder / name) for name in ("a.zip", "f.svg", "copy.db"))
     assert ask("export", id, "--to", archive)["file"] == archive
     assert ask("import", archive)["renamed"]
@@ -331,7 +331,7 @@ class Shaky(Client):
         self.back = back
         self.seen = False
 
-    def study(self, id: str) -> Any:  # noqa: A002
+    def study(self, id: str) -> Any:
         if self.away and self.seen:
             self.away -= 1
             if not self.away:

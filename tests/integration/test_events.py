@@ -12,13 +12,12 @@ from itertools import count
 
 import httpx2
 import pytest
-import uvicorn
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client, ServiceError
 from gaplab.api.http import event_feed as feeding
-from gaplab.api.http.event_feed import Feed
+from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.process.server import Server, listen
 from gaplab.schemas.events import EventKind, EventPage, EventRead
 from gaplab.schemas.lifecycle import Verb
@@ -282,11 +281,11 @@ def test_supervisors_that_record_claim_and_end_at_once_do_not_wait_for_each_othe
 
 
 @contextmanager
-def served(store: Store, port: int = 0) -> Iterator[tuple[str, Feed]]:
+def served(store: Store, port: int = 0) -> Iterator[tuple[str, EventFeed]]:
     """A service in a thread, ended as the real one is."""
     app = create_app(store)
     listener = listen("127.0.0.1", port)
-    server = Server(uvicorn.Config(app, log_level="critical"))
+    server = Server(app)
     thread = threading.Thread(target=server.run, args=([listener],))
     thread.start()
     try:
@@ -384,7 +383,7 @@ def test_all_streams_together_ask_the_database_once_a_look(sqlite_store, monkeyp
         submission.submit_experiment(sqlite_store, toy())
         second = [take(each, 1)[0].number for each in streams]
 
-    assert looks <= seconds / feeding.EVERY_S + 2  # eight streams that each ask would be eight times as many
+    assert looks <= seconds / feeding.POLL_S + 2  # eight streams that each ask would be eight times as many
     assert second == [2] * 8
 
 
@@ -399,7 +398,7 @@ def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(sqlite_store, mo
         return page(*asked, **named)
 
     async def follow() -> list[int]:
-        feed = Feed(sqlite_store, every_s=0.01)
+        feed = EventFeed(sqlite_store, every_s=0.01)
         stalled, resumed = feed.follow(0, WantedEvents()), feed.follow(0, WantedEvents())
         first = await anext(stalled)
         failing.append(True)

@@ -37,7 +37,7 @@ HIDDEN = 0.7319462853
 def api(sqlite_store: Store) -> Iterator[TestClient]:
     app = create_app(sqlite_store)
     yield TestClient(app)
-    app.state.physics.close()
+    app.state.rollout_process.close()
 
 
 @pytest.fixture

@@ -69,7 +69,7 @@ _TOKEN = "FROM token"
 
 
 def test_the_database_is_asked_once_however_often_the_metrics_are_read(sqlite_store, monkeypatch):
-    monkeypatch.setattr(metrics, "KEPT_S", 3600.0)
+    monkeypatch.setattr(metrics, "CACHED_S", 3600.0)
     api = TestClient(create_app(sqlite_store))
     asked: list[str] = []
 

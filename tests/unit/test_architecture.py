@@ -10,11 +10,8 @@ ROOT = Path(__file__).parents[2]
 OURS = ("schemas", "services", "workers", "api", "migrations")
 MODULES = sorted(path.relative_to(ROOT) for top in (*OURS, "gaplab") for path in (ROOT / top).rglob("*.py"))
 PHYSICS = {"pybullet", "mujoco", "numba", "sapien"}
-ON_DEMAND = {
-    "pandas",
-    "plotly",
-    "IPython",
-}  # heavy, or not installed everywhere: never at the top of a module of the API
+ON_DEMAND = {"pandas", "plotly", "IPython"}  # heavy, or optional: the API imports them inside functions alone
+WEB = {"fastapi", "starlette", "pydantic", "anyio", "prometheus_client"}
 
 ROOMS = {
     "core": ((), {"numpy", "scipy", "pydantic", "cma"}),
@@ -43,24 +40,16 @@ ARROWS = {
         {"pydantic", "pydantic_settings"},
     ),
     "workers": (("schemas", "services", "workers"), {"numpy", "ray"}),
-    "api": (
-        ("schemas", "services", "api", "migrations"),
-        {
-            "fastapi",
-            "starlette",
-            "uvicorn",
-            "typer",
-            "rich",
-            "httpx2",
-            "pydantic",
-            "fastapi_offline",
-            "anyio",
-            "prometheus_client",
-            "pandas",  # these three only inside the functions that need them
-            "plotly",
-            "IPython",
-        },
+    "api/http": (("schemas", "services", "api.http"), WEB | {"fastapi_offline"}),
+    "api/routes": (("schemas", "services", "api.http", "api.routes"), WEB),
+    "api/app.py": (("services", "api.http", "api.routes"), {"fastapi"}),
+    "api/process": (("services", "migrations", "api.app", "api.clients", "api.process"), {"fastapi", "uvicorn"}),
+    "api/clients": (("schemas", "services.settings", "api.clients"), ON_DEMAND | {"httpx2", "pydantic", "rich"}),
+    "api/commands": (
+        ("schemas", "services", "api.clients", "api.process", "api.commands"),
+        {"typer", "rich", "httpx2", "pydantic"},
     ),
+    "api": (("services", "api.process"), set()),
     "gaplab": (("schemas", "services.core", "services.engines", "api"), set()),
     "migrations": (
         ("services.core.errors", "services.settings", "services.store", "migrations"),
@@ -80,7 +69,7 @@ def imports(path):
 
 
 def rule(path):
-    return next(rule for prefix, rule in ARROWS.items() if path.as_posix().startswith(f"{prefix}/"))
+    return next(rule for prefix, rule in ARROWS.items() if f"{path.as_posix()}/".startswith(f"{prefix}/"))
 
 
 def is_under(module, allowed):

@@ -1,13 +1,13 @@
 """The time left that a watcher is shown."""
 
 import re
+from datetime import UTC, datetime
 
 import pytest
 
 from gaplab.api.clients.pace import Pace, span
-from gaplab.api.http import examples
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.records import ExperimentRead
+from gaplab.schemas.records import ExperimentRead, Progress
 
 
 class Clock:
@@ -22,9 +22,10 @@ class Clock:
 
 def experiment(done: int, state: State = State.RUNNING) -> ExperimentRead:
     """Return an experiment of a thousand rollouts."""
-    whole = ExperimentRead.model_validate(examples.EXPERIMENT)
-    progress = whole.progress.model_copy(update={"rollouts": 1000, "rollouts_done": done, "rollouts_saved": 0})
-    return whole.model_copy(update={"state": state, "progress": progress})
+    nothing = dict.fromkeys(Progress.model_fields, 0)
+    progress = Progress.model_validate(nothing | {"rollouts": 1000, "rollouts_done": done, "seconds_left": None})
+    names = {"id": "a", "name": "a", "strategy": "simulated_fit"}
+    return ExperimentRead(**names, state=state, spec={}, progress=progress, created_at=datetime.now(UTC))
 
 
 def test_the_time_left_is_not_known_before_a_pace_is_seen() -> None:

@@ -1,0 +1,115 @@
+"""The life cycle of experiments and studies: pause, resume, stop, cancel, extend, and change the schedule."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body
+
+from gaplab.api.http.dependencies import Id, LimitedDep, StoreDep
+from gaplab.api.http.problems import documented
+from gaplab.schemas.lifecycle import Verb
+from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.schemas.schedule import ExtensionSpec, ScheduleChange
+from gaplab.services.experiments import lifecycle
+from gaplab.services.experiments.extension import extend_experiment as extend_to
+
+_experiment = APIRouter(prefix="/experiments/{id}", tags=["experiments"])
+_study = APIRouter(prefix="/studies/{id}", tags=["studies"])
+
+_PAUSED = "PAUSING, or PAUSED if no repetition is running"
+_RESUMED = "RUNNING or QUEUED; it continues where it was"
+_STOPPED = "STOPPING, or ended if no repetition is running"
+_CANCELLED = "CANCELLED; what is stored is kept"
+
+
+@_experiment.post("/pause", summary="Pause an experiment", response_description=_PAUSED, responses=documented(404, 409))
+def pause_experiment(id: Id, store: StoreDep) -> ExperimentRead:
+    """Let running repetitions finish their step and free their cores, and start none until the experiment resumes."""
+    return lifecycle.ask_experiment(store, id, Verb.PAUSE)
+
+
+@_experiment.post(
+    "/resume", summary="Resume an experiment", response_description=_RESUMED, responses=documented(404, 409)
+)
+def resume_experiment(id: Id, store: StoreDep) -> ExperimentRead:
+    """Continue a paused experiment; the pause changes none of its numbers."""
+    return lifecycle.ask_experiment(store, id, Verb.RESUME)
+
+
+@_experiment.post("/stop", summary="Stop an experiment", response_description=_STOPPED, responses=documented(404, 409))
+def stop_experiment(id: Id, store: StoreDep) -> ExperimentRead:
+    """Let running repetitions finish their step, then complete the experiment with the results so far.
+
+    An experiment without a single point of its curve ends as CANCELLED.
+    """
+    return lifecycle.ask_experiment(store, id, Verb.STOP)
+
+
+@_experiment.post(
+    "/cancel", summary="Cancel an experiment", response_description=_CANCELLED, responses=documented(404, 409)
+)
+def cancel_experiment(id: Id, store: StoreDep) -> ExperimentRead:
+    """Cancel an experiment at once; what is stored is kept. An experiment that has ended cannot be cancelled."""
+    return lifecycle.ask_experiment(store, id, Verb.CANCEL)
+
+
+@_experiment.post(
+    "/extend",
+    status_code=202,
+    summary="Extend an experiment",
+    response_description="QUEUED again",
+    responses=documented(404, 409, 413, 415, 422, 429),
+)
+def extend_experiment(
+    id: Id,
+    extension: Annotated[ExtensionSpec, Body(openapi_examples=ExtensionSpec.EXAMPLES)],
+    store: StoreDep,
+    admitted: LimitedDep,
+) -> ExperimentRead:
+    """Set new totals of iterations or repetitions for a completed experiment.
+
+    Existing results stay, and the whole equals an experiment that was submitted with these totals. A stopped experiment
+    that is given its own totals is completed.
+    """
+    return extend_to(store, id, extension, admitted)
+
+
+@_experiment.patch(
+    "/schedule",
+    summary="Change an experiment's schedule",
+    response_description="With its new schedule",
+    responses=documented(404, 413, 415, 422),
+)
+def schedule_experiment(
+    id: Id, change: Annotated[ScheduleChange, Body(openapi_examples=ScheduleChange.EXAMPLES)], store: StoreDep
+) -> ExperimentRead:
+    """Change its priority, or how many repetitions run at once. This changes no result and stops no repetition."""
+    return lifecycle.schedule_experiment(store, id, change)
+
+
+@_study.post("/pause", summary="Pause a study", response_description=_PAUSED, responses=documented(404, 409))
+def pause_study(id: Id, store: StoreDep) -> StudyRead:
+    """Pause every experiment of the study that can be paused."""
+    return lifecycle.ask_study(store, id, Verb.PAUSE)
+
+
+@_study.post("/resume", summary="Resume a study", response_description=_RESUMED, responses=documented(404, 409))
+def resume_study(id: Id, store: StoreDep) -> StudyRead:
+    """Resume every paused experiment of the study."""
+    return lifecycle.ask_study(store, id, Verb.RESUME)
+
+
+@_study.post("/stop", summary="Stop a study", response_description=_STOPPED, responses=documented(404, 409))
+def stop_study(id: Id, store: StoreDep) -> StudyRead:
+    """Stop every experiment of the study that has not ended, and keep the results so far."""
+    return lifecycle.ask_study(store, id, Verb.STOP)
+
+
+@_study.post("/cancel", summary="Cancel a study", response_description=_CANCELLED, responses=documented(404, 409))
+def cancel_study(id: Id, store: StoreDep) -> StudyRead:
+    """Cancel every experiment of the study that has not ended."""
+    return lifecycle.ask_study(store, id, Verb.CANCEL)
+
+
+router = APIRouter()
+router.include_router(_experiment)
+router.include_router(_study)
