@@ -5,7 +5,7 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen, Id, Statistic, TunableName, Unit
 
 
-class Spread(Frozen):
+class Distribution(Frozen):
     """Statistics of a number over repetitions; null if too few repetitions have it."""
 
     n: int
@@ -15,7 +15,7 @@ class Spread(Frozen):
     greatest: Statistic
 
 
-class TunedSpread(Spread):
+class TunableDistribution(Distribution):
     """Statistics of the tuned value of one tunable."""
 
     name: TunableName
@@ -29,11 +29,13 @@ class MisfitPoint(Frozen):
     """The best simulators of one iteration; those of iteration 0 are random."""
 
     iteration: int
-    error: Spread = Field(description="root mean square of simulated minus real fitness, over the samples tuned on")
-    gap: Spread = Field(
+    error: Distribution = Field(
+        description="root mean square of simulated minus real fitness, over the samples tuned on"
+    )
+    gap: Distribution = Field(
         description="absolute difference between simulated and real fitness of the transferred controller"
     )
-    tunables: tuple[TunedSpread, ...]
+    tunables: tuple[TunableDistribution, ...]
 
 
 class MisfitRead(Frozen):

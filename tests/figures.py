@@ -5,9 +5,21 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.predictions import Prediction
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.predictions import predictions_figure
-from gaplab.services.figures.kinds.simulators import Dimension, Tuned, simulators_figure
+from gaplab.services.figures.kinds.simulators import Dimension, SimulatorPoint, simulators_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
-from gaplab.services.figures.marks import Arrow, Axis, Bars, Diagonal, Figure, Label, Level, Line, Panel, Points, Table
+from gaplab.services.figures.marks import (
+    Arrow,
+    Axis,
+    Bars,
+    Diagonal,
+    FigureDefinition,
+    Label,
+    Level,
+    Line,
+    Panel,
+    Points,
+    Table,
+)
 from gaplab.services.figures.style import style_of
 
 NAMES = [
@@ -48,7 +60,7 @@ DIRECT = curve("direct", point(0, 1.33, n=100, sd=0.1), direct=True)
 
 _X, _Y = Axis("time (s)", (0, 4)), Axis("height (m)", (-1, 2))
 
-EVERYTHING = Figure(
+EVERYTHING = FigureDefinition(
     name="everything",
     title="Every mark",
     panels=(
@@ -100,9 +112,11 @@ TRUTH = {"static_friction": 1.0, "dynamic_friction": 0.8}
 """Where reality is, as far as it is known."""
 
 
-def tuned(dimensions: int, repetitions: int = 3, iterations: int = 2) -> list[Tuned]:
+def tuned(dimensions: int, repetitions: int = 3, iterations: int = 2) -> list[SimulatorPoint]:
     return [
-        Tuned(repetition, iteration, tuple(each.lower + 0.1 * (1 + repetition) for each in DIMENSIONS[:dimensions]))
+        SimulatorPoint(
+            repetition, iteration, tuple(each.lower + 0.1 * (1 + repetition) for each in DIMENSIONS[:dimensions])
+        )
         for repetition in range(repetitions)
         for iteration in range(iterations + 1)
     ]

@@ -15,7 +15,7 @@ _CHUNK = 2**16
 class Archives:
     """A part of the client; its methods raise what the client's do."""
 
-    def export(self: "Client", id: str, file: IO[bytes]) -> None:  # noqa: A002 - as the API says
+    def export(self: "Client", id: str, file: IO[bytes]) -> None:
         """Write everything of a study or an experiment into the file, as one archive."""
         found = self.find(id)
         noun = "studies" if isinstance(found, StudyRead) else "experiments"

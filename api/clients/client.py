@@ -67,15 +67,15 @@ class Client(LifeCycle, Waiting, Frames, Figures, History, Archives, Connection)
         """Return the rollouts and the time that a study would take on the service's machine; nothing is stored."""
         return self._read(EstimateRead, self._patiently("POST", "/studies/estimate", json=_body(spec)))
 
-    def experiment(self, id: str) -> ExperimentRead:  # noqa: A002 - as the API says
+    def experiment(self, id: str) -> ExperimentRead:
         """An experiment."""
         return self._read(ExperimentRead, self._get(f"/experiments/{part(id)}"))
 
-    def study(self, id: str) -> StudyRead:  # noqa: A002 - as the API says
+    def study(self, id: str) -> StudyRead:
         """A study."""
         return self._read(StudyRead, self._get(f"/studies/{part(id)}"))
 
-    def find(self, id: str) -> ExperimentRead | StudyRead:  # noqa: A002 - as the API says
+    def find(self, id: str) -> ExperimentRead | StudyRead:
         """The study of this id, or the experiment."""
         try:
             return self.study(id)
@@ -92,22 +92,22 @@ class Client(LifeCycle, Waiting, Frames, Figures, History, Archives, Connection)
         """Studies, the newest first; filters as in the API: limit, cursor, state, strategy, text, sort."""
         return self._read(Page[StudyRead], self._get("/studies", **filters))
 
-    def edit(self, id: str, edit: Edit) -> ExperimentRead | StudyRead:  # noqa: A002 - as the API says
+    def edit(self, id: str, edit: Edit) -> ExperimentRead | StudyRead:
         """A study or an experiment with a new name or notes, whatever they were before."""
         found = self.find(id)
         kind, noun = (StudyRead, "studies") if isinstance(found, StudyRead) else (ExperimentRead, "experiments")
         body, headers = edit.model_dump(exclude_unset=True), {"If-Match": "*"}
         return self._read(kind, self._request("PATCH", f"/{noun}/{part(id)}", json=body, headers=headers))
 
-    def reveal(self, id: str) -> ExperimentRead:  # noqa: A002 - as the API says
+    def reveal(self, id: str) -> ExperimentRead:
         """An experiment with reality's parameters, ended or not; wants an admin's token."""
         return self._read(ExperimentRead, self._get(f"/experiments/{part(id)}", reveal="true"))
 
-    def repetitions(self, id: str) -> tuple[RepetitionRead, ...]:  # noqa: A002 - as the API says
+    def repetitions(self, id: str) -> tuple[RepetitionRead, ...]:
         """The repetitions of an experiment."""
         return self._read(tuple[RepetitionRead, ...], self._get(f"/experiments/{part(id)}/repetitions"))
 
-    def misfit(self, id: str) -> MisfitRead:  # noqa: A002 - as the API says
+    def misfit(self, id: str) -> MisfitRead:
         """How far an experiment's tuned simulators are from reality, and from each other."""
         return self._read(MisfitRead, self._get(f"/experiments/{part(id)}/misfit"))
 

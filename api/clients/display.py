@@ -10,7 +10,7 @@ from rich.table import Table
 
 from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.misfit import MisfitRead, TunedSpread
+from gaplab.schemas.misfit import MisfitRead, TunableDistribution
 from gaplab.schemas.plugin import Catalogue, PluginRead
 from gaplab.schemas.problems import Problem
 from gaplab.schemas.records import ExperimentRead, Progress, RepetitionRead, StudyRead
@@ -164,7 +164,7 @@ def _table(*columns: str) -> Table:
     return table
 
 
-def _at_bounds(found: TunedSpread) -> str:
+def _at_bounds(found: TunableDistribution) -> str:
     sides = ((found.lower, found.at_lower), (found.upper, found.at_upper))
     return ", ".join(f"{100 * share:.0f} % at {bound:g}" for bound, share in sides if share) or "-"
 

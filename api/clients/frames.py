@@ -50,7 +50,7 @@ class Frames:
 
     def samples(
         self: "Client",
-        id: str,  # noqa: A002 - as the API says
+        id: str,
         *,
         repetition: int | None = None,
         kind: str | None = None,
@@ -75,7 +75,7 @@ class Frames:
 
     def simulators(
         self: "Client",
-        id: str,  # noqa: A002 - as the API says
+        id: str,
         *,
         repetition: int | None = None,
         iteration: int | None = None,
@@ -94,7 +94,7 @@ class Frames:
         frame = frames.DataFrame([each.model_dump(include={*columns}) for each in found], columns=columns)
         return _numeric(frame.join(frames.DataFrame([each.parameters for each in found], index=frame.index)), columns)
 
-    def predictions(self: "Client", id: str, *, every_s: float = 0.5, timeout_s: float = 600.0) -> "pandas.DataFrame":  # noqa: A002
+    def predictions(self: "Client", id: str, *, every_s: float = 0.5, timeout_s: float = 600.0) -> "pandas.DataFrame":
         """What simulators said of each sample of an experiment before and after it was measured, and what reality said.
 
         The service computes it when it is asked for the first time, and is waited for. Of very many samples it has

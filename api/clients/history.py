@@ -33,10 +33,10 @@ class History:
             yield from page.items
             filters["after"] = page.last
 
-    def provenance(self: "Client", id: str) -> ProvenanceRead:  # noqa: A002 - as the API says
+    def provenance(self: "Client", id: str) -> ProvenanceRead:
         """Under what an experiment was computed."""
         return self._read(ProvenanceRead, self._get(f"/experiments/{part(id)}/provenance"))
 
-    def accept_versions(self: "Client", id: str) -> ExperimentRead:  # noqa: A002 - as the API says
+    def accept_versions(self: "Client", id: str) -> ExperimentRead:
         """Let an experiment go on under other engines or plug-ins than it was begun with."""
         return self._read(ExperimentRead, self._request("POST", f"/experiments/{part(id)}/accept-versions"))

@@ -19,7 +19,7 @@ class Waiting:
 
     def watch(
         self: "Client",
-        id: str,  # noqa: A002 - as the API says
+        id: str,
         *,
         every_s: float = 1.0,
         patience_s: float = 60.0,
@@ -45,7 +45,7 @@ class Waiting:
 
     def wait(
         self: "Client",
-        id: str,  # noqa: A002 - as the API says
+        id: str,
         *,
         progress: bool | None = None,
         timeout_s: float | None = None,

@@ -151,7 +151,7 @@ def _remembered(folder: Path) -> dict[str, dict[str, object]]:
     return found
 
 
-def _remember(folder: Path, name: str, spec: dict[str, object], id: str) -> None:  # noqa: A002 - as the API says
+def _remember(folder: Path, name: str, spec: dict[str, object], id: str) -> None:
     notes = _remembered(folder) | {name: {"study": id, "spec": spec}}
     (folder / "demo.json").write_text(json.dumps(notes), "utf-8")
 

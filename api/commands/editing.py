@@ -14,7 +14,7 @@ from gaplab.schemas.editing import Edit
 
 @app.command()
 def edit(
-    id: Id,  # noqa: A002 - as the API says
+    id: Id,
     name: Annotated[str | None, typer.Option(help="a new name", show_default=False)] = None,
     notes: Annotated[str | None, typer.Option(help="new notes; empty takes them away", show_default=False)] = None,
     as_json: AsJson = False,

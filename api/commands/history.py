@@ -18,7 +18,7 @@ from gaplab.schemas.records import StudyRead
 
 @app.command()
 def events(
-    id: Annotated[  # noqa: A002 - as the API says
+    id: Annotated[
         str | None,
         typer.Argument(metavar="[ID]", help="of a study or an experiment", autocompletion=completion.ids),
     ] = None,
@@ -40,7 +40,7 @@ def events(
 
 @app.command("accept-versions")
 def accept_versions(
-    id: ExperimentId,  # noqa: A002 - as the API says
+    id: ExperimentId,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:

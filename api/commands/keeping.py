@@ -14,7 +14,7 @@ from gaplab.services.store.backup import backup as copy
 
 @app.command()
 def export(
-    id: Id,  # noqa: A002 - as the API says
+    id: Id,
     to: Annotated[
         Path | None, typer.Option(help="file that must not be there yet; left out: gaplab-ID.zip", show_default=False)
     ] = None,

@@ -12,28 +12,28 @@ Total = typer.Option(min=1, help="in all, not what is added; left out: as many a
 
 
 @app.command()
-def pause(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A002 - as the API says
+def pause(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     """Let an experiment or a study finish the steps under way and give its cores back, until it is resumed."""
     with connect(url) as client:
         _say(client.pause(id), as_json=as_json)
 
 
 @app.command()
-def resume(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A002 - as the API says
+def resume(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     """Go on with an experiment or a study that was paused."""
     with connect(url) as client:
         _say(client.resume(id), as_json=as_json)
 
 
 @app.command()
-def stop(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A002 - as the API says
+def stop(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     """Let an experiment or a study finish the steps under way, and complete it with what is there."""
     with connect(url) as client:
         _say(client.stop(id), as_json=as_json)
 
 
 @app.command()
-def cancel(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A002 - as the API says
+def cancel(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     """Call an experiment off, or all of a study that has not ended; what is stored stays."""
     with connect(url) as client:
         _say(client.cancel(id), as_json=as_json)
@@ -41,7 +41,7 @@ def cancel(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A
 
 @app.command()
 def extend(
-    id: ExperimentId,  # noqa: A002 - as the API says
+    id: ExperimentId,
     iterations: Annotated[int | None, Total] = None,
     repetitions: Annotated[int | None, Total] = None,
     as_json: AsJson = False,

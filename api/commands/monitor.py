@@ -42,7 +42,7 @@ class Look:
     away_s: float = 0.0
 
 
-def looks(client: Client, id: str, *, every_s: float, patience_s: float) -> Iterator[Look]:  # noqa: A002 - as the API
+def looks(client: Client, id: str, *, every_s: float, patience_s: float) -> Iterator[Look]:
     """Look again and again, until it has ended; what is not known while the service is away is as it was.
 
     Raises:
@@ -99,7 +99,7 @@ def spark(values: list[float], least: float, greatest: float) -> str:
     return "".join(BLOCKS[min(7, int(8 * (value - least) / height))] for value in values)
 
 
-def _look(client: Client, id: str, before: Look | None) -> Look:  # noqa: A002 - as the API says
+def _look(client: Client, id: str, before: Look | None) -> Look:
     stage = client.find(id) if before is None else _again(client, before.stage)
     parts = stage.experiments if isinstance(stage, StudyRead) else (stage,)
     known = before or Look(stage, {}, {})

@@ -43,7 +43,7 @@ def list_(
 
 
 @app.command()
-def show(id: Id, as_json: AsJson = False, url: Url = None) -> None:  # noqa: A002 - as the API says
+def show(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     """Show a study's experiments, or an experiment's repetitions."""
     console = display.console()
     with connect(url) as client:

@@ -34,7 +34,7 @@ def submit(
         finish(ended, quiet=as_json)
 
 
-def watched(client: Client, id: str, *, quiet: bool) -> ExperimentRead | StudyRead:  # noqa: A002 - as the API says
+def watched(client: Client, id: str, *, quiet: bool) -> ExperimentRead | StudyRead:
     """What it ended as, after its progress was shown; if quiet, on standard error."""
     try:
         return follow(client.watch(id), display.console(stderr=quiet))

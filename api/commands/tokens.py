@@ -60,7 +60,7 @@ def list_(as_json: AsJson = False) -> None:
 
 @tokens.command()
 def revoke(
-    id: Annotated[str, typer.Argument(metavar="ID", help="as listed")],  # noqa: A002 - as listed
+    id: Annotated[str, typer.Argument(metavar="ID", help="as listed")],
     as_json: AsJson = False,
 ) -> None:
     """Revoke a token; it admits nobody from the next request on."""

@@ -18,7 +18,7 @@ from gaplab.schemas.records import ExperimentRead, StudyRead
 
 @app.command()
 def watch(
-    id: Id,  # noqa: A002 - as the API says
+    id: Id,
     every: Annotated[float, typer.Option(min=0.1, max=3600, help="seconds between two looks")] = 1.0,
     patience: Annotated[float, typer.Option(min=0, help="seconds for which the service may be away")] = 600.0,
     as_json: AsJson = False,
@@ -38,7 +38,7 @@ def watch(
 
 def _watched(
     client: Client,
-    id: str,  # noqa: A002 - as the API says
+    id: str,
     every_s: float,
     patience_s: float,
     *,

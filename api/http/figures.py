@@ -9,7 +9,7 @@ from gaplab.api.http.dependencies import Parameters
 from gaplab.api.http.problems import Responses, documented
 from gaplab.api.http.security_headers import page
 from gaplab.schemas.figures import Chart, FigureRead, TableRead
-from gaplab.services.figures.marks import Figure
+from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.figures.plotly.chart import chart
 from gaplab.services.figures.plotly.html import render_html
@@ -35,7 +35,7 @@ class Drawing(Parameters):
     caption: bool = Field(default=True, description="whether a file has its caption beneath")
 
 
-def answer(figure: Figure, query: Drawing) -> Response:
+def answer(figure: FigureDefinition, query: Drawing) -> Response:
     """Return the figure in the requested format."""
     if query.format == "html":
         return page(render_html(figure))
@@ -47,7 +47,7 @@ def answer(figure: Figure, query: Drawing) -> Response:
     return Response(drawn, media_type=media_type, headers=disposition)
 
 
-def read(figure: Figure) -> FigureRead:
+def read(figure: FigureDefinition) -> FigureRead:
     """Return the figure as the schema of the API."""
     table = figure.table and TableRead(head=figure.table.head, rows=figure.table.rows)
     return FigureRead(

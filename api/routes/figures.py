@@ -15,12 +15,12 @@ from gaplab.services.figures.kinds.curves import Band, curves_figure
 from gaplab.services.figures.kinds.predictions import predictions_figure
 from gaplab.services.figures.kinds.simulators import simulators_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
-from gaplab.services.figures.marks import Figure
+from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import TITLE, spoken
 from gaplab.services.replay.predictions import predictions
 from gaplab.services.results import curves
-from gaplab.services.results.curve_costs import abscissa
-from gaplab.services.results.tuned_simulators import tunings
+from gaplab.services.results.curve_costs import cost_axis
+from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.specs.resolution import is_direct, spec_of
 from gaplab.services.store.session import Store
 
@@ -87,7 +87,7 @@ def draw_curves(store: StoreDep, query: Annotated[CurvesDrawing, Query()]) -> Re
 @router.get("/squared-error", summary="Draw the squared error", response_model=FigureRead, responses=responses())
 def draw_squared_error(store: StoreDep, query: Annotated[ErrorDrawing, Query()]) -> Response:
     """Draw the squared error of an experiment's best simulator by iteration: median and quartiles over repetitions."""
-    tuned = tunings(store, query.experiment)
+    tuned = tuned_simulators(store, query.experiment)
     figure = squared_error_figure(tuned.errors, unit=tuned.unit, title=_title(store, query), each=query.each)
     return answer(_explained(store, query, figure), query)
 
@@ -95,7 +95,7 @@ def draw_squared_error(store: StoreDep, query: Annotated[ErrorDrawing, Query()])
 @router.get("/simulators", summary="Draw tuned simulators", response_model=FigureRead, responses=responses())
 def draw_simulators(store: StoreDep, query: Annotated[SimulatorsDrawing, Query()]) -> Response:
     """Draw an experiment's best simulators in the space of its tunables, with reality once its study has ended."""
-    tuned, title = tunings(store, query.experiment), _title(store, query)
+    tuned, title = tuned_simulators(store, query.experiment), _title(store, query)
     narrow = query.format not in {"html", "json"} and query.width < NARROW_IN
     columns = query.columns or (2 if narrow else 3)
     figure = simulators_figure(tuned.simulators, tuned.dimensions, truth=tuned.truth, title=title, columns=columns)
@@ -139,18 +139,18 @@ def _title(store: Store, query: ExperimentDrawing) -> str:
     return spoken(submission.read_experiment(store, query.experiment).name, TITLE)
 
 
-def _explained(store: Store, query: ExperimentDrawing, figure: Figure) -> Figure:
+def _explained(store: Store, query: ExperimentDrawing, figure: FigureDefinition) -> FigureDefinition:
     """Return the figure, with an explanation if it will always be empty."""
     if not figure.empty or not is_direct(spec_of(submission.read_experiment(store, query.experiment).spec)):
         return figure
     return replace(figure, nothing=DIRECT, alt=f"Nothing: {DIRECT}.")
 
 
-def _curves(store: Store, query: CurvesDrawing) -> Figure:
+def _curves(store: Store, query: CurvesDrawing) -> FigureDefinition:
     studies = [submission.read_study(store, id) for id in query.study]
     drawn = [curve for study in studies for curve in curves.study_curves(store, study.id)]
     drawn += curves.curves(store, query.experiment) if query.experiment else ()
     drawn = list({curve.experiment: curve for curve in drawn}.values())  # each experiment once
     title = query.title if query.title is not None else ", ".join(study.name for study in studies)
-    against = None if query.x == "evaluations" else abscissa(store, drawn, query.x, cost_s=query.cost_s)
+    against = None if query.x == "evaluations" else cost_axis(store, drawn, query.x, cost_s=query.cost_s)
     return curves_figure(drawn, title=title, band=query.band, against=against, each=query.each)

@@ -13,7 +13,7 @@ from gaplab.services.figures.kinds.gait import gait_figure
 from gaplab.services.figures.kinds.toy import toy_figure
 from gaplab.services.replay.replays import replay
 from gaplab.services.replay.rollout import ReplayChoice
-from gaplab.services.results.toy import toys
+from gaplab.services.results.toy import toy_iterations
 
 router = APIRouter(prefix="/figures", tags=["figures"])
 
@@ -50,5 +50,5 @@ def draw_toy(store: StoreDep, query: Annotated[ToyDrawing, Query()]) -> Response
 
     The true function is drawn once every experiment of the study has ended.
     """
-    iterations = toys(store, query.experiment, query.repetition, query.iteration)
+    iterations = toy_iterations(store, query.experiment, query.repetition, query.iteration)
     return answer(toy_figure(iterations, title=query.title), query)

@@ -1,7 +1,7 @@
-"""Archives: everything of an experiment or a study in one file, to keep, to analyse elsewhere, and to read back.
+"""Archives: one file with everything of an experiment or a study, for backup, analysis elsewhere, and import.
 
-An archive is a zip: a member for each exported table, as Parquet, or as JSON Lines where values are nested; the curves
-as `curves.json`, for whoever opens it; and `manifest.json`. The same content gives the same bytes.
+An archive is a zip with one member for each exported table (Parquet, or JSON Lines where values are nested), the curves
+as `curves.json` for readers without gaplab, and `manifest.json`. The same content gives the same bytes.
 """
 
 from gaplab.services.archives.reading import import_archive as import_archive

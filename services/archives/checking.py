@@ -1,44 +1,88 @@
-"""Rows of an archive, value by value: what this lets through can be stored, shown and computed with."""
+"""The rows of an archive, checked value by value before they are stored."""
 
 import json
-import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from datetime import UTC, datetime
-from math import isfinite
+from functools import cache
 from pathlib import Path
-from typing import IO, Any, NoReturn
+from typing import IO, Annotated, Any, Literal, NoReturn
 
+from pydantic import (
+    AfterValidator,
+    AwareDatetime,
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    StringConstraints,
+    ValidationError,
+    create_model,
+)
+
+from gaplab.services.archives.columns import EXPERIMENT, columns_of
 from gaplab.services.core.errors import InvalidArchive
-from gaplab.services.store.archive_columns import EXPERIMENT, Column, Kind, columns_of
+from gaplab.services.store.tables import Column, Kind
 
 Row = dict[str, Any]
 
 LONGEST_LINE = 8 * 2**20
 """Characters of one row."""
 
-_ID = re.compile(r"[A-Za-z0-9]{1,32}")
+GREATEST, GREATEST_LARGE = 2**30, 2**48
+"""Limits of whole numbers of 32 and 64 bits: far from overflow, since some continue to count or are added up."""
+
+_ID = r"^[A-Za-z0-9]{1,32}$"
 _IDS = {"id", "study_id", "experiment_id", EXPERIMENT}
+_MAY_BE_NEGATIVE = {"precedence"}
+
+_Moment = Annotated[
+    AwareDatetime,
+    Field(strict=False, ge=datetime(1970, 1, 1, tzinfo=UTC), lt=datetime(9000, 1, 1, tzinfo=UTC)),
+    AfterValidator(lambda moment: moment.astimezone(UTC)),
+]
+_TYPES: dict[Kind, Any] = {
+    Kind.REAL: FiniteFloat,
+    Kind.TRUTH: bool,
+    Kind.MOMENT: _Moment,
+    Kind.VECTOR: list[FiniteFloat],
+    Kind.NESTED: dict[str, Any] | list[Any],
+}
 
 
 def checked(table: str, file: Path, count: int) -> Iterator[Row]:
-    """The rows of a table, each checked; as many as there should be.
+    """Yield the rows of a table from its file of JSON Lines.
+
+    Args:
+        table: its name.
+        file: one row a line.
+        count: the number of rows that the manifest states.
 
     Raises:
-        InvalidArchive: with the first row and column that cannot be.
+        InvalidArchive: a row or the number of rows is invalid; the message names the first invalid row and column.
     """
-    columns = {each.name: each for each in columns_of(table)}
-    present: tuple[str, ...] | None = None
-    number = 0
+    model, columns, number = _model(table), None, 0
     with file.open(encoding="ascii", errors="surrogateescape") as lines:
         for number, line in enumerate(_lines(lines, table), 1):
-            row = _row(line, f"{table}, row {number}")
-            if present is None:
-                present = _present(row, columns, table)
-            if tuple(row) != present:
-                _refuse(f"{table}, row {number}", "has other columns than the first")
-            yield {name: _value(columns[name], value, f"{table}, row {number}") for name, value in row.items()}
+            place = f"{table}, row {number}"
+            row = _row(line, place)
+            columns = columns or list(row)
+            if list(row) != columns:
+                _refuse(place, "has other columns than the first row")
+            if unknown := sorted(set(columns) - set(model.model_fields)):
+                _refuse(place, f"has columns that this version of gaplab does not know: {', '.join(unknown)[:200]}")
+            try:
+                found = model.model_validate(row)
+            except ValidationError as error:
+                _refuse(f"{place},", first_error(error))
+            yield {name: getattr(found, name) for name in columns}
     if number != count:
-        _refuse(table, f"has {number} rows; the manifest says {count}")
+        _refuse(table, f"has {number} rows; the manifest states {count}")
+
+
+def first_error(error: ValidationError) -> str:
+    """Return the place and the message of the first error, without the value."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    return f"{'/'.join(map(str, first['loc']))[:100]}: {first['msg']}"
 
 
 def _lines(lines: IO[str], table: str) -> Iterator[str]:
@@ -50,104 +94,42 @@ def _lines(lines: IO[str], table: str) -> Iterator[str]:
 
 def _row(line: str, place: str) -> Row:
     try:
-        row = json.loads(line, parse_constant=_no_number)
+        row = json.loads(line, parse_constant=_refuse_constant)
         text = json.dumps(row, ensure_ascii=False, allow_nan=False)
-        text.encode()  # half a surrogate pair is no text
+        text.encode()  # fails for half of a surrogate pair
     except (ValueError, RecursionError):
-        _refuse(place, "is not JSON, in ASCII, or has a number or a text that is none")
+        _refuse(place, "is not JSON in ASCII, or has a number or a text that cannot be stored")
     if not isinstance(row, dict) or "\\u0000" in text:
-        _refuse(place, "is no JSON object, or has a NUL")
+        _refuse(place, "is not a JSON object, or has a NUL character")
     return row
 
 
-def _no_number(constant: str) -> NoReturn:
+def _refuse_constant(constant: str) -> NoReturn:
     raise ValueError(constant)
 
 
-def _present(row: Row, columns: dict[str, Column], table: str) -> tuple[str, ...]:
-    """The columns of all rows: ours, and every one that has no default."""
-    if unknown := set(row) - set(columns):
-        _refuse(table, f"has columns that this version does not know: {', '.join(sorted(unknown))[:200]}")
-    if missing := [each.name for each in columns.values() if each.required and each.name not in row]:
-        _refuse(table, f"lacks {', '.join(missing)}")
-    return tuple(row)
+@cache
+def _model(table: str) -> type[BaseModel]:
+    """Return the pydantic model of a row: columns without a default are required, others are not permitted."""
+    fields: dict[str, Any] = {
+        column.name: (_type(column) | None if column.nullable else _type(column), ... if column.required else None)
+        for column in columns_of(table)
+    }
+    return create_model(table, __config__=ConfigDict(extra="forbid", strict=True), **fields)
 
 
-def _value(column: Column, value: object, place: str) -> Any:  # noqa: ANN401 - as the column has it
-    if value is None:
-        if not column.nullable:
-            _refuse(f"{place}, {column.name}", "is null")
-        return None
-    try:
-        return _READERS[column.kind](column, value)
-    except (ValueError, TypeError, OverflowError) as error:
-        _refuse(f"{place}, {column.name}", str(error)[:200])
-
-
-def _text(column: Column, value: object) -> str:
-    if not isinstance(value, str):
-        raise TypeError("is no text")
-    if column.choices and value not in column.choices:
-        msg = f"is {value[:32]!r}; it may be {', '.join(column.choices)}"
-        raise ValueError(msg)
-    if column.longest is not None and len(value) > column.longest:
-        msg = f"has {len(value)} characters; {column.longest} are permitted"
-        raise ValueError(msg)
-    if column.name in _IDS and not _ID.fullmatch(value):
-        msg = f"is {value!r}, which is no id"
-        raise ValueError(msg)
-    return value
-
-
-def _whole(column: Column, value: object) -> int:
-    if type(value) is not int or not column.least <= value <= column.greatest:
-        msg = f"is no whole number from {column.least} to {column.greatest}"
-        raise ValueError(msg)
-    return value
-
-
-def _real(_: Column, value: object) -> float:
-    if type(value) not in {int, float} or not isfinite(number := float(value)):  # type: ignore[arg-type]
-        raise ValueError("is no finite number")
-    return number
-
-
-def _truth(_: Column, value: object) -> bool:
-    if type(value) is not bool:
-        raise TypeError("is neither true nor false")
-    return value
-
-
-def _moment(_: Column, value: object) -> datetime:
-    moment = datetime.fromisoformat(str(value))
-    if moment.tzinfo is None or not 1970 <= moment.year <= 9000:
-        raise ValueError("is no moment with a time zone, after 1970")
-    return moment.astimezone(UTC)
-
-
-def _vector(column: Column, value: object) -> list[float]:
-    if not isinstance(value, list):
-        raise TypeError("is no list of numbers")
-    return [_real(column, each) for each in value]
-
-
-def _nested(_: Column, value: object) -> object:
-    if not isinstance(value, dict | list):
-        raise TypeError("is neither an object nor a list")
-    return value
-
-
-_READERS: dict[Kind, Callable[[Column, object], Any]] = {
-    Kind.TEXT: _text,
-    Kind.WHOLE: _whole,
-    Kind.REAL: _real,
-    Kind.TRUTH: _truth,
-    Kind.MOMENT: _moment,
-    Kind.VECTOR: _vector,
-    Kind.NESTED: _nested,
-}
+def _type(column: Column) -> Any:  # noqa: ANN401 - a type, as pydantic takes it
+    if column.kind is Kind.WHOLE:
+        greatest = GREATEST_LARGE if column.large else GREATEST
+        return Annotated[int, Field(ge=-greatest if column.name in _MAY_BE_NEGATIVE else 0, le=greatest)]
+    if column.choices:
+        return Literal[column.choices]
+    if column.kind is Kind.TEXT:
+        return Annotated[
+            str, StringConstraints(max_length=column.longest, pattern=_ID if column.name in _IDS else None)
+        ]
+    return _TYPES[column.kind]
 
 
 def _refuse(place: str, what: str) -> NoReturn:
-    msg = f"{place} {what}" if what.startswith(("has", "lacks", "is")) else f"{place}: {what}"
-    raise InvalidArchive(msg)
+    raise InvalidArchive(f"{place} {what}")

@@ -1,6 +1,6 @@
-"""Parquet to JSON Lines, in a process of its own: `python -I unpacking.py PARQUET LINES [PARQUET LINES]...`.
+"""Parquet to JSON Lines, as a program: `python -I unpacking.py PARQUET LINES [PARQUET LINES]...`.
 
-A file that was made to harm a reader of Parquet, by eating memory, time or disk or by a crash, harms nothing else.
+A harmful file can only end this process, or exhaust its limits of memory, time and disk.
 """
 
 import json
@@ -17,15 +17,16 @@ MOST: dict[int, int] = {
     resource.RLIMIT_CPU: 300,
     resource.RLIMIT_CORE: 0,
 }
-"""Bytes of memory, bytes of all files that are written, seconds, and bytes of what a crash leaves behind."""
+"""Bytes of memory, bytes of all written files together, seconds of processor time, and bytes of a core dump."""
 
 _AT_ONCE = 500
 
 
 def main(paths: list[str]) -> int:
-    """Write each row of each Parquet file as a line of JSON; the exit code: 0, or the number of the first bad file.
+    """Convert each Parquet file to JSON Lines.
 
-    Nothing is said about what is wrong: it would come from the file.
+    Returns:
+        The exit code: 0, or the number of the first invalid file. There is no message, since it would quote the file.
     """
     for limit, most in MOST.items():
         _restrict(limit, most)
@@ -34,17 +35,17 @@ def main(paths: list[str]) -> int:
         if not convert(source, target):
             return number
         left -= Path(target).stat().st_size
-        _restrict(resource.RLIMIT_FSIZE, left)  # which the system holds against each file by itself
+        _restrict(resource.RLIMIT_FSIZE, left)  # the system limits each file by itself
     return 0
 
 
 def _restrict(limit: int, most: int) -> None:
-    with suppress(ValueError, OSError):  # the system does not know this limit, or has a lower one already
+    with suppress(ValueError, OSError):  # the system lacks this limit, or has a lower one already
         resource.setrlimit(limit, (most, most))
 
 
 def convert(source: str, target: str) -> bool:
-    """Write each row of one file as a line of JSON; whether that could be done."""
+    """Write each row of one file as a line of JSON, and return whether that succeeded."""
     import pyarrow as arrow  # within the limits
     from pyarrow import parquet
 
@@ -62,8 +63,7 @@ def convert(source: str, target: str) -> bool:
 def _plain(value: Any) -> str:  # noqa: ANN401 - whatever Parquet has
     if isinstance(value, datetime) and value.tzinfo is not None:
         return value.astimezone(UTC).isoformat()
-    msg = "no row of an archive has such a value"
-    raise TypeError(msg)
+    raise TypeError(f"an archive cannot have a {type(value).__name__}")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,11 @@
-"""Experiments and studies out of a store, into an archive."""
+"""Export: experiments and studies are written from a store into an archive."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from hashlib import file_digest
 from importlib.metadata import version
+from io import SEEK_END, BufferedIOBase, BytesIO
+from shutil import copyfileobj
 from tempfile import TemporaryFile
 from typing import IO, Literal
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
@@ -11,26 +14,27 @@ from pydantic import TypeAdapter
 
 from gaplab.schemas.archives import FORMAT, Manifest, Member
 from gaplab.schemas.curves import Curve
-from gaplab.services.archives.members import CURVES, MANIFEST, Hashed, member_of, write
+from gaplab.services.archives.columns import EXPORTED, columns_of
+from gaplab.services.archives.members import CURVES, MANIFEST, Row, member_of, write
 from gaplab.services.experiments import hiding
 from gaplab.services.results import curves
-from gaplab.services.store.archive_columns import EXPORTED
 from gaplab.services.store.models import REVISION, ExperimentRow
 from gaplab.services.store.queries import archives, experiments
 from gaplab.services.store.session import Session, Store
+from gaplab.services.store.stored_specs import without_truth
 
 _MOMENT = (1980, 1, 1, 0, 0, 0)
-"""Of every member, the earliest that a zip knows: the same content gives the same bytes."""
+"""Date of every member, the earliest of the zip format, so that the same content gives the same bytes."""
 
 _FILE = 0o644 << 16
 
 
 @dataclass(frozen=True)
 class Archive:
-    """A whole archive in a file without a name, which is gone once it is closed.
+    """An archive in a temporary file, which is deleted when it is closed.
 
     Attributes:
-        name: what it might be called.
+        name: a suitable file name.
         size: in bytes.
         file: at its beginning.
     """
@@ -41,12 +45,12 @@ class Archive:
 
 
 def export_experiment(store: Store, experiment_id: str) -> Archive:
-    """Everything of an experiment at one moment, on its own: whatever its study is, it is not in there.
+    """Return an archive of one experiment at one moment, without its study.
 
-    Memory does not grow with what there is. Reality's parameters are null until they may be shown.
+    The parameters of reality are null until they may be shown. Memory does not grow with the number of results.
 
     Raises:
-        NotFound: no such experiment.
+        NotFound: the experiment does not exist.
     """
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
@@ -54,10 +58,10 @@ def export_experiment(store: Store, experiment_id: str) -> Archive:
 
 
 def export_study(store: Store, study_id: str) -> Archive:
-    """Everything of a study and its experiments, as `export_experiment` does.
+    """Return an archive of a study and its experiments, as `export_experiment` does.
 
     Raises:
-        NotFound: no such study.
+        NotFound: the study does not exist.
     """
     with store.reading() as session:
         study = experiments.get_study(session, study_id)
@@ -67,17 +71,18 @@ def export_study(store: Store, study_id: str) -> Archive:
 def _export(
     session: Session, kind: Literal["study", "experiment"], id_: str, owners: Sequence[ExperimentRow]
 ) -> Archive:
-    ids, hidden = [each.id for each in owners], hiding.hidden(session, owners)
-    study = id_ if kind == "study" else None
-    file = TemporaryFile()  # noqa: SIM115 - whoever sends it closes it
+    ids, study = [row.id for row in owners], id_ if kind == "study" else None
+    hidden = hiding.hidden(session, owners)
+    file = TemporaryFile()  # noqa: SIM115 - the sender closes it
     try:
         members: dict[str, Member] = {}
         with ZipFile(file, "w") as archive:
             for table in EXPORTED:
-                rows = archives.rows(session, table, study=study, experiments=ids, hidden=hidden)
-                _add(archive, members, member_of(table), lambda into, table=table, rows=rows: write(table, rows, into))  # type: ignore[misc]
+                with TemporaryFile() as part:
+                    count = write(table, _rows(session, table, study, ids, hidden), part)
+                    members[member_of(table)] = _add(archive, member_of(table), part, count)
             points = TypeAdapter(tuple[Curve, ...]).dump_json(curves.curves_of(session, ids))
-            _add(archive, members, CURVES, lambda into: into.write(points) and len(ids))
+            members[CURVES] = _add(archive, CURVES, BytesIO(points), len(ids))
             manifest = Manifest(
                 format=FORMAT, gaplab=version("gaplab"), revision=REVISION, kind=kind, id=id_, members=members
             )
@@ -90,15 +95,29 @@ def _export(
     return Archive(name=f"gaplab-{id_}.zip", size=size, file=file)
 
 
-def _add(archive: ZipFile, members: dict[str, Member], name: str, fill: Callable[[Hashed], int]) -> None:
+def _rows(
+    session: Session, table: str, study: str | None, experiments: Sequence[str], hidden: Collection[str]
+) -> Iterator[Row]:
+    """Yield the rows of a table as they are exported: without secrets, and without a study that is not exported."""
+    owners = [study] if study and table == "study" else [] if table == "study" else experiments
+    for row in archives.read_rows(session, table, [column.name for column in columns_of(table)], owners):
+        if table == "experiment":
+            row |= {"study_id": study} | ({"spec": without_truth(row["spec"])} if row["id"] in hidden else {})
+        yield row
+
+
+def _add(archive: ZipFile, name: str, content: BufferedIOBase, rows: int) -> Member:
+    size = content.seek(0, SEEK_END)
+    content.seek(0)
+    digest = file_digest(content, "sha256").hexdigest()
+    content.seek(0)
     with archive.open(_info(name), "w", force_zip64=True) as target:
-        hashed = Hashed(target)
-        rows = fill(hashed)
-    members[name] = Member(sha256=hashed.digest, bytes=hashed.bytes, rows=rows)
+        copyfileobj(content, target)
+    return Member(sha256=digest, bytes=size, rows=rows)
 
 
 def _info(name: str) -> ZipInfo:
-    """Parquet is compressed by itself."""
+    """Return the entry of a member in the zip; Parquet is compressed already."""
     info = ZipInfo(name, _MOMENT)
     info.compress_type = ZIP_STORED if name.endswith(".parquet") else ZIP_DEFLATED
     info.external_attr = _FILE

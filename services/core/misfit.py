@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gaplab.schemas.misfit import MisfitPoint, Spread, TunedSpread
+from gaplab.schemas.misfit import Distribution, MisfitPoint, TunableDistribution
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import known
 from gaplab.services.core.types import Space
@@ -62,8 +62,8 @@ def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str]
     parameters = np.array([each.parameters for each in tunings]).reshape(-1, space.size)
     return MisfitPoint(
         iteration=iteration,
-        error=Spread.model_validate(_spread([each.error for each in tunings])),
-        gap=Spread.model_validate(_spread([abs(each.simulated - each.real) for each in tunings])),
+        error=Distribution.model_validate(_spread([each.error for each in tunings])),
+        gap=Distribution.model_validate(_spread([abs(each.simulated - each.real) for each in tunings])),
         tunables=tuple(
             _tuned(name, parameters[:, index], float(space.lower[index]), float(space.upper[index]))
             for index, name in enumerate(names)
@@ -81,17 +81,17 @@ def remarks(points: Sequence[MisfitPoint], unit: str) -> tuple[str, ...]:
     return (_remaining(last, unit), *_gaps(first, last, unit), *stuck)
 
 
-def _tuned(name: str, values: FloatArray, lower: float, upper: float) -> TunedSpread:
+def _tuned(name: str, values: FloatArray, lower: float, upper: float) -> TunableDistribution:
     near = AT_BOUND * (upper - lower)
     at_lower = float((values <= lower + near).mean()) if len(values) else None
     at_upper = float((values >= upper - near).mean()) if len(values) else None
-    return TunedSpread.model_validate(
+    return TunableDistribution.model_validate(
         {"name": name, "lower": lower, "upper": upper, "at_lower": at_lower, "at_upper": at_upper} | _spread(values)
     )
 
 
 def _spread(values: Sequence[float] | FloatArray) -> dict[str, float | int | None]:
-    """As `Spread` has it, over the finite values."""
+    """As `Distribution` has it, over the finite values."""
     there = np.asarray(values, dtype=np.float64)
     there = there[np.isfinite(there)]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -126,7 +126,7 @@ def _gaps(first: MisfitPoint, last: MisfitPoint, unit: str) -> tuple[str, ...]:
     return (f"the controller evolved in them differs by {last.gap.mean:.2g} {unit} in reality{before}",)
 
 
-def _stuck(tuned: TunedSpread) -> tuple[str, ...]:
+def _stuck(tuned: TunableDistribution) -> tuple[str, ...]:
     sides = (("lower", tuned.lower, tuned.at_lower), ("upper", tuned.upper, tuned.at_upper))
     return tuple(
         f"{tuned.name} is at its {side} bound, {bound:g}, in {100 * share:.0f} % of {_many(tuned.n, 'repetition')}"

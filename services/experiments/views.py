@@ -9,6 +9,7 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead, RepetitionRead, StudyRead
 from gaplab.services.experiments.checks import CheckSummary, summaries
 from gaplab.services.experiments.hiding import hidden
+from gaplab.services.experiments.progress import mean_best, progress_of
 from gaplab.services.store.models import ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries.experiments import experiments_of
 from gaplab.services.store.queries.progress import Tally, reasons, tallies
@@ -72,7 +73,7 @@ def _view(
             progress.get(row.id, Tally()),
             failures.get(row.id, ()),
             checks.get(row.id, CheckSummary()),
-            best=best.get(row.id),
+            best=mean_best(best[row.id]) if row.id in best else None,
             secret=row.id in secret,
         )
         for row in rows
@@ -100,7 +101,7 @@ def _experiment(
         spec=without_truth(row.spec) if secret else row.spec,
         priority=-row.precedence,
         max_parallel=row.max_parallel,
-        progress=tally.progress(),
+        progress=progress_of(tally),
         best_fitness=best,
         reasons=failures,
         sensitivity=check.id,
@@ -119,7 +120,7 @@ def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: Mappi
         edits=row.edits,
         state=state_of([experiment.state for experiment in experiments]),
         experiments=tuple(experiments),
-        progress=sum((progress.get(each.id, Tally()) for each in experiments), Tally()).progress(),
+        progress=progress_of(sum((progress.get(each.id, Tally()) for each in experiments), Tally())),
         created_at=row.created_at,
     )
 

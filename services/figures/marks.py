@@ -1,10 +1,10 @@
-"""What figures are made of. None of it knows how it is drawn.
+"""The parts of a figure, independent of how they are drawn.
 
-A value that is None is not there: it interrupts a line, and is left out among points. No number is nan or infinite.
+None stands for a missing value: it interrupts a line, and is left out among points. No number is nan or infinite.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from math import isfinite
 
 from gaplab.services.figures.style import INK, Style
@@ -17,14 +17,14 @@ PLAIN = Style(INK, "solid", "circle")
 
 @dataclass(frozen=True)
 class Line:
-    """A line through points, with a band around it if `lower` and `upper` have values.
+    """A line through points, with a band around it where `lower` and `upper` have values.
 
     Attributes:
-        name: in the legend; marks of one name are of one colour, and stand there once.
-        hover: a text for each point, for whoever points at it.
+        name: in the legend; marks of one name share one colour and one entry there.
+        hover: a text for each point, for the mouse pointer.
         markers: whether its points are marked.
-        faint: it stands behind others, as one repetition behind the mean of all.
-        steps: the value holds until the next point, rather than changing in between.
+        faint: drawn thinly behind other lines, as one repetition behind the mean.
+        steps: whether a value holds until the next point.
     """
 
     name: str
@@ -44,14 +44,15 @@ class Line:
 
 @dataclass(frozen=True)
 class Points:
-    """Points that nothing connects.
+    """Points without a line.
 
     Attributes:
-        shades: a number for each, drawn from light to dark in place of the style's colour; a bar beside the figure
-            says which is which, under `shades_label`.
-        hover: a text for each.
-        size: of their markers, as a factor.
-        hollow: only their outlines are drawn.
+        shades: a number for each point, drawn from light to dark instead of the style's colour; a bar beside the
+            figure explains them.
+        shades_label: of that bar.
+        hover: a text for each point.
+        size: of the markers, as a factor.
+        hollow: draw outlines only.
     """
 
     name: str
@@ -70,10 +71,10 @@ class Points:
 
 @dataclass(frozen=True)
 class Level:
-    """A value to compare with, drawn across the whole panel, with a band if it has ends.
+    """A reference value, drawn across the whole panel, with a band between `lower` and `upper`.
 
     Attributes:
-        upright: a value of x, not of y.
+        upright: a value of x rather than y.
     """
 
     name: str
@@ -84,7 +85,7 @@ class Level:
     upright: bool = False
 
     def __post_init__(self) -> None:
-        _check(self.name, ((self.value, self.lower, self.upper),), ())
+        _check(self.name, ((self.value, self.lower, self.upper),))
 
 
 @dataclass(frozen=True)
@@ -97,10 +98,10 @@ class Diagonal:
 
 @dataclass(frozen=True)
 class Bars:
-    """Intervals of x as thick bars at values of y, as a foot's contacts in a footfall diagram.
+    """Intervals of x, drawn as thick bars at values of y, as the contacts of feet in a footfall diagram.
 
     Attributes:
-        intervals: `(begin, end, y)` of each.
+        intervals: `(begin, end, y)` of each bar.
         thickness: in units of y.
     """
 
@@ -110,24 +111,24 @@ class Bars:
     thickness: float = 0.8
 
     def __post_init__(self) -> None:
-        _check(self.name, self.intervals, ())
+        _check(self.name, self.intervals)
 
 
 @dataclass(frozen=True)
 class Arrow:
-    """From one point to another."""
+    """An arrow from one point to another."""
 
     start: tuple[float, float]
     end: tuple[float, float]
     style: Style = PLAIN
 
     def __post_init__(self) -> None:
-        _check("arrow", (self.start, self.end), ())
+        _check("arrow", (self.start, self.end))
 
 
 @dataclass(frozen=True)
 class Label:
-    """A text at a point, above it or beside it."""
+    """A text above a point, or beside it."""
 
     text: str
     x: float
@@ -135,7 +136,7 @@ class Label:
     beside: bool = False
 
     def __post_init__(self) -> None:
-        _check(self.text, ((self.x, self.y),), ())
+        _check(self.text, ((self.x, self.y),))
 
 
 Mark = Line | Points | Level | Diagonal | Bars | Arrow | Label
@@ -146,11 +147,11 @@ class Axis:
     """One axis of a panel.
 
     Attributes:
-        label: with the unit; nothing if empty.
-        limits: the ends of what is shown.
-        whole: only whole numbers have ticks.
-        log: logarithmic; its limits are above 0.
-        ticks: values that are written as these texts, in place of numbers.
+        label: with the unit; empty for none.
+        limits: the ends of the axis, ascending.
+        whole: put ticks at whole numbers only.
+        log: logarithmic; the limits are above 0.
+        ticks: values and the texts that replace their numbers.
     """
 
     label: str
@@ -160,10 +161,9 @@ class Axis:
     ticks: tuple[tuple[float, str], ...] = ()
 
     def __post_init__(self) -> None:
-        _check(self.label, (self.limits,), ())
+        _check(self.label, (self.limits,))
         if not self.limits[0] < self.limits[1] or (self.log and self.limits[0] <= 0):
-            msg = f"the limits of an axis go up, and those of a logarithmic one from above 0, not {self.limits}"
-            raise ValueError(msg)
+            raise ValueError(f"the limits of an axis must ascend, from above 0 if it is logarithmic, not {self.limits}")
 
 
 @dataclass(frozen=True)
@@ -171,8 +171,8 @@ class Panel:
     """Marks between two axes.
 
     Attributes:
-        height: in units of the height of the figure's other panels.
-        square: it is as high as it is wide.
+        height: as a factor of the usual height.
+        square: as high as wide.
     """
 
     marks: tuple[Mark, ...]
@@ -185,25 +185,25 @@ class Panel:
 
 @dataclass(frozen=True)
 class Table:
-    """The figure's numbers in words: for a screen reader, and for whoever wants to copy one."""
+    """The numbers of a figure as text, for screen readers and for copying."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True)
-class Figure:
-    """Everything that is drawn, in words and numbers.
+class FigureDefinition:
+    """The content of a figure, in words and numbers.
 
     Attributes:
-        name: of its kind, for files.
-        title: above it; nothing if empty.
+        name: of its kind, for file names.
+        title: above it; empty for none.
         panels: row by row.
         columns: panels in a row.
-        share_x: panels of a column have one horizontal axis, which is labelled beneath the last.
-        caption: how many repetitions there are, what the bands are, and whatever else a caption must say.
-        alt: what it shows, in a sentence or two, for a screen reader.
-        nothing: what is said in place of marks as long as there are none.
+        share_x: panels of a column share one horizontal axis, which is labelled beneath the last.
+        caption: says at least how many repetitions there are and what the bands are.
+        alt: a description in a sentence or two, for screen readers.
+        nothing: the text in place of marks as long as there are none.
     """
 
     name: str
@@ -214,12 +214,34 @@ class Figure:
     columns: int = 1
     share_x: bool = False
     table: Table | None = None
-    nothing: str = field(default="no results yet")
+    nothing: str = "no results yet"
 
     @property
     def empty(self) -> bool:
         """Whether there is nothing to draw yet."""
-        return not any(_has_data(mark) for panel in self.panels for mark in panel.marks)
+        return not any(_has_data(mark) for mark in self.marks)
+
+    @property
+    def marks(self) -> tuple[Mark, ...]:
+        """The marks of all panels."""
+        return tuple(mark for panel in self.panels for mark in panel.marks)
+
+    @property
+    def shaded(self) -> list[Points]:
+        """The points that are drawn in shades."""
+        return [mark for mark in self.marks if isinstance(mark, Points) and mark.shades]
+
+    @property
+    def row_heights(self) -> list[float]:
+        """The height of each row of panels, as a factor: that of its highest panel."""
+        starts = range(0, len(self.panels), self.columns)
+        return [max(panel.height for panel in self.panels[start : start + self.columns]) for start in starts]
+
+
+def faint_lines(name: str, x: Sequence[Number], rows: Sequence[Sequence[Number]], style: Style) -> Line:
+    """Return a faint line through each row of y as a single mark, with gaps between the rows."""
+    y = tuple(value for row in rows for value in (*row, None))
+    return Line(name, (*x, None) * len(rows), y, style, faint=True)
 
 
 def _has_data(mark: Mark) -> bool:
@@ -228,21 +250,15 @@ def _has_data(mark: Mark) -> bool:
     return isinstance(mark, Level | Arrow) or (isinstance(mark, Bars) and bool(mark.intervals))
 
 
-def _check(name: str, full: Sequence[Sequence[Number]], optional: Sequence[Sequence[object]]) -> None:
-    """Refuse numbers that JSON does not have, and parts of different lengths.
+def _check(name: str, parts: Sequence[Sequence[Number]], optional: Sequence[Sequence[object]] = ()) -> None:
+    """Refuse numbers that JSON does not have, and parts of different lengths; optional parts may be empty.
 
     Raises:
-        ValueError: one of them.
+        ValueError: the message has the name and the value or the lengths.
     """
-    lengths = {len(each) for each in (*full, *filter(None, optional))}
+    lengths = {len(part) for part in (*parts, *filter(None, optional))}
     if len(lengths) > 1:
-        msg = f"the parts of {name!r} have {sorted(lengths)} values, and should have equally many"
-        raise ValueError(msg)
-    wrong = [each for each in _numbers((*full, *optional)) if not isfinite(each)]
-    if wrong:
-        msg = f"{name!r} has the value {wrong[0]}; what is not there is None"
-        raise ValueError(msg)
-
-
-def _numbers(parts: Iterable[Sequence[object]]) -> Iterator[float]:
-    return (each for part in parts for each in part if isinstance(each, int | float))
+        raise ValueError(f"the parts of {name!r} have {sorted(lengths)} values; they must have equally many")
+    for value in (each for part in (*parts, *optional) for each in part if isinstance(each, int | float)):
+        if not isfinite(value):
+            raise ValueError(f"{name!r} has the value {value}; a missing value must be None")

@@ -131,8 +131,7 @@ class RolloutProcess:
             late = isinstance(error, TimeoutError)
             what = f"took more than {self._longest_s:g} s in" if late else "ended"
             log.warning("%s %s the process for rollouts; the next call starts another", function.__name__, what)
-            msg = f"the physics {what} its process; nothing else was harmed"
-            raise EngineInterrupted(msg) from error
+            raise EngineInterrupted(f"the physics {what} its process; nothing else was harmed") from error
         if succeeded:
             return answer  # type: ignore[no-any-return]
         kind, text = answer

@@ -62,15 +62,13 @@ def _refuse_impossible(row: ExperimentRow, spec: ExperimentSpec, choice: ReplayC
 def _refuse_outside(what: str, number: int, first: int, end: int) -> None:
     if not first <= number < end:
         permitted = f"from {first} to {end - 1}" if end > first else "none"
-        msg = f"the experiment has no {what} {number}; permitted: {permitted}"
-        raise NotFound(msg)
+        raise NotFound(f"the experiment has no {what} {number}; permitted: {permitted}")
 
 
 def _request(session: Session, row: ExperimentRow, spec: ExperimentSpec, choice: ReplayChoice) -> ReplayRequest:
     found = replays.measured_controller(session, row.id, choice.repetition, choice.iteration, _MEASURED_AS[choice.kind])
     if found is None:
-        msg = f"the {_name(choice)} has not been measured in reality yet; try again later"
-        raise Conflict(msg)
+        raise Conflict(f"the {_name(choice)} has not been measured in reality yet; try again later")
     own = choice.iteration - (choice.kind is ControllerKind.SAMPLE)
     simulator = None if is_direct(spec) else own if choice.simulator is None else choice.simulator
     return ReplayRequest(

@@ -1,1 +1,1 @@
-"""What stored results show: curves, misfit, tuned simulators, costs."""
+"""Results, computed from stored rows: curves and their costs, misfit, tuned simulators, the toy function, totals."""

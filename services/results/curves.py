@@ -1,4 +1,4 @@
-"""Curves and comparisons, read from the store; the mathematics is the core's."""
+"""Curves and comparisons of stored experiments, computed by the core."""
 
 import csv
 import io
@@ -20,44 +20,43 @@ COLUMNS = ("experiment", "name", "strategy", "repetition", "evaluations", "fitne
 
 
 def curve(store: Store, experiment_id: str) -> Curve:
-    """The curve of one experiment, as far as it has got.
+    """Return the curve of an experiment so far.
 
     Raises:
-        NotFound: no such experiment.
+        NotFound: the experiment does not exist.
     """
     return curves(store, [experiment_id])[0]
 
 
 def curves(store: Store, experiment_ids: Sequence[str]) -> tuple[Curve, ...]:
-    """The curves of these experiments, in their order.
+    """Return the curves of experiments, in their order.
 
     Raises:
-        NotFound: no such experiment as one of them.
+        NotFound: an experiment does not exist.
     """
     with store.reading() as session:
         return curves_of(session, experiment_ids)
 
 
 def curves_of(session: Session, experiment_ids: Sequence[str]) -> tuple[Curve, ...]:
-    """The same, of the moment that the session reads.
+    """Return the curves of experiments, as `curves` does, in the snapshot of a session.
 
     Raises:
-        NotFound: no such experiment as one of them.
+        NotFound: an experiment does not exist.
     """
     rows, values = _recorded(session, experiment_ids)
     return tuple(_curve(row, values[row.id]) for row in rows)
 
 
 def study_curves(store: Store, study_id: str) -> tuple[Curve, ...]:
-    """The curves of a study's experiments, in its order.
+    """Return the curves of a study's experiments, in its order.
 
     Raises:
-        NotFound: no such study.
+        NotFound: the study does not exist.
     """
     with store.reading() as session:
         experiments.get_study(session, study_id)
-        ids = [row.id for row in experiments.experiments_of(session, [study_id])]
-    return curves(store, ids)
+        return curves_of(session, [row.id for row in experiments.experiments_of(session, [study_id])])
 
 
 def compare(
@@ -67,19 +66,19 @@ def compare(
     from_evaluations: int | None = None,
     to_evaluations: int | None = None,
 ) -> tuple[Comparison, ...]:
-    """Every pair of these experiments, on the recorded fitness at a range of counts of real-world evaluations, pooled.
+    """Compare every pair of experiments on their recorded fitness, pooled over a range of real-world evaluations.
 
-    The direct baseline's one value counts at any range.
+    The only value of the direct baseline belongs to any range.
 
     Args:
-        store: that has them.
+        store: has the experiments.
         experiment_ids: two or more, each once.
-        from_evaluations: the first count; left out: 1.
-        to_evaluations: the last count; left out: the last that any of them has.
+        from_evaluations: the first number of evaluations; by default 1.
+        to_evaluations: the last number of evaluations; by default the last that an experiment has.
 
     Raises:
-        NotFound: no such experiment as one of them.
-        InvalidSpec: fewer than two experiments, one twice, or a range that is empty or negative.
+        NotFound: an experiment does not exist.
+        InvalidSpec: fewer than two experiments, an experiment twice, or a range that is empty or negative.
     """
     if len(set(experiment_ids)) < max(2, len(experiment_ids)):
         message = f"a comparison needs two or more experiments, each once, not {len(experiment_ids)}"
@@ -90,14 +89,14 @@ def compare(
     first = 1 if from_evaluations is None else from_evaluations
     final = last if to_evaluations is None else to_evaluations
     if not 0 <= first <= final:
-        message = f"the range of real-world evaluations goes up from 0 or more, not from {first} to {final}"
+        message = f"the range of real-world evaluations must ascend from 0 or more, not from {first} to {final}"
         raise InvalidSpec([Violation("from_evaluations", first, message, f"0 to {final}")])
-    direct = frozenset(row.id for row in rows if _is_direct(row))
+    direct = frozenset(row.id for row in rows if is_direct(spec_of(row.spec)))
     return compare_all(values, direct, first, final)
 
 
 def curves_csv(curves: Sequence[Curve]) -> str:
-    """The values of the curves as CSV: one line for each repetition at each number of real-world evaluations."""
+    """Return the values of curves as CSV: a line for each repetition at each number of real-world evaluations."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -112,7 +111,7 @@ def curves_csv(curves: Sequence[Curve]) -> str:
 
 
 def _recorded(session: Session, ids: Sequence[str]) -> tuple[tuple[ExperimentRow, ...], dict[str, FloatArray]]:
-    """The experiments, and the recorded fitness of each: `(repetitions, iterations + 1)`, nan where it is not there."""
+    """Return the experiments, and the recorded fitness of each: `(repetitions, iterations + 1)`, nan if missing."""
     rows = experiments.get_experiments(session, ids)
     found = results.recorded(session, ids)
     values = {row.id: np.full((row.spec["repetitions"], row.iterations), np.nan) for row in rows}
@@ -132,7 +131,3 @@ def _curve(row: ExperimentRow, values: FloatArray) -> Curve:
         direct=is_direct(spec),
         points=curve_points(values),
     )
-
-
-def _is_direct(row: ExperimentRow) -> bool:
-    return is_direct(spec_of(row.spec))

@@ -1,4 +1,4 @@
-"""The misfit of an experiment, computed from its stored simulators and measurements."""
+"""The misfit of an experiment, from its stored simulators and measurements."""
 
 from collections import defaultdict
 from math import inf, nan
@@ -9,23 +9,23 @@ from gaplab.services.core.misfit import Tuning, misfit_point, remarks
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import is_direct, spec_of, unit
 from gaplab.services.store.queries import experiments, results
-from gaplab.services.store.queries.results import Best
+from gaplab.services.store.queries.results import BestSimulator
 from gaplab.services.store.session import Store
 
 
 def misfit(store: Store, experiment_id: str) -> MisfitRead:
-    """The misfit by iteration, as far as the experiment has got.
+    """Return the misfit of each iteration so far.
 
     Raises:
-        NotFound: no such experiment.
+        NotFound: the experiment does not exist.
     """
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
-        found = results.best_simulators(session, experiment_id)
-        measured = results.measured(session, experiment_id)
+        simulators = results.best_simulators(session, experiment_id)
+        measured = results.measured_iterations(session, experiment_id)
     spec = spec_of(row.spec)
     tunings: dict[int, list[Tuning]] = defaultdict(list)
-    for best in found:
+    for best in simulators:
         earlier = sum(iteration <= best.iteration for iteration in measured.get(best.repetition, ()))
         tunings[best.iteration].append(_tuning(best, earlier))
     names = [each.name for each in spec.tunables]
@@ -37,7 +37,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     return MisfitRead(experiment=row.id, unit=unit(spec), points=points, remarks=remarks(points, unit(spec)))
 
 
-def _tuning(best: Best, samples: int) -> Tuning:
+def _tuning(best: BestSimulator, samples: int) -> Tuning:
     return Tuning(
         parameters=frozen(best.parameters),
         squared_error=inf if best.squared_error is None else best.squared_error,

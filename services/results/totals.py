@@ -1,4 +1,4 @@
-"""What the whole database holds, in one short transaction."""
+"""Totals over the whole database."""
 
 from gaplab.services.store.queries import totals
 from gaplab.services.store.queries.totals import Totals as Totals
@@ -6,7 +6,7 @@ from gaplab.services.store.session import Store
 
 
 def read(store: Store) -> Totals:
-    """All experiments taken together, and who computes them; from tallies, so that it costs one sum.
+    """Return totals over all experiments, and the ages of supervisors; a short query, since tallies are stored.
 
     Raises:
         StoreUnavailable: the database cannot be used now.

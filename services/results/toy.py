@@ -1,4 +1,4 @@
-"""The toy of the paper's Fig. 3, iteration by iteration, from what is stored of an experiment."""
+"""The toy function of the paper's Fig. 3: iterations of a stored repetition, with their functions."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 
 from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.schemas.toys import Toy, ToySample, ToyTransfer, Values
+from gaplab.schemas.toy import ToyIteration, ToySample, ToyTransfer, Values
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
 from gaplab.services.core.robots import robots
@@ -21,13 +21,13 @@ from gaplab.services.store.queries.replays import MeasuredController
 from gaplab.services.store.session import Session, Store
 
 GENES = 201
-MOST = 100_000
-"""Rows of a repetition: more than the limits of a service let an experiment have."""
+MOST_ROWS = 100_000
+"""Rows of a repetition that are read: more than a service permits."""
 
 
 @dataclass(frozen=True)
 class _Stored:
-    """What is stored of one repetition; `transferred` is of the iterations that are wanted."""
+    """The stored part of a repetition; `transferred` has the requested iterations."""
 
     row: ExperimentRow
     spec: ExperimentSpec
@@ -38,14 +38,17 @@ class _Stored:
     transferred: dict[int, MeasuredController | None]
 
 
-def toys(store: Store, experiment_id: str, repetition: int, iterations: Sequence[int]) -> tuple[Toy, ...]:
-    """These iterations of a repetition; of none, the last that has simulators. What is not computed yet is left out.
+def toy_iterations(
+    store: Store, experiment_id: str, repetition: int, iterations: Sequence[int]
+) -> tuple[ToyIteration, ...]:
+    """Return iterations of a repetition; by default the last that has simulators.
 
-    Its functions are closed forms, computed here and now. The true one is shown when reality's parameters may be.
+    The functions are closed forms, which are computed here. The true function is included if the parameters of reality
+    may be shown.
 
     Raises:
-        NotFound: no such experiment, or it will never have such a repetition or iteration.
-        InvalidSpec: a robot that has a body, or more genes than one; or what it is simulated with has gone from here.
+        NotFound: the experiment does not exist, or will never have this repetition or iteration.
+        InvalidSpec: the robot has a body or several genes, or a plug-in of the experiment is no longer installed.
     """
     with store.reading() as session:
         found = _stored(session, experiment_id, repetition, iterations)
@@ -60,13 +63,13 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
     spec = spec_of(row.spec)
     robot = robots.create(spec.robot)
     if not robot.is_function:
-        message = f"the robot {spec.robot.name!r} is no function of one gene, so there is no curve to be drawn"
+        message = f"the robot {spec.robot.name!r} is not a function of one gene, so there is no curve to draw"
         raise InvalidSpec([Violation("experiment", row.id, message, "an experiment with the robot 'toy_function'")])
     _refuse_outside("repetition", [repetition], row.spec["repetitions"])
     _refuse_outside("iteration", iterations, row.iterations)
-    measured = results.page_of_samples(session, row.id, repetition=repetition, kind=None, limit=MOST, cursor=None)
+    measured = results.page_of_samples(session, row.id, repetition=repetition, kind=None, limit=MOST_ROWS, cursor=None)
     simulators = results.page_of_simulators(
-        session, row, repetition=repetition, iteration=None, limit=MOST, cursor=None
+        session, row, repetition=repetition, iteration=None, limit=MOST_ROWS, cursor=None
     )
     simulators = () if is_direct(spec) else simulators
     wanted = iterations or [max((each.iteration for each in simulators), default=0)]
@@ -87,8 +90,7 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
 def _refuse_outside(what: str, numbers: Iterable[int], end: int) -> None:
     for number in numbers:
         if not 0 <= number < end:
-            msg = f"the experiment has no {what} {number}; there is 0 to {end - 1}"
-            raise NotFound(msg)
+            raise NotFound(f"the experiment has no {what} {number}; permitted: from 0 to {end - 1}")
 
 
 def _truth(found: _Stored, genes: FloatArray) -> FloatArray | None:
@@ -99,7 +101,7 @@ def _truth(found: _Stored, genes: FloatArray) -> FloatArray | None:
 
 
 def _approximations(found: _Stored, simulators: Sequence[SimulatorRead], genes: FloatArray) -> FloatArray:
-    """`(simulators, genes)`: the fitness of each gene in each of them."""
+    """Return the fitness of each gene in each simulator, `(simulators, genes)`."""
     if not simulators:
         return np.empty((0, len(genes)))
     edits = edits_of(ref.name for ref in found.spec.tunables)
@@ -108,7 +110,7 @@ def _approximations(found: _Stored, simulators: Sequence[SimulatorRead], genes: 
 
 
 def _limits(found: _Stored, truth: FloatArray | None, genes: FloatArray) -> tuple[float, float]:
-    """Room for the truth, for the best simulator of each iteration, and for all that was measured."""
+    """Return the range of the truth, the best simulator of each iteration, and all measurements."""
     best = _approximations(found, [each for each in found.simulators if each.rank == 0], genes)
     values = [*best.ravel().tolist(), *([] if truth is None else truth.tolist())]
     values += [each.fitness for each in found.measured if each.fitness is not None]
@@ -123,10 +125,11 @@ def _toy(
     genes: FloatArray,
     truth: FloatArray | None,
     limits: tuple[float, float],
-) -> Toy:
+) -> ToyIteration:
     simulators = [each for each in found.simulators if each.iteration == iteration]
+    transfer = found.transferred[iteration]
     samples = [each for each in found.measured if each.kind is MeasurementKind.SAMPLE and each.iteration <= iteration]
-    return Toy(
+    return ToyIteration(
         experiment=found.row.id,
         name=found.row.name,
         repetition=repetition,
@@ -139,15 +142,9 @@ def _toy(
         samples=tuple(
             ToySample(iteration=each.iteration, gene=each.genome[0], fitness=each.fitness) for each in samples
         ),
-        transfer=_transfer(found.transferred[iteration]),
+        transfer=transfer and ToyTransfer(gene=transfer.genome[0], simulated=transfer.simulated, real=transfer.real),
         limits=limits,
     )
-
-
-def _transfer(controlled: MeasuredController | None) -> ToyTransfer | None:
-    if controlled is None:
-        return None
-    return ToyTransfer(gene=controlled.genome[0], simulated=controlled.simulated, real=controlled.real)
 
 
 def _values(function: FloatArray) -> Values:

@@ -20,6 +20,7 @@ from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export_experiment, export_study, import_archive, opening, unpacking
+from gaplab.services.archives.columns import EXPORTED
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
@@ -27,7 +28,6 @@ from gaplab.services.experiments import extension, submission
 from gaplab.services.results import curves
 from gaplab.services.results.misfit import misfit
 from gaplab.services.running import execution
-from gaplab.services.store.archive_columns import EXPORTED
 from gaplab.services.store.models import Base, ExperimentRow, RepetitionRow, SimulatorRow
 from gaplab.services.store.queries import archives as repository
 from gaplab.services.store.queries.attempts import attempts_of
@@ -154,14 +154,14 @@ def test_a_zero_has_no_sign_in_either_database(store, other, unpacked_here):
 
 
 def test_an_archive_may_arrive_twice_at_once(store, other, unpacked_here, monkeypatch):
-    archive, free = exported(export_experiment(store, finished(store))), repository.free
+    archive, taken_ids = exported(export_experiment(store, finished(store))), repository.taken_ids
 
     def slowly(*arguments):
-        found = free(*arguments)
+        found = taken_ids(*arguments)
         time.sleep(0.2)
         return found
 
-    monkeypatch.setattr(repository, "free", slowly)
+    monkeypatch.setattr(repository, "taken_ids", slowly)
     with ThreadPoolExecutor(2) as pool:
         both = list(pool.map(lambda _: import_archive(other, BytesIO(archive)), range(2)))
 

@@ -121,5 +121,5 @@ def test_the_command_says_what_is_wrong_with_an_archive(gaplab: Gaplab, tmp_path
     said = gaplab("import", str(tmp_path / "bad.zip"))
 
     assert said.code == 5
-    assert "no zip that can be read" in said.err
+    assert "not a readable zip" in said.err
     assert gaplab("import", str(tmp_path / "none.zip")).code == 7

@@ -7,25 +7,25 @@ import pytest
 
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred
-from gaplab.services.core.types import Tuned as TunedStep
+from gaplab.services.core.types import SimulatorPoint as TunedStep
 from gaplab.services.experiments import submission
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.predictions import AFTER, BEFORE, predictions_figure
 from gaplab.services.figures.kinds.simulators import MOST, REALITY, simulators_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
-from gaplab.services.figures.marks import Diagonal, Figure, Level, Line, Mark, Points
+from gaplab.services.figures.marks import Diagonal, FigureDefinition, Level, Line, Mark, Points
 from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.figures.plotly.chart import chart
 from gaplab.services.results import curves
-from gaplab.services.results.curve_costs import abscissa
-from gaplab.services.results.tuned_simulators import tunings
+from gaplab.services.results.curve_costs import cost_axis
+from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.experiments import run, toy
 from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, curve, point, prediction, tuned
 
 
-def marks(figure: Figure, panel: int = 0) -> dict[str, Mark]:
+def marks(figure: FigureDefinition, panel: int = 0) -> dict[str, Mark]:
     return {mark.name: mark for mark in figure.panels[panel].marks}
 
 
@@ -100,7 +100,7 @@ def test_predictions_are_drawn_before_and_after_with_the_line_of_agreement():
     assert "Before tuning on it: root-mean-square error 0.5 m/s." in told
     assert "After tuning on it: root-mean-square error 0.1 m/s." in told
     assert "2 samples left out: a measurement or the physics failed." in told
-    assert "3 samples of later repetitions left out: they are too many." in told
+    assert "3 samples of later repetitions left out: there are too many." in told
     assert "2 samples still being computed." in told
 
 
@@ -120,7 +120,7 @@ def test_squared_errors_have_their_median_and_quartiles_and_failures_are_counted
     assert not figure.panels[0].y.log
     told = figure.caption.replace("\N{NO-BREAK SPACE}", " ")
     assert "Median over 1\N{EN DASH}3 repetitions" in told
-    assert "1 value left out, for the physics failed." in told
+    assert "1 value left out, since the physics failed." in told
 
 
 def test_squared_errors_of_many_magnitudes_are_on_a_logarithmic_axis_without_zeros():
@@ -226,7 +226,7 @@ def experiment(store: Store) -> str:
 def test_rollouts_are_counted_from_the_start_over_those_that_got_there(store: Store, experiment: str):
     found_curves = curves.curves(store, [experiment])
 
-    found = abscissa(store, found_curves, "rollouts")
+    found = cost_axis(store, found_curves, "rollouts")
 
     assert found.label == "Rollouts in simulation"
     assert [found.at[experiment, at] for at in range(3)] == [30, 75, 120]
@@ -239,7 +239,7 @@ def test_the_baseline_which_is_drawn_across_has_no_say_in_the_units_of_the_axis(
     steps = TunedStep(0, ()), Transferred(0, genome, 1.0, Cost(10_000_000)), Probed(0, 1.0, 1.0)
     run(store, claim, iter(steps))
 
-    found = abscissa(store, curves.curves(store, [experiment, direct]), "rollouts")
+    found = cost_axis(store, curves.curves(store, [experiment, direct]), "rollouts")
 
     assert found.label == "Rollouts in simulation"
 
@@ -247,20 +247,20 @@ def test_the_baseline_which_is_drawn_across_has_no_say_in_the_units_of_the_axis(
 def test_time_is_that_of_evaluations_and_of_simulation_as_measured(store: Store, experiment: str):
     found_curves = curves.curves(store, [experiment])
 
-    simulated, both = (abscissa(store, found_curves, "time", cost_s=each) for each in (0, 3600))
+    simulated, both = (cost_axis(store, found_curves, "time", cost_s=each) for each in (0, 3600))
 
     steps = [3, 8, 13]  # of half a second each
     assert simulated.label == "Time (s)"
     assert [simulated.at[experiment, at] for at in range(3)] == pytest.approx([each / 2 for each in steps])
     assert both.label == "Time (min)"
     assert both.at[experiment, 2] == pytest.approx(120 + 6.5 / 60)
-    assert "at 3600\N{NO-BREAK SPACE}s each and simulation as it was measured" in both.note
+    assert "at 3600\N{NO-BREAK SPACE}s each and simulation as measured" in both.note
 
 
 def test_reality_is_among_the_simulators_only_once_all_of_its_study_have_ended(store: Store, experiment: str):
-    running = tunings(store, experiment)
+    running = tuned_simulators(store, experiment)
     submission.cancel_experiment(store, experiment)
-    ended = tunings(store, experiment)
+    ended = tuned_simulators(store, experiment)
 
     assert running.truth is None
     assert set(ended.truth or {}) == {"static_friction", "dynamic_friction"}

@@ -14,7 +14,7 @@ from matplotlib import rc_context
 from plotly.graph_objects import Figure as Chart
 
 from gaplab.services.figures.kinds.curves import curves_figure
-from gaplab.services.figures.marks import Figure
+from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.matplotlib.files import COLUMN_IN, DPI, LOOK, FileFormat, render_file
 from gaplab.services.figures.matplotlib.text_size import lines, shortened, width_in
 from gaplab.services.figures.plotly.chart import chart
@@ -27,16 +27,16 @@ SVG = "{http://www.w3.org/2000/svg}"
 EVERY = pytest.mark.parametrize("figure", FIGURES, ids=range(len(FIGURES)))
 
 
-def render_svg(figure: Figure) -> str:
+def render_svg(figure: FigureDefinition) -> str:
     return render_file(figure, "svg").decode()
 
 
-def pixels(figure: Figure, **how: object) -> np.ndarray:
+def pixels(figure: FigureDefinition, **how: object) -> np.ndarray:
     return matplotlib.image.imread(BytesIO(render_file(figure, "png", **how)))
 
 
 @EVERY
-def test_plotly_takes_the_chart_and_json_has_all_its_numbers(figure: Figure):
+def test_plotly_takes_the_chart_and_json_has_all_its_numbers(figure: FigureDefinition):
     drawn = json.loads(json.dumps(chart(figure), allow_nan=False))
 
     assert len(Chart(drawn).data) == len(drawn["data"])
@@ -45,7 +45,7 @@ def test_plotly_takes_the_chart_and_json_has_all_its_numbers(figure: Figure):
 
 
 @EVERY
-def test_every_mark_leaves_ink_on_paper(figure: Figure):
+def test_every_mark_leaves_ink_on_paper(figure: FigureDefinition):
     picture = pixels(figure)
 
     assert picture.shape[1] == pytest.approx(COLUMN_IN * DPI, abs=1)
@@ -55,7 +55,7 @@ def test_every_mark_leaves_ink_on_paper(figure: Figure):
 
 
 @EVERY
-def test_drawings_are_whole_documents_with_letters_that_publishers_take(figure: Figure):
+def test_drawings_are_whole_documents_with_letters_that_publishers_take(figure: FigureDefinition):
     drawing, document = render_svg(figure), render_file(figure, "pdf")
 
     assert ET.fromstring(drawing).tag == f"{SVG}svg"
@@ -68,12 +68,12 @@ def test_drawings_are_whole_documents_with_letters_that_publishers_take(figure: 
 
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
 @pytest.mark.parametrize("figure", [FIGURES[0], EVERYTHING, FIGURES[8]], ids=lambda each: each.name)
-def test_the_same_figure_is_the_same_bytes(figure: Figure, kind: FileFormat):
+def test_the_same_figure_is_the_same_bytes(figure: FigureDefinition, kind: FileFormat):
     assert render_file(figure, kind) == render_file(figure, kind)
 
 
 @EVERY
-def test_the_page_is_the_same_each_time_and_says_everything_in_words(figure: Figure):
+def test_the_page_is_the_same_each_time_and_says_everything_in_words(figure: FigureDefinition):
     page = render_html(figure)
 
     assert page == render_html(figure)

@@ -3,18 +3,18 @@
 import pytest
 
 from gaplab.schemas.curves import CurvePoint
-from gaplab.services.figures.kinds.curves import Abscissa, curves_figure
-from gaplab.services.figures.marks import Arrow, Axis, Bars, Figure, Label, Level, Line, Points
+from gaplab.services.figures.kinds.curves import CostAxis, curves_figure
+from gaplab.services.figures.marks import Arrow, Axis, Bars, FigureDefinition, Label, Level, Line, Points
 from gaplab.services.figures.style import COLORS, style_of
 from gaplab.services.figures.words import limits, power
 from tests.figures import DIRECT, RISING, curve, point
 
 
-def lines(figure: Figure) -> list[Line]:
+def lines(figure: FigureDefinition) -> list[Line]:
     return [mark for mark in figure.panels[0].marks if isinstance(mark, Line)]
 
 
-def levels(figure: Figure) -> list[Level]:
+def levels(figure: FigureDefinition) -> list[Level]:
     return [mark for mark in figure.panels[0].marks if isinstance(mark, Level)]
 
 
@@ -80,7 +80,7 @@ def test_each_repetition_has_a_thin_line_behind_the_mean_if_asked_for():
 
 
 def test_curves_are_drawn_against_what_they_cost_where_that_is_known():
-    cost = Abscissa("Time (h)", "Time: of everything.", {(RISING.experiment, 0): 2.5, (RISING.experiment, 2): 7.0})
+    cost = CostAxis("Time (h)", "Time: of everything.", {(RISING.experiment, 0): 2.5, (RISING.experiment, 2): 7.0})
     figure = curves_figure([RISING, DIRECT], against=cost)
 
     (line,) = lines(figure)

@@ -14,7 +14,7 @@ from gaplab.services.experiments import submission
 from gaplab.services.figures.kinds.gait import gait_figure
 from gaplab.services.figures.kinds.toy import toy_figure
 from gaplab.services.figures.marks import Arrow, Bars, Line, Points
-from gaplab.services.results.toy import toys
+from gaplab.services.results.toy import toy_iterations
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from tests.experiments import toy
@@ -94,7 +94,7 @@ def test_a_gait_of_which_nothing_moved_is_empty(replay):
 def test_the_toy_has_what_the_papers_figure_has(store):
     experiment, log = walked(store)
 
-    (shown,) = toys(store, experiment, 0, [2])
+    (shown,) = toy_iterations(store, experiment, 0, [2])
 
     tuned = next(step for step in log if isinstance(step, Tuned) and step.iteration == 2)
     sent = next(step for step in log if isinstance(step, Transferred) and step.iteration == 2)
@@ -115,7 +115,7 @@ def test_the_toy_has_what_the_papers_figure_has(store):
 
 def test_the_arrow_goes_from_simulation_to_reality(sqlite_store):
     experiment, _ = walked(sqlite_store)
-    (shown,) = toys(sqlite_store, experiment, 0, [0])
+    (shown,) = toy_iterations(sqlite_store, experiment, 0, [0])
 
     figure = toy_figure([shown])
 
@@ -131,8 +131,8 @@ def test_the_arrow_goes_from_simulation_to_reality(sqlite_store):
 def test_several_iterations_are_panels_and_none_is_the_last(sqlite_store):
     experiment, _ = walked(sqlite_store)
 
-    figure = toy_figure(toys(sqlite_store, experiment, 0, [0, 1, 2, 3]))
-    (last,) = toys(sqlite_store, experiment, 0, [])
+    figure = toy_figure(toy_iterations(sqlite_store, experiment, 0, [0, 1, 2, 3]))
+    (last,) = toy_iterations(sqlite_store, experiment, 0, [])
 
     assert [panel.title for panel in figure.panels] == [f"Iteration {number}" for number in range(4)]
     assert len({panel.y.limits for panel in figure.panels}) == 1
@@ -146,7 +146,7 @@ def test_the_true_function_is_hidden_until_the_experiment_has_ended(sqlite_store
     for _ in range(8):
         execution.record(sqlite_store, claim, next(log))
 
-    (shown,) = toys(sqlite_store, running, 0, [1])
+    (shown,) = toy_iterations(sqlite_store, running, 0, [1])
     figure = toy_figure([shown])
 
     assert shown.truth is None
@@ -159,12 +159,12 @@ def test_what_is_not_there_is_refused_and_what_is_not_yet_there_is_empty(sqlite_
     waiting = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
     walking = submission.submit_experiment(sqlite_store, toy(robot="quadruped", repetitions=1)).id
 
-    assert toy_figure(toys(sqlite_store, waiting, 0, [])).empty
+    assert toy_figure(toy_iterations(sqlite_store, waiting, 0, [])).empty
     for repetition_, iterations in ((1, [0]), (0, [3])):
         with pytest.raises(NotFound, match="there is 0 to"):
-            toys(sqlite_store, waiting, repetition_, iterations)
+            toy_iterations(sqlite_store, waiting, repetition_, iterations)
     with pytest.raises(InvalidSpec, match="'quadruped' is no function of one gene"):
-        toys(sqlite_store, walking, 0, [])
+        toy_iterations(sqlite_store, walking, 0, [])
 
 
 def test_the_direct_baseline_has_no_simulators_and_its_fittest_is_in_reality(sqlite_store):
@@ -174,7 +174,7 @@ def test_the_direct_baseline_has_no_simulators_and_its_fittest_is_in_reality(sql
         execution.record(sqlite_store, claim, step)
     execution.complete(sqlite_store, claim)
 
-    (shown,) = toys(sqlite_store, experiment, 0, [])
+    (shown,) = toy_iterations(sqlite_store, experiment, 0, [])
 
     assert (shown.approximations, shown.squared_error) == ((), None)
     assert shown.transfer.real == pytest.approx(max(shown.truth), rel=1e-3)

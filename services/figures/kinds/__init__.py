@@ -1,1 +1,1 @@
-"""The figures: one module for each kind."""
+"""The kinds of figures, one module for each."""

@@ -1,13 +1,13 @@
-"""Curves: recorded fitness against what it cost, the paper's Fig. 4 for any experiments."""
+"""Curves: recorded fitness against its cost, as in the paper's Fig. 4."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from gaplab.schemas.curves import Curve, CurvePoint
-from gaplab.services.figures.marks import Axis, Figure, Level, Line, Mark, Panel, Table
+from gaplab.services.figures.marks import Axis, FigureDefinition, Level, Line, Mark, Panel, Table, faint_lines
 from gaplab.services.figures.style import INK, Style, style_of
-from gaplab.services.figures.words import counted, drawable, heading, number, told_apart, with_unit
+from gaplab.services.figures.words import distinct_names, drawable, heading, number, number_of, with_unit
 
 Band = Literal["interval", "sd"]
 
@@ -18,17 +18,17 @@ BANDS: dict[Band, str] = {
 
 EVALUATIONS = "Number of real-world evaluations"
 
-FEW = 5  # repetitions; Student's t widens the interval of fewer to 1.6 SD and more, of two to 9 SD
+FEW = 5  # with fewer repetitions, Student's t widens the interval to 1.6 SD and more, with two to 9 SD
 
 
 @dataclass(frozen=True)
-class Abscissa:
-    """What a curve is drawn against, in place of the number of real-world evaluations.
+class CostAxis:
+    """A horizontal axis other than the number of real-world evaluations.
 
     Attributes:
         label: of the axis.
-        note: what it is, for the caption.
-        at: by experiment and number of real-world evaluations; what is not there is not drawn.
+        note: its explanation in the caption.
+        at: x by experiment and number of real-world evaluations; points without an x are not drawn.
     """
 
     label: str
@@ -38,7 +38,7 @@ class Abscissa:
 
 @dataclass(frozen=True)
 class _Placed:
-    """A curve with its name in the legend, and the points that have a mean and a place: the mean and its x."""
+    """A curve with its name in the legend, and its points that can be drawn, as `(x, mean, point)`."""
 
     name: str
     curve: Curve
@@ -50,25 +50,24 @@ def curves_figure(
     *,
     title: str = "",
     band: Band | None = None,
-    against: Abscissa | None = None,
+    against: CostAxis | None = None,
     each: bool = False,
-) -> Figure:
-    """The recorded fitness of experiments against their number of real-world evaluations, or what that cost.
+) -> FigureDefinition:
+    """Return a figure of the recorded fitness against the number of real-world evaluations, or their cost.
 
-    A point without a mean (no repetition got there yet), or with one too large to be reckoned with, is left out; a band
-    needs two repetitions.
+    A point without a mean, or with one too large to compute with, is left out. A band needs two repetitions.
 
     Args:
         curves: in the order of the legend.
-        title: above the figure; nothing if empty.
-        band: around the lines; left out: the interval, or the SD if there are too few repetitions for an interval to
-            be narrower than the figure. The direct baseline has always its SD, as in the paper.
-        against: the horizontal axis; left out: the number of real-world evaluations.
-        each: whether every repetition has a thin line behind the mean.
+        title: above the figure; empty for none.
+        band: around the lines; by default the interval, or the SD with so few repetitions that the interval would fill
+            the figure. The direct baseline always has its SD, as in the paper.
+        against: the horizontal axis; by default the number of real-world evaluations.
+        each: draw a thin line for every repetition.
     """
     curves = [_drawable(one) for one in curves]
-    band = band or _telling_band(curves)
-    names = told_apart([(one.name, one.experiment) for one in curves])
+    band = band or _default_band(curves)
+    names = distinct_names([(one.name, one.experiment) for one in curves])
     placed = [_placed(name, one, against) for name, one in zip(names, curves, strict=True)]
     lines = [one for one in placed if not one.curve.direct]
     levels = [one for one in placed if one.curve.direct and one.points]
@@ -78,7 +77,7 @@ def curves_figure(
     span = max([1.0, *(x for one in lines for x, _, _ in one.points)])
     x = Axis(against.label if against else EVALUATIONS, (-0.02 * span, 1.02 * span), whole=against is None)
     y = Axis(with_unit("Fitness in reality", {one.unit for one in curves}), _limits(marks))
-    return Figure(
+    return FigureDefinition(
         name="curves",
         title=heading(title),
         panels=(Panel(tuple(marks), x, y),),
@@ -89,7 +88,7 @@ def curves_figure(
 
 
 def _drawable(curve: Curve) -> Curve:
-    """The curve without what is too large to be reckoned with."""
+    """Return the curve without values too large to compute with."""
     return curve.model_copy(update={"points": tuple(map(_drawable_point, curve.points))})
 
 
@@ -98,20 +97,20 @@ def _drawable_point(point: CurvePoint) -> CurvePoint:
     return point.model_copy(update={**known, "values": tuple(map(drawable, point.values))})
 
 
-def _placed(name: str, curve: Curve, against: Abscissa | None) -> _Placed:
+def _placed(name: str, curve: Curve, against: CostAxis | None) -> _Placed:
     found = [(_place(curve, point, against), point.mean, point) for point in curve.points]
     return _Placed(
         name, curve, tuple((x, mean, point) for x, mean, point in found if x is not None and mean is not None)
     )
 
 
-def _place(curve: Curve, point: CurvePoint, against: Abscissa | None) -> float | None:
+def _place(curve: Curve, point: CurvePoint, against: CostAxis | None) -> float | None:
     if against is None or curve.direct:
         return point.evaluations
     return against.at.get((curve.experiment, point.evaluations))
 
 
-def _telling_band(curves: Sequence[Curve]) -> Band:
+def _default_band(curves: Sequence[Curve]) -> Band:
     counts = [point.n for one in curves if not one.direct for point in one.points if point.n]
     return "interval" if min(counts, default=FEW) >= FEW else "sd"
 
@@ -129,25 +128,20 @@ def _mean(one: _Placed, band: Band, style: Style) -> Line:
     )
 
 
-def _repetitions(one: _Placed, against: Abscissa | None, style: Style) -> Line:
-    """Every repetition's line as one mark, interrupted between them."""
-    places = [_place(one.curve, point, against) for point in one.curve.points]
-    repetitions = range(max(len(point.values) for point in one.curve.points))
-    x, y = [], []
-    for repetition in repetitions:
-        values = [point.values[repetition] if repetition < len(point.values) else None for point in one.curve.points]
-        x += [*places, None]
-        y += [*(value if place is not None else None for place, value in zip(places, values, strict=True)), None]
-    return Line(one.name, tuple(x), tuple(y), style, faint=True)
+def _repetitions(one: _Placed, against: CostAxis | None, style: Style) -> Line:
+    points = one.curve.points
+    places = [_place(one.curve, point, against) for point in points]
+    values = [() if place is None else point.values for place, point in zip(places, points, strict=True)]
+    rows = [
+        [each[repetition] if repetition < len(each) else None for each in values]
+        for repetition in range(max(len(point.values) for point in points))
+    ]
+    return faint_lines(one.name, places, rows, style)
 
 
 def _level(one: _Placed, position: int) -> Level:
     ((_, mean, point), *_) = one.points
     return Level(one.name, mean, Style(INK, style_of(position + 1).dash, "circle"), *_ends(point, "sd"))
-
-
-def _has_band(point: CurvePoint) -> bool:
-    return point.sd is not None
 
 
 def _ends(point: CurvePoint, band: Band) -> tuple[float | None, float | None]:
@@ -159,7 +153,7 @@ def _ends(point: CurvePoint, band: Band) -> tuple[float | None, float | None]:
 
 
 def _limits(marks: Sequence[Mark]) -> tuple[float, float]:
-    """Room for all means, and for as much of what is around them as the means themselves take."""
+    """Return limits around all means, extended for bands and single repetitions by the range of the means at most."""
     lines = [mark for mark in marks if isinstance(mark, Line)]
     levels = [mark for mark in marks if isinstance(mark, Level)]
     means = [y for mark in lines if not mark.faint for y in mark.y if y is not None] + [each.value for each in levels]
@@ -174,12 +168,12 @@ def _limits(marks: Sequence[Mark]) -> tuple[float, float]:
 
 
 def _caption(
-    lines: Sequence[_Placed], levels: Sequence[_Placed], band: str, against: Abscissa | None, *, each: bool
+    lines: Sequence[_Placed], levels: Sequence[_Placed], band: str, against: CostAxis | None, *, each: bool
 ) -> str:
-    """What a caption must say: n, the bands, the thin lines, the axis, the baseline."""
+    """Return the caption: n, the bands, the thin lines, the axis, the baseline."""
     counts = [point.n for one in lines for _, _, point in one.points]
-    bands = f"; bands: {band}" if any(_has_band(point) for one in lines for _, _, point in one.points) else ""
-    parts = [f"Mean over {counted(counts, 'repetition')}{bands}."] if counts else []
+    bands = f"; bands: {band}" if any(point.sd is not None for one in lines for _, _, point in one.points) else ""
+    parts = [f"Mean over {number_of('repetition', *counts)}{bands}."] if counts else []
     parts += ["Thin lines: single repetitions."] if counts and each else []
     parts += [against.note] if against else []
     parts += [f"{one.name}: evolved in reality itself, {_level_in_words(one)}." for one in levels]
@@ -204,7 +198,7 @@ def _table(placed: Sequence[_Placed]) -> Table:
     counts = sorted({point.evaluations for one in placed for _, _, point in one.points})
     rows = [(one.name, {point.evaluations: _written(point) for _, _, point in one.points}) for one in placed]
     return Table(
-        ("Mean ± SD (n) after so many evaluations", *map(str, counts)),
+        ("Mean ± SD (n) by number of evaluations", *map(str, counts)),
         tuple((name, *(cells.get(count, "") for count in counts)) for name, cells in rows),
     )
 

@@ -1,9 +1,9 @@
-"""The gait of a controller: which foot is on the ground when, how high the base is, and how fast it goes."""
+"""The gait of a controller: the contacts of its feet, and the height and speed of its base, over time."""
 
 from collections.abc import Sequence
 
 from gaplab.schemas.replays import Interval, Replay, ReplayWorld
-from gaplab.services.figures.marks import Axis, Bars, Figure, Level, Line, Mark, Panel, Table
+from gaplab.services.figures.marks import Axis, Bars, FigureDefinition, Level, Line, Mark, Panel, Table
 from gaplab.services.figures.style import INK, Style, style_of
 from gaplab.services.figures.words import heading, limits, number
 
@@ -12,19 +12,19 @@ COUNTED = Style(INK, "dotted", "circle")
 Named = tuple[str, ReplayWorld]
 
 
-def gait_figure(replay: Replay, *, title: str | None = None) -> Figure:
-    """Footfalls, height and speed over time, in simulation and in reality.
+def gait_figure(replay: Replay, *, title: str | None = None) -> FigureDefinition:
+    """Return a figure of footfalls, height and speed in simulation and in reality.
 
     Args:
-        replay: whose worlds moved; those whose physics failed are left out.
-        title: above the figure; left out: what it is of.
+        replay: the motion; a world whose physics failed is left out.
+        title: above the figure; by default the controller.
     """
     there = [("In simulation", replay.simulation), ("In reality", replay.reality)]
     worlds = [(name, world) for name, world in there if world is not None and world.heights_m]
     whose = "sample" if replay.kind == "sample" else "transferred controller"
     own = f"The {whose} of iteration {replay.iteration}, repetition {replay.repetition}"
     time = Axis("Time (s)", (0.0, replay.times_s[-1]))
-    return Figure(
+    return FigureDefinition(
         name="gait",
         title=heading(own if title is None else title),
         panels=(
@@ -41,7 +41,7 @@ def gait_figure(replay: Replay, *, title: str | None = None) -> Figure:
 
 
 def _footfall(replay: Replay, worlds: Sequence[Named], time: Axis) -> Panel:
-    """The first foot above, and of each foot the first world above."""
+    """Return the panel of contacts: a row for each foot from the top, with the bars of each world side by side."""
     rows = len(replay.feet)
     marks: list[Mark] = []
     for place, (name, world) in enumerate(worlds):
@@ -65,7 +65,7 @@ def _over_time(label: str, replay: Replay, series: Sequence[tuple[str, Sequence[
 
 def _counted(replay: Replay) -> tuple[Level, ...]:
     begin = replay.counted_s[0]
-    return (Level("Counted from here", begin, COUNTED, upright=True),) if 0 < begin < replay.times_s[-1] else ()
+    return (Level("Fitness counts from here", begin, COUNTED, upright=True),) if 0 < begin < replay.times_s[-1] else ()
 
 
 def _share(spans: Sequence[Interval], whole_s: float) -> float:
@@ -79,29 +79,29 @@ def _caption(replay: Replay, worlds: Sequence[Named]) -> str:
         [
             *parts,
             "Bars: the foot is less than 2 mm above the ground.",
-            "Speed: over ground, towards where the movement ends, over 0.2 s.",
+            "Speed: over ground in the direction of the whole motion, mean over 0.2 s.",
         ]
     )
 
 
 def _told(replay: Replay, worlds: Sequence[Named]) -> str:
     parts = [
-        f"{name} it reaches {number(world.fitness)} {replay.unit}, and its feet are on the ground for "
+        f"{name} its fitness is {number(world.fitness)} {replay.unit}; share of the time on the ground: "
         + ", ".join(
-            f"{100 * _share(spans, replay.times_s[-1]):.0f} % ({foot})"
+            f"{foot} {100 * _share(spans, replay.times_s[-1]):.0f} %"
             for foot, spans in zip(replay.feet, world.contacts, strict=True)
         )
-        + " of the time."
+        + "."
         for name, world in worlds
     ]
     return " ".join(parts) or "The physics failed in both worlds."
 
 
 def _table(replay: Replay, worlds: Sequence[Named]) -> Table:
-    """How long and how often each foot is down, and the means."""
+    """Return the time share and number of contacts of each foot, and means of height and speed."""
     rows = [
         (
-            f"{foot}: share on the ground, and how often",
+            f"{foot}: share of time on the ground, number of contacts",
             *(
                 f"{100 * _share(world.contacts[at], replay.times_s[-1]):.0f} %, {len(world.contacts[at])} ×"
                 for _, world in worlds

@@ -1,25 +1,14 @@
-"""What simulators said of a controller, against what reality said."""
+"""Predictions: the fitness of samples in simulation against their fitness in reality."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import dist, sqrt
 
 from gaplab.schemas.predictions import Prediction
-from gaplab.services.figures.marks import Axis, Diagonal, Figure, Panel, Points, Table
+from gaplab.services.figures.marks import Axis, Diagonal, FigureDefinition, Panel, Points, Table
 from gaplab.services.figures.style import INK, Style, style_of
-from gaplab.services.figures.words import counted, drawable, heading, limits, number, printable, with_unit
+from gaplab.services.figures.words import drawable, heading, limits, number, number_of, printable, with_unit
 
 BEFORE, AFTER = "Before tuning on it", "After tuning on it"
-
-
-@dataclass(frozen=True)
-class _Whole:
-    """A sample with its fitness in all three: in the simulators before and after tuning on it, and in reality."""
-
-    sample: Prediction
-    before: float
-    after: float
-    real: float
 
 
 Pair = tuple[float, float]
@@ -28,22 +17,26 @@ Pair = tuple[float, float]
 
 def predictions_figure(
     items: Sequence[Prediction], *, unit: str = "", pending: int = 0, left_out: int = 0, title: str = ""
-) -> Figure:
-    """The fitness of each sample in simulation against its fitness in reality, with the diagonal on which they agree.
+) -> FigureDefinition:
+    """Return a figure of the samples, with the diagonal on which simulation and reality agree.
 
-    A sample that misses one of the three, or has one too large to be reckoned with, is left out: before and after are
-    compared over the same samples.
+    A sample is left out if one of its three fitnesses is missing or too large to compute with, so that before and after
+    are compared over the same samples.
 
     Args:
         items: the samples.
         unit: of fitness.
-        pending: how many more there are, which are not computed yet.
-        left_out: how many more there are, of later repetitions, which never will be.
+        pending: samples that are not computed yet.
+        left_out: samples of later repetitions that will not be computed.
         title: above the figure.
     """
-    whole = _whole(items)
-    drawn = {BEFORE: [(each.before, each.real) for each in whole], AFTER: [(each.after, each.real) for each in whole]}
-    told = tuple(f"repetition {each.sample.repetition}, iteration {each.sample.iteration}" for each in whole)
+    told, drawn = [], {BEFORE: list[Pair](), AFTER: list[Pair]()}
+    for each in items:
+        before, after, real = map(drawable, (each.simulated_before, each.simulated_after, each.fitness))
+        if before is not None and after is not None and real is not None:
+            told.append(f"repetition {each.repetition}, iteration {each.iteration}")
+            drawn[BEFORE].append((before, real))
+            drawn[AFTER].append((after, real))
     values = [value for pairs in drawn.values() for both in pairs for value in both]
     ends = limits(values)
     marks = (
@@ -57,7 +50,7 @@ def predictions_figure(
         Axis(with_unit("Fitness in simulation", {unit}), ends),
         square=True,
     )
-    return Figure(
+    return FigureDefinition(
         name="predictions",
         title=heading(title),
         panels=(panel,),
@@ -68,18 +61,9 @@ def predictions_figure(
     )
 
 
-def _whole(items: Sequence[Prediction]) -> list[_Whole]:
-    found = []
-    for each in items:
-        before, after, real = map(drawable, (each.simulated_before, each.simulated_after, each.fitness))
-        if before is not None and after is not None and real is not None:
-            found.append(_Whole(each, before, after, real))
-    return found
-
-
-def _points(name: str, pairs: Sequence[Pair], told: tuple[str, ...], style: Style, *, hollow: bool) -> Points:
+def _points(name: str, pairs: Sequence[Pair], told: Sequence[str], style: Style, *, hollow: bool) -> Points:
     simulated, real = tuple(each for each, _ in pairs), tuple(each for _, each in pairs)
-    return Points(name, real, simulated, style, hover=told, hollow=hollow)
+    return Points(name, real, simulated, style, hover=tuple(told), hollow=hollow)
 
 
 def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], unit: str, pending: int, left_out: int) -> str:
@@ -87,28 +71,28 @@ def _caption(items: Sequence[Prediction], drawn: dict[str, list[Pair]], unit: st
         return ""
     repetitions = len({each.repetition for each in items})
     parts = [
-        f"{counted([len(items)], 'sample')} of {counted([repetitions], 'repetition')}, each in the simulator that was "
-        "the best before it was measured, and in the best that was tuned on it and all before it."
+        f"{number_of('sample', len(items))} of {number_of('repetition', repetitions)}, each in the best simulator "
+        "before it was measured, and in the best simulator after tuning on it."
     ]
     shown = f"\N{NO-BREAK SPACE}{printable(unit)}" if unit not in {"", "1"} else ""
     parts += [
         f"{name}: root-mean-square error {number(_error(pairs), 2)}{shown}." for name, pairs in drawn.items() if pairs
     ]
     failed = len(items) - len(drawn[BEFORE])
-    parts += [f"{counted([failed], 'sample')} left out: a measurement or the physics failed."] if failed else []
-    parts += [f"{counted([left_out], 'sample')} of later repetitions left out: they are too many."] if left_out else []
-    parts += [f"{counted([pending], 'sample')} still being computed."] if pending else []
+    parts += [f"{number_of('sample', failed)} left out: a measurement or the physics failed."] if failed else []
+    parts += [f"{number_of('sample', left_out)} of later repetitions left out: there are too many."] if left_out else []
+    parts += [f"{number_of('sample', pending)} still being computed."] if pending else []
     return " ".join(parts)
 
 
 def _error(pairs: Sequence[Pair]) -> float:
     simulated, real = zip(*pairs, strict=True)
-    return dist(simulated, real) / sqrt(len(pairs))  # without squares, which physics that explodes has no numbers for
+    return dist(simulated, real) / sqrt(len(pairs))  # squares of diverging physics would overflow
 
 
 def _alt(drawn: dict[str, list[Pair]]) -> str:
     told = [
-        f"{name.lower()}, {len(pairs)} samples are off by {number(_error(pairs), 2)} on average (root mean square)"
+        f"{name.lower()}, the root-mean-square error of {number_of('sample', len(pairs))} is {number(_error(pairs), 2)}"
         for name, pairs in drawn.items()
         if pairs
     ]
@@ -120,11 +104,8 @@ def _table(items: Sequence[Prediction]) -> Table:
         ("Repetition", "Iteration", "Before", "After", "In reality"),
         tuple(
             (
-                str(each.repetition),
-                str(each.iteration),
-                number(each.simulated_before),
-                number(each.simulated_after),
-                number(each.fitness),
+                *map(str, (each.repetition, each.iteration)),
+                *map(number, (each.simulated_before, each.simulated_after, each.fitness)),
             )
             for each in items
         ),

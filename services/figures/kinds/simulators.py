@@ -1,18 +1,18 @@
-"""Where tuning went: the best simulators in the space of the tunables."""
+"""Tuned simulators: the best of each iteration, in the space of the tunables."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
-from gaplab.services.figures.marks import Axis, Figure, Level, Mark, Panel, Points, Table
+from gaplab.services.figures.marks import Axis, FigureDefinition, Level, Mark, Panel, Points, Table
 from gaplab.services.figures.style import INK, Style
-from gaplab.services.figures.words import counted, heading, limits, number, spoken, with_unit
+from gaplab.services.figures.words import heading, limits, number, number_of, spoken, with_unit
 
 IN_PAIRS = 3
-"""Of more tunables there are too many pairs to look at: each has a panel of its own, against iterations."""
+"""Most tunables that are drawn pair by pair; of more, each has a panel against iterations."""
 
 MOST = 5_000
-"""Points in a panel; of more, only the first repetitions are drawn."""
+"""Most points in a panel; beyond them, only the first repetitions are drawn."""
 
 REALITY = "Reality"
 STAR = Style(INK, "dashed", "star")
@@ -21,7 +21,7 @@ DOT = Style(INK, "solid", "circle")
 
 @dataclass(frozen=True)
 class Dimension:
-    """A tunable: what it is called, its unit, and its bounds."""
+    """A tunable: its name, its unit and its bounds."""
 
     name: str
     unit: str
@@ -30,7 +30,7 @@ class Dimension:
 
 
 @dataclass(frozen=True)
-class Tuned:
+class SimulatorPoint:
     """The best simulator of one iteration of one repetition.
 
     Attributes:
@@ -43,33 +43,35 @@ class Tuned:
 
 
 def simulators_figure(
-    tuned: Sequence[Tuned],
+    tuned: Sequence[SimulatorPoint],
     dimensions: Sequence[Dimension],
     *,
     truth: Mapping[str, float] | None,
     title: str = "",
     columns: int = 3,
-) -> Figure:
-    """The best simulators after each iteration, from light to dark, and where reality is if that may be known.
+) -> FigureDefinition:
+    """Return a figure of the best simulators, from light to dark by iteration, and of reality if it may be shown.
 
-    Two or three tunables are drawn pair by pair; one alone, or more, each against iterations.
+    Two or three tunables are drawn pair by pair; one, or more than three, are drawn against iterations.
 
     Args:
-        tuned: by iteration; each has the order of the dimensions.
+        tuned: the best simulator of each iteration of each repetition.
         dimensions: the tunables.
-        truth: reality's parameters by name, as far as they are known; None as long as they are hidden.
+        truth: the known parameters of reality by name; None as long as they are hidden.
         title: above the figure.
-        columns: panels in a row, at most.
+        columns: most panels in a row.
     """
     shown = _first_repetitions(sorted(tuned, key=lambda each: (each.iteration, each.repetition)))
     if 1 < len(dimensions) <= IN_PAIRS:
         panels = [_pair(shown, dimensions, pair, truth or {}) for pair in combinations(range(len(dimensions)), 2)]
     else:
         panels = [_alone(shown, dimensions, at, truth or {}) for at in range(len(dimensions))]
-    return Figure(
+    if not shown:
+        panels = [replace(panel, marks=()) for panel in panels]  # reality alone is no result
+    return FigureDefinition(
         name="simulators",
         title=heading(title),
-        panels=tuple(panels) if shown else tuple(_emptied(each) for each in panels),
+        panels=tuple(panels),
         caption=_caption(tuned, shown, truth),
         alt=_alt(shown, dimensions, truth or {}),
         columns=min(columns, len(panels)),
@@ -78,7 +80,7 @@ def simulators_figure(
 
 
 def _pair(
-    shown: Sequence[Tuned], dimensions: Sequence[Dimension], pair: tuple[int, int], truth: Mapping[str, float]
+    shown: Sequence[SimulatorPoint], dimensions: Sequence[Dimension], pair: tuple[int, int], truth: Mapping[str, float]
 ) -> Panel:
     one, other = pair
     x, y = dimensions[one], dimensions[other]
@@ -93,7 +95,9 @@ def _pair(
     return Panel((*reality, points), _axis(x, truth), _axis(y, truth), square=True)
 
 
-def _alone(shown: Sequence[Tuned], dimensions: Sequence[Dimension], at: int, truth: Mapping[str, float]) -> Panel:
+def _alone(
+    shown: Sequence[SimulatorPoint], dimensions: Sequence[Dimension], at: int, truth: Mapping[str, float]
+) -> Panel:
     dimension = dimensions[at]
     along = [float(each.iteration) for each in shown]
     points = _points(shown, along, [each.parameters[at] for each in shown])
@@ -103,7 +107,7 @@ def _alone(shown: Sequence[Tuned], dimensions: Sequence[Dimension], at: int, tru
     return Panel((*reality, points), frame, _axis(dimension, truth))
 
 
-def _points(shown: Sequence[Tuned], x: Sequence[float], y: Sequence[float]) -> Points:
+def _points(shown: Sequence[SimulatorPoint], x: Sequence[float], y: Sequence[float]) -> Points:
     return Points(
         "Best simulator of a repetition",
         tuple(x),
@@ -115,31 +119,27 @@ def _points(shown: Sequence[Tuned], x: Sequence[float], y: Sequence[float]) -> P
     )
 
 
-def _emptied(panel: Panel) -> Panel:
-    """The panel without reality's place, which alone tells nothing."""
-    return Panel((), panel.x, panel.y, square=panel.square)
-
-
 def _axis(dimension: Dimension, truth: Mapping[str, float]) -> Axis:
-    """From bound to bound, and as far as reality, where it is known."""
+    """Return an axis between the bounds, extended to the value of reality if that is known."""
     label = with_unit(spoken(dimension.name), {dimension.unit})
     return Axis(label, limits([dimension.lower, dimension.upper, truth.get(dimension.name)], margin=0.06))
 
 
-def _first_repetitions(tuned: Sequence[Tuned]) -> list[Tuned]:
+def _first_repetitions(tuned: Sequence[SimulatorPoint]) -> list[SimulatorPoint]:
     iterations = len({each.iteration for each in tuned})
-    repetitions = sorted({each.repetition for each in tuned})[: max(1, MOST // max(1, iterations))]
-    kept = frozenset(repetitions)
+    kept = frozenset(sorted({each.repetition for each in tuned})[: max(1, MOST // max(1, iterations))])
     return [each for each in tuned if each.repetition in kept]
 
 
-def _caption(tuned: Sequence[Tuned], shown: Sequence[Tuned], truth: Mapping[str, float] | None) -> str:
+def _caption(
+    tuned: Sequence[SimulatorPoint], shown: Sequence[SimulatorPoint], truth: Mapping[str, float] | None
+) -> str:
     if not shown:
         return ""
     repetitions, all_ = (len({each.repetition for each in found}) for found in (shown, tuned))
     of = f" of {all_}" if all_ > repetitions else ""
     parts = [
-        f"The best simulator after each iteration of {counted([repetitions], 'repetition')}{of}, within the bounds of "
+        f"The best simulator after each iteration of {number_of('repetition', repetitions)}{of}, within the bounds of "
         "tuning; those of iteration 0 are random."
     ]
     if truth is None:
@@ -147,7 +147,7 @@ def _caption(tuned: Sequence[Tuned], shown: Sequence[Tuned], truth: Mapping[str,
     return " ".join(parts)
 
 
-def _alt(shown: Sequence[Tuned], dimensions: Sequence[Dimension], truth: Mapping[str, float]) -> str:
+def _alt(shown: Sequence[SimulatorPoint], dimensions: Sequence[Dimension], truth: Mapping[str, float]) -> str:
     if not shown:
         return "Tuned simulators in the space of the tunables: no results yet."
     last = [each for each in shown if each.iteration == shown[-1].iteration]
@@ -163,7 +163,7 @@ def _range(values: Sequence[float]) -> str:
     return f"from {number(min(values), 2)} to {number(max(values), 2)}"
 
 
-def _table(shown: Sequence[Tuned], dimensions: Sequence[Dimension], truth: Mapping[str, float]) -> Table:
+def _table(shown: Sequence[SimulatorPoint], dimensions: Sequence[Dimension], truth: Mapping[str, float]) -> Table:
     rows = [(str(each.iteration), str(each.repetition), *map(number, each.parameters)) for each in shown]
     reality = [(REALITY, "", *(number(truth.get(each.name)) for each in dimensions))] if truth else []
     return Table(("Iteration", "Repetition", *(spoken(each.name) for each in dimensions)), (*reality, *rows))

@@ -1,31 +1,32 @@
-"""How well the best tuned simulator explains the samples, over iterations."""
+"""The squared error of the best simulator on the samples, over iterations."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from statistics import median, quantiles
 
-from gaplab.services.figures.marks import Axis, Figure, Line, Number, Panel, Table
+from gaplab.services.figures.marks import Axis, FigureDefinition, Line, Number, Panel, Table, faint_lines
 from gaplab.services.figures.style import style_of
-from gaplab.services.figures.words import counted, drawable, heading, limits, number, printable
+from gaplab.services.figures.words import drawable, heading, limits, number, number_of, printable
 
 WIDE = 30.0
-"""Medians that differ by this factor are drawn on a logarithmic axis."""
+"""Ratio of the greatest to the least median above which the axis is logarithmic."""
 
 LOOK = style_of(0)
 
 Errors = Mapping[int, Number]
-"""Squared errors by repetition; None where the physics failed on a sample."""
+"""Squared errors by repetition; None if the physics failed on a sample."""
 
 
 def squared_error_figure(
     errors: Mapping[int, Errors], *, unit: str = "", title: str = "", each: bool = False
-) -> Figure:
-    """The squared error of the best simulator after each iteration that tuned: its median and quartiles.
+) -> FigureDefinition:
+    """Return a figure of the median and quartiles of the squared error after each iteration with tuning.
 
     Args:
-        errors: by iteration, of each repetition that got there; what is too large to be reckoned with is left out.
+        errors: by iteration; values too large to compute with are left out.
         unit: of fitness.
         title: above the figure.
-        each: whether every repetition has a thin line behind the median.
+        each: draw a thin line for every repetition.
     """
     errors = {at: {one: drawable(value) for one, value in found.items()} for at, found in errors.items()}
     there = {at: [value for value in found.values() if value is not None] for at, found in sorted(errors.items())}
@@ -38,7 +39,7 @@ def squared_error_figure(
         Axis("Iteration (real-world evaluations so far)", _frame(there), whole=True),
         Axis(_label(unit), _limits(marks, logarithmic=logarithmic), log=logarithmic),
     )
-    return Figure(
+    return FigureDefinition(
         name="squared-error",
         title=heading(title),
         panels=(panel,),
@@ -62,10 +63,9 @@ def _median(there: Mapping[int, Sequence[float]]) -> Line:
 
 
 def _repetitions(errors: Mapping[int, Errors]) -> Line:
-    """Every repetition's line as one mark, interrupted between them."""
     iterations, repetitions = sorted(errors), sorted({each for found in errors.values() for each in found})
-    y = [value for each in repetitions for value in (*(errors[at].get(each) for at in iterations), None)]
-    return Line("Best simulator", (*iterations, None) * len(repetitions), tuple(y), LOOK, faint=True)
+    rows = [[errors[at].get(each) for at in iterations] for each in repetitions]
+    return faint_lines("Best simulator", iterations, rows, LOOK)
 
 
 def _is_wide(medians: Sequence[Number]) -> bool:
@@ -74,11 +74,11 @@ def _is_wide(medians: Sequence[Number]) -> bool:
 
 
 def _above_zero(line: Line) -> Line:
-    """The line without what a logarithmic axis does not have; a band goes down to the least that there is."""
+    """Return the line for a logarithmic axis: zeros are left out, and the band ends at the least positive value."""
     least = min(each for part in (line.y, line.lower) for each in part if each)
     lower = tuple(None if each is None else max(each, least) for each in line.lower)
     y = tuple(each or None for each in line.y)
-    return Line(line.name, line.x, y, line.style, lower, line.upper, line.hover, line.markers, line.faint)
+    return replace(line, y=y, lower=lower)
 
 
 def _frame(there: Mapping[int, object]) -> tuple[float, float]:
@@ -108,10 +108,10 @@ def _caption(errors: Mapping[int, Errors], there: Mapping[int, Sequence[float]],
     failed = sum(value is None for found in errors.values() for value in found.values())
     parts = [
         "Sum over the samples so far of the squared difference between fitness in simulation and in reality.",
-        f"Median over {counted(counts, 'repetition')}{band}.",
+        f"Median over {number_of('repetition', *counts)}{band}.",
     ]
     parts += ["Thin lines: single repetitions."] if each else []
-    parts += [f"{counted([failed], 'value')} left out, for the physics failed."] if failed else []
+    parts += [f"{number_of('value', failed)} left out, since the physics failed."] if failed else []
     return " ".join(parts)
 
 

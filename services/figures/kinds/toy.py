@@ -1,11 +1,11 @@
-"""The toy, the paper's Fig. 3: the true function, its approximations, the samples, and the transfer."""
+"""The toy function, as in the paper's Fig. 3: the true function, its approximations, the samples, and the transfer."""
 
 from collections.abc import Sequence
 
-from gaplab.schemas.toys import Toy
-from gaplab.services.figures.marks import Arrow, Axis, Figure, Line, Mark, Panel, Points, Table
+from gaplab.schemas.toy import ToyIteration
+from gaplab.services.figures.marks import Arrow, Axis, FigureDefinition, Line, Mark, Panel, Points, Table
 from gaplab.services.figures.style import COLORS, INK, Style
-from gaplab.services.figures.words import heading, number, spoken, with_unit
+from gaplab.services.figures.words import heading, number, number_of, spoken, with_unit
 
 REALITY = Style(INK, "dashed", "circle")
 SIMULATION = Style(COLORS[0], "solid", "circle")
@@ -13,20 +13,20 @@ SAMPLES = Style(COLORS[1], "solid", "circle")
 TRANSFER = Style(COLORS[2], "solid", "star")
 
 SHORTEST = 0.03
-"""An arrow that is a smaller share of the figure would hide what it points from."""
+"""Shortest arrow, as a share of the figure's height: a shorter one would hide its own start."""
 
 
-def toy_figure(toys: Sequence[Toy], *, title: str | None = None) -> Figure:
-    """A panel for each of these iterations of one repetition, as in the paper.
+def toy_figure(toys: Sequence[ToyIteration], *, title: str | None = None) -> FigureDefinition:
+    """Return a figure with one panel for each iteration, as in the paper.
 
     Args:
-        toys: one or more, all of one repetition.
-        title: above the figure; left out: what it is of.
+        toys: one or more iterations of one repetition.
+        title: above the figure; by default the experiment and the repetition.
     """
     several = len(toys) > 1
     first = toys[0]
     own = f"{spoken(first.name)}, repetition {first.repetition}{'' if several else f', iteration {first.iteration}'}"
-    return Figure(
+    return FigureDefinition(
         name="toy",
         title=heading(own if title is None else title),
         panels=tuple(_panel(each, titled=several) for each in toys),
@@ -38,7 +38,7 @@ def toy_figure(toys: Sequence[Toy], *, title: str | None = None) -> Figure:
     )
 
 
-def _panel(toy: Toy, *, titled: bool) -> Panel:
+def _panel(toy: ToyIteration, *, titled: bool) -> Panel:
     marks: list[Mark] = []
     if toy.truth is not None:
         marks.append(Line("Reality", toy.genes, toy.truth, REALITY, markers=False))
@@ -55,7 +55,7 @@ def _panel(toy: Toy, *, titled: bool) -> Panel:
     )
 
 
-def _samples(toy: Toy) -> list[Mark]:
+def _samples(toy: ToyIteration) -> list[Mark]:
     found = [each for each in toy.samples if each.fitness is not None]
     if not found:
         return []
@@ -64,8 +64,8 @@ def _samples(toy: Toy) -> list[Mark]:
     return [Points("Samples", *places, SAMPLES, hover=told)]
 
 
-def _transfer(toy: Toy) -> list[Mark]:
-    """The arrow goes from what simulation says of the transferred gene to what reality does."""
+def _transfer(toy: ToyIteration) -> list[Mark]:
+    """Return the arrow from the simulated to the real fitness of the transferred gene, and its points."""
     if toy.transfer is None:
         return []
     gene, simulated, real = toy.transfer.gene, toy.transfer.simulated, toy.transfer.real
@@ -80,41 +80,35 @@ def _transfer(toy: Toy) -> list[Mark]:
     return marks
 
 
-def _caption(toys: Sequence[Toy]) -> str:
-    parts = [
-        "Solid: the best simulator"
-        + ("; thin: the others." if any(len(each.approximations) > 1 for each in toys) else ".")
-    ]
-    if not any(each.approximations for each in toys):
-        parts = []
+def _caption(toys: Sequence[ToyIteration]) -> str:
+    most = max(len(toy.approximations) for toy in toys)
+    parts = [f"Solid: the best simulator{'; thin: the others' if most > 1 else ''}."] if most else []
     hidden = "Reality's function is shown once the experiment has ended."
     parts += ["Dashed: reality." if toys[0].truth is not None else hidden]
-    parts += ["The arrow goes from what simulation says of the transferred controller to what reality says."]
+    parts += ["The arrow goes from the simulated to the real fitness of the transferred controller."]
     return " ".join([*parts, *(map(_told, toys) if len(toys) == 1 else ())])
 
 
-def _told(toy: Toy) -> str:
-    parts = [f"after {len(toy.samples)} sample{'' if len(toy.samples) == 1 else 's'}"]
+def _told(toy: ToyIteration) -> str:
+    parts = [f"after {number_of('sample', len(toy.samples))}"]
     if toy.squared_error is not None:
         parts.append(f"the best simulator's squared error is {number(toy.squared_error)}")
-    if toy.transfer is not None:
-        gene, simulated, real = map(number, (toy.transfer.gene, toy.transfer.simulated, toy.transfer.real))
-        worth = f"{simulated or 'nothing'} in simulation and {real or 'nothing'} in reality"
-        parts.append(f"the transferred gene {gene} reaches {worth}")
+    gene, simulated, real = _transfer_in_words(toy)
+    if gene:
+        fitness = f"{simulated or 'nothing'} in simulation and {real or 'nothing'} in reality"
+        parts.append(f"the transferred gene {gene} reaches {fitness}")
     return f"Iteration {toy.iteration}: {', '.join(parts)}."
 
 
-def _table(toys: Sequence[Toy]) -> Table:
+def _transfer_in_words(toy: ToyIteration) -> tuple[str, str, str]:
+    """Return the gene and its fitness in simulation and in reality; empty if missing."""
+    transfer = toy.transfer
+    return (number(transfer.gene), number(transfer.simulated), number(transfer.real)) if transfer else ("", "", "")
+
+
+def _table(toys: Sequence[ToyIteration]) -> Table:
     rows = [
-        (
-            str(each.iteration),
-            str(len(each.samples)),
-            number(each.squared_error),
-            number(each.transfer.gene if each.transfer else None),
-            number(each.transfer.simulated if each.transfer else None),
-            number(each.transfer.real if each.transfer else None),
-        )
-        for each in toys
+        (str(toy.iteration), str(len(toy.samples)), number(toy.squared_error), *_transfer_in_words(toy)) for toy in toys
     ]
     head = ("Iteration", "Samples", "Squared error", "Transferred gene", "Fitness in simulation", "Fitness in reality")
     return Table(head, tuple(rows))

@@ -1,1 +1,1 @@
-"""Figures drawn by matplotlib."""
+"""Figures as files for papers, drawn by matplotlib."""

@@ -1,9 +1,9 @@
-"""Marks on matplotlib's axes."""
+"""Marks as matplotlib's artists."""
 
 from typing import TYPE_CHECKING, Any
 
 from gaplab.services.figures.marks import Arrow, Bars, Diagonal, Label, Level, Line, Mark, Number, Panel, Points
-from gaplab.services.figures.matplotlib.text_size import shown
+from gaplab.services.figures.matplotlib.text_size import printable
 from gaplab.services.figures.style import INK, SHADES, Style
 
 if TYPE_CHECKING:
@@ -30,37 +30,39 @@ MARKERS = {
 NAN = float("nan")
 
 
-def paint(panel: Panel, axes: "Axes", shades: tuple[float, float]) -> None:
+def draw_marks(panel: Panel, axes: "Axes", shades: tuple[float, float]) -> None:
     """Draw the marks of a panel, the first lines above later ones.
 
     Args:
         panel: has the marks.
         axes: with their limits set.
-        shades: the numbers that are drawn lightest and darkest.
+        shades: the numbers of the lightest and the darkest shade.
     """
     for order, mark in enumerate(panel.marks):
-        _paint(mark, axes, 10 - 0.01 * order, shades)
+        _draw(mark, axes, 10 - 0.01 * order, shades)
 
 
-def _paint(mark: Mark, axes: "Axes", order: float, shades: tuple[float, float]) -> None:
-    if isinstance(mark, Line):
-        _line(mark, axes, order)
-    elif isinstance(mark, Points):
-        _points(mark, axes, order + 5, shades)
-    elif isinstance(mark, Level):
-        _level(mark, axes)
-    elif isinstance(mark, Diagonal):
-        axes.axline((0, 0), slope=1, **_thin(mark.name, mark.style))
-    elif isinstance(mark, Bars):
-        _bars(mark, axes)
-    elif isinstance(mark, Arrow):
-        _arrow(mark, axes)
-    else:
-        _label(mark, axes)
+def _draw(mark: Mark, axes: "Axes", order: float, shades: tuple[float, float]) -> None:
+    match mark:
+        case Line():
+            _line(mark, axes, order)
+        case Points():
+            _points(mark, axes, order + 5, shades)
+        case Level():
+            _level(mark, axes)
+        case Diagonal():
+            axes.axline((0, 0), slope=1, **_thin(mark.name, mark.style))
+        case Bars():
+            _bars(mark, axes)
+        case Arrow():
+            look = {"arrowstyle": "-|>", "color": mark.style.color, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
+            axes.annotate("", xy=mark.end, xytext=mark.start, arrowprops=look, zorder=20)
+        case Label():
+            _label(mark, axes)
 
 
 def legend_name(name: str) -> str:
-    """The name in the legend, which leaves out what begins with an underscore."""
+    """Return the name for matplotlib's legend, which leaves out names that begin with an underscore."""
     return f" {name}" if name.startswith("_") else name or "_nothing"
 
 
@@ -73,15 +75,8 @@ def _line(line: Line, axes: "Axes", order: float) -> None:
         return
     if line.markers:
         drawn |= {"marker": MARKERS[look.marker], "markersize": 3.6, "markeredgecolor": "white", "markeredgewidth": 0.4}
-    axes.plot(
-        x,
-        y,
-        **drawn,
-        linestyle=DASHES[look.dash],
-        linewidth=1.2,
-        label=legend_name(line.name),
-        zorder=order,
-    )
+    drawn |= {"linestyle": DASHES[look.dash], "linewidth": 1.2, "label": legend_name(line.name), "zorder": order}
+    axes.plot(x, y, **drawn)
     if any(each is not None for each in line.lower):
         lower, upper = _ends(line.lower, line.y), _ends(line.upper, line.y)
         step: Any = {"step": "post"} if line.steps else {}
@@ -113,11 +108,10 @@ def _level(level: Level, axes: "Axes") -> None:
 
 
 def _bars(bars: Bars, axes: "Axes") -> None:
-    begins = [begin for begin, _, _ in bars.intervals]
     axes.barh(
         [y for _, _, y in bars.intervals],
         [end - begin for begin, end, _ in bars.intervals],
-        left=begins,
+        left=[begin for begin, _, _ in bars.intervals],
         height=bars.thickness,
         color=bars.style.color,
         linewidth=0,
@@ -126,27 +120,16 @@ def _bars(bars: Bars, axes: "Axes") -> None:
     )
 
 
-def _arrow(arrow: Arrow, axes: "Axes") -> None:
-    look = {"arrowstyle": "-|>", "color": arrow.style.color, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", xy=arrow.end, xytext=arrow.start, arrowprops=look, zorder=20)
-
-
 def _label(label: Label, axes: "Axes") -> None:
     away = (4, 0) if label.beside else (0, 3)
     place: Any = {"ha": "left", "va": "center"} if label.beside else {"ha": "center", "va": "bottom"}
-    axes.annotate(
-        shown(label.text), (label.x, label.y), away, textcoords="offset points", color=INK, zorder=20, **place
-    )
+    place |= {"textcoords": "offset points", "color": INK, "zorder": 20}
+    axes.annotate(printable(label.text), (label.x, label.y), away, **place)
 
 
 def _thin(name: str, look: Style) -> dict[str, Any]:
-    return {
-        "color": look.color,
-        "linestyle": DASHES[look.dash],
-        "linewidth": 0.9,
-        "label": legend_name(name),
-        "zorder": 2,
-    }
+    shown = {"color": look.color, "linestyle": DASHES[look.dash], "linewidth": 0.9}
+    return shown | {"label": legend_name(name), "zorder": 2}
 
 
 def _floats(values: tuple[Number, ...]) -> list[float]:
@@ -154,5 +137,5 @@ def _floats(values: tuple[Number, ...]) -> list[float]:
 
 
 def _ends(ends: tuple[Number, ...], values: tuple[Number, ...]) -> list[float]:
-    """The ends of the band; where there is none, it has no width."""
+    """Return the ends of a band, of width 0 where it has none."""
     return _floats(tuple(value if end is None else end for end, value in zip(ends, values, strict=True)))

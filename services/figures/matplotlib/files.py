@@ -1,16 +1,16 @@
-"""Figures as files for papers, by matplotlib: SVG, PNG and PDF, the same bytes for the same figure.
+"""Figures as SVG, PNG and PDF files for papers: the same bytes for the same figure.
 
-Text is of 8 pt at the width that is asked for, which is that of one column of a paper unless said otherwise.
+Text has 8 pt at the requested width, by default that of one column of a paper.
 """
 
 from io import BytesIO
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Literal
 
-from gaplab.services.figures.marks import Axis, Figure
-from gaplab.services.figures.matplotlib.artists import paint
-from gaplab.services.figures.matplotlib.page_layout import Beneath, draw_bar_of_shades, shades_of, surround
-from gaplab.services.figures.matplotlib.text_size import FAMILY, shown
+from gaplab.services.figures.marks import Axis, FigureDefinition
+from gaplab.services.figures.matplotlib.artists import draw_marks
+from gaplab.services.figures.matplotlib.page_layout import PageLayout, add_surroundings, draw_bar_of_shades, shades_of
+from gaplab.services.figures.matplotlib.text_size import FAMILY, printable
 from gaplab.services.figures.style import INK
 from gaplab.services.figures.words import power
 
@@ -21,20 +21,20 @@ if TYPE_CHECKING:
 FileFormat = Literal["svg", "png", "pdf"]
 
 COLUMN_IN = 3.5
-"""The width of one column in most journals; of two it is 7.2."""
+"""The width of one column in most journals; two columns have 7.2."""
 
 DPI = 300
 SIZE_PT = 8
 PANEL_IN, LOW_IN = 2.1, 1.1
-"""Height of a row of panels, where there is one and where there are several."""
+"""Height of the only row of panels, and of one of several rows."""
 
 SQUARE_IN = 3.2
-"""The greatest height of a square panel."""
+"""Greatest height of a square panel."""
 
 LOOK: Any = {
     "svg.hashsalt": "gaplab",
-    "pdf.fonttype": 42,  # letters as TrueType: publishers refuse type 3
-    "text.parse_math": False,  # names may have dollars in them
+    "pdf.fonttype": 42,  # TrueType: publishers refuse type 3 fonts
+    "text.parse_math": False,  # names may contain dollar signs
     "font.family": FAMILY,
     "font.size": SIZE_PT,
     "axes.titlesize": SIZE_PT,
@@ -52,19 +52,21 @@ METADATA: dict[str, dict[str, Any]] = {
     "pdf": {"Creator": "gaplab", "Producer": None, "CreationDate": None},
     "png": {"Software": None},
 }
-"""No moment and no version: the same figure is the same bytes."""
+"""No dates and no versions: the same figure gives the same bytes."""
 
-_matplotlib = Lock()  # its settings are global to the process, and an API has many threads
+_matplotlib = Lock()  # its settings are global to the process, and the service has many threads
 
 
-def render_file(figure: Figure, kind: FileFormat, *, width_in: float = COLUMN_IN, caption: bool = True) -> bytes:
-    """The figure as a file; an SVG has its letters as paths, so that it looks alike everywhere.
+def render_file(
+    figure: FigureDefinition, kind: FileFormat, *, width_in: float = COLUMN_IN, caption: bool = True
+) -> bytes:
+    """Return the figure as a file; an SVG has letters as paths, so that it needs no font.
 
     Args:
-        figure: what is drawn.
-        kind: of the file.
-        width_in: its width in inches.
-        caption: whether it is drawn beneath; a paper has one of its own.
+        figure: the content.
+        kind: the format.
+        width_in: width in inches.
+        caption: draw the caption beneath; a paper has its own.
     """
     from matplotlib import rc_context
 
@@ -76,10 +78,10 @@ def render_file(figure: Figure, kind: FileFormat, *, width_in: float = COLUMN_IN
     return target.getvalue()
 
 
-def _canvas(figure: Figure, width_in: float, *, caption: bool) -> "Canvas":
+def _canvas(figure: FigureDefinition, width_in: float, *, caption: bool) -> "Canvas":
     from matplotlib.figure import Figure as Canvas
 
-    rows = _rows(figure)
+    rows = figure.row_heights
     canvas = Canvas(figsize=(width_in, sum(rows) * LOW_IN + 0.3 if len(rows) > 1 else PANEL_IN), layout="constrained")
     share: Any = "col" if figure.share_x else False
     grid = canvas.subplots(len(rows), figure.columns, squeeze=False, sharex=share, gridspec_kw={"height_ratios": rows})
@@ -89,28 +91,28 @@ def _canvas(figure: Figure, width_in: float, *, caption: bool) -> "Canvas":
         else:
             axes.set_visible(False)
     if figure.empty:
-        canvas.text(0.5, 0.6, shown(figure.nothing), ha="center", color="#777777")
+        canvas.text(0.5, 0.6, printable(figure.nothing), ha="center", color="#777777")
     canvas.align_ylabels()
     draw_bar_of_shades(canvas, figure)
     sides = _square(canvas, len(rows)) if figure.panels[0].square else 0.0
-    surround(canvas, figure, Beneath.of(figure, width_in, sides, caption=caption))
-    _settle(canvas)
+    add_surroundings(canvas, figure, PageLayout.of(figure, width_in, sides, caption=caption))
+    _fix_positions(canvas)
     return canvas
 
 
-def _draw(figure: Figure, index: int, axes: "Axes") -> None:
+def _draw(figure: FigureDefinition, index: int, axes: "Axes") -> None:
     panel = figure.panels[index]
     _set_up(axes, panel.x, panel.y, labelled=not figure.share_x or index + figure.columns >= len(figure.panels))
     if panel.title:
-        axes.set_title(shown(panel.title), loc="left")
-    paint(panel, axes, shades_of(figure))
+        axes.set_title(printable(panel.title), loc="left")
+    draw_marks(panel, axes, shades_of(figure))
 
 
 def _square(canvas: "Canvas", rows: int) -> float:
-    """Make the canvas so high that its panels are as high as wide.
+    """Change the height of the canvas until its panels are as high as wide.
 
     Returns:
-        The room in inches that is left free at either side, for no panel is wider than it should be.
+        The free space at either side in inches, since a panel has a greatest width.
     """
     engine = canvas.get_layout_engine()
     assert engine is not None
@@ -123,8 +125,8 @@ def _square(canvas: "Canvas", rows: int) -> float:
     return columns * (width - side) / 2
 
 
-def _settle(canvas: "Canvas") -> None:
-    """Lay everything out, without the last digits: the solver does not find the same ones each time."""
+def _fix_positions(canvas: "Canvas") -> None:
+    """Compute the layout once, and round its positions: the solver's last digits vary from run to run."""
     engine = canvas.get_layout_engine()
     assert engine is not None
     engine.execute(canvas)
@@ -134,22 +136,17 @@ def _settle(canvas: "Canvas") -> None:
         axes.set_position((round(left, 6), round(bottom, 6), round(width, 6), round(height, 6)))
 
 
-def _rows(figure: Figure) -> list[float]:
-    starts = range(0, len(figure.panels), figure.columns)
-    return [max(panel.height for panel in figure.panels[start : start + figure.columns]) for start in starts]
-
-
 def _set_up(axes: "Axes", x: Axis, y: Axis, *, labelled: bool) -> None:
-    axes.set(ylabel=shown(y.label), xlim=x.limits, ylim=y.limits)
+    axes.set(ylabel=printable(y.label), xlim=x.limits, ylim=y.limits)
     if labelled:
-        axes.set_xlabel(shown(x.label))
+        axes.set_xlabel(printable(x.label))
     _ticks(axes.xaxis, x)
     _ticks(axes.yaxis, y)
     axes.grid(axis="y", color="#e6e6e6", linewidth=0.5)
     axes.set_axisbelow(True)
 
 
-def _ticks(axis: Any, of: Axis) -> None:  # noqa: ANN401 - either of an axes' two, which are of two types
+def _ticks(axis: Any, of: Axis) -> None:  # noqa: ANN401 - XAxis or YAxis
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
     if of.log:
@@ -159,6 +156,6 @@ def _ticks(axis: Any, of: Axis) -> None:  # noqa: ANN401 - either of an axes' tw
         axis.set_major_formatter(FuncFormatter(lambda value, _: power(value)))
         axis.set_minor_formatter(NullFormatter())
     elif of.ticks:
-        axis.set_ticks([at for at, _ in of.ticks], [shown(words) for _, words in of.ticks])
+        axis.set_ticks([at for at, _ in of.ticks], [printable(words) for _, words in of.ticks])
     elif of.whole:
         axis.set_major_locator(MaxNLocator(nbins=11, integer=True))

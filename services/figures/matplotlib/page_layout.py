@@ -1,35 +1,36 @@
-"""What stands around the panels of a file: title, legend, the bar of shades, caption."""
+"""The parts of a file around its panels: title, legend, bar of shades, caption."""
 
 from dataclasses import dataclass
+from itertools import accumulate
 from math import ceil, inf
 from typing import TYPE_CHECKING, Any
 
-from gaplab.services.figures.marks import Arrow, Figure, Label, Line, Points
+from gaplab.services.figures.marks import Arrow, FigureDefinition, Label, Line
 from gaplab.services.figures.matplotlib.artists import legend_name
-from gaplab.services.figures.matplotlib.text_size import lines, shortened, shown, width_in
+from gaplab.services.figures.matplotlib.text_size import lines, printable, shortened, width_in
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
 LEGEND_PT, CAPTION_PT, TITLE_PT = 8, 7, 8
-ROW_IN = 0.1445  # of a legend
-HANDLE_IN, BETWEEN_IN = 0.46, 0.16  # beside the words of a legend, and between its columns
-LINE_IN = 0.125  # of a caption
+ROW_IN = 0.1445  # height of a legend entry
+HANDLE_IN, BETWEEN_IN = 0.46, 0.16  # width of a legend handle, and of the gap between columns
+LINE_IN = 0.125  # height of a line of the caption
 MARGIN_IN = 0.06
-BOLD = 1.15  # how much wider bold letters are, at most
+BOLD = 1.15  # width of bold letters, as a factor
 
 
 @dataclass(frozen=True)
-class Beneath:
-    """How much room is needed above and beneath the panels, and for what.
+class PageLayout:
+    """The space around the panels, in inches.
 
     Attributes:
         columns: of the legend.
-        legend_in: its height.
+        legend_in: height of the legend.
         caption: its lines.
         title: its lines.
         width: of the file.
-        sides: room that is left free at either side.
+        sides: free space at the left and at the right.
     """
 
     columns: int
@@ -40,11 +41,11 @@ class Beneath:
     sides: float
 
     @staticmethod
-    def of(figure: Figure, width: float, sides: float = 0.0, *, caption: bool) -> "Beneath":
-        """The room that a figure of this width in inches needs."""
+    def of(figure: FigureDefinition, width: float, sides: float = 0.0, *, caption: bool) -> "PageLayout":
+        """Return the layout of a figure with this width in inches."""
         names = _names(figure)
         columns = next((each for each in (4, 3, 2) if _legend_in(names, each) <= width - 2 * MARGIN_IN), 1)
-        return Beneath(
+        return PageLayout(
             columns=columns,
             legend_in=ceil(len(names) / columns) * ROW_IN + (MARGIN_IN if names else 0),
             caption=tuple(lines(figure.caption, CAPTION_PT, width - 2 * MARGIN_IN)) if caption else (),
@@ -55,35 +56,35 @@ class Beneath:
 
     @property
     def above_in(self) -> float:
-        """Of the title."""
+        """Height of the title."""
         return len(self.title) * LINE_IN + 1.25 * MARGIN_IN if self.title else 0.0
 
     @property
     def height_in(self) -> float:
-        """Of legend and caption."""
+        """Height of legend and caption."""
         return self.legend_in + (len(self.caption) * LINE_IN + 2 * MARGIN_IN if self.caption else 0)
 
 
-def surround(canvas: "Canvas", figure: Figure, room: Beneath) -> None:
-    """Make room for title, legend and caption around the panels, and draw them."""
-    height = canvas.get_figheight() + room.above_in + room.height_in
+def add_surroundings(canvas: "Canvas", figure: FigureDefinition, layout: PageLayout) -> None:
+    """Enlarge the canvas for title, legend and caption, and draw them."""
+    height = canvas.get_figheight() + layout.above_in + layout.height_in
     canvas.set_figheight(height)
-    bottom, top = room.height_in / height, 1 - room.above_in / height
-    left, side = MARGIN_IN / room.width, room.sides / room.width
+    bottom, top = layout.height_in / height, 1 - layout.above_in / height
+    left, side = MARGIN_IN / layout.width, layout.sides / layout.width
     engine: Any = canvas.get_layout_engine()
     engine.set(rect=(side, bottom, 1 - 2 * side, top - bottom))
-    if room.title:
-        words = "\n".join(map(shown, room.title))
+    if layout.title:
+        words = "\n".join(map(printable, layout.title))
         title = canvas.text(left, 1 - MARGIN_IN / height, words, va="top", weight="bold", size=TITLE_PT)
         title.set_in_layout(False)
-    _legend(canvas, _names(figure), room, bottom)
-    for number, line in enumerate(room.caption):
-        y = (LINE_IN * (len(room.caption) - number) + MARGIN_IN) / height
-        note = canvas.text(left, y, shown(line), size=CAPTION_PT, color="#555555", va="top")
+    _legend(canvas, _names(figure), layout, bottom)
+    for number, line in enumerate(layout.caption):
+        y = (LINE_IN * (len(layout.caption) - number) + MARGIN_IN) / height
+        note = canvas.text(left, y, printable(line), size=CAPTION_PT, color="#555555", va="top")
         note.set_in_layout(False)
 
 
-def _legend(canvas: "Canvas", names: list[str], room: Beneath, bottom: float) -> None:
+def _legend(canvas: "Canvas", names: list[str], layout: PageLayout, bottom: float) -> None:
     found: dict[str, Any] = {}
     for axes in canvas.axes:
         for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -93,10 +94,10 @@ def _legend(canvas: "Canvas", names: list[str], room: Beneath, bottom: float) ->
     named = [each for each in names if each in found]
     legend = canvas.legend(
         [found[each] for each in named],
-        [shortened(shown(each), LEGEND_PT, room.width - 2 * MARGIN_IN - HANDLE_IN) for each in named],
+        [shortened(printable(each), LEGEND_PT, layout.width - 2 * MARGIN_IN - HANDLE_IN) for each in named],
         loc="upper center",
         bbox_to_anchor=(0.5, bottom),
-        ncols=room.columns,
+        ncols=layout.columns,
         frameon=False,
         handlelength=3.2,
         handletextpad=0.6,
@@ -108,45 +109,41 @@ def _legend(canvas: "Canvas", names: list[str], room: Beneath, bottom: float) ->
     legend.set_in_layout(False)
 
 
-def shades_of(figure: Figure) -> tuple[float, float]:
-    """The numbers that are drawn lightest and darkest."""
-    values = [value for points in _shaded(figure) for value in points.shades]
+def shades_of(figure: FigureDefinition) -> tuple[float, float]:
+    """Return the numbers of the lightest and the darkest shade."""
+    values = [value for points in figure.shaded for value in points.shades]
     return (min(values), max(min(values) + 1, *values)) if values else (0.0, 1.0)
 
 
-def draw_bar_of_shades(canvas: "Canvas", figure: Figure) -> None:
-    """Draw what says which number is how dark, beside the panels, if there are shades."""
+def draw_bar_of_shades(canvas: "Canvas", figure: FigureDefinition) -> None:
+    """Draw the bar that explains the shades beside the panels, if there are any."""
     from matplotlib.ticker import MaxNLocator
 
     drawn = [each for axes in canvas.axes for each in axes.collections if each.get_array() is not None]
     if not drawn:
         return
     bar = canvas.colorbar(drawn[0], ax=canvas.axes, aspect=30, pad=0.02, fraction=0.05)
-    bar.set_label(shown(_shaded(figure)[0].shades_label))
+    bar.set_label(printable(figure.shaded[0].shades_label))
     bar.outline.set_visible(False)
     bar.locator = MaxNLocator(nbins=6, integer=True)
     bar.update_ticks()
 
 
-def _shaded(figure: Figure) -> list[Points]:
-    return [mark for panel in figure.panels for mark in panel.marks if isinstance(mark, Points) and mark.shades]
-
-
 def _legend_in(names: list[str], columns: int) -> float:
-    """How wide a legend of so many columns is, which are filled one after another."""
+    """Return the width of a legend whose columns are filled one after another."""
     if len(names) < columns:
         return inf
     few, longer = divmod(len(names), columns)
-    widths, start = [], 0
-    for column in range(columns):
-        end = start + few + (column < longer)
-        widths.append(max(width_in(each, LEGEND_PT) for each in names[start:end]) + HANDLE_IN)
-        start = end
-    return sum(widths) + BETWEEN_IN * (columns - 1)
+    sizes = [few + (column < longer) for column in range(columns)]
+    widest = [
+        max(width_in(name, LEGEND_PT) for name in names[end - size : end])
+        for size, end in zip(sizes, accumulate(sizes), strict=True)
+    ]
+    return sum(widest) + HANDLE_IN * columns + BETWEEN_IN * (columns - 1)
 
 
-def _names(figure: Figure) -> list[str]:
-    """What stands in the legend."""
-    marks = [mark for panel in figure.panels for mark in panel.marks if not isinstance(mark, Label | Arrow)]
+def _names(figure: FigureDefinition) -> list[str]:
+    """Return the names in the legend."""
+    marks = [mark for mark in figure.marks if not isinstance(mark, Label | Arrow)]
     named = [each.name for each in marks if each.name and not (isinstance(each, Line) and each.faint)]
     return list(dict.fromkeys(map(legend_name, named)))

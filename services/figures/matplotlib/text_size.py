@@ -1,4 +1,4 @@
-"""Words in files: how wide they are, and what the font can write. Asked within the settings of the file."""
+"""The width of text in files, and the characters of the font; to be called within matplotlib's settings for files."""
 
 from functools import cache
 from typing import TYPE_CHECKING
@@ -8,25 +8,24 @@ if TYPE_CHECKING:
 
 FAMILY = "DejaVu Sans"
 POINTS_PER_INCH = 72
-MEASURED_PT = 100  # what it measures at: large, for its measures are rounded
-FRACTIONS = 64  # of a pixel, in which it measures
-MARK = "\N{REPLACEMENT CHARACTER}"
+MEASURED_PT = 100  # the size at which text is measured: large, since the measures are rounded
+FRACTIONS = 64  # parts of a pixel, the unit of the measures
 
 
-def shown(text: str) -> str:
-    """The text with a mark in place of each character that the font does not have."""
-    return "".join(each if _font().get_char_index(ord(each)) else MARK for each in text)
+def printable(text: str) -> str:
+    """Return the text with a replacement for each character that the font does not have."""
+    return "".join(each if _font().get_char_index(ord(each)) else "\N{REPLACEMENT CHARACTER}" for each in text)
 
 
 def width_in(text: str, size_pt: float) -> float:
-    """How wide a line of text is, in inches."""
+    """Return the width of a line of text in inches."""
     font = _font()
-    font.set_text(shown(text), 0.0)
+    font.set_text(printable(text), 0.0)
     return float(font.get_width_height()[0]) / FRACTIONS / MEASURED_PT * size_pt / POINTS_PER_INCH
 
 
 def lines(text: str, size_pt: float, width: float) -> list[str]:
-    """The text in lines of at most this width in inches; a word that is wider is broken."""
+    """Return the text in lines of at most `width` inches; a wider word is broken."""
     found = [""]
     for word in text.split(" "):
         longer = f"{found[-1]} {word}".lstrip()
@@ -38,12 +37,11 @@ def lines(text: str, size_pt: float, width: float) -> list[str]:
 
 
 def shortened(text: str, size_pt: float, width: float) -> str:
-    """The text, with its middle left out if it is wider than so many inches: names are told apart at their ends."""
-    left_out = 0
+    """Return the text, without its middle if it is wider than `width` inches: names often differ at their ends."""
     found = text
-    while width_in(found, size_pt) > width and left_out < len(text) - 2:
-        left_out += 1
-        keep = len(text) - left_out
+    for keep in range(len(text) - 1, 1, -1):
+        if width_in(found, size_pt) <= width:
+            break
         found = f"{text[: keep - keep // 2]}…{text[len(text) - keep // 2 :]}"
     return found
 

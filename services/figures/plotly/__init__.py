@@ -1,1 +1,1 @@
-"""Figures drawn by Plotly."""
+"""Figures for Plotly: on the page, in notebooks and in HTML files."""

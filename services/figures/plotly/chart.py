@@ -1,30 +1,29 @@
-"""Figures as Plotly charts: data and layout as JSON has them, without Plotly itself.
+"""Figures as Plotly charts: plain data and layout for JSON, built without importing Plotly.
 
-The layout has no template, no font, and no colour of paper, axes or grid: whoever shows it sets those, and can be light
-or dark. A trace whose `meta` is `{"ink": true}` is drawn in the colour of text and wants the page's own: in its line,
-its marker and, with the opacity that it has, its fill. So does an annotation whose `name` is `ink`. `layout.height`
-suits the figure.
+The layout has no template, no font, and no colours of paper, axes or grid: a page sets them, and can be light or dark.
+A trace with `"meta": {"ink": true}` has the colour of text; the page replaces it by its own in the line, the marker and
+the fill, whose opacity it keeps. The same holds for an annotation named `ink`.
 """
 
 from math import log10
 from typing import Any
 
-from gaplab.services.figures.marks import Arrow, Axis, Figure, Label, Line, Panel, Points
+from gaplab.services.figures.marks import Arrow, Axis, FigureDefinition, Label, Line, Panel, Points
 from gaplab.services.figures.plotly.trace_dicts import Trace, short, text, traces
 from gaplab.services.figures.style import SHADES
 
 ROW_PX, LOW_ROW_PX = 300, 190
-"""Height of a row of panels, where there is one and where there are several."""
+"""Height of the only row of panels, and of one of several rows."""
 
 SQUARE_PX = {1: 380, 2: 300, 3: 240}
-"""Height of square panels, by how many stand in a row."""
+"""Height of square panels, by the number of panels in a row."""
 
 AROUND_PX = 120
-"""For labels, legend and margins."""
+"""Height of labels, legend and margins together."""
 
 
-def chart(figure: Figure) -> dict[str, Any]:
-    """The figure as `{"data": […], "layout": {…}}`, which is what `Plotly.newPlot` takes."""
+def chart(figure: FigureDefinition) -> dict[str, Any]:
+    """Return the figure as `{"data": […], "layout": {…}}`, the arguments of `Plotly.newPlot`."""
     data: list[Trace] = []
     named: set[str] = set()
     for index, panel in enumerate(figure.panels):
@@ -36,7 +35,7 @@ def chart(figure: Figure) -> dict[str, Any]:
 
 
 def _legend(trace: Trace, named: set[str]) -> Trace:
-    """Marks of one name are switched on and off together, and stand in the legend once."""
+    """Show each name in the legend once; its entry toggles all marks of that name."""
     name = trace["name"]
     shown = bool(name) and name not in named and trace.get("showlegend", True)
     if shown:
@@ -48,7 +47,7 @@ def _suffix(index: int) -> str:
     return "" if index == 0 else str(index + 1)
 
 
-def _layout(figure: Figure) -> dict[str, Any]:
+def _layout(figure: FigureDefinition) -> dict[str, Any]:
     titled = any(panel.title for panel in figure.panels)
     layout: dict[str, Any] = {
         "height": _height(figure),
@@ -61,9 +60,8 @@ def _layout(figure: Figure) -> dict[str, Any]:
     for index, panel in enumerate(figure.panels):
         layout |= _axes(figure, index)
         layout["annotations"] += _annotations(panel, _suffix(index))
-    shaded = [mark for panel in figure.panels for mark in panel.marks if isinstance(mark, Points) and mark.shades]
-    if shaded:
-        layout["coloraxis"] = _shades(shaded)
+    if figure.shaded:
+        layout["coloraxis"] = _shades(figure.shaded)
     if figure.empty:
         layout["annotations"].append(
             _annotation(figure.nothing) | {"xref": "paper", "yref": "paper", "x": 0.5, "y": 0.5}
@@ -71,30 +69,19 @@ def _layout(figure: Figure) -> dict[str, Any]:
     return layout
 
 
-def _height(figure: Figure) -> int:
-    rows = _rows(figure)
-    each = (
-        SQUARE_PX.get(figure.columns, LOW_ROW_PX)
-        if figure.panels[0].square
-        else ROW_PX
-        if len(rows) == 1
-        else LOW_ROW_PX
-    )
-    return round(each * sum(rows)) + AROUND_PX
+def _height(figure: FigureDefinition) -> int:
+    rows = figure.row_heights
+    usual = ROW_PX if len(rows) == 1 else LOW_ROW_PX
+    row_px = SQUARE_PX.get(figure.columns, LOW_ROW_PX) if figure.panels[0].square else usual
+    return round(row_px * sum(rows)) + AROUND_PX
 
 
-def _rows(figure: Figure) -> list[float]:
-    """The height of each row: of its highest panel."""
-    starts = range(0, len(figure.panels), figure.columns)
-    return [max(panel.height for panel in figure.panels[start : start + figure.columns]) for start in starts]
-
-
-def _axes(figure: Figure, index: int) -> dict[str, Any]:
+def _axes(figure: FigureDefinition, index: int) -> dict[str, Any]:
     panel, suffix = figure.panels[index], _suffix(index)
     row, column = divmod(index, figure.columns)
     x = _axis(panel.x) | {"domain": _part([1.0] * figure.columns, column, 0.14), "anchor": f"y{suffix}"}
     gap = 0.08 if figure.share_x else 0.2
-    low, high = _part(_rows(figure), row, gap)
+    low, high = _part(figure.row_heights, row, gap)
     y = _axis(panel.y) | {"domain": [round(1 - high, 4), round(1 - low, 4)], "anchor": f"x{suffix}"}
     if panel.square:
         x["constrain"] = "domain"
@@ -128,7 +115,7 @@ def _span(axis: Axis) -> float:
 
 
 def _part(sizes: list[float], index: int, gap: float) -> list[float]:
-    """The ends of a part of 0 to 1 that is shared out in these sizes, with gaps between."""
+    """Return the ends of one part when 0 to 1 is divided into parts of these sizes, with gaps between them."""
     unit = (1 - gap * (len(sizes) - 1)) / sum(sizes)
     start = sum(sizes[:index]) * unit + gap * index
     return [round(start, 4), round(start + sizes[index] * unit, 4)]
@@ -178,7 +165,7 @@ def _shades(shaded: list[Points]) -> dict[str, Any]:
     }
 
 
-def _is_read_along_x(figure: Figure) -> bool:
-    """Whether a value of x has one value of each line, to be shown all at once."""
-    marks = [mark for panel in figure.panels for mark in panel.marks]
-    return any(isinstance(each, Line) for each in marks) and not any(isinstance(each, Points) for each in marks)
+def _is_read_along_x(figure: FigureDefinition) -> bool:
+    """Return whether one hover text can show the values of all lines at an x: without points, each line has one."""
+    kinds = {type(mark) for mark in figure.marks}
+    return Line in kinds and Points not in kinds

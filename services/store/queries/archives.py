@@ -1,152 +1,106 @@
-"""Rows of any exported table, out of a database and into one; `gaplab.services.store.archive_columns` says which."""
+"""Rows of whole tables, for archives: read in a stable order, and inserted in bulk."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime
 from enum import Enum
 from itertools import islice
 from typing import Any
 
-from sqlalchemy import ColumnElement, Select, Table, insert, select, text
+from sqlalchemy import Select, insert, select, text
 from sqlalchemy.exc import DataError, IntegrityError
 from sqlalchemy.orm import Session
 
-from gaplab.services.store.archive_columns import COLUMNS_LEFT_OUT, EXPERIMENT, REPETITION, columns_of, table_of
 from gaplab.services.store.clock import now
-from gaplab.services.store.models import ExperimentProvenanceRow, ExperimentRow, ProvenanceRow, RepetitionRow, StudyRow
+from gaplab.services.store.models import Base, ExperimentProvenanceRow, ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries import provenance
-from gaplab.services.store.queries.experiments import new_id
-from gaplab.services.store.stored_specs import without_truth
-
-__all__ = ["Refused", "free", "insert_rows", "moment", "rows"]
 
 Row = dict[str, Any]
 
 Refused = (IntegrityError, DataError)
-"""What a database says to rows that contradict each other, or that have no place in it."""
+"""Errors of the database for rows that contradict each other, or have no place in it."""
+
+REPETITION_ID, EXPERIMENT, REPETITION = "repetition_id", "experiment", "repetition"
+"""Rows have the experiment and the number of a repetition in place of its id, which one database generated."""
 
 _AT_ONCE = 1_000
 _LOCK = 0x67617069  # among the advisory locks of a Postgres database
-_REPETITIONS = table_of("repetition")
+_REPETITIONS = Base.metadata.tables["repetition"]
 _REPLACED = {EXPERIMENT: _REPETITIONS.c.experiment_id, REPETITION: _REPETITIONS.c.number}
 
 
-def rows(
-    session: Session, name: str, *, study: str | None, experiments: Sequence[str], hidden: Collection[str]
-) -> Iterator[Row]:
-    """The rows that these experiments have in a table, as they come from the database, a few at a time.
+def read_rows(session: Session, name: str, columns: Iterable[str], owners: Sequence[str]) -> Iterator[Row]:
+    """Yield the rows that experiments have in a table, as they come from the database.
 
     Args:
-        session: of the moment of which the rows are.
-        name: of the table.
-        study: that is exported with its experiments; without one, the experiments are cut off from theirs.
-        experiments: in the order in which their rows come.
-        hidden: those whose reality's parameters are null.
+        session: a snapshot of the database.
+        name: the table.
+        columns: their names, with `EXPERIMENT` and `REPETITION` in place of the id of a repetition.
+        owners: ids of experiments; of studies, if the table is `study`. Their rows come in this order.
     """
-    cut_off = {"study_id": None} if study is None else {}
-    if name == "provenance":  # experiments have them in common
-        used = select(ExperimentProvenanceRow.provenance_id).where(
-            ExperimentProvenanceRow.experiment_id.in_(experiments)
-        )
-        columns = [table_of(name).c[each.name] for each in columns_of(name)]
-        found = session.execute(select(*columns).where(ProvenanceRow.id.in_(used)).order_by(ProvenanceRow.id))
-        yield from map(dict, found.mappings())
-        return
-    for owner in ([study] if study else []) if name == "study" else experiments:
-        found = session.execute(_query(name, owner), execution_options={"yield_per": _AT_ONCE})
-        for each in found.mappings():
-            row = {key: value.value if isinstance(value, Enum) else value for key, value in each.items()}
-            row |= {key: value for key, value in cut_off.items() if key in row}
-            yield {key: _hide(value) for key, value in row.items()} if owner in hidden else row
+    names = list(columns)
+    queries = [_provenances(names, owners)] if name == "provenance" else [_query(name, names, each) for each in owners]
+    for query in queries:
+        for row in session.execute(query, execution_options={"yield_per": _AT_ONCE}).mappings():
+            yield {key: value.value if isinstance(value, Enum) else value for key, value in row.items()}
 
 
-def free(session: Session, model: type[StudyRow | ExperimentRow], wanted: Iterable[str]) -> dict[str, str]:
-    """The id under which each is stored here: its own, or a new one if that is taken.
-
-    No other import looks until this one's transaction ends: of two of the same archive, one would be refused.
-    """
+def taken_ids(session: Session, model: type[StudyRow | ExperimentRow], ids: Iterable[str]) -> set[str]:
+    """Return the ids that the database has already; another import waits here until this transaction ends."""
     if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write ever overlap
         session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
-    ids = list(wanted)
-    taken = set(session.scalars(select(model.id).where(model.id.in_(ids))))
-    return {each: new_id() if each in taken else each for each in ids}
+    return set(session.scalars(select(model.id).where(model.id.in_(list(ids)))))
 
 
-def moment(session: Session) -> datetime:
-    """Now, by the database's clock."""
+def database_time(session: Session) -> datetime:
+    """Return the time by the database's clock."""
     return session.execute(select(now())).scalar_one()
 
 
-def insert_rows(session: Session, name: str, found: Iterable[Row]) -> int:
-    """Add rows of an archive to a table, a few at a time; how many they were.
-
-    Args:
-        session: of a transaction that writes.
-        name: of the table.
-        found: checked, with the ids of experiments and studies as they are here.
+def insert_rows(session: Session, name: str, rows: Iterable[Row]) -> int:
+    """Insert rows into a table, and return their number.
 
     Raises:
-        IntegrityError: a row is there twice, or what it belongs to is not there.
+        IntegrityError: a row exists already, or belongs to a row that does not exist.
         DataError: a value has no place in its column.
-        KeyError: as well, if that is a repetition.
+        KeyError: a row belongs to a repetition that does not exist.
     """
-    table, count, incoming = table_of(name), 0, iter(found)
-    numbered = "repetition_id" in table.c
+    table, count, incoming = Base.metadata.tables[name], 0, iter(rows)
     while some := list(islice(incoming, _AT_ONCE)):
-        values = _numbered(session, some) if numbered else some
-        if name == "provenance":
-            provenance.insert_unless_there(session, values)
-        else:
-            session.execute(insert(table), values)
         count += len(some)
+        if name == "provenance":
+            provenance.insert_unless_there(session, some)
+        else:
+            session.execute(insert(table), _with_ids(session, some) if REPETITION_ID in table.c else some)
     return count
 
 
-def _numbered(session: Session, some: Sequence[Row]) -> list[Row]:
-    """With the numbers that this database gave to their repetitions.
-
-    Raises:
-        KeyError: a row belongs to a repetition that is not there.
-    """
-    row = RepetitionRow
-    owners = {each[EXPERIMENT] for each in some}
-    found = session.execute(select(row.experiment_id, row.number, row.id).where(row.experiment_id.in_(owners)))
+def _with_ids(session: Session, rows: Sequence[Row]) -> list[Row]:
+    """Return the rows with the ids of their repetitions in this database."""
+    model = RepetitionRow
+    owners = {row[EXPERIMENT] for row in rows}
+    found = session.execute(select(model.experiment_id, model.number, model.id).where(model.experiment_id.in_(owners)))
     ids = {(experiment, number): id_ for experiment, number, id_ in found}
     return [
-        {key: value for key, value in each.items() if key not in _REPLACED}
-        | {"repetition_id": ids[each[EXPERIMENT], each[REPETITION]]}
-        for each in some
+        {key: value for key, value in row.items() if key not in _REPLACED}
+        | {REPETITION_ID: ids[row[EXPERIMENT], row[REPETITION]]}
+        for row in rows
     ]
 
 
-def _query(name: str, owner: str) -> Select[Any]:
-    table = table_of(name)
-    numbered = "repetition_id" in table.c
-    columns = [(_REPLACED[each.name] if numbered and each.name in _REPLACED else table.c[each.name]).label(each.name)
-               for each in columns_of(name)]  # fmt: skip
-    query = select(*columns).select_from(table).where(_belongs(table, owner))
-    key = [each for each in table.primary_key.columns if each.name != "repetition_id"]
-    if not numbered:
-        return query.order_by(*([table.c.number] if table is _REPETITIONS else key))
-    query = query.join(_REPETITIONS, _REPETITIONS.c.id == table.c.repetition_id)
-    return query.order_by(_REPETITIONS.c.number, *key)
+def _provenances(columns: Sequence[str], experiments: Sequence[str]) -> Select[Any]:
+    """Return the query for provenances, which experiments share."""
+    table, use = Base.metadata.tables["provenance"], ExperimentProvenanceRow
+    used = select(use.provenance_id).where(use.experiment_id.in_(experiments))
+    return select(*(table.c[each] for each in columns)).where(table.c.id.in_(used)).order_by(table.c.id)
 
 
-def _belongs(table: Table, owner: str) -> ColumnElement[bool]:
-    if table.name in {"study", "experiment"}:
-        return table.c.id == owner
-    column = table.c.experiment_id if "experiment_id" in table.c else _REPETITIONS.c.experiment_id
-    return column == owner
-
-
-def _hide(value: Any) -> Any:  # noqa: ANN401 - JSON
-    """The same without reality's parameters, wherever a spec stands in it."""
-    if isinstance(value, Mapping):
-        reality = value.get("reality")
-        shown = without_truth(value) if isinstance(reality, Mapping) and "parameters" in reality else value
-        return {key: _hide(each) for key, each in shown.items()}
-    if isinstance(value, list):
-        return [_hide(each) for each in value]
-    return value
-
-
-assert all(column in table_of(name).c for name, column in COLUMNS_LEFT_OUT)
+def _query(name: str, columns: Sequence[str], owner: str) -> Select[Any]:
+    table = Base.metadata.tables[name]
+    key = [each for each in table.primary_key.columns if each.name != REPETITION_ID]
+    if REPETITION_ID in table.c:
+        query = select(*((_REPLACED if each in _REPLACED else table.c)[each].label(each) for each in columns))
+        query = query.join_from(table, _REPETITIONS, _REPETITIONS.c.id == table.c.repetition_id)
+        return query.where(_REPETITIONS.c.experiment_id == owner).order_by(_REPETITIONS.c.number, *key)
+    owned_by = table.c.id if name in {"study", "experiment"} else table.c.experiment_id
+    order = [table.c.number] if table is _REPETITIONS else key
+    return select(*(table.c[each] for each in columns)).where(owned_by == owner).order_by(*order)

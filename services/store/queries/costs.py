@@ -1,4 +1,4 @@
-"""What rollouts took so far, by the experiments that they were of."""
+"""Rollouts and their time, by experiment."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from gaplab.services.store.models import ExperimentRow, RepetitionRow
 
 
 def latest(session: Session, count: int) -> tuple[tuple[dict[str, Any], float, int], ...]:
-    """The specs of the `count` newest experiments that have begun, the seconds of their work, and their rollouts."""
+    """Return spec, seconds of work and rollouts of the `count` newest experiments that have started."""
     row, run = ExperimentRow, RepetitionRow
     newest = (
         select(row.id, row.spec)

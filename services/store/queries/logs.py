@@ -11,8 +11,7 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
-from gaplab.services.store.models import IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
-from gaplab.services.store.queries.step_rows import position
+from gaplab.services.store.models import IterationRow, MeasurementRow, SimulatorRow
 
 R = TypeVar("R", IterationRow, MeasurementRow, SimulatorRow)
 
@@ -23,13 +22,6 @@ def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, 
     measurements = _rows(session, repetitions, MeasurementRow, MeasurementRow.iteration)
     simulators = _rows(session, repetitions, SimulatorRow, SimulatorRow.iteration, SimulatorRow.rank)
     return {each: _log(iterations[each], measurements[each], simulators[each]) for each in repetitions}
-
-
-def is_whole(session: Session, repetition: RepetitionRow) -> bool:
-    """Whether the rows of the repetition tell of as many steps and iterations as it counts, in order, without holes."""
-    (log,) = logs(session, [repetition.id]).values()
-    done = sum(isinstance(each, Probed) for each in log)
-    return done == repetition.iterations_done and [position(each) for each in log] == list(range(repetition.steps))
 
 
 def _rows(session: Session, repetitions: Sequence[int], table: type[R], *order: Any) -> dict[int, list[R]]:  # noqa: ANN401  # columns

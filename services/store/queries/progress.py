@@ -1,4 +1,4 @@
-"""How far experiments are: one sum over repetitions each, whatever the number of their results."""
+"""The progress of experiments: sums over their repetitions, independent of the number of results."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -7,7 +7,6 @@ from sqlalchemy import ColumnElement, case, func, select
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.records import Progress
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 
 _OPEN = (State.QUEUED, State.RUNNING)
@@ -15,11 +14,11 @@ _OPEN = (State.QUEUED, State.RUNNING)
 
 @dataclass(frozen=True)
 class Tally:
-    """What repetitions add up to; of a study, the sum of its experiments'.
+    """Sums over the repetitions of an experiment or a study.
 
     Attributes:
-        running: those with a step stored; a claimed one that has none may still wait for a core.
-        rollouts_left: of the repetitions that have not ended.
+        running: repetitions with a stored step; a claimed repetition without one may still wait for a core.
+        rollouts_left: of repetitions that have not ended.
         seconds: of work in the rollouts that are done.
     """
 
@@ -40,34 +39,9 @@ class Tally:
     def __add__(self, other: "Tally") -> "Tally":
         return Tally(*(mine + theirs for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True)))
 
-    @property
-    def seconds_left(self) -> float | None:
-        """What is left at the pace so far by those that run now; None while that is unknown."""
-        if not self.open:
-            return 0.0
-        behind = self.rollouts_done + self.rollouts_saved
-        if not (self.running and behind and self.seconds):
-            return None
-        return self.rollouts_left * self.seconds / behind / self.running
-
-    def progress(self) -> Progress:
-        """As it is shown."""
-        return Progress(
-            repetitions=self.repetitions,
-            completed=self.completed,
-            failed=self.failed,
-            iterations=self.iterations,
-            iterations_done=self.iterations_done,
-            rollouts=self.rollouts,
-            rollouts_done=self.rollouts_done,
-            rollouts_failed=self.rollouts_failed,
-            rollouts_saved=self.rollouts_saved,
-            seconds_left=self.seconds_left,
-        )
-
 
 def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
-    """The tally of each experiment."""
+    """Return the tally of each experiment."""
     row = RepetitionRow
     left = ExperimentRow.rollouts - row.rollouts_done - row.rollouts_saved
     found = session.execute(
@@ -95,7 +69,7 @@ def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
 
 
 def reasons(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Why repetitions of each experiment failed, each reason once, by the first repetition that it befell."""
+    """Return the distinct errors of failed repetitions, by experiment, in the order of repetitions."""
     row = RepetitionRow
     found = session.execute(
         select(row.experiment_id, row.error)
@@ -110,7 +84,7 @@ def reasons(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str
 
 
 def _tally(*counts: int, seconds: float) -> Tally:
-    """In the order of the fields; Postgres sums whole numbers to decimals."""
+    """Return a tally of counts in the order of its fields; Postgres sums whole numbers to decimals."""
     names = (each.name for each in fields(Tally))
     return Tally(seconds=seconds, **{name: int(count) for name, count in zip(names, counts, strict=False)})
 

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session, aliased
 
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.store.models import IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
+from gaplab.services.store.queries.results import of_experiments
 
 
 @dataclass(frozen=True)
@@ -28,20 +28,12 @@ class TunedSample:
 def tuned_samples(session: Session, experiment: str) -> tuple[TunedSample, ...]:
     """Return the samples of an experiment that simulators were tuned on, by repetition and iteration."""
     row, before, after = MeasurementRow, aliased(SimulatorRow), aliased(SimulatorRow)
-    query = (
-        select(RepetitionRow.number, row.iteration, row.genome, row.fitness, before.parameters, after.parameters)
-        .join(RepetitionRow, RepetitionRow.id == row.repetition_id)
-        .join(
-            before,
-            (before.repetition_id == row.repetition_id) & (before.iteration == row.iteration - 1) & (before.rank == 0),
-        )
-        .join(
-            after, (after.repetition_id == row.repetition_id) & (after.iteration == row.iteration) & (after.rank == 0)
-        )
-        .where(RepetitionRow.experiment_id == experiment, row.kind == MeasurementKind.SAMPLE)
-        .order_by(RepetitionRow.number, row.iteration)
-    )
-    return tuple(TunedSample(*each) for each in session.execute(query))
+    columns = row.iteration, row.genome, row.fitness, before.parameters, after.parameters
+    query = of_experiments(row, [experiment], RepetitionRow.number, *columns).where(row.kind == MeasurementKind.SAMPLE)
+    for found, iteration in ((before, row.iteration - 1), (after, row.iteration)):
+        best = (found.repetition_id == row.repetition_id) & (found.iteration == iteration) & (found.rank == 0)
+        query = query.join(found, best)
+    return tuple(TunedSample(*each) for each in session.execute(query.order_by(RepetitionRow.number, row.iteration)))
 
 
 @dataclass(frozen=True)
@@ -65,15 +57,9 @@ def measured_controller(
     """Return the sample or the transferred controller of an iteration; None if it is not measured yet."""
     row, measured = IterationRow, MeasurementRow
     query = (
-        select(measured.genome, measured.fitness, row.simulated_fitness)
-        .join(RepetitionRow, RepetitionRow.id == measured.repetition_id)
+        of_experiments(measured, [experiment], measured.genome, measured.fitness, row.simulated_fitness)
         .join(row, (row.repetition_id == measured.repetition_id) & (row.number == measured.iteration))
-        .where(
-            RepetitionRow.experiment_id == experiment,
-            RepetitionRow.number == repetition,
-            measured.iteration == iteration,
-            measured.kind == kind,
-        )
+        .where(RepetitionRow.number == repetition, measured.iteration == iteration, measured.kind == kind)
     )
     found = session.execute(query).first()
     if found is None:
@@ -85,12 +71,6 @@ def measured_controller(
 def tuned_parameters(session: Session, experiment: str, repetition: int, iteration: int) -> list[list[float]]:
     """Return the parameters of the simulators of an iteration, the best first; empty if they are not tuned yet."""
     row = SimulatorRow
-    query = (
-        select(row.parameters)
-        .join(RepetitionRow, RepetitionRow.id == row.repetition_id)
-        .where(
-            RepetitionRow.experiment_id == experiment, RepetitionRow.number == repetition, row.iteration == iteration
-        )
-        .order_by(row.rank)
-    )
-    return list(session.scalars(query))
+    query = of_experiments(row, [experiment], row.parameters)
+    query = query.where(RepetitionRow.number == repetition, row.iteration == iteration)
+    return list(session.scalars(query.order_by(row.rank)))

@@ -1,4 +1,4 @@
-"""What the whole database holds, from tallies alone: for whoever watches the service."""
+"""Totals over the whole database, from stored tallies."""
 
 from dataclasses import dataclass
 
@@ -12,15 +12,15 @@ from gaplab.services.store.queries.supervisors import ages
 
 @dataclass(frozen=True)
 class Totals:
-    """All experiments taken together.
+    """Totals over all experiments.
 
     Attributes:
-        experiments: by state.
-        repetitions: by state.
-        rollouts_queued: that repetitions which have not ended still need.
+        experiments: their number, by state.
+        repetitions: their number, by state.
+        rollouts_queued: still needed by repetitions that have not ended.
         rollouts_done: recorded so far.
         steps: recorded so far.
-        supervisor_ages_s: since each supervisor was last heard of.
+        supervisor_ages_s: seconds since the last heartbeat of each supervisor.
     """
 
     experiments: dict[State, int]
@@ -32,7 +32,7 @@ class Totals:
 
 
 def totals(session: Session) -> Totals:
-    """One sum over repetitions, by state."""
+    """Return the totals: sums over repetitions, by state."""
     row = RepetitionRow
     by_state = select(ExperimentRow.state, func.count()).group_by(ExperimentRow.state)
     left = ExperimentRow.rollouts - row.rollouts_done - row.rollouts_saved

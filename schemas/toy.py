@@ -23,7 +23,7 @@ class ToyTransfer(Frozen):
     real: float | None = Field(description="null: not measured yet, or failed")
 
 
-class Toy(Frozen):
+class ToyIteration(Frozen):
     """The toy function in one iteration of one repetition."""
 
     experiment: str

@@ -1,0 +1,76 @@
+"""The tables and columns of an archive.
+
+Each table is exported, or left out for a reason; a column that is added to an exported table is exported from then on.
+Values that have a meaning in one database only are left out, or replaced by the values they stand for.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+from gaplab.services.store import tables
+from gaplab.services.store.queries.archives import EXPERIMENT as EXPERIMENT
+from gaplab.services.store.queries.archives import REPETITION as REPETITION
+from gaplab.services.store.queries.archives import REPETITION_ID
+from gaplab.services.store.tables import Column, Kind
+
+EXPORTED = (
+    "provenance",
+    "study",
+    "experiment",
+    "experiment_provenance",
+    "repetition",
+    "iteration",
+    "measurement",
+    "simulator",
+    "attempt",
+)
+"""In the order in which an import inserts them: each after the tables that it refers to."""
+
+LEFT_OUT: Mapping[str, str] = {
+    "sensitivity": "follows from what is tuned, and is shared by all experiments that tune the same",
+    "event": "is numbered without gaps in the one database where it happened",
+    "event_counter": "counts the events of one database",
+    "supervisor": "is a process of one service",
+    "token": "is a secret of one service",
+    "idempotency": "belongs to requests to one service",
+    "checkpoint": "is part of an unfinished step, which only its own service continues",
+}
+"""The other tables, each with the reason."""
+
+COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
+    "experiment": {
+        "token_id": "names a token of one service",
+        "sensitivity_id": "names a check of one service",
+        "running": "counts leases, and an archive has none",
+        "claimable": "follows from the states of repetitions",
+    },
+    "repetition": {
+        "checkpoints": "counts checkpoints, which are left out",
+        "owner": "names a machine and a process there",
+        "heartbeat_at": "belongs to a lease, and an archive has none",
+    },
+}
+"""Columns of exported tables, each with the reason."""
+
+
+@cache
+def columns_of(table: str) -> tuple[Column, ...]:
+    """Return the columns that an archive has of a table.
+
+    The id of a repetition is replaced by its experiment and its number.
+    """
+    left_out = COLUMNS_LEFT_OUT.get(table, {})
+    kept = [each for each in tables.columns_of(table) if not (each.generated or each.name in left_out)]
+    return tuple(column for each in kept for column in _replaced(each))
+
+
+def _replaced(column: Column) -> tuple[Column, ...]:
+    if column.name != REPETITION_ID:
+        return (column,)
+    return replace(column, name=EXPERIMENT, kind=Kind.TEXT, longest=32), replace(column, name=REPETITION)
+
+
+def is_nested(table: str) -> bool:
+    """Return whether rows of the table have nested values, which suit JSON and not Parquet."""
+    return any(each.kind is Kind.NESTED for each in columns_of(table)) or table == "study"

@@ -1,0 +1,120 @@
+"""Checks that the rows of an archive belong together, and that this installation can show its experiments."""
+
+from collections.abc import Mapping
+
+from pydantic import ValidationError
+
+from gaplab.schemas.provenance import Provenance
+from gaplab.schemas.spec import ExperimentSpec, Schedule
+from gaplab.services.archives.checking import Row
+from gaplab.services.archives.columns import EXPERIMENT, REPETITION
+from gaplab.services.archives.opening import OpenedArchive
+from gaplab.services.core.errors import InvalidArchive
+from gaplab.services.core.robots import robots
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.tunables import tunables
+from gaplab.services.specs.resolution import is_direct, spec_of
+from gaplab.services.store.models import SPEC_VERSION
+from gaplab.services.store.queries import provenance
+
+MOST_EXPERIMENTS = 1_000
+
+_RESOLVED = sorted(set(ExperimentSpec.model_fields) - set(Schedule.model_fields))
+"""The fields of a resolved spec, none of which is null."""
+
+
+def checked_experiments(opened: OpenedArchive) -> dict[str, Row]:
+    """Return the rows of the experiments by their ids in the archive, with checked specs.
+
+    Raises:
+        InvalidArchive: a spec is invalid, or the archive has other experiments than its manifest states.
+    """
+    manifest, experiments = opened.manifest, dict[str, Row]()
+    for row in opened.rows("experiment"):
+        if len(experiments) == MOST_EXPERIMENTS:
+            raise InvalidArchive(f"it has more than {MOST_EXPERIMENTS} experiments")
+        experiments[row["id"]] = row | {"spec": _checked_spec(row)}
+    study = manifest.id if manifest.kind == "study" else None
+    studies = [row["id"] for row in opened.rows("study")]
+    if studies != ([study] if study else []) or {row.get("study_id") for row in experiments.values()} - {study}:
+        raise InvalidArchive(f"its study or experiments are not those of the {manifest.kind} {manifest.id!r}")
+    if study is None and list(experiments) != [manifest.id]:
+        raise InvalidArchive(f"its experiment is not {manifest.id!r}")
+    return experiments
+
+
+def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
+    """Refuse a row that belongs to no experiment, or exceeds the size of its experiment.
+
+    Raises:
+        InvalidArchive: the message quotes the row.
+    """
+    if table == "study":
+        return
+    if table == "provenance":
+        _check_provenance(row)
+        return
+    owner = experiments.get(row["id"] if table == "experiment" else row.get(EXPERIMENT) or row["experiment_id"])
+    number = row.get(REPETITION, row["number"] if table == "repetition" else 0)
+    iteration = row.get("iteration", row["number"] if table == "iteration" else 0)
+    if (
+        owner is None
+        or number >= owner["spec"]["repetitions"]
+        or iteration >= owner["iterations"]
+        or (table == "simulator" and len(row["parameters"]) != len(owner["spec"]["tunables"]))
+    ):
+        raise InvalidArchive(f"a row of {table} does not fit its experiment: {str(row)[:200]}")
+
+
+def _check_provenance(row: Row) -> None:
+    try:
+        facts = Provenance.model_validate(row["facts"])
+    except ValidationError as error:
+        raise InvalidArchive(f"the facts of provenance {row['id']!r} are invalid") from error
+    if provenance.id_of(facts) != row["id"]:
+        raise InvalidArchive(f"the facts of provenance {row['id']!r} belong to another id")
+
+
+def _checked_spec(row: Row) -> Row:
+    """Return the spec as it is stored: with the fields that were given, and unknown parameters of reality as null."""
+    place, given = f"the spec of experiment {row['id']!r}", row["spec"]
+    if row.get("spec_version", SPEC_VERSION) > SPEC_VERSION:
+        raise InvalidArchive(f"{place} has version {row['spec_version']}; this gaplab reads up to {SPEC_VERSION}")
+    try:
+        spec = spec_of(given)
+        truth = dict.fromkeys(given["reality"]["parameters"])
+    except (ValidationError, KeyError, TypeError, AttributeError) as error:
+        raise InvalidArchive(f"{place} is not a spec") from error
+    names = [each.name for each in spec.tunables]
+    wrong = [*(name for name in _RESOLVED if given.get(name) is None), *_unresolved(spec)]
+    wrong += [name for name in (*truth, *names) if name not in tunables]
+    wrong += [] if spec.robot.name in robots else [spec.robot.name]
+    if wrong or len(set(names)) < len(names) or spec.strategy.name != row["strategy"]:
+        msg = f"{place} is not resolved, or names plug-ins that are not installed here: {', '.join(wrong)[:200]}"
+        raise InvalidArchive(msg)
+    if row["iterations"] not in _iterations(spec):
+        msg = f"{place} does not fit its experiment, whose repetitions have {row['iterations']:,} iterations"
+        raise InvalidArchive(msg)
+    stored = {name: value for name, value in spec.model_dump(mode="json").items() if name in given}
+    return stored | {"reality": stored["reality"] | {"parameters": truth | stored["reality"]["parameters"]}}
+
+
+def _unresolved(spec: ExperimentSpec) -> list[str]:
+    """Return the parts that a resolved spec has, whatever is installed, and this one lacks."""
+    return [
+        *(f"budget/{name}" for name, value in spec.budget if value is None),
+        *(
+            f"bounds of {each.name}"
+            for each in spec.tunables
+            if each.lower is None or each.upper is None or each.lower >= each.upper
+        ),
+        *(["reality/engine"] if spec.reality.engine is None else []),
+    ]
+
+
+def _iterations(spec: ExperimentSpec) -> set[int]:
+    """Return the permitted iterations of a repetition: both numbers for a strategy that is not installed here."""
+    several = (spec.iterations or 0) + 1
+    if spec.strategy.name in strategies:
+        return {1 if is_direct(spec) else several}
+    return {1, several}

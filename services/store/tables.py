@@ -1,0 +1,87 @@
+"""The columns of each table, described without SQLAlchemy: they follow from the models."""
+
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+from functools import cache
+from typing import Any, get_args, get_type_hints
+
+from sqlalchemy import JSON, BigInteger, Boolean, Integer, String
+from sqlalchemy import Column as TableColumn
+
+from gaplab.services.store.clock import UtcDateTime
+from gaplab.services.store.models import Base, Number
+
+
+class Kind(StrEnum):
+    """The type of a column's values."""
+
+    TEXT = "text"
+    WHOLE = "whole"
+    REAL = "real"
+    TRUTH = "truth"
+    MOMENT = "moment"
+    VECTOR = "vector"
+    NESTED = "nested"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Attributes:
+        nullable: null is permitted.
+        required: an insert must give a value, since there is no default.
+        generated: the database itself numbers the rows.
+        longest: characters of a text; None if there is no limit.
+        large: a whole number of 64 bits, rather than 32.
+        choices: the only permitted texts; empty if all are.
+    """
+
+    name: str
+    kind: Kind
+    nullable: bool
+    required: bool
+    generated: bool = False
+    longest: int | None = None
+    large: bool = False
+    choices: tuple[str, ...] = ()
+
+
+@cache
+def columns_of(table: str) -> tuple[Column, ...]:
+    """Return the columns of a table, in the order of the database."""
+    return tuple(_column(each) for each in Base.metadata.tables[table].columns)
+
+
+def _column(column: TableColumn[Any]) -> Column:
+    choices = tuple(getattr(column.type, "enums", ()))
+    return Column(
+        name=column.name,
+        kind=_kind(column),
+        nullable=bool(column.nullable),
+        required=not column.nullable and column.default is None and column.server_default is None,
+        generated=column.table.autoincrement_column is column,
+        longest=column.type.length if isinstance(column.type, String) and not choices else None,
+        large=isinstance(column.type, BigInteger),
+        choices=choices,
+    )
+
+
+def _kind(column: TableColumn[Any]) -> Kind:
+    kinds: dict[type, Kind] = {
+        UtcDateTime: Kind.MOMENT,
+        Boolean: Kind.TRUTH,
+        Integer: Kind.WHOLE,
+        Number: Kind.REAL,
+        String: Kind.TEXT,
+        JSON: Kind.VECTOR if _is_vector(column) else Kind.NESTED,
+    }
+    return next(kind for type_, kind in kinds.items() if isinstance(column.type, type_))
+
+
+def _is_vector(column: TableColumn[Any]) -> bool:
+    """Return whether the model declares the column as a list of numbers."""
+    (model,) = (each.class_ for each in Base.registry.mappers if each.local_table is column.table)
+    (declared,) = get_args(get_type_hints(model, {"datetime": datetime, "Any": Any})[column.name])
+    return declared == list[float] or list[float] in get_args(declared)
