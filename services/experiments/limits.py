@@ -1,33 +1,22 @@
-"""Admission of submissions: within the limits, and once for each idempotency key."""
+"""Limits of submissions: how large one may be, and how much may be under way."""
 
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import timedelta
-from hashlib import sha256
-from typing import Generic, TypeVar
 
 from sqlalchemy import case, func, select, text
 
-from gaplab.schemas.base import Frozen
 from gaplab.schemas.lifecycle import OPEN
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.core.errors import InvalidSpec, KeyReused, LimitReached, Violation
+from gaplab.services.core.errors import InvalidSpec, LimitReached, Violation
 from gaplab.services.settings import Limits, variable_of
 from gaplab.services.specs.resolution import expected_rollouts
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
-from gaplab.services.store.queries import idempotency
-from gaplab.services.store.session import Session, Store
-
-KEYS_LIVE = timedelta(days=7)
-"""How long an idempotency key stands for the request that it came with."""
+from gaplab.services.store.session import Session
 
 RETRY_AFTER_S = 60
 """A service that is full of experiments is full for minutes at least."""
 
 _LOCK = 0x67617071  # among the advisory locks of a Postgres database
-
-R = TypeVar("R", bound=Frozen)
 
 
 @dataclass(frozen=True)
@@ -49,56 +38,11 @@ FREELY = Admission()
 
 
 @dataclass(frozen=True)
-class Once(Generic[R]):
-    """The answer to a request that may have come before.
-
-    Attributes:
-        answer: the same each time.
-        replayed: whether it was given before, and nothing was done now.
-    """
-
-    answer: R
-    replayed: bool = False
-
-
-@dataclass(frozen=True)
 class Load:
     """Experiments that have not ended, and the rollouts that they have left."""
 
     experiments: int
     rollouts: int
-
-
-def once(store: Store, admitted: Admission, asked: Frozen, kind: type[R], work: Callable[[Session], R]) -> Once[R]:
-    """Do the work and keep its answer under the key, in one transaction; or return the answer that is kept.
-
-    Args:
-        store: the database.
-        admitted: with the key; without one, the work is always done.
-        asked: the request's body; its class tells one endpoint from another.
-        kind: class of the answer.
-        work: creates the answer in the transaction.
-
-    Raises:
-        KeyReused: the key stands for another request.
-    """
-    key, caller = admitted.key, admitted.token or ""
-    if key is None:
-        return Once(store.write(work))
-    digest = _digest(asked)
-
-    def transaction(session: Session) -> Once[R]:
-        idempotency.forget(session, KEYS_LIVE)
-        if (known := idempotency.reserve(session, caller, key, digest)) is None:
-            answer = work(session)
-            idempotency.keep(session, caller, key, answer.model_dump(mode="json"))
-            return Once(answer)
-        if known.digest != digest:
-            msg = f"the idempotency key {key!r} stands for another request already; a new request needs a new key"
-            raise KeyReused(msg)
-        return Once(kind.model_validate(known.answer), replayed=True)
-
-    return store.write(transaction)
 
 
 def check_extent(specs: Sequence[ExperimentSpec], limits: Limits | None) -> None:
@@ -174,8 +118,3 @@ def _check(name: str, present: int, more: int, limits: Limits) -> None:
 
 def _too_much(name: str, value: int, limit: int) -> str:
     return f"this service takes at most {limit:,} {name} in one submission ({variable_of(name)}), not {value:,}"
-
-
-def _digest(asked: Frozen) -> str:
-    text = json.dumps([type(asked).__name__, asked.model_dump(mode="json")], sort_keys=True)
-    return sha256(text.encode()).hexdigest()

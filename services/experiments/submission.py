@@ -19,8 +19,9 @@ from gaplab.schemas.records import (
 )
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.experiments import checks
+from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.lifecycle import ask_experiment
-from gaplab.services.experiments.limits import FREELY, Admission, Once, check_extent, check_load, once
+from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
 from gaplab.services.experiments.listing import list_experiments as list_experiments
 from gaplab.services.experiments.listing import list_studies as list_studies
 from gaplab.services.experiments.views import view_experiments, view_repetition, view_studies

@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.connection import ServiceError
+from gaplab.api.clients.errors import ServiceError
 from gaplab.api.commands.cli import main
 from gaplab.schemas.access import Role
 from gaplab.services import access

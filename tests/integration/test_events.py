@@ -15,7 +15,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
-from gaplab.api.clients.client import Client, ServiceError
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.errors import ServiceError
 from gaplab.api.http import event_feed as feeding
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.process.server import Server, listen

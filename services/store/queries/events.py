@@ -5,17 +5,17 @@ ones, and a transaction that is rolled back takes none. Nothing is locked after 
 """
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
-from sqlalchemy import ColumnElement, Table, bindparam, insert, select, text, update
+from sqlalchemy import Table, bindparam, insert, text, update
 from sqlalchemy.orm import Session
 
-from gaplab.schemas.events import EventKind, EventRead
+from gaplab.schemas.events import EventKind
 from gaplab.services.core.types import Measured, Probed, Selected, Step, Transferred, Tuned
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Claim, TimedStep
-from gaplab.services.store.models import EventCounterRow, EventRow, ExperimentRow
+from gaplab.services.store.models import EventCounterRow, EventRow
 from gaplab.services.store.queries.step_rows import finite
 
 _NOTED = "events"
@@ -71,42 +71,6 @@ def write(session: Session) -> None:
     else:
         rows = [{"number": number, **each} for number, each in enumerate(noted, start=before + 1)]
         connection.execute(_INSERT, rows)
-
-
-def latest(session: Session) -> int:
-    """The number of the latest event; 0 if there is none."""
-    return session.execute(select(EventCounterRow.latest)).scalar_one()
-
-
-def after(
-    session: Session,
-    number: int,
-    *,
-    limit: int,
-    experiment: str | None = None,
-    study: str | None = None,
-    kinds: Iterable[EventKind] = (),
-) -> tuple[EventRead, ...]:
-    """Up to `limit` events that follow that number, in their order."""
-    row, wanted = EventRow, list(kinds)
-    query = select(row.number, row.kind, row.experiment_id, ExperimentRow.study_id, row.repetition, row.body, row.at)
-    conditions: list[ColumnElement[bool]] = [row.number > number]
-    if experiment is not None:
-        conditions.append(row.experiment_id == experiment)
-    if study is not None:
-        conditions.append(ExperimentRow.study_id == study)
-    if wanted:
-        conditions.append(row.kind.in_(wanted))
-    found = session.execute(
-        query.outerjoin(ExperimentRow, ExperimentRow.id == row.experiment_id)
-        .where(*conditions)
-        .order_by(row.number)
-        .limit(limit)
-    )
-    return tuple(
-        EventRead(number=place, kind=EventKind(kind), experiment=of, study=within, repetition=which, body=body, at=at)
-        for place, kind, of, within, which, body, at in found
-    )
 
 
 def _columns(noted: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:

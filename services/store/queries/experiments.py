@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from secrets import choice
+from typing import TypeVar
 
 from sqlalchemy import event, insert, select
 from sqlalchemy.orm import Session
@@ -15,6 +16,8 @@ from gaplab.services.store.clock import moment
 from gaplab.services.store.models import SPEC_VERSION, ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.statements import storable
+
+R = TypeVar("R", ExperimentRow, StudyRow)
 
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 
@@ -97,15 +100,12 @@ def insert_repetitions(session: Session, experiment_id: str, numbers: range) -> 
 
 
 def get_experiment(session: Session, experiment_id: str) -> ExperimentRow:
-    """The experiment of that id.
+    """Return the experiment of that id.
 
     Raises:
         NotFound: there is none.
     """
-    if (found := session.get(ExperimentRow, storable(experiment_id))) is None:
-        msg = f"there is no experiment {experiment_id!r}"
-        raise NotFound(msg)
-    return found
+    return _get(session, ExperimentRow, "experiment", experiment_id)
 
 
 def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow, ...]:
@@ -123,15 +123,12 @@ def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow
 
 
 def get_study(session: Session, study_id: str) -> StudyRow:
-    """The study of that id.
+    """Return the study of that id.
 
     Raises:
         NotFound: there is none.
     """
-    if (found := session.get(StudyRow, storable(study_id))) is None:
-        msg = f"there is no study {study_id!r}"
-        raise NotFound(msg)
-    return found
+    return _get(session, StudyRow, "study", study_id)
 
 
 def experiments_of(session: Session, studies: Sequence[str]) -> tuple[ExperimentRow, ...]:
@@ -161,6 +158,13 @@ def lock(session: Session, experiments: Sequence[str]) -> dict[str, State]:
     row = ExperimentRow
     locked = select(row.id, row.state).where(row.id.in_(experiments)).order_by(row.id).with_for_update()
     return dict(session.execute(locked).all())
+
+
+def _get(session: Session, table: type[R], noun: str, id_: str) -> R:
+    if (found := session.get(table, storable(id_))) is None:
+        msg = f"there is no {noun} {id_!r}"
+        raise NotFound(msg)
+    return found
 
 
 @event.listens_for(ExperimentRow, "load")
