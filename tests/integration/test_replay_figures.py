@@ -166,7 +166,7 @@ def test_what_is_not_there_is_refused_and_what_is_not_yet_there_is_empty(sqlite_
     for repetition_, iterations in ((1, [0]), (0, [3])):
         with pytest.raises(NotFound, match="permitted: from 0 to"):
             toy_iterations(sqlite_store, waiting, repetition_, iterations)
-    with pytest.raises(InvalidSpec, match="'quadruped' is no function of one gene"):
+    with pytest.raises(InvalidSpec, match="'quadruped' is not a function of one gene"):
         toy_iterations(sqlite_store, walking, 0, [])
 
 
