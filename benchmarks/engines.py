@@ -13,9 +13,9 @@ from scipy.stats import spearmanr
 
 from benchmarks.physics import TUNED
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes
-from gaplab.services.core.optimizers.base import maximise
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.search import maximise
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.world import Motion
@@ -42,7 +42,7 @@ def simulation(engine: Engine) -> Simulation:
 def evolved(engine: Engine, evaluations: int, seed: int) -> Genome:
     """A controller evolved in the robot's own world."""
     simulate, rng = simulation(engine), stream(seed, "evolved", engine.name)
-    found = maximise(SteadyState(), ROBOT.space, lambda drawn, _: simulate(drawn, TRUTH)[:, 0], evaluations, rng)
+    found = maximise(SteadyState(), ROBOT.space, lambda asked: simulate(asked.genomes, TRUTH)[:, 0], evaluations, rng)
     best: Genome = found.genomes[0]
     return best
 

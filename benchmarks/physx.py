@@ -9,9 +9,9 @@ from scipy import stats
 from benchmarks.measure import Row, rates, ratio
 from benchmarks.physics import SWITCHING, TUNED, edges, genomes
 from gaplab.services.core.arrays import Fitnesses, Genome, Genomes
-from gaplab.services.core.optimizers.base import maximise
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.search import maximise
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.world import Motion
@@ -101,7 +101,9 @@ def evolved(engine: Engine, evaluations: int, *address: str | int) -> Genome:
     """A controller evolved in the robot's own world."""
     simulate = simulation(engine)
     rng = stream(0, *address)
-    found = maximise(SteadyState(), ROBOT.space, lambda drawn, _: simulate(drawn, SWITCHING)[:, 0], evaluations, rng)
+    found = maximise(
+        SteadyState(), ROBOT.space, lambda asked: simulate(asked.genomes, SWITCHING)[:, 0], evaluations, rng
+    )
     best: Genome = found.genomes[0]
     return best
 

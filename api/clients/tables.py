@@ -69,9 +69,8 @@ class Tables:
             iteration: only this iteration; 0 is the untuned start.
         """
         path = f"/experiments/{segment(id)}/simulators"
-        simulators = list(
-            self._connection.items(Page[SimulatorRead], path, limit=PAGE, repetition=repetition, iteration=iteration)
-        )
+        filters = {"limit": PAGE, "repetition": repetition, "iteration": iteration}
+        simulators = list(self._connection.items(Page[SimulatorRead], path, **filters))
         columns = ("repetition", "iteration", "rank", "squared_error")
         frame = _frame([[getattr(row, name) for name in columns] for row in simulators], columns, columns)
         return frame.join(_pandas().DataFrame([row.parameters for row in simulators], index=frame.index))

@@ -27,8 +27,5 @@ def print_json(value: Value, *, line: bool = False) -> None:
         value: schemas, mappings, lists and plain values.
         line: on one line, for several documents in one output.
     """
-    typer.echo(
-        json.dumps(
-            _PLAIN.dump_python(value, mode="json"), ensure_ascii=False, allow_nan=False, indent=None if line else 2
-        )
-    )
+    plain = _PLAIN.dump_python(value, mode="json")
+    typer.echo(json.dumps(plain, ensure_ascii=False, allow_nan=False, indent=None if line else 2))

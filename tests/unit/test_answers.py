@@ -1,14 +1,15 @@
 """A step that was interrupted is repeated from what simulators had answered, to the last bit."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gaplab.schemas.plugin import PluginRef
+from gaplab.services.core.answers import BLOCK, Answers, pack, unpack
 from gaplab.services.core.loop import History, next_step, repetition
 from gaplab.services.core.optimizers import optimizers
-from gaplab.services.core.recall import TOGETHER, Recall, pack, unpack
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.types import Budget
 from tests.fakes import Recorder, flat, paraboloid, small_setting
@@ -20,56 +21,56 @@ class Interrupted(Exception):
     """The power went off."""
 
 
-class Interruptible:
-    """A Simulate that keeps what it answered, and is interrupted after some calls."""
+class Interruption:
+    """A recorder of answers that interrupts the step after some calls."""
 
-    def __init__(self, simulate, calls):
+    def __init__(self, calls: Any) -> None:
         self.left = calls
         self.answers = []
-        self.simulate = simulate
 
-    def __call__(self, genomes, parameters):
+    def genomes_per_call(self, simulators: Any) -> int:
         if not self.left:
             raise Interrupted
         self.left -= 1
-        fitnesses = self.simulate(genomes, parameters)
-        self.answers.append((genomes, parameters, fitnesses))
-        return fitnesses
+        return 1_000
+
+    def record(self, answers: Any) -> None:
+        self.answers += answers
 
 
-def half_broken(genomes, parameters):
+def half_broken(genomes: Any, parameters: Any) -> Any:
     """The paraboloid, where physics fails on a part of the space."""
     return np.where(genomes[:, :1] < 0.3, np.nan, paraboloid(genomes, parameters))
 
 
-def setting_of(strategy, optimizer, simulate=half_broken, batch=1):
+def setting_of(strategy: Any, optimizer: Any, simulate: Any = half_broken, batch: Any = 1) -> Any:
     chosen = optimizers.create(PluginRef(name=optimizer, options={"population": 6}))
-    small = small_setting(strategy, optimizer=chosen, budget=BUDGET, simulate=simulate, batch=lambda: batch)
+    small = small_setting(strategy, optimizer=chosen, budget=BUDGET, simulate=simulate, batch_size=lambda: batch)
     return replace(small, iterations=2)
 
 
-def interrupted(setting, history, calls, answers=()):
+def interrupted(setting: Any, history: Any, calls: Any, answers: Any = ()) -> Any:
     """What the step had been answered when it was interrupted after so many calls; None if it was not."""
-    simulate = Interruptible(setting.simulate, calls)
-    recall = Recall(simulate, setting.batch, answers)
+    recorder = Interruption(calls)
     try:
-        next_step(replace(setting, simulate=recall, batch=recall.batch), history)
+        next_step(setting, history, Answers(setting.simulate, setting.batch_size, answers, recorder))
     except Interrupted:
-        return pack(simulate.answers)
+        return pack(recorder.answers)
     return None
 
 
-def resumed(setting, history, answers):
+def resumed(setting: Any, history: Any, answers: Any) -> Any:
     """The step after the interruption, and how many rollouts it still took."""
     simulate = Recorder(setting.simulate)
-    recall = Recall(simulate, setting.batch, answers)
-    return next_step(replace(setting, simulate=recall, batch=recall.batch), history), simulate.rollouts
+    return next_step(setting, history, Answers(simulate, setting.batch_size, answers)), simulate.rollouts
 
 
 @pytest.mark.parametrize(("before", "after"), [(1, 1), (1, 8), (8, 1)])
 @pytest.mark.parametrize("optimizer", sorted(optimizers))
 @pytest.mark.parametrize("strategy", sorted(strategies))
-def test_a_step_interrupted_anywhere_equals_one_that_was_not(strategy, optimizer, before, after):
+def test_a_step_interrupted_anywhere_equals_one_that_was_not(
+    strategy: Any, optimizer: Any, before: Any, after: Any
+) -> None:
     whole = setting_of(strategy, optimizer)
     history = History()
     for step in repetition(whole):
@@ -83,7 +84,7 @@ def test_a_step_interrupted_anywhere_equals_one_that_was_not(strategy, optimizer
 
 @pytest.mark.parametrize("optimizer", sorted(optimizers))
 @pytest.mark.parametrize("strategy", sorted(strategies))
-def test_nothing_that_was_answered_is_simulated_again(strategy, optimizer):
+def test_nothing_that_was_answered_is_simulated_again(strategy: Any, optimizer: Any) -> None:
     setting = setting_of(strategy, optimizer)
     history = History()
     for step in repetition(setting):
@@ -96,7 +97,7 @@ def test_nothing_that_was_answered_is_simulated_again(strategy, optimizer):
         history = history.after(step)
 
 
-def test_a_step_may_be_interrupted_again_and_again():
+def test_a_step_may_be_interrupted_again_and_again() -> None:
     setting = setting_of("informative", "steady_state", batch=8)
     history = History()
     for step in repetition(setting):
@@ -109,7 +110,7 @@ def test_a_step_may_be_interrupted_again_and_again():
         history = history.after(step)
 
 
-def test_answers_of_another_step_are_of_no_use_and_do_no_harm():
+def test_answers_of_another_step_are_of_no_use_and_do_no_harm() -> None:
     setting = setting_of("simulated_fit", "steady_state")
     steps = list(repetition(setting))
     histories = [History()]
@@ -124,29 +125,25 @@ def test_answers_of_another_step_are_of_no_use_and_do_no_harm():
     assert rollouts == resumed(setting, histories[tuning], ())[1]
 
 
-def test_answers_survive_packing_to_the_last_bit():
+def test_answers_survive_packing_to_the_last_bit() -> None:
     rng = np.random.default_rng(0)
     awkward = np.array([[np.nan, -0.0, 5e-324], [np.inf, 0.1 + 0.2, -1.7976931348623157e308]])
-    answers = [
-        (rng.random((2, 4)), rng.random((3, 2)), awkward),
-        (rng.random((1, 4)), rng.random((1, 2)), awkward[:1, :1]),
-    ]
+    answers = [(rng.bytes(16), row) for row in (awkward[0], awkward[1], awkward[0, :1])]
 
-    rows = list(unpack(pack(answers)))
+    unpacked = list(unpack(pack(answers)))
 
-    assert [row.tobytes() for _, row in rows] == [awkward[0].tobytes(), awkward[1].tobytes(), awkward[0, :1].tobytes()]
-    assert len({key for key, _ in rows}) == 3
+    assert [(key, row.tobytes()) for key, row in unpacked] == [(key, row.tobytes()) for key, row in answers]
     assert len(pack(answers)) == 2 * 8 + 3 * 16 + 7 * 8
 
 
-def test_many_simulators_are_asked_in_parts():
+def test_many_simulators_are_asked_in_parts() -> None:
     simulate = Recorder()
     genomes, parameters = (
         np.random.default_rng(0).random((2, 2)),
-        np.random.default_rng(1).random((2 * TOGETHER + 1, 2)),
+        np.random.default_rng(1).random((2 * BLOCK + 1, 2)),
     )
 
-    fitnesses = Recall(simulate, lambda: 1)(genomes, parameters)
+    fitnesses = Answers(simulate)(genomes, parameters)
 
-    assert simulate.calls == [(2, TOGETHER), (2, TOGETHER), (2, 1)]
+    assert simulate.calls == [(2, BLOCK), (2, BLOCK), (2, 1)]
     np.testing.assert_array_equal(fitnesses, paraboloid(genomes, parameters))
