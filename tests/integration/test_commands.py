@@ -281,7 +281,7 @@ def test_the_shell_gets_a_script_and_the_script_gets_commands_and_ids(url: str, 
 
 
 def test_completion_installs_itself_for_the_shell_that_it_is_asked_from(tmp_path: Path) -> None:
-    ask = f"'{sys.executable}' -m api.cli --install-completion; true"  # bash would become the last command itself
+    ask = f"'{sys.executable}' -m gaplab --install-completion; true"  # bash would become the last command itself
     environment = os.environ | {"HOME": str(tmp_path)}
 
     done = subprocess.run(["bash", "-c", ask], env=environment, capture_output=True, text=True, check=False)
