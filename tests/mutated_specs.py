@@ -161,7 +161,7 @@ def measure(count: int, seed: int, api: TestClient) -> Found:
 @contextmanager
 def service(database_url: str | None) -> Iterator[TestClient]:
     """The API over a database, by default a SQLite file that goes away; room for all that is accepted."""
-    room = replace(Limits(), experiments=10**9, experiments_per_token=10**9, rollouts=10**18, rollouts_per_token=10**18)
+    room = replace(Limits(), experiments=10**9, experiments_per_token=10**9, rollouts=10**18, rollouts_per_token=10**18)  # type: ignore[type-var]
     with TemporaryDirectory() as folder:
         url = database_url or f"sqlite:///{Path(folder) / 'mutated.db'}"
         migrations.upgrade(url)
