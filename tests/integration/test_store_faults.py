@@ -131,7 +131,8 @@ def outcome(store: Store) -> Any:
     rounds = 0
     while unfinished(store):
         assert rounds < 100
-        Trying(store).serve(Stop(12 if rounds else 2))  # the first is stopped while a check is under way  # type: ignore[arg-type]  # type: ignore[arg-type]
+        # the first is stopped while a check is under way
+        Trying(store).serve(Stop(12 if rounds else 2))  # type: ignore[arg-type]
         rounds += 1
     with store.reading() as session:
         rows = session.query(RepetitionRow).all()
