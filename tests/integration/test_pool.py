@@ -155,7 +155,7 @@ def test_a_task_computes_every_step_of_a_repetition() -> None:
             {"strategy": "random", "robot": "toy_function", "iterations": 2, "repetitions": 1, "budget": "smoke"}
         )
     )
-    claim = Claim(repetition_id=0, epoch=0, experiment_id="none", number=0, spec=spec)  # type: ignore[call-arg]
+    claim = Claim(id=0, epoch=0, experiment_id="none", number=0, spec=spec)
 
     stream = task.run.remote(claim, {}, CHECKPOINT_S)
 
