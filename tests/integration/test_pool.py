@@ -58,7 +58,7 @@ def spreads(monkeypatch: pytest.MonkeyPatch) -> Any:
     """What was spread over cores."""
     spread = []
     run = Spread.run
-    monkeypatch.setattr(Spread, "run", lambda self: spread.append(self) or run(self))
+    monkeypatch.setattr(Spread, "run", lambda self: spread.append(self) or run(self))  # type: ignore[func-returns-value]
     return spread
 
 
@@ -159,5 +159,5 @@ def test_a_task_computes_every_step_of_a_repetition() -> None:
 
     stream = task.run.remote(claim, {}, CHECKPOINT_S)
 
-    steps = [each for batch in stream for each in ray.get(batch) if isinstance(each, TimedStep)]
+    steps = [each for batch in stream for each in ray.get(batch) if isinstance(each, TimedStep)]  # type: ignore[attr-defined]
     assert len(steps) == sum(1 for _ in repetition(setting(spec, 0)))

@@ -102,9 +102,9 @@ def test_the_toy_has_what_the_papers_figure_has(store: Store) -> None:
     tuned = next(step for step in log if isinstance(step, Tuned) and step.iteration == 2)
     sent = next(step for step in log if isinstance(step, Transferred) and step.iteration == 2)
     probed = next(step for step in log if isinstance(step, Probed) and step.iteration == 2)
-    assert shown.truth == pytest.approx(speed(np.array(shown.genes), 1.0, 0.8, 0.0), abs=1e-12)
+    assert shown.truth == pytest.approx(speed(np.array(shown.genes), 1.0, 0.8, 0.0), abs=1e-12)  # type: ignore[arg-type]
     assert len(shown.approximations) == len(tuned.simulators)
-    best = speed(np.array(shown.genes), *tuned.simulators[0].parameters, 0.0)
+    best = speed(np.array(shown.genes), *tuned.simulators[0].parameters, 0.0)  # type: ignore[call-arg]
     assert shown.approximations[0] == pytest.approx(best, abs=1e-12)
     assert shown.squared_error == tuned.simulators[0].squared_error
     assert [each.iteration for each in shown.samples] == [1, 2]

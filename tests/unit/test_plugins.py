@@ -56,7 +56,7 @@ def put(tmp_path: Path) -> Iterator[Put]:
 
 
 def strategies() -> Registry[Strategy]:
-    return Registry("strategy", "gaplab.services.core.strategies", Strategy)
+    return Registry("strategy", "gaplab.services.core.strategies", Strategy)  # type: ignore[type-abstract]
 
 
 def test_a_file_in_the_folder_is_a_plug_in_among_gaplabs_own(put: Put) -> None:
@@ -75,7 +75,7 @@ def test_a_file_in_the_folder_is_a_plug_in_among_gaplabs_own(put: Put) -> None:
 def test_it_belongs_to_its_kind_only(put: Put) -> None:
     put(careful=CAREFUL)
 
-    assert "careful" not in Registry("tunable", "gaplab.services.core.tunables", Tunable)
+    assert "careful" not in Registry("tunable", "gaplab.services.core.tunables", Tunable)  # type: ignore[type-abstract]
 
 
 def test_files_import_from_each_other_and_one_with_an_underscore_is_only_for_that(put: Put) -> None:
