@@ -16,7 +16,7 @@ from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
 from gaplab.api.commands.cli import app
 from gaplab.api.commands.completion import KINDS
-from gaplab.api.commands.exit_codes import MEANINGS
+from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.plugin import BudgetRead, PluginRead
 from gaplab.services.plugins.catalogue import catalogue
 from gaplab.services.plugins.folders import VARIABLE
@@ -53,7 +53,7 @@ def commands() -> Iterator[str]:
         rows = [_parameter(each) for each in command.params]
         yield from _table(("argument or option", "meaning", "left out"), rows)
     yield "## Exit codes\n"
-    yield from _table(("code", "meaning"), [(str(code.value), meaning) for code, meaning in MEANINGS.items()])
+    yield from _table(("code", "meaning"), [(str(code.value), code.meaning) for code in Exit])
 
 
 def http() -> Iterator[str]:

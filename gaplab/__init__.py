@@ -1,4 +1,4 @@
-"""What programs and notebooks import.
+"""The names that programs and notebooks import.
 
 from gaplab import Client
 
@@ -7,7 +7,7 @@ with Client() as gaplab:
     gaplab.wait(study.id)
     gaplab.figure(study.id).save("curves.pdf")
 
-Plug-ins of one's own import from `gaplab.plugins`.
+Your own plug-ins import from `gaplab.plugins`.
 """
 
 from importlib import import_module
@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gaplab.api.clients.client import Client as Client
-    from gaplab.api.clients.client import ExperimentFailed as ExperimentFailed
-    from gaplab.api.clients.client import ExtraMissing as ExtraMissing
-    from gaplab.api.clients.client import ServiceError as ServiceError
-    from gaplab.api.clients.client import ServiceUnreachable as ServiceUnreachable
+    from gaplab.api.clients.errors import ExperimentFailed as ExperimentFailed
+    from gaplab.api.clients.errors import ExtraMissing as ExtraMissing
+    from gaplab.api.clients.errors import ServiceError as ServiceError
+    from gaplab.api.clients.errors import ServiceUnreachable as ServiceUnreachable
     from gaplab.api.clients.figures import Figure as Figure
     from gaplab.api.process.errors import CommandError as CommandError
     from gaplab.api.process.local_service import local_service as local_service
@@ -26,28 +26,19 @@ if TYPE_CHECKING:
 _HOMES = {
     "Client": "gaplab.api.clients.client",
     "CommandError": "gaplab.api.process.errors",
-    "ExperimentFailed": "gaplab.api.clients.client",
-    "ExtraMissing": "gaplab.api.clients.client",
+    "ExperimentFailed": "gaplab.api.clients.errors",
+    "ExtraMissing": "gaplab.api.clients.errors",
     "Figure": "gaplab.api.clients.figures",
-    "ServiceError": "gaplab.api.clients.client",
-    "ServiceUnreachable": "gaplab.api.clients.client",
+    "ServiceError": "gaplab.api.clients.errors",
+    "ServiceUnreachable": "gaplab.api.clients.errors",
     "local_service": "gaplab.api.process.local_service",
 }
 
-__all__ = [
-    "Client",
-    "CommandError",
-    "ExperimentFailed",
-    "ExtraMissing",
-    "Figure",
-    "ServiceError",
-    "ServiceUnreachable",
-    "local_service",
-]
+__all__ = sorted(_HOMES)
 
 
-def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever it is
-    """What is asked for, imported only now: a worker that loads a plug-in needs no client."""
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - a class or a function
+    """Import a name when it is first used: a worker that loads a plug-in needs no client."""
     if name not in _HOMES:
         msg = f"module {__name__!r} has no attribute {name!r}"
         raise AttributeError(msg)

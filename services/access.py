@@ -1,27 +1,34 @@
-"""Access: who asks, by which token, and what that permits. Each function is one transaction.
+"""Access: the caller of a request, by its token, and what its role permits. Each function is one transaction.
 
-A token is `gaplab_ID_SECRET`. The secret has 256 random bits, and only its SHA-256 is stored: nobody can try out so
-many secrets, so that a slow hash, which passwords need because people choose them, would add nothing but its time to
-every request.
+A token is `gaplab_ID_SECRET`. Only the SHA-256 of the secret is stored. The secret has 256 random bits, too many to try
+out; the slow hash that chosen passwords need would only add its time to every request.
 """
 
 import hmac
 import re
 from contextlib import suppress
 from dataclasses import dataclass
+from datetime import timedelta
 from hashlib import sha256
 from ipaddress import ip_address
 from secrets import token_hex
 
+from sqlalchemy import func, select, update
+
 from gaplab.schemas.access import Role, TokenRead
-from gaplab.services.core.errors import Forbidden, StoreUnavailable, Unauthenticated
+from gaplab.services.core.errors import Forbidden, NotFound, StoreUnavailable, Unauthenticated
+from gaplab.services.store.clock import moment, now
 from gaplab.services.store.models import TokenRow
-from gaplab.services.store.queries import tokens
-from gaplab.services.store.session import Store
+from gaplab.services.store.queries.experiments import new_id
+from gaplab.services.store.session import Session, Store, snapshot, transaction
+from gaplab.services.store.statements import storable
 
 MAKE_ONE = "`gaplab token create --role admin` makes one"
 
-_NOBODY = "0" * 64
+NOTED_EVERY = timedelta(minutes=1)
+"""Precision of a token's last use; a write with every request would cost more than it tells."""
+
+_NO_DIGEST = "0" * 64
 """Compared with where there is no such token, so that the answer takes as long."""
 
 _TOKEN = re.compile(r"gaplab_([a-z0-9]{1,32})_([0-9a-f]{64})")
@@ -29,11 +36,11 @@ _TOKEN = re.compile(r"gaplab_([a-z0-9]{1,32})_([0-9a-f]{64})")
 
 @dataclass(frozen=True)
 class Caller:
-    """Who asks.
+    """The sender of a request.
 
     Attributes:
-        token: the id of the token that was shown; None where none is needed.
-        role: what is permitted.
+        token: id of its token; None where none is needed.
+        role: what it may do.
     """
 
     token: str | None
@@ -41,7 +48,7 @@ class Caller:
 
 
 ANYONE = Caller(None, Role.RUNNER)
-"""Whoever reaches an open service on loopback; what is hidden stays hidden from them."""
+"""The caller of an open service on loopback; what is hidden stays hidden from it."""
 
 
 @dataclass(frozen=True)
@@ -62,43 +69,49 @@ class NewToken:
 
 
 def create_token(store: Store, role: Role, name: str | None = None) -> NewToken:
-    """A new token; its secret cannot be had again."""
+    """Make a token; its secret cannot be read again."""
     secret = token_hex(32)
-    row = store.write(lambda session: tokens.insert(session, name or role.value, role, _digest(secret)))
-    return NewToken(_read(row), f"gaplab_{row.id}_{secret}")
+    token = store.write(_insert, name or role.value, role, _digest(secret))
+    return NewToken(token, f"gaplab_{token.id}_{secret}")
 
 
-def list_tokens(store: Store) -> tuple[TokenRead, ...]:
-    """All tokens, revoked ones too, the oldest first."""
-    with store.reading() as session:
-        return tuple(map(_read, tokens.listed(session)))
+@snapshot
+def list_tokens(session: Session) -> tuple[TokenRead, ...]:
+    """Return all tokens, revoked ones too, the oldest first."""
+    return tuple(map(_view, session.scalars(select(TokenRow).order_by(TokenRow.created_at, TokenRow.id))))
 
 
-def revoke_token(store: Store, id: str) -> TokenRead:
-    """The token, which admits nobody from now on.
+@transaction
+def revoke_token(session: Session, token_id: str) -> TokenRead:
+    """Revoke a token, so that it admits no request from now on; a second time changes nothing.
 
     Raises:
         NotFound: no such token.
     """
-    return _read(store.write(lambda session: tokens.revoke(session, id)))
+    row, id_ = TokenRow, storable(token_id)
+    session.execute(update(row).where(row.id == id_).values(revoked_at=func.coalesce(row.revoked_at, now())))
+    if (token := session.get(row, id_, populate_existing=True)) is None:
+        msg = f"there is no token {token_id!r}"
+        raise NotFound(msg)
+    return _view(token)
 
 
 def authenticate(store: Store, shown: str | None, *, required: bool) -> Caller:
-    """Who shows this token, or shows none.
+    """Return the caller that sent this token, or none.
 
     Args:
-        store: that knows the tokens.
+        store: with the tokens.
         shown: the token; None for none.
-        required: whether one is needed even where none was ever made.
+        required: whether a token is needed even where none was ever made.
 
     Raises:
-        Unauthenticated: no token although one is needed, or one that admits nobody.
+        Unauthenticated: a token is needed and missing, unknown or revoked.
     """
     if shown is not None:
         return _known(store, shown)
     if not required:
         with store.reading() as session:
-            required = tokens.any_ever(session)
+            required = session.scalar(select(TokenRow.id).limit(1)) is not None
     if required:
         msg = "this service wants a token, as in `Authorization: Bearer …`; the `gaplab` command sends GAPLAB_TOKEN"
         raise Unauthenticated(msg)
@@ -106,10 +119,10 @@ def authenticate(store: Store, shown: str | None, *, required: bool) -> Caller:
 
 
 def demand(caller: Caller, role: Role, what: str) -> None:
-    """Do nothing if the caller's role permits it.
+    """Refuse a caller whose role does not permit an action.
 
     Raises:
-        Forbidden: it does not; the message says what wants which role.
+        Forbidden: the message says what wants which role.
     """
     if not caller.role.permits(role):
         held = f"this token is a {caller.role.value}'s" if caller.token else "none was shown"
@@ -118,21 +131,21 @@ def demand(caller: Caller, role: Role, what: str) -> None:
 
 
 def demand_token_beyond_loopback(store: Store, host: str) -> None:
-    """Do nothing if the host is loopback, or a token admits someone.
+    """Refuse to serve an address beyond loopback as long as there is no valid token.
 
     Raises:
-        Unauthenticated: neither; whoever reaches that address could do anything.
+        Unauthenticated: everyone who reaches that address could do anything.
     """
     if is_loopback(host):
         return
     with store.reading() as session:
-        if not tokens.any_valid(session):
+        if session.scalar(select(TokenRow.id).where(TokenRow.revoked_at.is_(None)).limit(1)) is None:
             msg = f"{host} is more than loopback, and there is no token yet to let anyone in: {MAKE_ONE}"
             raise Unauthenticated(msg)
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches the host; a name other than `localhost` may lead anywhere."""
+    """Return whether only this machine reaches the host; a name other than `localhost` may lead anywhere."""
     if host == "localhost":
         return True
     try:
@@ -144,15 +157,26 @@ def is_loopback(host: str) -> bool:
 def _known(store: Store, shown: str) -> Caller:
     parts = _TOKEN.fullmatch(shown)
     with store.reading() as session:
-        known = tokens.find(session, parts[1]) if parts else None
-    genuine = hmac.compare_digest(_digest(parts[2] if parts else ""), known.digest if known else _NOBODY)
-    if known is None or not genuine or known.revoked:
+        token, present = session.get(TokenRow, parts[1]) if parts else None, moment(session)
+    genuine = hmac.compare_digest(_digest(parts[2] if parts else ""), token.digest if token else _NO_DIGEST)
+    if token is None or not genuine or token.revoked_at is not None:
         msg = "this token admits nobody: it is unknown here, or was revoked"
         raise Unauthenticated(msg)
-    if known.stale:
-        with suppress(StoreUnavailable):  # that it was used is good to know, and no reason to refuse
-            store.write(lambda session: tokens.use(session, known.id))
-    return Caller(known.id, known.role)
+    if token.last_used_at is None or present - token.last_used_at > NOTED_EVERY:
+        with suppress(StoreUnavailable):  # the note of its use is welcome, but no reason to refuse
+            store.write(_note_use, token.id)
+    return Caller(token.id, token.role)
+
+
+def _insert(session: Session, name: str, role: Role, digest: str) -> TokenRead:
+    row = TokenRow(id=new_id(), name=storable(name), role=role, digest=digest, created_at=moment(session))
+    session.add(row)
+    session.flush()
+    return _view(row)
+
+
+def _note_use(session: Session, token_id: str) -> None:
+    session.execute(update(TokenRow).where(TokenRow.id == token_id).values(last_used_at=now()))
 
 
 def _digest(secret: str) -> str:
@@ -163,12 +187,5 @@ def _article(role: Role) -> str:
     return f"an {role.value}" if role is Role.ADMIN else f"a {role.value}"
 
 
-def _read(row: TokenRow) -> TokenRead:
-    return TokenRead(
-        id=row.id,
-        name=row.name,
-        role=row.role,
-        created_at=row.created_at,
-        last_used_at=row.last_used_at,
-        revoked_at=row.revoked_at,
-    )
+def _view(row: TokenRow) -> TokenRead:
+    return TokenRead.model_validate(row, from_attributes=True)

@@ -1,13 +1,16 @@
-"""What happened to experiments, read in order. Each function is one short transaction.
+"""Events of experiments, read in order. Each function is one short transaction.
 
 All of them raise StoreUnavailable while the database cannot be used.
 """
 
 from dataclasses import dataclass
 
+from sqlalchemy import select
+
 from gaplab.schemas.events import EventKind, EventPage, EventRead
-from gaplab.services.store.queries import events, experiments
-from gaplab.services.store.session import Store
+from gaplab.services.store.models import EventCounterRow, EventRow, ExperimentRow
+from gaplab.services.store.queries.experiments import get_experiment, get_study
+from gaplab.services.store.session import Session, snapshot
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,7 @@ class WantedEvents:
     kinds: frozenset[EventKind] = frozenset()
 
     def has(self, event: EventRead) -> bool:
-        """Whether the event is one of them."""
+        """Return whether the event is one of them."""
         return (
             self.experiment in (None, event.experiment)
             and self.study in (None, event.study)
@@ -33,31 +36,43 @@ class WantedEvents:
         )
 
 
-def page(store: Store, after: int, which: WantedEvents, *, limit: int) -> EventPage:
-    """Up to `limit` of these events, in order, from the first that follows the number `after`."""
-    with store.reading() as session:
-        latest = events.latest(session)
-        found = events.after(
-            session, after, limit=limit, experiment=which.experiment, study=which.study, kinds=which.kinds
-        )
-    last = found[-1].number if len(found) == limit else max(latest, after)
-    return EventPage(items=found, last=last, latest=latest)
+@snapshot
+def page(session: Session, after: int, wanted: WantedEvents, *, limit: int) -> EventPage:
+    """Return up to `limit` of these events in order, from the first that follows the number `after`."""
+    row, experiment, newest = EventRow, ExperimentRow, _latest(session)
+    query = select(row.number, row.kind, row.experiment_id, experiment.study_id, row.repetition, row.body, row.at)
+    if wanted.experiment is not None:
+        query = query.where(row.experiment_id == wanted.experiment)
+    if wanted.study is not None:
+        query = query.where(experiment.study_id == wanted.study)
+    if wanted.kinds:
+        query = query.where(row.kind.in_(list(wanted.kinds)))
+    query = query.outerjoin(experiment, experiment.id == row.experiment_id).where(row.number > after)
+    names = ("number", "kind", "experiment", "study", "repetition", "body", "at")
+    rows = session.execute(query.order_by(row.number).limit(limit))
+    items = tuple(EventRead(**dict(zip(names, values, strict=True))) for values in rows)
+    last = items[-1].number if len(items) == limit else max(newest, after)
+    return EventPage(items=items, last=last, latest=newest)
 
 
-def latest(store: Store) -> int:
-    """The number of the latest event; 0 if there is none."""
-    with store.reading() as session:
-        return events.latest(session)
+@snapshot
+def latest(session: Session) -> int:
+    """Return the number of the latest event; 0 if there is none."""
+    return _latest(session)
 
 
-def check(store: Store, which: WantedEvents) -> None:
-    """Do nothing if there is what events are wanted of.
+@snapshot
+def check(session: Session, wanted: WantedEvents) -> None:
+    """Refuse a choice of events of what is not there.
 
     Raises:
         NotFound: no such experiment, or no such study.
     """
-    with store.reading() as session:
-        if which.experiment is not None:
-            experiments.get_experiment(session, which.experiment)
-        if which.study is not None:
-            experiments.get_study(session, which.study)
+    if wanted.experiment is not None:
+        get_experiment(session, wanted.experiment)
+    if wanted.study is not None:
+        get_study(session, wanted.study)
+
+
+def _latest(session: Session) -> int:
+    return session.execute(select(EventCounterRow.latest)).scalar_one()

@@ -1,1 +1,1 @@
-"""What the Python client is put together from; `gaplab.api.clients.client` is what programs import."""
+"""The parts of the Python client; programs import `gaplab.Client`."""

@@ -1,4 +1,4 @@
-"""What goes wrong between a client and the service."""
+"""Errors between a client and the service."""
 
 import httpx2
 from pydantic import ValidationError
@@ -8,45 +8,54 @@ from gaplab.schemas.records import ExperimentRead, StudyRead
 
 
 class ServiceError(Exception):
-    """The service refused or failed; `problem` is its answer.
+    """The service refused a request or failed; `problem` is its answer.
 
-    The message is the problem's detail, or a line for each thing that is wrong with what was sent.
+    The message is the problem's detail, or a line for each mistake in the request.
     """
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        lines = [f"{each.pointer or '(the whole)'}: {each.message}" for each in problem.errors]
+        lines = lines_of(problem)
         super().__init__("\n".join(lines) if len(lines) > 1 else problem.detail)
 
 
 class ServiceUnreachable(Exception):
-    """Nothing answers at the service's address."""
+    """No service answers at the address."""
+
+
+class UnknownService(ServiceUnreachable):
+    """What answers at the address is no gaplab of this version."""
 
 
 class ExperimentFailed(Exception):
-    """What was waited for did not complete; `ended` is what it ended as, the message says why."""
+    """A study or an experiment ended without completing; `ended` is its last state, the message says why."""
 
     def __init__(self, ended: ExperimentRead | StudyRead) -> None:
         self.ended = ended
-        parts = ended.experiments if isinstance(ended, StudyRead) else (ended,)
-        reasons = sorted({reason for each in parts for reason in each.reasons})
-        super().__init__(f"{ended.name} ({ended.id}) ended as {ended.state}" + "".join(f"; {each}" for each in reasons))
+        experiments = ended.experiments if isinstance(ended, StudyRead) else (ended,)
+        reasons = sorted({reason for experiment in experiments for reason in experiment.reasons})
+        super().__init__("; ".join([f"{ended.name} ({ended.id}) ended as {ended.state}", *reasons]))
 
 
 class ExtraMissing(ImportError):
-    """A library that only some need is not installed; the message is the line that installs it."""
+    """A library of an optional extra is not installed; the message has the command that installs it."""
 
     def __init__(self, library: str, extra: str) -> None:
         super().__init__(f"this needs {library}, which is not installed: pip install 'gaplab[{extra}]'", name=library)
 
 
-def is_for_good(error: Exception) -> bool:
-    """Whether asking again would end the same."""
+def is_final(error: Exception) -> bool:
+    """Return whether a repeated request would fail the same way."""
     return isinstance(error, ServiceError) and error.problem.status < 500
 
 
+def lines_of(problem: Problem) -> list[str]:
+    """Return a problem in words: a line for each mistake in the request, or its detail."""
+    return [f"{error.pointer or '(the whole)'}: {error.message}" for error in problem.errors] or [problem.detail]
+
+
 def problem_of(answer: httpx2.Response) -> Problem:
-    """The problem in an answer; one that carries none comes from something else than this service."""
+    """Return the problem in an answer; an answer without one does not come from this service."""
     try:
         return Problem.model_validate_json(answer.content)
     except ValidationError:

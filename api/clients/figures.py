@@ -1,35 +1,34 @@
-"""Figures as a client has them: shown in a notebook, saved as a file's suffix says."""
+"""Figures that show themselves in a notebook and save themselves in the format of a file's suffix."""
 
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import BaseModel
 
+from gaplab.api.clients.connection import Connection
+from gaplab.api.clients.records import Records
 from gaplab.schemas.records import ExperimentRead, StudyRead
-
-if TYPE_CHECKING:
-    from gaplab.api.clients.client import Client
 
 _FIGURES = "/figures/"
 
 FORMATS = ("svg", "png", "pdf", "html", "json")
 
 
-class _Described(BaseModel):
-    """Of what a service says of itself, the addresses."""
+class _Paths(BaseModel):
+    """The paths in the service's OpenAPI document."""
 
     paths: dict[str, Any]
 
 
 class Figure:
-    """A figure, drawn by the service when it is first looked at, and kept: what one saw is what one saves.
+    """A figure that the service draws once per format, so that a saved file equals what was shown.
 
     Args:
-        kind: of figure.
-        ids: whose.
-        draw: gives it in a format.
+        kind: kind of figure.
+        ids: ids of the experiments and studies in it.
+        draw: returns the figure in a format.
     """
 
     def __init__(self, kind: str, ids: tuple[str, ...], draw: Callable[[str], bytes]) -> None:
@@ -42,16 +41,16 @@ class Figure:
         return f"<figure {self.kind} of {', '.join(self.ids)}>"
 
     def content(self, format: str) -> bytes:  # noqa: A002 - as the API says
-        """The figure as a file of this format: svg, png, pdf, html or json."""
+        """Return the content of a file in this format: svg, png, pdf, html or json."""
         if format not in FORMATS:
-            msg = f"there is no format {format!r} of figures; there is {', '.join(FORMATS)}"
+            msg = f"unknown figure format {format!r}; available: {', '.join(FORMATS)}"
             raise ValueError(msg)
         if format not in self._drawn:
             self._drawn[format] = self._draw(format)
         return self._drawn[format]
 
     def save(self, file: str | Path) -> Path:
-        """Write it into a file, in the format that its suffix names; folders that are missing are made."""
+        """Write the figure into a file in the format of its suffix; missing folders are created."""
         path = Path(file)
         content = self.content(path.suffix.removeprefix(".").lower())
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -59,43 +58,45 @@ class Figure:
         return path
 
     def plotly(self) -> Any:  # noqa: ANN401 - Plotly has no types
-        """The same as a figure of Plotly, to zoom into, or to change."""
+        """Return the figure as a Plotly figure, to zoom or to change."""
         from plotly.graph_objects import Figure as PlotlyFigure
 
         return PlotlyFigure(json.loads(self.content("json"))["figure"])
 
     def _repr_mimebundle_(self, **_: object) -> dict[str, str]:
-        """What a notebook shows: the drawing itself, which stays in the notebook's file."""
+        """Return what a notebook shows: the drawing itself, which stays in the notebook's file."""
         return {"image/svg+xml": self.content("svg").decode(), "text/plain": repr(self)}
 
 
 class Figures:
-    """A part of the client; its methods raise what the client's do."""
+    """Figures that the service draws."""
 
-    def figure(self: "Client", *ids: str, of: str = "curves", **options: str | float | bool | None) -> Figure:
-        """A figure of experiments and studies.
+    def __init__(self, connection: Connection, records: Records) -> None:
+        self._connection = connection
+        self._records = records
+
+    def draw(self, *ids: str, of: str = "curves", **options: str | float | bool | None) -> Figure:
+        """Return a figure of experiments and studies; the service draws it when it is shown or saved.
 
         Args:
-            ids: of experiments, or of studies for all of their experiments.
-            of: what is drawn, like "curves" or "predictions"; `figure_kinds` lists them.
-            options: of that kind, like band="sd" or title="…"; docs/figures.md says which.
+            ids: ids of experiments, or of studies for all of their experiments.
+            of: kind of figure, like "curves" or "predictions"; `figure_kinds` lists them.
+            options: options of the kind, like band="sd" or title="…"; docs/figures.md lists them.
 
         Raises:
-            ServiceError: there is no such id; no such kind and no such option show when the figure is looked at.
+            ServiceError: an id is unknown. An unknown kind or option raises when the figure is drawn.
         """
-        found = [self.find(each) for each in ids]
-        which = {
-            "study": [each.id for each in found if isinstance(each, StudyRead)],
-            "experiment": [each.id for each in found if isinstance(each, ExperimentRead)],
-        }
-        asked: dict[str, Any] = {name: those for name, those in which.items() if those} | options
+        records = [self._records.find(id) for id in ids]
+        studies = [record.id for record in records if isinstance(record, StudyRead)]
+        experiments = [record.id for record in records if isinstance(record, ExperimentRead)]
 
         def draw(format: str) -> bytes:  # noqa: A002 - as the API says
-            return self._get(f"{_FIGURES}{of}", **asked, format=format).content
+            which = {"study": studies or None, "experiment": experiments or None, "format": format}
+            return self._connection.get_bytes(f"{_FIGURES}{of}", **(which | options))
 
         return Figure(of, ids, draw)
 
-    def figure_kinds(self: "Client") -> tuple[str, ...]:
-        """The kinds of figures that the service draws."""
-        paths = self._read(_Described, self._get("/openapi.json")).paths
+    def kinds(self) -> tuple[str, ...]:
+        """Return the kinds of figures that the service draws."""
+        paths = self._connection.get(_Paths, "/openapi.json").paths
         return tuple(path.removeprefix(_FIGURES) for path in paths if path.startswith(_FIGURES))

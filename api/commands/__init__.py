@@ -1,1 +1,1 @@
-"""The parts of the `gaplab` command; one file in this folder is a group of them."""
+"""The parts of the `gaplab` command; each module holds a group of commands, or what they share."""

@@ -1,62 +1,47 @@
-"""The `gaplab` command: it runs the service, and talks to one that runs."""
+"""The `gaplab` command: it runs the service, and sends requests to a running one."""
 
 import sys
 
 import typer
 
-from gaplab.api.clients import display
-from gaplab.api.clients.client import ServiceError, ServiceUnreachable
-from gaplab.api.commands import (
-    drawing,
-    editing,
-    helping,
-    history,
-    keeping,
-    life_cycle,
-    reading,
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, lines_of
+
+# isort: off
+from gaplab.api.commands import (  # noqa: F401 - the order of the commands in `gaplab --help`
     service,
-    submitting,
+    submission,
+    progress,
+    records,
+    figures,
+    life_cycle,
+    events,
+    catalogue,
+    archives,
     tokens,
-    watching,
+    help,  # noqa: A004 - a module
 )
-from gaplab.api.commands.base import app
+
+# isort: on
+from gaplab.api.commands.app import app
 from gaplab.api.commands.exit_codes import CommandError, Exit, code_of
 from gaplab.services.core.errors import GaplabError, NotFound
 
-__all__ = [
-    "app",
-    "drawing",
-    "editing",
-    "helping",
-    "history",
-    "keeping",
-    "life_cycle",
-    "main",
-    "reading",
-    "service",
-    "submitting",
-    "tokens",
-    "watching",
-]
-
 
 def main() -> None:
-    """Run the command; what goes wrong is a sentence and an exit code, never a traceback."""
+    """Run the command; an error prints a sentence and sets the exit code, without a traceback."""
     try:
         app(prog_name="gaplab")
     except ServiceError as error:
-        _leave(display.problem(error.problem), code_of(error))
+        _exit(lines_of(error.problem), code_of(error))
     except (ServiceUnreachable, CommandError) as error:
-        _leave([str(error)], code_of(error))
-    except NotFound as error:
-        _leave([str(error)], Exit.NOT_FOUND)
+        _exit([str(error)], code_of(error))
     except (GaplabError, ValueError) as error:
-        _leave([str(error)], Exit.FAILED)
+        _exit([str(error)], Exit.NOT_FOUND if isinstance(error, NotFound) else Exit.FAILED)
     except OSError as error:
-        _leave([f"{error.filename}: {error.strerror}" if error.filename else str(error)], Exit.FILE)
+        _exit([f"{error.filename}: {error.strerror}" if error.filename else str(error)], Exit.FILE)
 
 
-def _leave(lines: list[str], code: Exit) -> None:
+def _exit(lines: list[str], code: int) -> None:
     for line in lines:
         printable = line.encode("utf-8", "backslashreplace").decode()  # names of files need not be Unicode
         typer.echo(f"gaplab: {printable}", err=True)

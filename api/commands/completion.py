@@ -1,80 +1,59 @@
-"""What the shell offers while an argument is typed; a service that does not answer at once has nothing to offer."""
+"""Shell completion of arguments; if the service does not answer at once, there is none."""
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any
 
-import httpx2
-
-from gaplab.api.clients.client import Client, ServiceError, ServiceUnreachable
-from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
+from gaplab.api.clients.records import Record
 
 PATIENCE_S = 1.5
-"""A shell that waits longer for an offer seems to hang."""
+"""Longest wait for an answer; a shell that waits longer seems to hang."""
 
 MOST = 50
 KINDS = ("strategies", "robots", "engines", "tunables", "optimizers")
 
 
-class _Hasty(Client):
-    """A client that asks once: who presses a key again asks again."""
-
-    def _patiently(self, method: str, path: str, **request: Any) -> httpx2.Response:  # noqa: ANN401 - as the client's
-        return self._request(method, path, **request)
-
-
 def ids(incomplete: str) -> list[tuple[str, str]]:
-    """The newest studies and experiments, each with its name and state."""
-    return _offered(lambda client: _newest(client, incomplete))
+    """Return the newest studies and experiments, each with its name and state."""
+    return _completions(incomplete, lambda client: [*_studies(client), *_experiments(client)])
 
 
 def experiments(incomplete: str) -> list[tuple[str, str]]:
-    """The newest experiments, each with its name and state."""
-    return _offered(lambda client: _named(client.experiments(limit=MOST).items, incomplete))
-
-
-def kinds(incomplete: str) -> list[str]:
-    """The kinds of plug-ins."""
-    return [each for each in KINDS if each.startswith(incomplete)]
+    """Return the newest experiments, each with its name and state."""
+    return _completions(incomplete, _experiments)
 
 
 def plugins(incomplete: str) -> list[tuple[str, str]]:
-    """Every plug-in by its name, with what it is."""
-
-    def found(client: Client) -> Iterator[tuple[str, str]]:
-        catalogue = client.catalogue()
-        for kind in KINDS:
-            for each in getattr(catalogue, kind):
-                if each.name.startswith(incomplete):
-                    yield each.name, each.summary
-
-    return _offered(found)
+    """Return the plug-ins, each with its summary."""
+    return _completions(incomplete, _plugins)
 
 
-def _newest(client: Client, incomplete: str) -> Iterator[tuple[str, str]]:
-    yield from _named(client.studies(limit=MOST).items, incomplete)
-    yield from _named(client.experiments(limit=MOST).items, incomplete)
+def figures(incomplete: str) -> list[str]:
+    """Return the kinds of figures."""
+    kinds = _completions(incomplete, lambda client: [(kind, "") for kind in client.figures.kinds()])
+    return [kind for kind, _ in kinds]
 
 
-def _named(found: Iterable[ExperimentRead | StudyRead], incomplete: str) -> Iterator[tuple[str, str]]:
-    for each in found:
-        if each.id.startswith(incomplete):
-            yield each.id, f"{each.name} ({each.state})"
-
-
-def _offered(of: Callable[[Client], Iterator[tuple[str, str]]]) -> list[tuple[str, str]]:
+def _completions(incomplete: str, candidates: Callable[[Client], Iterable[tuple[str, str]]]) -> list[tuple[str, str]]:
     try:
-        with _Hasty(timeout_s=PATIENCE_S) as client:
-            return list(of(client))
+        with Client(timeout_s=PATIENCE_S, pauses_s=()) as client:
+            return [(name, summary) for name, summary in candidates(client) if name.startswith(incomplete)]
     except (ServiceError, ServiceUnreachable, ValueError):
         return []
 
 
-def figures(incomplete: str) -> list[str]:
-    """The kinds of figures, as the service documents them."""
+def _studies(client: Client) -> list[tuple[str, str]]:
+    return _named(client.studies(limit=MOST).items)
 
-    def found(client: Client) -> Iterator[tuple[str, str]]:
-        for kind in client.figure_kinds():
-            if kind.startswith(incomplete):
-                yield kind, ""
 
-    return [kind for kind, _ in _offered(found)]
+def _experiments(client: Client) -> list[tuple[str, str]]:
+    return _named(client.experiments(limit=MOST).items)
+
+
+def _named(records: Iterable[Record]) -> list[tuple[str, str]]:
+    return [(record.id, f"{record.name} ({record.state})") for record in records]
+
+
+def _plugins(client: Client) -> Iterator[tuple[str, str]]:
+    catalogue = client.catalogue()
+    return ((plugin.name, plugin.summary) for kind in KINDS for plugin in getattr(catalogue, kind))

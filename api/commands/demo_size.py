@@ -1,10 +1,10 @@
-"""The size of the demo's study of physics: what this machine computes in the time that a person waits."""
+"""The size of the demo's study with physics: what this machine computes while a person waits."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gaplab.api.clients.client import Client
+from gaplab.schemas.estimates import EstimateRead
 
 SECONDS = 100.0
 """Time for the study."""
@@ -23,10 +23,10 @@ SIZES = (
     (2, 2, 0.4),
     (2, 2, 0.2),
 )
-"""Repetitions, iterations, and the part of each search's evaluations, from large to small."""
+"""Repetitions, iterations and the fraction of each search's evaluations, from large to small."""
 
 POPULATION = 20
-"""Evaluations that fill the population with which a search starts."""
+"""Evaluations of the population that a search starts with."""
 
 SEARCHES = ("controller_evaluations", "selection_evaluations", "simulator_evaluations")
 
@@ -38,8 +38,8 @@ class Sized:
     """A study that suits a machine.
 
     Attributes:
-        spec: with every number in it, so that it gives the same curves on any machine.
-        reason: the pace for which it is sized, and the time that it is expected to take.
+        spec: its spec, with every number, so that it gives the same curves on any machine.
+        reason: the pace of the machine and the expected duration, in words.
     """
 
     spec: dict[str, Any]
@@ -47,23 +47,23 @@ class Sized:
 
 
 def trial(spec: Spec) -> dict[str, Any]:
-    """Return the spec of a small experiment, from which the service learns what a rollout of the study takes."""
+    """Return the spec of a small experiment, from which the service learns the duration of a rollout."""
     same = {name: spec[name] for name in ("robot", "engine", "reality", "seed") if name in spec}
     size = {"strategy": "direct", "repetitions": 2, "budget": {"preset": "smoke", "controller_evaluations": 100}}
     return same | size | {"name": "how long a rollout takes here"}
 
 
-def sized(spec: Spec, client: Client, seconds: float = SECONDS) -> Sized:
-    """Return the largest version of the study that is expected to fit into the time, or the smallest of all."""
+def sized(spec: Spec, estimate: Callable[[Spec], EstimateRead], seconds: float = SECONDS) -> Sized:
+    """Return the largest version of the study that is estimated to fit into the time, or the smallest version."""
     for smaller in _versions(spec):
-        estimate = client.estimate(smaller)
-        rollout_s = max(cost.seconds_per_rollout for cost in estimate.engines)
-        expected_s = estimate.seconds + CHECK_ROLLOUTS * rollout_s / estimate.cores
+        found = estimate(smaller)
+        rollout_s = max(cost.seconds_per_rollout for cost in found.engines)
+        expected_s = found.seconds + CHECK_ROLLOUTS * rollout_s / found.cores
         if expected_s <= seconds:
             break
     pace = f"{rollout_s * 1000:.0f} ms a rollout"
     named = smaller | {"name": f"{spec['name']}, sized for {pace}"}
-    return Sized(named, f"{pace} on {estimate.cores} cores: about {expected_s:.0f} s")
+    return Sized(named, f"{pace} on {found.cores} cores: about {expected_s:.0f} s")
 
 
 def _versions(spec: Spec) -> Iterator[dict[str, Any]]:

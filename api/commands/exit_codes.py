@@ -1,40 +1,35 @@
-"""How the command ends when it cannot do what it was asked: a sentence, and a number for scripts."""
+"""Exit codes of the `gaplab` command, for scripts."""
 
 from enum import IntEnum
+from typing import Self
 
-from gaplab.api.clients.client import ServiceError, ServiceUnreachable
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
 from gaplab.api.process.errors import CommandError as CommandError
 
 
 class Exit(IntEnum):
-    """The exit codes of `gaplab`; 2 is a wrong use of the command itself."""
+    """The exit codes of `gaplab`, with the meaning of each."""
 
-    OK = 0
-    FAILED = 1
-    USAGE = 2
-    UNREACHABLE = 3
-    NOT_FOUND = 4
-    INVALID = 5
-    CONFLICT = 6
-    FILE = 7
-    DENIED = 8
-    INTERRUPTED = 130
+    meaning: str
 
+    def __new__(cls, code: int, meaning: str) -> Self:
+        """Return a code that knows its meaning."""
+        member = int.__new__(cls, code)
+        member._value_ = code
+        member.meaning = meaning
+        return member
 
-MEANINGS = {
-    Exit.OK: "done",
-    Exit.FAILED: "the service or what was watched failed",
-    Exit.USAGE: "wrong use of the command",
-    Exit.UNREACHABLE: "no service answers",
-    Exit.NOT_FOUND: "no such id",
-    Exit.INVALID: "invalid spec or request",
-    Exit.CONFLICT: "its state, or all that is under way, forbids it now",
-    Exit.FILE: "a file cannot be read or written, or is not JSON",
-    Exit.DENIED: "the token does not permit it, or there is none",
-    Exit.INTERRUPTED: "interrupted",
-}
+    OK = 0, "done"
+    FAILED = 1, "the service or a watched experiment failed"
+    USAGE = 2, "wrong use of the command"
+    UNREACHABLE = 3, "no service answers"
+    NOT_FOUND = 4, "unknown id or name"
+    INVALID = 5, "invalid spec or request"
+    CONFLICT = 6, "the state of the experiment, or a limit of the service, forbids it now"
+    FILE = 7, "a file cannot be read or written, or is not JSON"
+    DENIED = 8, "no token, or one that does not permit it"
+    INTERRUPTED = 130, "interrupted"
 
-EXPLAINED = f"Exit codes: {'; '.join(f'{code.value} {meaning}' for code, meaning in MEANINGS.items())}."
 
 BY_STATUS = {
     401: Exit.DENIED,
@@ -50,10 +45,10 @@ BY_STATUS = {
 }
 
 
-def code_of(error: ServiceError | ServiceUnreachable | CommandError) -> Exit:
-    """The exit code that tells a script what happened."""
+def code_of(error: ServiceError | ServiceUnreachable | CommandError) -> int:
+    """Return the exit code for an error."""
     if isinstance(error, CommandError):
-        return Exit(error.code)
+        return error.code
     if isinstance(error, ServiceUnreachable):
         return Exit.UNREACHABLE
     return BY_STATUS.get(error.problem.status, Exit.FAILED)

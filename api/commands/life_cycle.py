@@ -1,42 +1,42 @@
-"""Pause, resume, stop, call off, extend."""
+"""Commands that change the state or the size of experiments and studies."""
 
 from typing import Annotated
 
 import typer
 
-from gaplab.api.commands.base import AsJson, ExperimentId, Id, Url, app, connect
-from gaplab.api.commands.json_output import document
-from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.api.clients.records import Record
+from gaplab.api.commands.app import AsJson, ExperimentId, Id, Url, app, connect
+from gaplab.api.commands.json_output import print_result
 
-Total = typer.Option(min=1, help="in all, not what is added; left out: as many as there are")
+Total = typer.Option(min=1, help="new total; left out: unchanged", show_default=False)
 
 
 @app.command()
 def pause(id: Id, as_json: AsJson = False, url: Url = None) -> None:
-    """Let an experiment or a study finish the steps under way and give its cores back, until it is resumed."""
+    """Pause an experiment or a study once its current steps end, and free its cores."""
     with connect(url) as client:
-        _say(client.pause(id), as_json=as_json)
+        _print_state(client.pause(id), as_json=as_json)
 
 
 @app.command()
 def resume(id: Id, as_json: AsJson = False, url: Url = None) -> None:
-    """Go on with an experiment or a study that was paused."""
+    """Continue a paused experiment or study."""
     with connect(url) as client:
-        _say(client.resume(id), as_json=as_json)
+        _print_state(client.resume(id), as_json=as_json)
 
 
 @app.command()
 def stop(id: Id, as_json: AsJson = False, url: Url = None) -> None:
-    """Let an experiment or a study finish the steps under way, and complete it with what is there."""
+    """Complete an experiment or a study with its results so far, once its current steps end."""
     with connect(url) as client:
-        _say(client.stop(id), as_json=as_json)
+        _print_state(client.stop(id), as_json=as_json)
 
 
 @app.command()
 def cancel(id: Id, as_json: AsJson = False, url: Url = None) -> None:
-    """Call an experiment off, or all of a study that has not ended; what is stored stays."""
+    """Cancel an experiment, or the experiments of a study that have not ended; stored results are kept."""
     with connect(url) as client:
-        _say(client.cancel(id), as_json=as_json)
+        _print_state(client.cancel(id), as_json=as_json)
 
 
 @app.command()
@@ -47,13 +47,18 @@ def extend(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Add iterations or repetitions to a completed experiment; what is there stands."""
+    """Add iterations or repetitions to a completed experiment; its results are kept."""
     with connect(url) as client:
-        _say(client.extend(id, iterations=iterations, repetitions=repetitions), as_json=as_json)
+        _print_state(client.extend(id, iterations=iterations, repetitions=repetitions), as_json=as_json)
 
 
-def _say(found: ExperimentRead | StudyRead, *, as_json: bool) -> None:
-    if as_json:
-        document(found)
-        return
-    typer.echo(f"{found.name} is {found.state}.")
+@app.command("accept-versions")
+def accept_versions(id: ExperimentId, as_json: AsJson = False, url: Url = None) -> None:
+    """Let an experiment continue under other versions of engines or plug-ins than it started with."""
+    with connect(url) as client:
+        experiment = client.accept_versions(id)
+    print_result(experiment, f"{experiment.id} continues under the versions of the next supervisor.", as_json=as_json)
+
+
+def _print_state(record: Record, *, as_json: bool) -> None:
+    print_result(record, f"{record.name} is {record.state}.", as_json=as_json)

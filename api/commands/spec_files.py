@@ -1,4 +1,4 @@
-"""The files that the `gaplab` command reads."""
+"""Spec files."""
 
 import json
 import sys
@@ -9,10 +9,10 @@ from gaplab.api.commands.exit_codes import CommandError, Exit
 
 
 def read_spec(name: str) -> dict[str, Any]:
-    """The spec in a JSON file, or in standard input if the name is "-".
+    """Return the spec in a JSON file, or in standard input if the name is "-".
 
     Raises:
-        CommandError: it cannot be read, or holds no JSON object.
+        CommandError: the file cannot be read, or does not hold a JSON object.
     """
     try:
         text = sys.stdin.read() if name == "-" else Path(name).read_text("utf-8")
@@ -24,11 +24,11 @@ def read_spec(name: str) -> dict[str, Any]:
         msg = f"{name} is not JSON: {error}"
         raise CommandError(msg, Exit.FILE) from error
     if not isinstance(spec, dict):
-        msg = f'{name} holds no JSON object; a spec is one, like {{"strategy": "simulated_fit"}}'
+        msg = f'{name} holds no JSON object; write one, like {{"strategy": "simulated_fit"}}'
         raise CommandError(msg, Exit.FILE)
     return spec
 
 
 def _refuse(constant: str) -> NoReturn:
-    msg = f"{constant} is no number in JSON"
+    msg = f"JSON has no {constant}; use a number or null"
     raise ValueError(msg)

@@ -1,4 +1,4 @@
-"""Make, list and revoke tokens. These commands work on the database itself, so that the first needs none."""
+"""Commands that create, list and revoke tokens. They use the database directly, so that the first needs no token."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -6,38 +6,37 @@ from datetime import datetime
 from typing import Annotated
 
 import typer
-from rich.box import SIMPLE_HEAD
 from rich.markup import escape
-from rich.table import Table
 
-from gaplab.api.clients import display
-from gaplab.api.commands.base import AsJson, app
-from gaplab.api.commands.json_output import document
+from gaplab.api.clients.progress.text import console
+from gaplab.api.commands.app import AsJson, app
+from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.tables import table
 from gaplab.schemas.access import Role
 from gaplab.services import access
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import Store
 
 tokens = typer.Typer(
-    help="Tokens that the service lets in; on the database of GAPLAB_DATABASE_URL.", no_args_is_help=True
+    help="Manage the tokens that the service accepts, in the database of GAPLAB_DATABASE_URL.", no_args_is_help=True
 )
 app.add_typer(tokens, name="token")
 
 
 @tokens.command()
 def create(
-    role: Annotated[Role, typer.Option(help="what it permits: reading; running too; revealing reality too")],
-    name: Annotated[str | None, typer.Option(help="of whoever will use it", show_default=False)] = None,
+    role: Annotated[Role, typer.Option(help="permissions: reader reads; runner also runs; admin also reveals reality")],
+    name: Annotated[str | None, typer.Option(help="name of the user", show_default=False)] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Make a token, and print it this once: only its digest is stored."""
+    """Create a token, and print it this once: only its digest is stored."""
     from gaplab.api.process.service import migrate
 
     migrate(Settings.from_environment().database_url)
     with _store() as store:
         made = access.create_token(store, role, name)
     if as_json:
-        document({"token": made.token, "secret": made.secret})
+        print_json({"token": made.token, "secret": made.secret})
         return
     typer.echo(f"{made.token.id} ({made.token.name}, {role.value}); this is shown once, for GAPLAB_TOKEN:", err=True)
     typer.echo(made.secret)
@@ -49,27 +48,27 @@ def list_(as_json: AsJson = False) -> None:
     with _store() as store:
         found = access.list_tokens(store)
     if as_json:
-        document(found)
+        print_json(found)
         return
-    table = Table("id", "name", "role", "made", "last used", "revoked", box=SIMPLE_HEAD)
-    for each in found:
-        moments = map(_minute, (each.created_at, each.last_used_at, each.revoked_at))
-        table.add_row(each.id, escape(each.name), each.role.value, *moments)
-    display.console().print(table if found else "No tokens yet; `gaplab token create` makes one.")
+    rows = [
+        (
+            token.id,
+            escape(token.name),
+            token.role.value,
+            *map(_minute, (token.created_at, token.last_used_at, token.revoked_at)),
+        )
+        for token in found
+    ]
+    columns = ("id", "name", "role", "created", "last used", "revoked")
+    console().print(table(columns, rows) if rows else "No tokens yet; `gaplab token create` makes one.")
 
 
 @tokens.command()
-def revoke(
-    id: Annotated[str, typer.Argument(metavar="ID", help="as listed")],
-    as_json: AsJson = False,
-) -> None:
-    """Revoke a token; it admits nobody from the next request on."""
+def revoke(id: Annotated[str, typer.Argument(metavar="ID", help="id of the token")], as_json: AsJson = False) -> None:
+    """Revoke a token; the service refuses it from the next request on."""
     with _store() as store:
         access.revoke_token(store, id)
-    if as_json:
-        document({"id": id, "revoked": True})
-        return
-    typer.echo(f"Revoked {id}.")
+    print_result({"id": id, "revoked": True}, f"Revoked {id}.", as_json=as_json)
 
 
 @contextmanager

@@ -14,7 +14,8 @@ from gaplab.schemas.access import Role
 from gaplab.schemas.base import Frozen
 from gaplab.services.access import Caller, demand
 from gaplab.services.core.errors import InvalidSpec, NotFound
-from gaplab.services.experiments.limits import Admission, Once
+from gaplab.services.experiments.idempotency import Once
+from gaplab.services.experiments.limits import Admission
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.store.session import Store
 

@@ -17,7 +17,8 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.sensitivity import Checked, Sensitivity, SensitivityRead, SensitivitySpec
 from gaplab.services.core.errors import NotFound
 from gaplab.services.core.sensitivity import VERSION, Effort, warning
-from gaplab.services.experiments.limits import FREELY, Admission, Once, once
+from gaplab.services.experiments.idempotency import Once, once
+from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import move
 from gaplab.services.plugins.external import external_plugins
 from gaplab.services.specs.resolution import resolve_sensitivity, unit

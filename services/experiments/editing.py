@@ -20,11 +20,7 @@ from gaplab.services.store.statements import storable
 
 @transaction
 def edit_experiment(
-    session: Session,
-    id: str,
-    edit: Edit,
-    *,
-    starting_from: Collection[int] | None,
+    session: Session, experiment_id: str, edit: Edit, *, starting_from: Collection[int] | None
 ) -> ExperimentRead:
     """Change the experiment's name or notes; its spec stays as it was submitted.
 
@@ -32,26 +28,20 @@ def edit_experiment(
         NotFound: no such experiment.
         Changed: it was edited meanwhile.
     """
-    row = get_experiment(session, id)
+    row = get_experiment(session, experiment_id)
     _edit(session, row, edit, starting_from)
     return view_experiments(session, [row])[0]
 
 
 @transaction
-def edit_study(
-    session: Session,
-    id: str,
-    edit: Edit,
-    *,
-    starting_from: Collection[int] | None,
-) -> StudyRead:
+def edit_study(session: Session, study_id: str, edit: Edit, *, starting_from: Collection[int] | None) -> StudyRead:
     """Change the study's name or notes; its experiments keep theirs.
 
     Raises:
         NotFound: no such study.
         Changed: it was edited meanwhile.
     """
-    row = get_study(session, id)
+    row = get_study(session, study_id)
     _edit(session, row, edit, starting_from)
     return view_studies(session, [row])[0]
 

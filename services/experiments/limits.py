@@ -1,33 +1,22 @@
-"""Admission of submissions: within the limits, and once for each idempotency key."""
+"""Limits of submissions: how large one may be, and how much may be under way."""
 
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import timedelta
-from hashlib import sha256
-from typing import Generic, TypeVar
 
 from sqlalchemy import case, func, select, text
 
-from gaplab.schemas.base import Frozen
 from gaplab.schemas.lifecycle import OPEN
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.core.errors import InvalidSpec, KeyReused, LimitReached, Violation
+from gaplab.services.core.errors import InvalidSpec, LimitReached, Violation
 from gaplab.services.settings import Limits, variable_of
 from gaplab.services.specs.resolution import expected_rollouts
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
-from gaplab.services.store.queries import idempotency
-from gaplab.services.store.session import Session, Store
-
-KEYS_LIVE = timedelta(days=7)
-"""How long an idempotency key stands for the request that it came with."""
+from gaplab.services.store.session import Session
 
 RETRY_AFTER_S = 60
 """A service that is full of experiments is full for minutes at least."""
 
 _LOCK = 0x67617071  # among the advisory locks of a Postgres database
-
-R = TypeVar("R", bound=Frozen)
 
 
 @dataclass(frozen=True)
@@ -49,56 +38,11 @@ FREELY = Admission()
 
 
 @dataclass(frozen=True)
-class Once(Generic[R]):
-    """The answer to a request that may have come before.
-
-    Attributes:
-        answer: the same each time.
-        replayed: whether it was given before, and nothing was done now.
-    """
-
-    answer: R
-    replayed: bool = False
-
-
-@dataclass(frozen=True)
-class Load:
+class OpenWork:
     """Experiments that have not ended, and the rollouts that they have left."""
 
     experiments: int
     rollouts: int
-
-
-def once(store: Store, admitted: Admission, asked: Frozen, kind: type[R], work: Callable[[Session], R]) -> Once[R]:
-    """Do the work and keep its answer under the key, in one transaction; or return the answer that is kept.
-
-    Args:
-        store: the database.
-        admitted: with the key; without one, the work is always done.
-        asked: the request's body; its class tells one endpoint from another.
-        kind: class of the answer.
-        work: creates the answer in the transaction.
-
-    Raises:
-        KeyReused: the key stands for another request.
-    """
-    key, caller = admitted.key, admitted.token or ""
-    if key is None:
-        return Once(store.write(work))
-    digest = _digest(asked)
-
-    def transaction(session: Session) -> Once[R]:
-        idempotency.forget(session, KEYS_LIVE)
-        if (known := idempotency.reserve(session, caller, key, digest)) is None:
-            answer = work(session)
-            idempotency.keep(session, caller, key, answer.model_dump(mode="json"))
-            return Once(answer)
-        if known.digest != digest:
-            msg = f"the idempotency key {key!r} stands for another request already; a new request needs a new key"
-            raise KeyReused(msg)
-        return Once(kind.model_validate(known.answer), replayed=True)
-
-    return store.write(transaction)
 
 
 def check_extent(specs: Sequence[ResolvedSpec], limits: Limits | None) -> None:
@@ -138,7 +82,7 @@ def check_load(session: Session, specs: Sequence[ResolvedSpec], admitted: Admiss
     if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write overlap
         session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
     under_way = _load(session)
-    of_token = under_way.get(admitted.token, Load(0, 0))
+    of_token = under_way.get(admitted.token, OpenWork(0, 0))
     rollouts = max(0, sum(expected_rollouts(each) * each.repetitions for each in specs) - done)
     _check("experiments_per_token", of_token.experiments, len(specs), limits)
     _check("rollouts_per_token", of_token.rollouts, rollouts, limits)
@@ -146,7 +90,7 @@ def check_load(session: Session, specs: Sequence[ResolvedSpec], admitted: Admiss
     _check("rollouts", sum(each.rollouts for each in under_way.values()), rollouts, limits)
 
 
-def _load(session: Session) -> dict[str | None, Load]:
+def _load(session: Session) -> dict[str | None, OpenWork]:
     """Return what is under way, by the id of the token that submitted it."""
     row, run = ExperimentRow, RepetitionRow
     left = row.rollouts - run.rollouts_done - run.rollouts_saved
@@ -158,7 +102,7 @@ def _load(session: Session) -> dict[str | None, Load]:
         .group_by(row.token_id)
     )
     sums = {token: int(total) for token, total in session.execute(rollouts)}
-    return {token: Load(count, sums.get(token, 0)) for token, count in session.execute(counts)}
+    return {token: OpenWork(count, sums.get(token, 0)) for token, count in session.execute(counts)}
 
 
 def _check(name: str, present: int, more: int, limits: Limits) -> None:
@@ -174,8 +118,3 @@ def _check(name: str, present: int, more: int, limits: Limits) -> None:
 
 def _too_much(name: str, value: int, limit: int) -> str:
     return f"this service takes at most {limit:,} {name} in one submission ({variable_of(name)}), not {value:,}"
-
-
-def _digest(asked: Frozen) -> str:
-    text = json.dumps([type(asked).__name__, asked.model_dump(mode="json")], sort_keys=True)
-    return sha256(text.encode()).hexdigest()

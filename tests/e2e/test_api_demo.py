@@ -26,7 +26,7 @@ def specs(tmp_path: Path) -> Path:
 def demo(folder: Path, specs: Path) -> "subprocess.Popen[str]":
     script = (
         "import sys; from pathlib import Path\n"
-        "from gaplab.api.clients.display import console\n"
+        "from gaplab.api.clients.progress.text import console\n"
         "from gaplab.api.commands.demo import run\n"
         "run(Path(sys.argv[1]), console(), Path(sys.argv[2]))"
     )
@@ -70,7 +70,7 @@ def test_a_demo_killed_outright_leaves_nothing_running_and_goes_on_when_run_agai
     said, _ = second.communicate(timeout=120)
 
     assert second.returncode == 0, said
-    assert "going on with study" in said
+    assert "continuing study" in said
     assert "toy: 12 of 12 repetitions" in said
     assert "evolved in reality itself" in said
     assert "real-world evaluation" in said

@@ -174,7 +174,7 @@ def test_what_is_not_there_says_so_and_another_may_be_chosen(visit, archive, wal
     visit.forgive("404")
     page = visit(f"{archive.url}/#/replay?experiment={walker}&repetition=99&iteration=1")
 
-    page.wait_for_selector("text=no repetition 99; there is 0 to 19", timeout=120_000)
+    page.wait_for_selector("text=no repetition 99; permitted: from 0 to 19", timeout=120_000)
     page.get_by_label("Repetition", exact=True).fill("3")
     page.get_by_label("Repetition", exact=True).press("Enter")
 
@@ -190,7 +190,7 @@ def test_what_is_not_yet_there_may_be_looked_for_again(visit, archive):
     page = visit(f"{archive.url}/#/replay?experiment={stopped}&repetition={number}&iteration={done[number]}")
 
     page.wait_for_selector(
-        f"text=Reality has not been asked yet about the transferred controller of iteration {done[number]}"
+        f"text=The transferred controller of iteration {done[number]} of repetition {number} has not been measured"
     )
     assert page.get_by_role("button", name="Try again").is_visible()
 

@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.connection import ServiceError
+from gaplab.api.clients.errors import ServiceError
 from gaplab.api.commands.cli import main
 from gaplab.schemas.access import Role
 from gaplab.services import access
@@ -173,7 +173,7 @@ def test_no_token_is_in_logs_answers_or_problems_whatever_happens(
     headers = bearer(sqlite_store, Role.READER)
     secret = headers["Authorization"].rpartition("_")[2]
     said = [lite.get("/experiments", headers=headers), lite.post("/experiments", json=TOY, headers=headers)]
-    monkeypatch.setattr("gaplab.services.experiments.submission.list_experiments", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("gaplab.services.experiments.listing.list_experiments", lambda *_, **__: 1 / 0)
     said.append(lite.get("/experiments", headers=headers))
     said.append(lite.get("/experiments", headers={"Authorization": f"Bearer gaplab_x_{secret}"}))
 

@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 
-from gaplab.api.clients.client import Client, ServiceError, ServiceUnreachable
-from gaplab.api.commands import reading
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
+from gaplab.api.commands import records
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
@@ -73,7 +74,7 @@ def test_a_spec_with_several_strategies_or_none_is_a_study(gaplab: Gaplab):
 def test_an_experiment_of_no_study_is_listed_whatever_many_of_studies_are_newer(
     gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(reading, "PAGE", 4)
+    monkeypatch.setattr(records, "PAGE", 4)
     older, alone = submitted(gaplab), submitted(gaplab)
     studies = [submitted(gaplab, str(EXAMPLES / "toy.json")) for _ in range(2)]
 

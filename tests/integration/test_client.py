@@ -17,8 +17,8 @@ from fastapi.testclient import TestClient
 import gaplab
 from gaplab import Client, ExperimentFailed, ExtraMissing, ServiceError, ServiceUnreachable
 from gaplab.api.app import create_app
-from gaplab.api.clients import connection, frames
 from gaplab.api.clients import events as stream
+from gaplab.api.clients import results, tables
 from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind, EventRead
 from gaplab.services import access
@@ -62,7 +62,7 @@ def network(sqlite_store: Store) -> InProcess:
 
 @pytest.fixture
 def client(network: InProcess) -> Iterator[Client]:
-    with Client("http://127.0.0.1:1", transport=network) as found:
+    with Client("http://127.0.0.1:1", transport=network, pauses_s=(0.0, 0.0, 0.0)) as found:
         yield found
 
 
@@ -87,7 +87,7 @@ def test_samples_come_whole_however_many_pages_they_are(
     experiment = client.submit(SMALL)
     finish()
     whole = client.samples(experiment.id)
-    monkeypatch.setattr(frames, "MOST", 2)
+    monkeypatch.setattr(tables, "PAGE", 2)
     network.asked.clear()
 
     by_twos = client.samples(experiment.id)
@@ -128,7 +128,7 @@ def test_curves_are_asked_for_in_parts_that_the_service_takes_and_come_in_order(
 
     assert network.asked == ["GET /curves"] * 2
     assert [each.experiment for each in curves] == many
-    monkeypatch.setattr("gaplab.api.clients.client.MOST_CURVES", 1)
+    monkeypatch.setattr(results, "MOST_CURVES", 1)
     assert client.curves_csv([study.id]) == whole
 
 
@@ -236,7 +236,7 @@ def test_waiting_for_what_is_cancelled_raises_too(client: Client):
 def test_waiting_has_an_end_if_asked(client: Client):
     id = client.submit(SMALL).id
 
-    with pytest.raises(TimeoutError, match=r"is QUEUED after 0\.1 s; it goes on"):
+    with pytest.raises(TimeoutError, match=r"is QUEUED after 0\.1 s; it continues"):
         client.wait(id, timeout_s=0.1, every_s=0.1)
 
 
@@ -300,7 +300,7 @@ def test_the_client_knows_which_kinds_of_figures_there_are(client: Client):
 def test_a_figure_of_an_unknown_format_or_kind_or_id_is_a_sentence(client: Client, tmp_path: Any):
     id = client.submit(SMALL).id
 
-    with pytest.raises(ValueError, match="there is no format 'docx' of figures; there is svg, png"):
+    with pytest.raises(ValueError, match="unknown figure format 'docx'; available: svg, png"):
         client.figure(id).save(tmp_path / "mine.docx")
     with pytest.raises(ServiceError) as unknown:
         client.figure(id, of="portrait").content("svg")
@@ -311,10 +311,7 @@ def test_a_figure_of_an_unknown_format_or_kind_or_id_is_a_sentence(client: Clien
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_read_is_asked_for_again_if_the_answer_is_lost_or_the_service_busy(
-    client: Client, network: InProcess, monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.setattr(connection, "PAUSES_S", (0.0, 0.0, 0.0))
+def test_what_is_read_is_asked_for_again_if_the_answer_is_lost_or_the_service_busy(client: Client, network: InProcess):
     id = client.submit(SMALL).id
     network.asked.clear()
     network.lost, network.busy = 1, 1
@@ -327,10 +324,7 @@ def test_what_is_read_is_asked_for_again_if_the_answer_is_lost_or_the_service_bu
         client.experiment(id)
 
 
-def test_what_is_submitted_while_answers_are_lost_exists_once(
-    client: Client, network: InProcess, monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.setattr(connection, "PAUSES_S", (0.0, 0.0, 0.0))
+def test_what_is_submitted_while_answers_are_lost_exists_once(client: Client, network: InProcess):
     network.lost, network.busy = 2, 1
 
     submitted = client.submit(SMALL)
@@ -403,11 +397,10 @@ def test_events_and_lists_are_values_that_json_can_hold(client: Client):
     assert json.dumps([each.model_dump(mode="json") for each in client.studies().items])
 
 
-def test_what_cannot_be_unpacked_is_no_answer(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(connection, "PAUSES_S", ())
+def test_what_cannot_be_unpacked_is_no_answer():
     network = httpx2.MockTransport(lambda _: httpx2.Response(200, headers={"Content-Encoding": "gzip"}, content=b"no"))
 
-    with Client("http://gaplab.example", transport=network) as client:
+    with Client("http://gaplab.example", transport=network, pauses_s=()) as client:
         with pytest.raises(ServiceUnreachable, match="no service answers"):
             client.catalogue()
         with pytest.raises(ServiceUnreachable, match="no service answers"):

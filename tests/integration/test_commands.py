@@ -11,15 +11,18 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import httpx2
 import pytest
 import typer
 from rich.console import Console
 
-from gaplab.api.clients.client import Client, ServiceError, ServiceUnreachable
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
+from gaplab.api.clients.progress import terminal
+from gaplab.api.clients.progress.snapshots import Snapshot, Snapshots
 from gaplab.api.commands import completion
 from gaplab.api.commands.cli import app
-from gaplab.api.commands.exit_codes import BY_STATUS, MEANINGS, Exit
-from gaplab.api.commands.monitor import Look, looks, spark, watch
+from gaplab.api.commands.exit_codes import BY_STATUS, Exit
 from gaplab.api.http import problems
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
@@ -169,7 +172,6 @@ def test_a_failed_experiment_is_a_document_and_still_a_failure_for_the_shell(
 def test_help_explains_every_exit_code(gaplab: Gaplab):
     said = gaplab("help", "exit-codes").out
 
-    assert set(MEANINGS) == set(Exit)
     assert [int(line.split()[0]) for line in said.splitlines()] == [each.value for each in Exit]
     assert "watch" in gaplab("help").out
     assert gaplab("help", "nonsense").code == Exit.USAGE
@@ -306,14 +308,14 @@ def test_in_a_log_watching_is_lines(gaplab: Gaplab, study: str, finish: Callable
 def test_in_a_terminal_it_is_a_view_of_curves_and_repetitions(url: str, study: str, finish: Callable[[], None]):
     screen = Console(force_terminal=True, width=140, file=io.StringIO(), highlight=False)
 
-    def looked(client: Client) -> Iterator[Look]:
-        found = looks(client, study, every_s=0.1, patience_s=60)
-        yield next(found)
+    def finishing(snapshots: Iterator[Snapshot]) -> Iterator[Snapshot]:
+        yield next(snapshots)
         finish()
-        yield from found
+        yield from snapshots
 
     with Client(url) as client:
-        ended = watch(looked(client), screen)
+        snapshots = Snapshots(client.records, client.results).of(study, every_s=0.1, patience_s=60)
+        ended = terminal.show(finishing(snapshots), screen, keep=True)
 
     shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", screen.file.getvalue())
     assert ended.state == "COMPLETED"
@@ -322,42 +324,43 @@ def test_in_a_terminal_it_is_a_view_of_curves_and_repetitions(url: str, study: s
     assert re.search(r"random .* COMPLETED .* ▁▄█ 3\.20±0\.20 after 2 +███ ", shown)  # three repetitions
 
 
-class Shaky(Client):
-    """A client whose service is away for some of its answers."""
+class Shaky(httpx2.HTTPTransport):
+    """A network on which the service is away for some of the requests after the first."""
 
-    def __init__(self, url: str, away: int, back: Callable[[], None] = lambda: None) -> None:
-        super().__init__(url)
+    def __init__(self, away: int, back: Callable[[], None] = lambda: None) -> None:
+        super().__init__()
         self.away = away
         self.back = back
         self.seen = False
 
-    def study(self, id: str) -> Any:
-        if self.away and self.seen:
+    def handle_request(self, request: httpx2.Request) -> httpx2.Response:
+        if self.away and self.seen and "/studies/" in request.url.path:
             self.away -= 1
             if not self.away:
                 self.back()
-            raise ServiceUnreachable("away")
-        self.seen = True
-        return super().study(id)
+            msg = "away"
+            raise httpx2.ConnectError(msg)
+        self.seen |= "/studies/" in request.url.path
+        return super().handle_request(request)
 
 
 def test_the_view_survives_a_service_that_is_away_and_says_so(url: str, study: str, finish: Callable[[], None]):
     screen = Console(force_terminal=True, width=140, file=io.StringIO(), highlight=False)
 
-    with Shaky(url, 2, finish) as client:
-        ended = watch(looks(client, study, every_s=0.1, patience_s=60), screen)
+    with Client(url, transport=Shaky(2, finish)) as client:
+        ended = client.watcher.show(study, screen, curves=True, every_s=0.1, patience_s=60)
 
     assert ended.state == "COMPLETED"
     assert "the service has not answered for" in screen.file.getvalue()
 
 
 def test_it_is_waited_for_only_so_long_and_a_refusal_not_at_all(url: str, study: str):
-    with Shaky(url, 99) as client, pytest.raises(ServiceUnreachable):
-        list(looks(client, study, every_s=0.05, patience_s=0.1))
+    with Client(url, transport=Shaky(99)) as client, pytest.raises(ServiceUnreachable):
+        list(client.watch(study, every_s=0.05, patience_s=0.1))
     with Client(url) as client, pytest.raises(ServiceError):
-        next(looks(client, "nope", every_s=0.1, patience_s=60))
+        next(client.watch("nope", every_s=0.1, patience_s=60))
 
 
 def test_numbers_become_blocks():
-    assert spark([0, 1, 2], 0, 2) == "▁▅█"
-    assert spark([3, 3], 3, 3) == "▁▁"
+    assert terminal.spark([0, 1, 2], 0, 2) == "▁▅█"
+    assert terminal.spark([3, 3], 3, 3) == "▁▁"

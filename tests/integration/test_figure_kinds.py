@@ -7,7 +7,7 @@ import pytest
 
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred
-from gaplab.services.core.types import SimulatorPoint as TunedStep
+from gaplab.services.core.types import Tuned as TunedStep
 from gaplab.services.experiments import submission
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.predictions import AFTER, BEFORE, predictions_figure
@@ -21,7 +21,7 @@ from gaplab.services.results.curve_costs import cost_axis
 from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
-from tests.experiments import run, toy
+from tests.experiments import cancel, run, toy
 from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, curve, point, prediction, tuned
 
 
@@ -157,7 +157,7 @@ def test_a_sample_that_misses_one_of_its_points_is_left_out_of_both_so_that_they
 
     assert "2\N{NO-BREAK SPACE}samples left out" in figure.caption
     assert "Before tuning on it: root-mean-square error 0.2." in figure.caption
-    assert "before tuning on it, 2 samples are off by 0.2" in figure.alt
+    assert "before tuning on it, the root-mean-square error of 2\N{NO-BREAK SPACE}samples is 0.2" in figure.alt
     assert predictions_figure(halves).empty
 
 
@@ -259,7 +259,7 @@ def test_time_is_that_of_evaluations_and_of_simulation_as_measured(store: Store,
 
 def test_reality_is_among_the_simulators_only_once_all_of_its_study_have_ended(store: Store, experiment: str):
     running = tuned_simulators(store, experiment)
-    submission.cancel_experiment(store, experiment)
+    cancel(store, experiment)
     ended = tuned_simulators(store, experiment)
 
     assert running.truth is None

@@ -63,7 +63,7 @@ def test_a_refusal_is_shown_and_can_be_lifted(sqlite_store, gaplab):
 
     assert f"computed with gaplab {provenance().gaplab}" in shown
     assert f"`gaplab accept-versions {id_}`" in warned
-    assert (code, accepted) == (0, f"{id_} goes on under the versions of the next supervisor.\n")
+    assert (code, accepted) == (0, f"{id_} continues under the versions of the next supervisor.\n")
     assert silent == ""
     assert refused == Exit.CONFLICT
     assert "has not begun" in why

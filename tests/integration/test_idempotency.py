@@ -11,13 +11,12 @@ from fastapi.testclient import TestClient
 from sqlalchemy import func, select, update
 
 from gaplab.api.app import create_app
-from gaplab.api.clients import connection
 from gaplab.api.clients.client import Client
 from gaplab.schemas.access import Role
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.access import create_token
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.experiments import limits, submission
+from gaplab.services.experiments import idempotency, listing, submission
 from gaplab.services.experiments.limits import Admission
 from gaplab.services.store.models import ExperimentRow, IdempotencyRow, RepetitionRow
 from gaplab.services.store.session import Store
@@ -121,7 +120,7 @@ def test_key_and_work_are_committed_together_or_not_at_all(store: Store, monkeyp
 
     spec = ExperimentSpec.model_validate(TOY)
     with monkeypatch.context() as patch:
-        patch.setattr("gaplab.services.experiments.limits.idempotency.keep", fail)
+        patch.setattr("gaplab.services.experiments.idempotency.update", fail)
         with pytest.raises(InvalidSpec):
             submission.admit_experiment(store, spec, Admission(key="k"))
 
@@ -134,7 +133,7 @@ def test_a_key_is_forgotten_after_a_week(store: Store, api: TestClient):
     with store.transaction() as session:
         moment = session.scalar(select(IdempotencyRow.created_at))
         assert moment
-        session.execute(update(IdempotencyRow).values(created_at=moment - limits.KEYS_LIVE - timedelta(minutes=1)))
+        session.execute(update(IdempotencyRow).values(created_at=moment - idempotency.KEYS_LIVE - timedelta(minutes=1)))
 
     again = api.post("/experiments", json=TOY, headers={"Idempotency-Key": "k"})
 
@@ -142,8 +141,7 @@ def test_a_key_is_forgotten_after_a_week(store: Store, api: TestClient):
     assert count(store, IdempotencyRow) == 1
 
 
-def test_a_client_whose_answer_is_lost_asks_again_and_creates_one(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(connection, "PAUSES_S", (0.0, 0.0))
+def test_a_client_whose_answer_is_lost_asks_again_and_creates_one(sqlite_store: Store):
     inner = TestClient(create_app(sqlite_store))._transport  # what carries requests into the app itself
 
     class Losing(httpx2.BaseTransport):
@@ -156,7 +154,7 @@ def test_a_client_whose_answer_is_lost_asks_again_and_creates_one(sqlite_store: 
                 raise httpx2.ReadError("the connection was reset")
             return answer
 
-    with Client("http://testserver", transport=Losing()) as client:
+    with Client("http://testserver", transport=Losing(), pauses_s=(0.0, 0.0)) as client:
         made = client.submit(TOY)
 
-    assert [each.id for each in submission.list_experiments(sqlite_store).items] == [made.id]
+    assert [each.id for each in listing.list_experiments(sqlite_store).items] == [made.id]

@@ -37,7 +37,7 @@ ARROWS = {
     },
     "services": (
         ("schemas", "services.core", "services.plugins", "services.store"),
-        {"pydantic", "pydantic_settings"},
+        {"pydantic", "pydantic_settings", "sqlalchemy"},
     ),
     "workers": (("schemas", "services", "workers"), {"numpy", "ray"}),
     "api/http": (("schemas", "services", "api.http"), WEB | {"fastapi_offline"}),

@@ -1,6 +1,7 @@
 """The demo's study of physics fits the machine."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ class Service:
     def __init__(self, store: Store, rollout_s: float) -> None:
         self._store, self._rollout_s = store, rollout_s
 
-    def estimate(self, spec: dict[str, Any]) -> EstimateRead:
+    def estimate(self, spec: Mapping[str, Any]) -> EstimateRead:
         found = estimates.estimate(self._store, StudySpec.model_validate(spec), cores=2)
         cost = EngineCost(engine="pybullet", seconds_per_rollout=self._rollout_s, measured=True)
         return found.model_copy(update={"engines": (cost,), "seconds": found.rollouts * self._rollout_s / 2})
@@ -30,7 +31,7 @@ class Service:
 
 @pytest.mark.parametrize("rollout_ms", [2, 6, 13, 26])
 def test_the_study_fits_into_the_time(sqlite_store: Store, rollout_ms: int) -> None:
-    found = sized(QUADRUPED, Service(sqlite_store, rollout_ms / 1000))  # type: ignore[arg-type]
+    found = sized(QUADRUPED, Service(sqlite_store, rollout_ms / 1000).estimate)
 
     again = Service(sqlite_store, rollout_ms / 1000).estimate(found.spec)
     assert again.seconds <= SECONDS
@@ -39,8 +40,8 @@ def test_the_study_fits_into_the_time(sqlite_store: Store, rollout_ms: int) -> N
 
 
 def test_a_fast_machine_computes_the_whole_study_and_a_slow_one_the_smallest(sqlite_store: Store) -> None:
-    whole = sized(QUADRUPED, Service(sqlite_store, 0.002)).spec  # type: ignore[arg-type]
-    small = sized(QUADRUPED, Service(sqlite_store, 1.0)).spec  # type: ignore[arg-type]
+    whole = sized(QUADRUPED, Service(sqlite_store, 0.002).estimate).spec
+    small = sized(QUADRUPED, Service(sqlite_store, 1.0).estimate).spec
 
     assert whole | {"name": QUADRUPED["name"]} == QUADRUPED
     assert (small["repetitions"], small["iterations"]) == SIZES[-1][:2]

@@ -25,7 +25,7 @@ function plotly() {
 }
 
 /**
- * Prepare the figure `/figures/{kind}` in an element, with its caption and its description for screen readers.
+ * Prepare the figure `/figures/{kind}` for an element, with its caption and its description for screen readers.
  *
  * Returns a function that draws it for a query. That function resolves to false if the figure could not be updated and an earlier
  * answer to the same query still stands. After each drawing the element dispatches the event `drawn`, for what stands over the figure.
@@ -39,7 +39,6 @@ export function plot(element, kind, signal) {
   const caption = h("figcaption");
   const numbers = h("div");
   const figure = h("figure", {}, canvas, caption, numbers);
-  element.replaceChildren(figure);
   /** @type {Api.FigureRead | null} */
   let answer = null;
   let isDrawn = false;

@@ -76,6 +76,13 @@ declare namespace Api {
     upper: number | null;
     values: Array<number | null>;
   }
+  interface Distribution {
+    n: number;
+    mean: number | null;
+    sd: number | null;
+    least: number | null;
+    greatest: number | null;
+  }
   interface Edit {
     name: string | null;
     notes: string | null;
@@ -179,9 +186,9 @@ declare namespace Api {
   type MeasurementKind = "sample" | "probe";
   interface MisfitPoint {
     iteration: number;
-    error: Spread;
-    gap: Spread;
-    tunables: Array<TunedSpread>;
+    error: Distribution;
+    gap: Distribution;
+    tunables: Array<TunableDistribution>;
   }
   interface MisfitRead {
     experiment: string;
@@ -385,13 +392,6 @@ declare namespace Api {
     permitted: Array<string> | string | null;
     nearest: string | null;
   }
-  interface Spread {
-    n: number;
-    mean: number | null;
-    sd: number | null;
-    least: number | null;
-    greatest: number | null;
-  }
   type State = "QUEUED" | "RUNNING" | "PAUSING" | "PAUSED" | "STOPPING" | "COMPLETED" | "FAILED" | "CANCELLED";
   interface StudyRead {
     id: string;
@@ -429,8 +429,7 @@ declare namespace Api {
     p_holm: number | null;
     degrees_of_freedom: number | null;
   }
-  type TunableRef = string | Record<string, any>;
-  interface TunedSpread {
+  interface TunableDistribution {
     n: number;
     mean: number | null;
     sd: number | null;
@@ -442,5 +441,6 @@ declare namespace Api {
     at_lower: number | null;
     at_upper: number | null;
   }
+  type TunableRef = string | Record<string, any>;
   type Verdict = "nothing" | "rough" | "smooth" | "unknown";
 }

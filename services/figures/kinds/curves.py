@@ -11,10 +11,7 @@ from gaplab.services.figures.words import distinct_names, drawable, heading, num
 
 Band = Literal["interval", "sd"]
 
-BANDS: dict[Band, str] = {
-    "interval": "95\N{NO-BREAK SPACE}% interval of the mean",
-    "sd": "one standard deviation",
-}
+BANDS: dict[Band, str] = {"interval": "95\N{NO-BREAK SPACE}% interval of the mean", "sd": "one standard deviation"}
 
 EVALUATIONS = "Number of real-world evaluations"
 

@@ -17,15 +17,7 @@ DASHES: dict[str, Any] = {
     "long": (0, (8, 2)),
     "longdot": (0, (7, 1.4, 1, 1.4, 1, 1.4)),
 }
-MARKERS = {
-    "circle": "o",
-    "square": "s",
-    "triangle": "^",
-    "diamond": "D",
-    "inverted": "v",
-    "cross": "X",
-    "star": "*",
-}
+MARKERS = {"circle": "o", "square": "s", "triangle": "^", "diamond": "D", "inverted": "v", "cross": "X", "star": "*"}
 
 NAN = float("nan")
 

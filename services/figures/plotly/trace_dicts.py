@@ -10,23 +10,9 @@ from gaplab.services.figures.style import SHADES, Style, tint
 
 Trace = dict[str, Any]
 
-DASHES = {
-    "solid": "solid",
-    "dashed": "dash",
-    "dotted": "dot",
-    "dashdot": "dashdot",
-    "long": "longdash",
-    "longdot": "longdashdot",
-}
-MARKERS = {
-    "circle": "circle",
-    "square": "square",
-    "triangle": "triangle-up",
-    "diamond": "diamond",
-    "inverted": "triangle-down",
-    "cross": "x",
-    "star": "star",
-}
+DASHES = {"dashed": "dash", "dotted": "dot", "long": "longdash", "longdot": "longdashdot"}
+MARKERS = {"triangle": "triangle-up", "inverted": "triangle-down", "cross": "x"}
+"""Plotly's names of dashes and markers, where they differ from ours."""
 
 DIGITS = 6
 """Significant digits of a coordinate: more than a screen can show."""
@@ -81,8 +67,8 @@ def _line(line: Line) -> Trace:
     look = line.style
     mode = "lines+markers" if line.markers and not line.faint else "lines"
     trace = _scatter(line.name, look, line.x, line.y, mode) | {
-        "line": {"color": look.color, "dash": DASHES[look.dash], "width": 2.25},
-        "marker": {"color": look.color, "symbol": MARKERS[look.marker], "size": 8},
+        "line": {"color": look.color, "dash": DASHES.get(look.dash, look.dash), "width": 2.25},
+        "marker": {"color": look.color, "symbol": MARKERS.get(look.marker, look.marker), "size": 8},
     }
     if line.steps:
         trace["line"]["shape"] = "hv"
@@ -105,10 +91,11 @@ def _band(line: Line) -> list[Trace]:
 
 def _points(points: Points) -> list[Trace]:
     look = points.style
-    marker: Trace = {"color": look.color, "symbol": MARKERS[look.marker], "size": round(7 * points.size, 1)}
+    symbol = MARKERS.get(look.marker, look.marker)
+    marker: Trace = {"color": look.color, "symbol": symbol, "size": round(7 * points.size, 1)}
     marker |= {"opacity": 0.8 if len(points.y) > 1 else 1}
     if points.hollow:
-        marker |= {"symbol": f"{MARKERS[look.marker]}-open", "line": {"width": 1.5}, "opacity": 1}
+        marker |= {"symbol": f"{symbol}-open", "line": {"width": 1.5}, "opacity": 1}
     trace = _scatter(points.name, look, points.x, points.y, "markers") | {"marker": marker} | _hover(points.hover)
     if not points.shades:
         return [trace]
@@ -128,7 +115,7 @@ def _level(level: Level, panel: Panel) -> list[tuple[int, Trace]]:
 
 
 def _across(name: str, look: Style, x: Sequence[float], y: Sequence[float]) -> Trace:
-    line = {"color": look.color, "dash": DASHES[look.dash], "width": 1.5}
+    line = {"color": look.color, "dash": DASHES.get(look.dash, look.dash), "width": 1.5}
     return _scatter(name, look, x, y, "lines") | {"line": line, "hoverinfo": "skip"}
 
 

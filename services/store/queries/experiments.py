@@ -1,8 +1,9 @@
-"""Experiments and studies: inserted, found, listed."""
+"""Experiments and studies: inserted, found, locked."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from secrets import choice
+from typing import TypeVar
 
 from sqlalchemy import event, insert, select
 from sqlalchemy.orm import Session
@@ -17,12 +18,14 @@ from gaplab.services.store.models import SPEC_VERSION, ExperimentRow, Repetition
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.statements import storable
 
+R = TypeVar("R", ExperimentRow, StudyRow)
+
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 
 
 @dataclass(frozen=True)
 class Extent:
-    """How much one repetition is.
+    """The size of one repetition.
 
     Attributes:
         iterations: number 0 included.
@@ -34,16 +37,16 @@ class Extent:
 
 
 def new_id() -> str:
-    """A short random name, without letters that look alike.
+    """Return a short random name, without letters that look alike.
 
-    There are 31 to the tenth of them, 8e14: among a million, the next one is taken with a probability of 1e-9. Then the
-    database refuses it, as an IntegrityError, and nothing of what it was for is stored.
+    There are 31 to the tenth, 8e14: among a million names, the next one is taken with a probability of 1e-9. The
+    database then refuses it with an IntegrityError, and stores nothing of its transaction.
     """
     return "".join(choice(_LETTERS) for _ in range(10))
 
 
 def insert_study(session: Session, name: str) -> StudyRow:
-    """A study without experiments yet."""
+    """Add a study without experiments."""
     study = StudyRow(id=new_id(), name=storable(name), created_at=moment(session))
     session.add(study)
     session.flush()
@@ -59,7 +62,7 @@ def insert_experiment(
     position: int = 0,
     token: str | None = None,
 ) -> ExperimentRow:
-    """An experiment with its repetitions, all QUEUED.
+    """Add an experiment with its repetitions, all QUEUED.
 
     Args:
         session: of a transaction that writes.
@@ -91,29 +94,26 @@ def insert_experiment(
 
 
 def insert_repetitions(session: Session, experiment_id: str, numbers: range) -> None:
-    """Repetitions of these numbers, QUEUED."""
+    """Add repetitions of these numbers, QUEUED."""
     rows = [{"experiment_id": experiment_id, "number": each} for each in numbers]
     if rows:
         session.execute(insert(RepetitionRow), rows)
 
 
 def get_experiment(session: Session, experiment_id: str) -> ExperimentRow:
-    """The experiment of that id.
+    """Return the experiment of that id.
 
     Raises:
         NotFound: there is none.
     """
-    if (found := session.get(ExperimentRow, storable(experiment_id))) is None:
-        msg = f"there is no experiment {experiment_id!r}"
-        raise NotFound(msg)
-    return found
+    return _get(session, ExperimentRow, "experiment", experiment_id)
 
 
 def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow, ...]:
-    """The experiments of these ids, in their order.
+    """Return the experiments of these ids, in their order.
 
     Raises:
-        NotFound: there is none of one of them.
+        NotFound: one of them is not there.
     """
     named = ExperimentRow.id.in_([storable(each) for each in ids])
     found = {row.id: row for row in session.scalars(select(ExperimentRow).where(named))}
@@ -124,32 +124,29 @@ def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow
 
 
 def get_study(session: Session, study_id: str) -> StudyRow:
-    """The study of that id.
+    """Return the study of that id.
 
     Raises:
         NotFound: there is none.
     """
-    if (found := session.get(StudyRow, storable(study_id))) is None:
-        msg = f"there is no study {study_id!r}"
-        raise NotFound(msg)
-    return found
+    return _get(session, StudyRow, "study", study_id)
 
 
 def experiments_of(session: Session, studies: Sequence[str]) -> tuple[ExperimentRow, ...]:
-    """The experiments of these studies, in the order in which each study has them."""
+    """Return the experiments of these studies, by study and position."""
     row = ExperimentRow
     return tuple(session.scalars(select(row).where(row.study_id.in_(studies)).order_by(row.study_id, row.position)))
 
 
 def open_studies(session: Session, studies: Sequence[str]) -> frozenset[str]:
-    """Those of these studies in which an experiment has not ended."""
+    """Return the ids of the studies in which an experiment has not ended."""
     row = ExperimentRow
     found = session.scalars(select(row.study_id).where(row.study_id.in_(studies), row.state.in_(OPEN)).distinct())
     return frozenset(each for each in found if each is not None)
 
 
 def repetitions_of(session: Session, experiment_id: str) -> tuple[RepetitionRow, ...]:
-    """The repetitions of an experiment, by number."""
+    """Return the repetitions of an experiment, by number."""
     row = RepetitionRow
     return tuple(session.scalars(select(row).where(row.experiment_id == experiment_id).order_by(row.number)))
 
@@ -164,9 +161,16 @@ def lock(session: Session, experiments: Sequence[str]) -> dict[str, State]:
     return dict(session.execute(locked).all())
 
 
+def _get(session: Session, table: type[R], noun: str, id_: str) -> R:
+    if (found := session.get(table, storable(id_))) is None:
+        msg = f"there is no {noun} {id_!r}"
+        raise NotFound(msg)
+    return found
+
+
 @event.listens_for(ExperimentRow, "load")
 def _refuse_newer(row: ExperimentRow, _: object) -> None:
-    """A spec of a later version may mean something else than what it seems to: it is not read at all."""
+    """Refuse a spec of a later version, which may mean something else than it seems to."""
     if row.spec_version > SPEC_VERSION:
         msg = f"the spec of experiment {row.id!r} is of version {row.spec_version}, and this gaplab reads up to "
         msg += f"{SPEC_VERSION}: use a later gaplab with this database"

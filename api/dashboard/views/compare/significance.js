@@ -36,6 +36,8 @@ export function significance(view) {
   let requests = 0;
   const update = (/** @type {unknown[]} */ events) => {
     const ids = view.cache.known(view.choice.experiments);
+    element.hidden = ids.length < 2;
+    if (element.hidden) return;
     const last = Math.max(1, ...ids.map((id) => lastEvaluation(view.cache.get(id))));
     /** @type {Page.Range} */
     const range = [view.choice.from ?? 1, view.choice.to ?? last];

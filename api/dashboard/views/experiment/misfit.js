@@ -38,7 +38,7 @@ function row({ iteration, error, gap, tunables }) {
   return [iteration, meanAndSd(error), meanAndSd(gap), ...tuned, gap.n];
 }
 
-/** @param {Api.Spread} spread */
+/** @param {Api.Distribution} distribution */
 const meanAndSd = ({ mean, sd }) => (mean === null ? "–" : `${threeDigits(mean)}${sd === null ? "" : ` ± ${threeDigits(sd)}`}`);
 
 /** @type {(share: number | null, sign: string) => string} */

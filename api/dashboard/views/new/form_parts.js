@@ -51,7 +51,7 @@ export function strategiesPart(form) {
     for (const strategy of draft.strategies) strategy.on = on;
     form.remake();
   };
-  return part("Strategies", h("p", { class: "note" }, "One experiment for each; all else is equal. ",
+  return part("Strategies", h("p", { class: "note" }, "One experiment each, all else equal. ",
     linkButton("All", tickAll(true)), " ", linkButton("None", tickAll(false))), room, list);
 }
 

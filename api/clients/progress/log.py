@@ -1,0 +1,38 @@
+"""Progress in a log: a line every ten seconds, and one for each experiment that ends."""
+
+import time
+from collections.abc import Iterable
+
+from rich.console import Console
+from rich.markup import escape
+
+from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
+from gaplab.api.clients.progress.text import counts, percent
+from gaplab.api.clients.records import Record
+
+LINE_EVERY_S = 10.0
+
+
+def show(snapshots: Iterable[Snapshot], console: Console) -> Record:
+    """Print snapshots as lines; return the last record."""
+    printed_at = -LINE_EVERY_S
+    ended: set[str] = set()
+    for snapshot in snapshots:
+        lines = [
+            f"{row.record.name}: {row.record.state}, {counts(row.record.progress)}"
+            for row in snapshot.rows[1:]
+            if row.record.state.ended and row.record.id not in ended
+        ]
+        ended |= {row.record.id for row in snapshot.rows if row.record.state.ended}
+        if snapshot.record.state.ended or time.monotonic() - printed_at >= LINE_EVERY_S:
+            printed_at = time.monotonic()
+            lines.append(snapshot.warning or _line(snapshot.rows[0]))
+        for line in lines:
+            console.print(f"{time.strftime('%H:%M:%S')} {escape(line)}")
+    return snapshot.record
+
+
+def _line(row: RecordProgress) -> str:
+    progress, state = row.record.progress, row.record.state
+    rest = state if state.ended else f"{row.time_left} left" if row.time_left else "time left not known yet"
+    return f"{row.record.name}: {percent(progress)}, {counts(progress)}; {rest}"

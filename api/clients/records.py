@@ -1,0 +1,78 @@
+"""Studies and experiments, and what the service stores of them."""
+
+from typing import TypeAlias
+
+import httpx2
+
+from gaplab.api.clients.connection import Connection, segment
+from gaplab.api.clients.errors import ServiceError
+from gaplab.schemas.editing import Edit
+from gaplab.schemas.provenance import ProvenanceRead
+from gaplab.schemas.records import AttemptRead, ExperimentRead, Page, RepetitionRead, StudyRead
+
+Record: TypeAlias = ExperimentRead | StudyRead
+
+
+def experiments_of(record: Record) -> tuple[ExperimentRead, ...]:
+    """Return the experiments of a study, or the experiment itself."""
+    return record.experiments if isinstance(record, StudyRead) else (record,)
+
+
+def path_of(record: Record) -> str:
+    """Return the path of a study or an experiment."""
+    return f"/{'studies' if isinstance(record, StudyRead) else 'experiments'}/{segment(record.id)}"
+
+
+class Records:
+    """Studies and experiments of a service."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def study(self, id: str) -> StudyRead:
+        """Return a study."""
+        return self._connection.get(StudyRead, f"/studies/{segment(id)}")
+
+    def experiment(self, id: str) -> ExperimentRead:
+        """Return an experiment."""
+        return self._connection.get(ExperimentRead, f"/experiments/{segment(id)}")
+
+    def find(self, id: str) -> ExperimentRead | StudyRead:
+        """Return the study or the experiment with this id."""
+        try:
+            return self.study(id)
+        except ServiceError as error:
+            if error.problem.status != httpx2.codes.NOT_FOUND:
+                raise
+        return self.experiment(id)
+
+    def studies(self, **filters: str | int | None) -> Page[StudyRead]:
+        """Return studies, newest first; filters as in the API: limit, cursor, state, strategy, text, sort."""
+        return self._connection.get(Page[StudyRead], "/studies", **filters)
+
+    def experiments(self, **filters: str | int | None) -> Page[ExperimentRead]:
+        """Return experiments, newest first; filters: those of `studies`, and study."""
+        return self._connection.get(Page[ExperimentRead], "/experiments", **filters)
+
+    def edit(self, id: str, edit: Edit) -> ExperimentRead | StudyRead:
+        """Replace the name or the notes of a study or an experiment, and return it."""
+        record = self.find(id)
+        body, headers = edit.model_dump(exclude_unset=True), {"If-Match": "*"}
+        return self._connection.change(type(record), "PATCH", path_of(record), json=body, headers=headers)
+
+    def reveal(self, id: str) -> ExperimentRead:
+        """Return an experiment with reality's parameters, even before it ends; needs the token of an admin."""
+        return self._connection.get(ExperimentRead, f"/experiments/{segment(id)}", reveal="true")
+
+    def repetitions(self, id: str) -> tuple[RepetitionRead, ...]:
+        """Return the repetitions of an experiment."""
+        return self._connection.get(tuple[RepetitionRead, ...], f"/experiments/{segment(id)}/repetitions")
+
+    def attempts(self, id: str, repetition: int) -> tuple[AttemptRead, ...]:
+        """Return the attempts at a repetition of an experiment: supervisor, times and ending of each."""
+        path = f"/experiments/{segment(id)}/repetitions/{repetition}/attempts"
+        return self._connection.get(tuple[AttemptRead, ...], path)
+
+    def provenance(self, id: str) -> ProvenanceRead:
+        """Return the versions of everything that computed an experiment."""
+        return self._connection.get(ProvenanceRead, f"/experiments/{segment(id)}/provenance")

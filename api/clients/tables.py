@@ -1,0 +1,134 @@
+"""Results as tables: pandas frames with one row per observation, complete however many pages the service sends."""
+
+import time
+from collections.abc import Iterator, Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from gaplab.api.clients.connection import Connection, segment
+from gaplab.api.clients.errors import ExtraMissing
+from gaplab.api.clients.results import Results
+from gaplab.schemas.curves import CurvePoint
+from gaplab.schemas.predictions import Prediction, Predictions
+from gaplab.schemas.records import MeasurementKind, Page, SampleRead, SimulatorRead
+
+if TYPE_CHECKING:
+    import pandas
+
+T = TypeVar("T")
+
+PAGE = 5_000
+"""Items of a page: the most that the service permits."""
+
+STATISTICS = ("evaluations", "n", "mean", "sd", "lower", "upper")
+
+
+class Tables:
+    """Results as pandas frames. Each method raises ExtraMissing without pandas."""
+
+    def __init__(self, connection: Connection, results: Results) -> None:
+        self._connection = connection
+        self._results = results
+
+    def curve(self, *ids: str, each: bool = False) -> "pandas.DataFrame":
+        """Return curves: fitness in reality against the number of real-world evaluations.
+
+        Args:
+            ids: ids of experiments, or of studies for all of their experiments.
+            each: one row per repetition, instead of one with their mean, SD, n and 95 % interval.
+        """
+        _pandas()
+        numbers = ("repetition", "evaluations", "fitness") if each else STATISTICS
+        rows = [
+            (curve.experiment, curve.name, curve.strategy, *row)
+            for curve in self._results.curves(ids)
+            for point in curve.points
+            for row in _rows(point, each=each)
+        ]
+        return _frame(rows, ("experiment", "name", "strategy", *numbers), numbers)
+
+    def samples(self, id: str, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
+        """Return the real-world evaluations of an experiment, with a column for each gene.
+
+        Args:
+            id: id of the experiment.
+            repetition: only this repetition.
+            kind: only "sample" (learned from) or "probe" (only recorded).
+        """
+        _pandas()
+        path, wanted = f"/experiments/{segment(id)}/samples", None if kind is None else MeasurementKind(kind)
+        samples = list(self._items(Page[SampleRead], path, repetition=repetition, kind=wanted))
+        columns = ("repetition", "iteration", "kind", "fitness", "measured_by", "measured_at")
+        frame = _frame([[getattr(sample, name) for name in columns] for sample in samples], columns, ("fitness",))
+        frame["kind"] = frame["kind"].astype(str)
+        genes = _pandas().DataFrame([sample.genome for sample in samples], index=frame.index)
+        return frame.join(genes.rename(columns=lambda gene: f"gene_{gene}"))
+
+    def simulators(self, id: str, *, repetition: int | None = None, iteration: int | None = None) -> "pandas.DataFrame":
+        """Return the tuned simulators of an experiment, with a column for each tunable; rank 0 is an iteration's best.
+
+        Args:
+            id: id of the experiment.
+            repetition: only this repetition.
+            iteration: only this iteration; 0 is the untuned start.
+        """
+        _pandas()
+        path = f"/experiments/{segment(id)}/simulators"
+        simulators = list(self._items(Page[SimulatorRead], path, repetition=repetition, iteration=iteration))
+        columns = ("repetition", "iteration", "rank", "squared_error")
+        frame = _frame([[getattr(row, name) for name in columns] for row in simulators], columns, columns)
+        return frame.join(_pandas().DataFrame([row.parameters for row in simulators], index=frame.index))
+
+    def predictions(self, id: str, *, every_s: float = 0.5, timeout_s: float = 600.0) -> "pandas.DataFrame":
+        """Return the fitness of each sample in reality, and in simulation before and after it was measured.
+
+        The service computes predictions at the first request, and this method waits for it. If there are very many
+        samples, the table has those of the first repetitions.
+
+        Args:
+            id: id of the experiment.
+            every_s: interval between requests until all predictions are computed.
+            timeout_s: longest wait.
+
+        Raises:
+            TimeoutError: it takes longer; computed predictions are kept, so ask again.
+        """
+        _pandas()
+        deadline, path = time.monotonic() + timeout_s, f"/experiments/{segment(id)}/predictions"
+        while (predictions := self._connection.get(Predictions, path)).pending:
+            if time.monotonic() > deadline:
+                msg = f"{predictions.pending} predictions of {id} are not computed after {timeout_s:g} s; ask again"
+                raise TimeoutError(msg)
+            time.sleep(every_s)
+        columns = tuple(Prediction.model_fields)
+        return _frame([[getattr(item, name) for name in columns] for item in predictions.items], columns, columns)
+
+    def _items(self, page: type[Page[T]], path: str, /, **filters: str | int | None) -> Iterator[T]:
+        """Yield every item of a list, page after page."""
+        cursor = None
+        while True:
+            answer = self._connection.get(page, path, limit=PAGE, cursor=cursor, **filters)
+            yield from answer.items
+            if (cursor := answer.next) is None:
+                return
+
+
+def _rows(point: CurvePoint, *, each: bool) -> list[tuple[float | None, ...]]:
+    if each:
+        return [(repetition, point.evaluations, fitness) for repetition, fitness in enumerate(point.values)]
+    return [tuple(getattr(point, name) for name in STATISTICS)]
+
+
+def _pandas() -> Any:  # noqa: ANN401 - a module that may be missing
+    try:
+        return import_module("pandas")
+    except ImportError as error:
+        raise ExtraMissing("pandas", "notebook") from error
+
+
+def _frame(rows: Sequence[Sequence[object]], columns: Sequence[str], numeric: Sequence[str]) -> "pandas.DataFrame":
+    """Return a frame whose numeric columns have nan for null, even if every value is null."""
+    frame = _pandas().DataFrame(rows, columns=columns)
+    for name in numeric:
+        frame[name] = _pandas().to_numeric(frame[name])
+    return frame

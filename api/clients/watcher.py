@@ -1,0 +1,102 @@
+"""Waiting for studies and experiments, with their progress shown."""
+
+import sys
+import time
+from collections import deque
+from collections.abc import Iterator
+
+from rich.console import Console
+
+from gaplab.api.clients.errors import ExperimentFailed
+from gaplab.api.clients.progress import log, notebook, terminal
+from gaplab.api.clients.progress.notebook import in_notebook
+from gaplab.api.clients.progress.snapshots import Snapshot, Snapshots
+from gaplab.api.clients.progress.text import console
+from gaplab.api.clients.records import Record, Records
+from gaplab.api.clients.results import Results
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.records import ExperimentRead, StudyRead
+
+
+class Watcher:
+    """The progress of studies and experiments."""
+
+    def __init__(self, records: Records, results: Results) -> None:
+        self._records = records
+        self._results = results
+
+    def watch(self, id: str, *, every_s: float = 1.0, patience_s: float = 60.0) -> Iterator[ExperimentRead | StudyRead]:
+        """Yield a study or an experiment again and again, until it has ended.
+
+        Args:
+            id: id of the study or the experiment.
+            every_s: interval between requests.
+            patience_s: longest time without a service before the error is raised.
+        """
+        for snapshot in Snapshots(self._records).of(id, every_s=every_s, patience_s=patience_s):
+            if not snapshot.away_s:
+                yield snapshot.record
+
+    def wait(
+        self,
+        id: str,
+        *,
+        progress: bool | None = None,
+        timeout_s: float | None = None,
+        every_s: float = 1.0,
+        patience_s: float = 60.0,
+    ) -> ExperimentRead | StudyRead:
+        """Wait until a study or an experiment has completed, and return it.
+
+        Args:
+            id: id of the study or the experiment.
+            progress: show progress on standard error or in the notebook; left out: only in a terminal or a notebook.
+            timeout_s: longest wait; left out: no limit.
+            every_s: interval between requests.
+            patience_s: longest time without a service before the error is raised.
+
+        Raises:
+            ExperimentFailed: it failed or was cancelled; `ended` is its last state.
+            TimeoutError: it has not ended yet. It continues; wait again.
+        """
+        snapshots = _within(Snapshots(self._records).of(id, every_s=every_s, patience_s=patience_s), timeout_s)
+        if progress is None:
+            progress = in_notebook() or sys.stderr.isatty()
+        if not progress:
+            ended = deque(snapshots, maxlen=1).pop().record
+        elif in_notebook():
+            ended = notebook.show(snapshots)
+        else:
+            ended = _print(snapshots, console(stderr=True))
+        if ended.state is not State.COMPLETED:
+            raise ExperimentFailed(ended)
+        return ended
+
+    def show(
+        self, id: str, console: Console, *, curves: bool = False, every_s: float = 1.0, patience_s: float = 60.0
+    ) -> Record:
+        """Show the progress of a study or an experiment until it has ended, and return it.
+
+        Args:
+            id: id of the study or the experiment.
+            console: a terminal gets a live table, anything else a line every ten seconds.
+            curves: in a terminal, show curves and repetitions too, and leave the last table on the screen.
+            every_s: interval between requests.
+            patience_s: longest time without a service before the error is raised.
+        """
+        source = Snapshots(self._records, self._results if curves and console.is_terminal else None)
+        return _print(source.of(id, every_s=every_s, patience_s=patience_s), console, keep=curves)
+
+
+def _print(snapshots: Iterator[Snapshot], console: Console, *, keep: bool = False) -> Record:
+    return terminal.show(snapshots, console, keep=keep) if console.is_terminal else log.show(snapshots, console)
+
+
+def _within(snapshots: Iterator[Snapshot], timeout_s: float | None) -> Iterator[Snapshot]:
+    started_at = time.monotonic()
+    for snapshot in snapshots:
+        yield snapshot
+        record = snapshot.record
+        if timeout_s is not None and not record.state.ended and time.monotonic() - started_at > timeout_s:
+            msg = f"{record.name} ({record.id}) is {record.state} after {timeout_s:g} s; it continues, so wait again"
+            raise TimeoutError(msg)

@@ -1,0 +1,43 @@
+"""The `gaplab` command, and the arguments that its parts share."""
+
+from typing import Annotated
+
+import typer
+
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.records import Record, experiments_of
+from gaplab.api.commands import completion
+from gaplab.api.commands.exit_codes import Exit
+from gaplab.services.settings import Settings
+
+app = typer.Typer(
+    help="Close the reality gap: tune a robot simulator from a few real-world evaluations.",
+    epilog=f"Exit codes: {'; '.join(f'{code.value} {code.meaning}' for code in Exit)}.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Id = Annotated[str, typer.Argument(metavar="ID", help="a study or an experiment", autocompletion=completion.ids)]
+ExperimentId = Annotated[str, typer.Argument(metavar="ID", help="an experiment", autocompletion=completion.experiments)]
+Ids = Annotated[
+    list[str], typer.Argument(metavar="ID...", help="studies or experiments", autocompletion=completion.ids)
+]
+SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or - for standard input")]
+AsJson = Annotated[bool, typer.Option("--json", help="print one JSON document, for programs")]
+Url = Annotated[
+    str | None,
+    typer.Option("--url", help="address of the service; left out: GAPLAB_URL, or this machine", show_default=False),
+]
+
+
+def connect(url: str | None) -> Client:
+    """Return a client of the service at this address."""
+    settings = Settings.from_environment()
+    return Client(url or settings.url, token=settings.token)
+
+
+def print_warnings(record: Record) -> None:
+    """Print the warnings of experiments on standard error."""
+    for warning in sorted({warning for experiment in experiments_of(record) for warning in experiment.warnings}):
+        typer.echo(f"warning: {warning}", err=True)

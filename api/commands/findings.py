@@ -1,0 +1,55 @@
+"""The result of a study in sentences: which strategies differ, and after how many real-world evaluations."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from gaplab.api.clients.client import Client
+from gaplab.schemas.curves import Comparison, Curve
+
+SIGNIFICANT = 0.05
+MOST = 4
+"""Pairs that are named; the others are counted."""
+
+
+def findings(client: Client, curves: Sequence[Curve]) -> Iterator[str]:
+    """Yield a sentence for each of the paper's ranges: one evaluation, more than two, more than five.
+
+    Pairs of strategies are compared by Student's t, as in the paper, with Holm's correction over all pairs.
+    """
+    learned = [curve for curve in curves if not curve.direct]
+    names = {curve.experiment: curve.name.replace("_", " ") for curve in learned}
+    last = max((point.evaluations for curve in curves for point in curve.points), default=0)
+    ranges = ((1, 1), (3, last), (6, last))  # Source: the caption of the paper's Fig. 4
+    for first, final in ranges:
+        if len(names) > 1 and first <= final <= last:
+            yield _sentence(client.compare(list(names), first, final), names, first, final)
+    level = next((point.mean for curve in curves if curve.direct for point in curve.points), None)
+    ratios = [
+        f"{names[curve.experiment]} {mean / level:.2f}"
+        for curve in learned
+        for mean in [point.mean for point in curve.points[-1:]]
+        if level and mean is not None
+    ]
+    if ratios:
+        yield f"After {last} real-world evaluations, relative to the direct baseline: {', '.join(ratios)}"
+
+
+def _sentence(pairs: Sequence[Comparison], names: Mapping[str, str], first: int, final: int) -> str:
+    differing = sorted((pair for pair in pairs if _p(pair) < SIGNIFICANT), key=_p)
+    counts = f"{first}" if first == final else f"{first}-{final}"
+    where = f"At {counts} real-world evaluation{'' if final == 1 else 's'}"
+    start = f"{where}, {len(differing)} of {len(pairs)} pairs differ (p < {SIGNIFICANT}, Student's t, Holm)"
+    shown = [_words(pair, names) for pair in differing[:MOST]]
+    more = [f"and {len(differing) - MOST} more"] if len(differing) > MOST else []
+    return f"{start}: {', '.join(shown + more)}" if differing else start
+
+
+def _words(pair: Comparison, names: Mapping[str, str]) -> str:
+    better, worse = names[pair.first], names[pair.second]
+    if (pair.difference or 0) < 0:
+        better, worse = worse, better
+    return f"{better} > {worse} (p = {_p(pair):.1g})"
+
+
+def _p(pair: Comparison) -> float:
+    p = pair.student.p_holm if pair.student.p_holm is not None else pair.student.p
+    return 1.0 if p is None else p

@@ -1,0 +1,125 @@
+"""Commands that list, show and edit studies and experiments."""
+
+from collections.abc import Iterator
+from itertools import islice, takewhile
+from typing import Annotated
+
+import typer
+from pydantic import ValidationError
+
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.progress.text import console, counts
+from gaplab.api.clients.records import Record
+from gaplab.api.commands import tables
+from gaplab.api.commands.app import AsJson, Id, Url, app, connect, print_warnings
+from gaplab.api.commands.exit_codes import CommandError, Exit
+from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.schemas.editing import Edit
+from gaplab.schemas.provenance import ProvenanceUse
+from gaplab.schemas.records import ExperimentRead, StudyRead
+
+PAGE = 100
+"""Experiments of one request."""
+
+
+@app.command("list")
+def list_(
+    experiments: Annotated[bool, typer.Option("--experiments", help="experiments instead of studies")] = False,
+    limit: Annotated[int, typer.Option(min=1, max=500)] = 20,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """List the newest studies, and the experiments without a study."""
+    with connect(url) as client:
+        newest = client.experiments(limit=limit).items if experiments else _newest(client, limit)
+    if as_json:
+        print_json(newest)
+    else:
+        console().print(tables.overview(newest) if newest else "Nothing yet; `gaplab submit` starts something.")
+
+
+@app.command()
+def show(id: Id, as_json: AsJson = False, url: Url = None) -> None:
+    """Show the experiments of a study, or the repetitions of an experiment."""
+    with connect(url) as client:
+        record = client.find(id)
+        if isinstance(record, StudyRead):
+            _show_study(record, as_json=as_json)
+        else:
+            _show_experiment(client, record, as_json=as_json)
+
+
+@app.command()
+def edit(
+    id: Id,
+    name: Annotated[str | None, typer.Option(help="new name", show_default=False)] = None,
+    notes: Annotated[str | None, typer.Option(help="new notes; empty removes them", show_default=False)] = None,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Change the name or the notes of a study or an experiment."""
+    changes: dict[str, str | None] = {} if name is None else {"name": name}
+    if notes is not None:
+        changes["notes"] = notes or None
+    try:
+        checked = Edit.model_validate(changes)
+    except ValidationError as error:
+        mistakes = [(wrong["loc"], wrong["msg"].removeprefix("Value error, ")) for wrong in error.errors()]
+        msg = "; ".join(f"--{place[0]}: {message}" if place else message for place, message in mistakes)
+        raise CommandError(msg, Exit.INVALID) from error
+    with connect(url) as client:
+        record = client.edit(id, checked)
+    notes_shown = f" ({record.notes})" if record.notes else ""
+    print_result(record, f"{record.id}: {record.name}{notes_shown}", as_json=as_json)
+
+
+def _show_study(study: StudyRead, *, as_json: bool) -> None:
+    if as_json:
+        print_json({"study": study})
+        return
+    console().print(tables.overview([study]), counts(study.progress), tables.overview(study.experiments), sep="\n")
+    print_warnings(study)
+
+
+def _show_experiment(client: Client, experiment: ExperimentRead, *, as_json: bool) -> None:
+    repetitions, misfit = client.repetitions(experiment.id), client.misfit(experiment.id)
+    provenance = client.provenance(experiment.id)
+    if as_json:
+        shown = {"experiment": experiment, "repetitions": repetitions, "provenance": provenance, "misfit": misfit}
+        print_json(shown)
+        return
+    screen = console()
+    screen.print(tables.overview([experiment]), counts(experiment.progress), tables.repetitions(repetitions), sep="\n")
+    for use in provenance.uses:
+        screen.print(f"computed with {_software(use)}", markup=False, soft_wrap=True)
+    if misfit.remarks:
+        screen.print(tables.tuned(misfit), *misfit.remarks, sep="\n", markup=False)
+    screen.print_json(data=experiment.spec)
+    print_warnings(experiment)
+
+
+def _software(use: ProvenanceUse) -> str:
+    """Return the versions that computed a part of an experiment."""
+    found = use.provenance
+    commit = f", commit {found.commit[:8]}{' and changes' if found.dirty else ''}" if found.commit else ""
+    engines = ", ".join(f"{name} ({library})" for name, library in found.engines.items())
+    return f"gaplab {found.gaplab}{commit}, Python {found.python}, {engines}; {found.processor}, {found.system}"
+
+
+def _newest(client: Client, limit: int) -> list[Record]:
+    """Return the newest studies, and the experiments without a study that are as new."""
+    studies = client.studies(limit=limit).items
+    oldest = studies[-1].created_at if len(studies) == limit else None
+    as_new = takewhile(lambda each: oldest is None or each.created_at >= oldest, _experiments(client))
+    alone = islice((experiment for experiment in as_new if experiment.study is None), limit)
+    newest: list[Record] = [*studies, *alone]
+    return sorted(newest, key=lambda record: record.created_at, reverse=True)[:limit]
+
+
+def _experiments(client: Client) -> Iterator[ExperimentRead]:
+    """Yield all experiments, newest first, page after page."""
+    page = client.experiments(limit=PAGE)
+    yield from page.items
+    while page.next is not None:
+        page = client.experiments(limit=PAGE, cursor=page.next)
+        yield from page.items

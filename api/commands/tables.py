@@ -1,0 +1,171 @@
+"""Tables and sentences for what the service answers."""
+
+from collections.abc import Iterable, Sequence
+
+from rich.box import SIMPLE_HEAD
+from rich.markup import escape
+from rich.table import Table
+
+from gaplab.api.clients.progress.text import colored, percent
+from gaplab.api.clients.records import Record
+from gaplab.schemas.curves import Curve, CurvePoint
+from gaplab.schemas.misfit import MisfitRead, TunableDistribution
+from gaplab.schemas.plugin import Catalogue, PluginRead
+from gaplab.schemas.records import Progress, RepetitionRead, StudyRead
+from gaplab.schemas.sensitivity import SensitivityRead
+
+
+def overview(records: Iterable[Record]) -> Table:
+    """Return a table of studies and experiments."""
+    rows = [
+        (
+            record.id,
+            escape(record.name) + (f" ({len(record.experiments)})" if isinstance(record, StudyRead) else ""),
+            colored(record.state),
+            percent(record.progress),
+            time_left(record.progress),
+            record.created_at.astimezone().strftime("%Y-%m-%d %H:%M"),
+        )
+        for record in records
+    ]
+    return table(("id", "name", "state", "progress", "left", "created"), rows)
+
+
+def repetitions(found: Iterable[RepetitionRead]) -> Table:
+    """Return a table of the repetitions of an experiment."""
+    rows = [
+        (
+            f"{each.number}",
+            colored(each.state),
+            f"{each.iterations_done}",
+            f"{each.rollouts_done:,}",
+            f"{each.attempts}",
+            escape(each.error or ""),
+        )
+        for each in found
+    ]
+    return table(("repetition", "state", "iterations", "rollouts", "attempts", "reason of failure"), rows)
+
+
+def curves(found: Sequence[Curve]) -> Table:
+    """Return a table of recorded fitness, mean±SD: a row per number of real-world evaluations, a column per curve.
+
+    Seven curves fit into 80 columns: headings break between words, numbers never.
+    """
+    lines = [curve for curve in found if not curve.direct]
+    points = {(curve.experiment, point.evaluations): point for curve in lines for point in curve.points}
+    rows = [
+        (f"{count}", *(_mean(points.get((curve.experiment, count))) for curve in lines))
+        for count in sorted({count for _, count in points})
+    ]
+    made = table(("after", *(escape(curve.name.replace("_", " ")) for curve in lines)), rows)
+    made.collapse_padding, made.show_edge = True, False
+    return made
+
+
+def baselines(found: Sequence[Curve]) -> list[str]:
+    """Return a sentence for each direct baseline."""
+    return [
+        f"{escape(curve.name)} (evolved in reality itself): {_mean(point)} {curve.unit}, n = {point.n}"
+        for curve in found
+        if curve.direct
+        for point in curve.points[:1]
+    ]
+
+
+def catalogue(plugins: Catalogue) -> list[Table]:
+    """Return a table for each kind of plug-in."""
+    return [
+        table(
+            (kind, "summary", "options"),
+            [
+                (
+                    plugin.name if plugin.available else f"{plugin.name} (not installed)",
+                    escape(plugin.summary),
+                    ", ".join(plugin.options.get("properties", {})),
+                )
+                for plugin in getattr(plugins, kind)
+            ],
+        )
+        for kind in type(plugins).model_fields
+        if kind != "budgets"
+    ]
+
+
+def plugin(found: PluginRead) -> list[Table | str]:
+    """Return all that is known of a plug-in: summary, source, details and options."""
+    lines = [f"[bold]{found.name}[/]", escape(found.summary), f"source: {escape(found.source)}"]
+    lines += [escape(found.note)] if found.note else []
+    lines += [f"{name}: {escape(str(value))}" for name, value in found.details.items()]
+    options = [
+        (name, escape(str(schema.get("default", "-"))), escape(schema.get("description", "")))
+        for name, schema in found.options.get("properties", {}).items()
+    ]
+    return [*lines, table(("option", "default", "meaning"), options) if options else "no options"]
+
+
+def sensitivity(found: SensitivityRead) -> Table:
+    """Return a table of the effect of each tunable on fitness."""
+    rows = [
+        (
+            each.name,
+            f"{each.values[0]:g} to {each.values[-1]:g}",
+            _number(each.effect),
+            _number(each.relative_effect),
+            _number(each.roughness),
+            f"{each.failures}",
+            each.verdict,
+        )
+        for each in found.tunables
+    ]
+    return table(("tunable", "over", f"effect, {found.unit}", "of the spread", "roughness", "nan", "verdict"), rows)
+
+
+def tuned(found: MisfitRead) -> Table:
+    """Return a table of the tunables of the best simulators at the latest iteration, over repetitions."""
+    last = found.points[-1]
+    rows = [
+        (
+            each.name,
+            f"{_number(each.mean)}±{_number(each.sd)}",
+            _number(each.least),
+            _number(each.greatest),
+            _bounds(each),
+        )
+        for each in last.tunables
+    ]
+    return table((f"tuned at {last.iteration}", "mean±SD", "least", "greatest", "at a bound"), rows)
+
+
+def time_left(progress: Progress) -> str:
+    """Return the expected time left, like "1 h 05 min" or "3:20"; a dash while unknown."""
+    if progress.seconds_left is None:
+        return "-"
+    minutes, seconds = divmod(round(progress.seconds_left), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02} min" if hours else f"{minutes}:{seconds:02}"
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    """Return a table whose long cells are folded."""
+    made = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for column in columns:
+        made.add_column(column, overflow="fold")
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
+def _bounds(found: TunableDistribution) -> str:
+    sides = ((found.lower, found.at_lower), (found.upper, found.at_upper))
+    return ", ".join(f"{100 * share:.0f} % at {bound:g}" for bound, share in sides if share) or "-"
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
+
+
+def _mean(point: CurvePoint | None) -> str:
+    if point is None or point.mean is None:
+        return "-"
+    return f"{point.mean:.2f}±{point.sd:.2f}" if point.sd is not None else f"{point.mean:.2f}"

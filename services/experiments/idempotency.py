@@ -1,0 +1,74 @@
+"""Requests that create something, answered once for each key that their sender gave them."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import timedelta
+from hashlib import sha256
+from typing import Generic, TypeVar
+
+from sqlalchemy import delete, select, update
+
+from gaplab.schemas.base import Frozen
+from gaplab.services.core.errors import KeyReused
+from gaplab.services.experiments.limits import Admission
+from gaplab.services.store.clock import moment
+from gaplab.services.store.models import IdempotencyRow
+from gaplab.services.store.session import Session, Store
+from gaplab.services.store.statements import insert_new
+
+KEYS_LIVE = timedelta(days=7)
+"""Time for which an idempotency key stands for its request."""
+
+R = TypeVar("R", bound=Frozen)
+
+
+@dataclass(frozen=True)
+class Once(Generic[R]):
+    """The answer to a request that may have come before.
+
+    Attributes:
+        answer: the same each time.
+        replayed: whether it was given before, and nothing was done now.
+    """
+
+    answer: R
+    replayed: bool = False
+
+
+def once(store: Store, admitted: Admission, asked: Frozen, kind: type[R], work: Callable[[Session], R]) -> Once[R]:
+    """Do the work and keep its answer under the key, in one transaction; or return the answer that is kept.
+
+    Another transaction with the same key is waited for: in Postgres by the unique key, in SQLite by the one writer.
+
+    Args:
+        store: the database.
+        admitted: with the key; without one, the work is always done.
+        asked: the request's body; its class tells one endpoint from another.
+        kind: class of the answer.
+        work: creates the answer in the transaction.
+
+    Raises:
+        KeyReused: the key stands for another request.
+    """
+    key, caller, row = admitted.key, admitted.token or "", IdempotencyRow
+    if key is None:
+        return Once(store.write(work))
+    text = json.dumps([type(asked).__name__, asked.model_dump(mode="json")], sort_keys=True)
+    digest = sha256(text.encode()).hexdigest()
+    ours = (row.caller == caller) & (row.key == key)
+
+    def transaction(session: Session) -> Once[R]:
+        session.execute(delete(row).where(row.created_at < moment(session) - KEYS_LIVE))
+        values = {"caller": caller, "key": key, "digest": digest, "created_at": moment(session)}
+        if session.execute(insert_new(session, row).values(values).returning(row.key)).first():
+            answer = work(session)
+            session.execute(update(row).where(ours).values(answer=answer.model_dump(mode="json")))
+            return Once(answer)
+        known = session.execute(select(row.digest, row.answer).where(ours)).one()
+        if known.digest != digest:
+            msg = f"the idempotency key {key!r} stands for another request already; a new request needs a new key"
+            raise KeyReused(msg)
+        return Once(kind.model_validate(known.answer), replayed=True)
+
+    return store.write(transaction)
