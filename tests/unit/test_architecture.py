@@ -2,6 +2,7 @@
 
 import ast
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -68,6 +69,11 @@ def imports(path):
             yield node.module
 
 
+def name_of(path):
+    """Return the dotted name of a file's module, without `gaplab`."""
+    return ".".join(path.with_suffix("").parts).removesuffix(".__init__")
+
+
 def rule(path):
     return next(rule for prefix, rule in ARROWS.items() if f"{path.as_posix()}/".startswith(f"{prefix}/"))
 
@@ -115,6 +121,19 @@ def test_states_are_written_in_one_place():
                         named = [ast.unparse(value) for key, value in pairs if getattr(key, "value", None) == "state"]
                         writers |= {path.as_posix() for each in named if each.startswith("State.")}
     assert writers == {"services/experiments/states.py"}
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    names = {name_of(path) for path in MODULES}
+    graph = {}
+    for path in MODULES:
+        for node in ast.walk(ast.parse((ROOT / path).read_text())):
+            if isinstance(node, ast.ImportFrom):
+                package = node.module.removeprefix("gaplab.")
+                found = {f"{package}.{alias.name}" for alias in node.names} & names or {package} & names
+                graph[name_of(path)] = graph.get(name_of(path), set()) | found
+
+    TopologicalSorter(graph).prepare()  # raises CycleError with the circle
 
 
 @pytest.mark.parametrize("path", [each for each in MODULES if each.as_posix().startswith("services/core/")], ids=str)
