@@ -1,4 +1,4 @@
-"""What a study would cost: checked and resolved like one that is submitted, and not stored."""
+"""Estimates: the cost of a study that is checked and resolved as if submitted, and not stored."""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -14,18 +14,18 @@ from gaplab.services.specs.resolution import expected_rollouts, is_direct, resol
 from gaplab.services.store.queries import costs, supervisors
 from gaplab.services.store.session import Store
 
-LOOKED_AT = 100
-"""Experiments, the newest, whose times are what a rollout is expected to take."""
+LATEST = 100
+"""Number of the newest experiments whose times estimate a rollout."""
 
 SILENT_S = 60.0
-"""A supervisor that was not heard of for so long does not work."""
+"""Age of the last sign of life after which a supervisor does not work."""
 
 Key = tuple[str, str]
 """Robot and engine, with their options."""
 
 
 def estimate(store: Store, spec: StudySpec, *, limits: Limits | None = None, cores: int = 1) -> EstimateRead:
-    """What the study would take on so many cores.
+    """Return what the study would take on a number of cores.
 
     Raises:
         InvalidSpec: with everything that is wrong with it, as if it were submitted.
@@ -34,7 +34,7 @@ def estimate(store: Store, spec: StudySpec, *, limits: Limits | None = None, cor
     resolved = resolve_study(spec)
     check_extent(resolved, limits)
     with store.reading() as session:
-        measured = _measured(costs.latest(session, LOOKED_AT))
+        measured = _measured(costs.latest(session, LATEST))
         working = sum(age < SILENT_S for age in supervisors.ages(session))
     found = tuple(_experiment(each, _cost(each, measured)) for each in resolved)
     total = sum(each.core_seconds for each in found)
@@ -51,7 +51,7 @@ def estimate(store: Store, spec: StudySpec, *, limits: Limits | None = None, cor
 
 
 def _measured(found: tuple[tuple[dict[str, object], float, int], ...]) -> dict[Key, float]:
-    """Seconds a rollout; of what was computed by two engines only the simulator's counts, which has nearly all."""
+    """Return the seconds of a rollout by robot and simulator's engine, which computes nearly all of them."""
     seconds: dict[Key, float] = defaultdict(float)
     rollouts: dict[Key, int] = defaultdict(int)
     for stored, took, count in found:

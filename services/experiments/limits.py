@@ -38,7 +38,7 @@ FREELY = Admission()
 
 
 @dataclass(frozen=True)
-class Load:
+class OpenWork:
     """Experiments that have not ended, and the rollouts that they have left."""
 
     experiments: int
@@ -82,7 +82,7 @@ def check_load(session: Session, specs: Sequence[ResolvedSpec], admitted: Admiss
     if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write overlap
         session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
     under_way = _load(session)
-    of_token = under_way.get(admitted.token, Load(0, 0))
+    of_token = under_way.get(admitted.token, OpenWork(0, 0))
     rollouts = max(0, sum(expected_rollouts(each) * each.repetitions for each in specs) - done)
     _check("experiments_per_token", of_token.experiments, len(specs), limits)
     _check("rollouts_per_token", of_token.rollouts, rollouts, limits)
@@ -90,7 +90,7 @@ def check_load(session: Session, specs: Sequence[ResolvedSpec], admitted: Admiss
     _check("rollouts", sum(each.rollouts for each in under_way.values()), rollouts, limits)
 
 
-def _load(session: Session) -> dict[str | None, Load]:
+def _load(session: Session) -> dict[str | None, OpenWork]:
     """Return what is under way, by the id of the token that submitted it."""
     row, run = ExperimentRow, RepetitionRow
     left = row.rollouts - run.rollouts_done - run.rollouts_saved
@@ -102,7 +102,7 @@ def _load(session: Session) -> dict[str | None, Load]:
         .group_by(row.token_id)
     )
     sums = {token: int(total) for token, total in session.execute(rollouts)}
-    return {token: Load(count, sums.get(token, 0)) for token, count in session.execute(counts)}
+    return {token: OpenWork(count, sums.get(token, 0)) for token, count in session.execute(counts)}
 
 
 def _check(name: str, present: int, more: int, limits: Limits) -> None:

@@ -8,25 +8,27 @@ service with workers.
 """
 
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from gaplab.schemas.lifecycle import OPEN
 from gaplab.services.archives import import_archive
-from gaplab.services.experiments.listing import ListFilter
-from gaplab.services.experiments.submission import cancel_experiment, list_experiments
+from gaplab.services.experiments.listing import ListFilter, list_experiments
 from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import Chromium
 from tests.e2e.service import Service
+from tests.experiments import cancel
 from tests.filling import fill
 
 STUDY = Path(__file__).parents[2] / "docs" / "studies" / "mujoco-in-mujoco.zip"
 
 
 @pytest.fixture(scope="module")
-def browser():
+def browser() -> Iterator[Any]:
     """Of a module, not of all tests: Playwright keeps an event loop running, which others could not run beside."""
     browser = Chromium()
     yield browser
@@ -34,10 +36,10 @@ def browser():
 
 
 @pytest.fixture
-def visit(browser):
+def visit(browser: Any) -> Iterator[Any]:
     """Opens the page at an address."""
 
-    def open_page(address, **how):
+    def open_page(address: Any, **how: Any) -> Any:
         return browser.visit(address, **how)
 
     open_page.forgive = browser.forgive
@@ -46,13 +48,13 @@ def visit(browser):
 
 
 @pytest.fixture(scope="session")
-def written_file(folder, sqlite_template):
+def written_file(folder: Path, sqlite_template: Path) -> Any:
     """The database of `api`."""
     return Path(shutil.copy(sqlite_template, folder / "written.db"))
 
 
 @pytest.fixture(scope="session")
-def api(written_file, folder):
+def api(written_file: Any, folder: Path) -> Iterator[Any]:
     """The API alone, on a database that tests fill as workers would."""
     api = Api(f"sqlite:///{written_file}", folder / "written.log").start()
     yield api
@@ -60,18 +62,18 @@ def api(written_file, folder):
 
 
 @pytest.fixture
-def written(written_file):
+def written(written_file: Any) -> Iterator[Any]:
     """The database of `api`, in which nothing is queued when a test begins."""
     store = Store(f"sqlite:///{written_file}")
     yield store
     for state in OPEN:
         for each in list_experiments(store, ListFilter(state=state), limit=500, cursor=None).items:
-            cancel_experiment(store, each.id)
+            cancel(store, each.id)
     store.dispose()
 
 
 @pytest.fixture(scope="session")
-def archive(folder, sqlite_template):
+def archive(folder: Path, sqlite_template: Path) -> Iterator[Any]:
     """The API on a database with seventy made-up experiments and the study that is published with this repository."""
     file = folder / "archive.db"
     shutil.copy(sqlite_template, file)
@@ -86,7 +88,7 @@ def archive(folder, sqlite_template):
 
 
 @pytest.fixture(scope="session")
-def shared_service(folder):
+def shared_service(folder: Path) -> Iterator[Any]:
     """The real service, with workers, for all tests of the page."""
     place = folder / "service"
     place.mkdir()

@@ -3,10 +3,12 @@
 import json
 import time
 import tracemalloc
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from io import BytesIO
 from math import copysign, inf, nan
+from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
@@ -24,14 +26,15 @@ from gaplab.services.archives.columns import EXPORTED
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
-from gaplab.services.experiments import extension, submission
+from gaplab.services.experiments import extension, listing, reading, submission
 from gaplab.services.results import curves
 from gaplab.services.results.misfit import misfit
 from gaplab.services.running import execution
 from gaplab.services.store.models import Base, ExperimentRow, RepetitionRow, SimulatorRow
 from gaplab.services.store.queries import archives as repository
 from gaplab.services.store.queries.attempts import attempts_of
-from tests.experiments import AWKWARD, run, some_log, toy
+from gaplab.services.store.session import Store
+from tests.experiments import AWKWARD, cancel, run, some_log, toy
 
 EVERY = settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -46,12 +49,12 @@ NAME = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0")
 
 
 @st.composite
-def logs(draw):
+def logs(draw: Any) -> Any:
     """A whole log of a toy experiment with whatever numbers."""
     return list(_steps(draw))
 
 
-def _steps(draw):
+def _steps(draw: Any) -> Iterator[Any]:
     for iteration in range(3):
         if iteration:
             yield Selected(iteration, draw(GENOME), draw(COST))
@@ -62,19 +65,19 @@ def _steps(draw):
 
 
 @pytest.fixture
-def other(request, store):
+def other(request: pytest.FixtureRequest, store: Store) -> Any:
     """A database of the other kind."""
     with store.reading() as session:
         kind = session.get_bind().dialect.name
     return request.getfixturevalue("postgres_store" if kind == "sqlite" else "sqlite_store")
 
 
-def exported(archive):
+def exported(archive: Any) -> Any:
     with archive.file as file:
         return file.read()
 
 
-def finished(store, log=None, **changes):
+def finished(store: Store, log: Any = None, **changes: Any) -> Any:
     """The id of an experiment whose repetitions are all complete."""
     submitted = submission.submit_experiment(store, toy(**changes)).id
     while claims := execution.claim(store, "me", 9):
@@ -83,19 +86,19 @@ def finished(store, log=None, **changes):
     return submitted
 
 
-def shown(store, experiment):
+def shown(store: Store, experiment: Any) -> Any:
     """Everything that the service shows of it, but for its sensitivity check, which is its tunables'."""
     return (
-        submission.read_experiment(store, experiment).model_dump(exclude={"sensitivity"}),
-        submission.list_repetitions(store, experiment),
-        submission.list_samples(store, experiment),
-        submission.list_simulators(store, experiment),
+        reading.read_experiment(store, experiment).model_dump(exclude={"sensitivity"}),
+        reading.list_repetitions(store, experiment),
+        reading.list_samples(store, experiment),
+        reading.list_simulators(store, experiment),
         curves.curve(store, experiment),
         misfit(store, experiment),
     )
 
 
-def forget(store):
+def forget(store: Store) -> None:
     """Remove what there is, as an import must find its ids free again."""
     with store.transaction() as session:
         for table in reversed(Base.metadata.sorted_tables):
@@ -103,7 +106,7 @@ def forget(store):
                 session.execute(table.delete())
 
 
-def test_an_experiment_goes_to_the_other_kind_of_database_and_back(store, other):
+def test_an_experiment_goes_to_the_other_kind_of_database_and_back(store: Store, other: Any) -> None:
     submitted = finished(store, reality={"parameters": {"static_friction": 0.9}})
     before, archive = shown(store, submitted), exported(export_experiment(store, submitted))
 
@@ -119,10 +122,10 @@ def test_an_experiment_goes_to_the_other_kind_of_database_and_back(store, other)
 
 
 @pytest.fixture
-def unpacked_here(monkeypatch):
+def unpacked_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Parquet is read in this process, without its limits, which saves a second each time."""
 
-    def read(files):
+    def read(files: Any) -> None:
         assert all(unpacking.convert(str(each), str(opening._lines_of(each))) for each in files)
 
     monkeypatch.setattr(opening, "_read_parquet", read)
@@ -130,7 +133,7 @@ def unpacked_here(monkeypatch):
 
 @EVERY
 @given(st.data())
-def test_whatever_numbers_and_names_go_there_and_back(store, other, unpacked_here, data):
+def test_whatever_numbers_and_names_go_there_and_back(store: Store, other: Any, unpacked_here: Any, data: Any) -> None:
     forget(store)
     forget(other)
     submitted = finished(store, data.draw(logs()), repetitions=1, name=data.draw(NAME))
@@ -142,7 +145,7 @@ def test_whatever_numbers_and_names_go_there_and_back(store, other, unpacked_her
     assert repr(shown(other, submitted)) == repr(shown(store, submitted))
 
 
-def test_a_zero_has_no_sign_in_either_database(store, other, unpacked_here):
+def test_a_zero_has_no_sign_in_either_database(store: Store, other: Any, unpacked_here: Any) -> None:
     submitted = finished(store, list(some_log(recorded=-0.0)), repetitions=1)
     archive = exported(export_experiment(store, submitted))
 
@@ -153,10 +156,12 @@ def test_a_zero_has_no_sign_in_either_database(store, other, unpacked_here):
     assert copysign(1, values[0]) == 1
 
 
-def test_an_archive_may_arrive_twice_at_once(store, other, unpacked_here, monkeypatch):
+def test_an_archive_may_arrive_twice_at_once(
+    store: Store, other: Any, unpacked_here: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     archive, taken_ids = exported(export_experiment(store, finished(store))), repository.taken_ids
 
-    def slowly(*arguments):
+    def slowly(*arguments: Any) -> Any:
         found = taken_ids(*arguments)
         time.sleep(0.2)
         return found
@@ -168,14 +173,14 @@ def test_an_archive_may_arrive_twice_at_once(store, other, unpacked_here, monkey
     assert sorted(len(each.renamed) for each in both) == [0, 1]
 
 
-def test_the_best_of_repetitions_whose_sum_is_no_number_is_one(store):
+def test_the_best_of_repetitions_whose_sum_is_no_number_is_one(store: Store) -> None:
     greatest = 1.7e308
     id_ = finished(store, list(some_log(recorded=greatest)))
 
-    assert submission.read_experiment(store, id_).best_fitness == pytest.approx(greatest)
+    assert reading.read_experiment(store, id_).best_fitness == pytest.approx(greatest)
 
 
-def test_a_study_goes_there_with_all_that_is_its_own(store, other):
+def test_a_study_goes_there_with_all_that_is_its_own(store: Store, other: Any) -> None:
     study = submission.submit_study(
         store,
         StudySpec.model_validate(TOY_STUDY | {"strategies": ["random", "direct"]}),
@@ -194,12 +199,12 @@ def test_a_study_goes_there_with_all_that_is_its_own(store, other):
 
     assert stored.study == study.id
     assert stored.experiments == tuple(each.id for each in study.experiments)
-    assert len(submission.list_experiments(other).items) == 2
+    assert len(listing.list_experiments(other).items) == 2
     assert curves.study_curves(other, study.id) == curves.study_curves(store, study.id)
     assert exported(export_study(other, study.id)) == archive
 
 
-def _fitting(step, tunables):
+def _fitting(step: Any, tunables: Any) -> Any:
     """The same step for so many tunables."""
     if not isinstance(step, Tuned):
         return step
@@ -207,18 +212,18 @@ def _fitting(step, tunables):
     return Tuned(step.iteration, simulators, step.cost)
 
 
-def test_an_experiment_of_a_study_goes_on_its_own(store, other):
+def test_an_experiment_of_a_study_goes_on_its_own(store: Store, other: Any) -> None:
     study = submission.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["random"]}))
     (experiment,) = (each.id for each in study.experiments)
 
     import_archive(other, BytesIO(exported(export_experiment(store, experiment))))
 
-    assert submission.read_experiment(other, experiment).study is None
+    assert reading.read_experiment(other, experiment).study is None
     with pytest.raises(NotFound):
-        submission.read_study(other, study.id)
+        reading.read_study(other, study.id)
 
 
-def test_ids_that_are_taken_become_new_ones_and_the_rest_is_the_same(store):
+def test_ids_that_are_taken_become_new_ones_and_the_rest_is_the_same(store: Store) -> None:
     submitted = finished(store)
     archive = exported(export_experiment(store, submitted))
 
@@ -231,7 +236,7 @@ def test_ids_that_are_taken_become_new_ones_and_the_rest_is_the_same(store):
         assert repr(first) == repr(second).replace(new, submitted)
 
 
-def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(store, other):
+def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(store: Store, other: Any) -> None:
     submitted = submission.submit_experiment(store, toy()).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)
@@ -241,25 +246,25 @@ def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(sto
     stored = import_archive(other, BytesIO(exported(export_experiment(store, submitted))))
 
     assert stored.called_off == (submitted,)
-    assert submission.read_experiment(other, submitted).state is State.CANCELLED
-    states = [each.state for each in submission.list_repetitions(other, submitted)]
+    assert reading.read_experiment(other, submitted).state is State.CANCELLED
+    states = [each.state for each in reading.list_repetitions(other, submitted)]
     assert states == [State.COMPLETED, State.CANCELLED, State.CANCELLED]
     assert execution.claim(other, "me", 9) == ()
     assert execution.requeue_lost(other, stale_after_s=-1) == 0
     assert curves.curve(other, submitted).points == curves.curve(store, submitted).points
-    assert submission.list_samples(other, submitted) == submission.list_samples(store, submitted)
-    assert submission.read_experiment(store, submitted).state is State.RUNNING
+    assert reading.list_samples(other, submitted) == reading.list_samples(store, submitted)
+    assert reading.read_experiment(store, submitted).state is State.RUNNING
 
 
 @pytest.mark.parametrize("ended", [False, True])
-def test_reality_is_hidden_until_its_study_has_ended(store, other, ended):
+def test_reality_is_hidden_until_its_study_has_ended(store: Store, other: Any, ended: Any) -> None:
     spec = TOY_STUDY | {"strategies": ["direct", "random"], "repetitions": 1}
     truth = {"reality": {"parameters": {"static_friction": 0.98765}}, "tunables": ["static_friction", "restitution"]}
     study = submission.submit_study(store, StudySpec.model_validate(spec | truth))
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim, some_log(0))
     if ended:
-        submission.cancel_experiment(store, study.experiments[1].id)
+        cancel(store, study.experiments[1].id)
 
     archives = [exported(export_study(store, study.id)), exported(export_experiment(store, study.experiments[0].id))]
 
@@ -269,24 +274,24 @@ def test_reality_is_hidden_until_its_study_has_ended(store, other, ended):
         assert (b"0.98765" in everything) is ended
         stored = import_archive(other, BytesIO(archive))
         first = stored.experiments[0]
-        found = submission.read_experiment(other, first).spec["reality"]["parameters"]["static_friction"]
+        found = reading.read_experiment(other, first).spec["reality"]["parameters"]["static_friction"]
         assert found == (0.98765 if ended else None)
         assert curves.curve(other, first).points == curves.curve(store, study.experiments[0].id).points
         assert misfit(other, first).points == ()
 
 
-def test_an_export_is_of_one_moment_while_a_supervisor_writes(store, other):
+def test_an_export_is_of_one_moment_while_a_supervisor_writes(store: Store, other: Any) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=6)).id
     for claim in execution.claim(store, "me", 6):
         run(store, claim)
         archive = export_experiment(store, submitted)
         if claim.number == 3:
             stored = import_archive(other, archive.file)  # which refuses rows that are no whole logs
-            assert submission.read_experiment(other, stored.experiments[0]).progress.completed == claim.number + 1
+            assert reading.read_experiment(other, stored.experiments[0]).progress.completed == claim.number + 1
         archive.file.close()
 
 
-def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store):
+def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store: Store) -> None:
     submitted = finished(sqlite_store)
 
     with ZipFile(BytesIO(exported(export_experiment(sqlite_store, submitted)))) as opened:
@@ -295,7 +300,7 @@ def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store):
         (row,) = map(json.loads, opened.read("experiment.jsonl").splitlines())
         manifest = json.loads(opened.read("manifest.json"))
 
-    samples = submission.list_samples(sqlite_store, submitted).items
+    samples = reading.list_samples(sqlite_store, submitted).items
     assert len(measurements) == len(samples)
     sample = next(each for each in measurements if each["kind"] == "sample")
     assert np.array_equal(sample["genome"], AWKWARD)
@@ -306,7 +311,7 @@ def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store):
     assert {name.partition(".")[0] for name in manifest["members"]} == {*EXPORTED, "curves"}
 
 
-def test_attempts_go_with_it_and_none_goes_on(store, other):
+def test_attempts_go_with_it_and_none_goes_on(store: Store, other: Any) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=2)).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)
@@ -323,12 +328,12 @@ def test_attempts_go_with_it_and_none_goes_on(store, other):
     assert last.ended_at is not None
 
 
-def attempts(store, experiment, number):
+def attempts(store: Store, experiment: Any, number: Any) -> Any:
     with store.reading() as session:
         return attempts_of(session, experiment, number)
 
 
-def test_what_came_without_its_reality_cannot_be_extended(store, other):
+def test_what_came_without_its_reality_cannot_be_extended(store: Store, other: Any) -> None:
     study = submission.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["direct", "random"]}))
     direct = study.experiments[0].id
     for claim in execution.claim(store, "me", 9):
@@ -337,12 +342,12 @@ def test_what_came_without_its_reality_cannot_be_extended(store, other):
 
     import_archive(other, BytesIO(exported(export_study(store, study.id))))
 
-    assert submission.read_experiment(other, direct).state is State.COMPLETED
+    assert reading.read_experiment(other, direct).state is State.COMPLETED
     with pytest.raises(Conflict, match="before its reality was shown"):
         extension.extend_experiment(other, direct, ExtensionSpec(repetitions=3))
 
 
-def test_times_keep_their_microseconds(store, other):
+def test_times_keep_their_microseconds(store: Store, other: Any) -> None:
     submitted = finished(store)
     moment = datetime(2012, 11, 5, 9, 0, 0, 123457, tzinfo=UTC)
     with store.transaction() as session:
@@ -351,10 +356,10 @@ def test_times_keep_their_microseconds(store, other):
 
     import_archive(other, BytesIO(exported(export_experiment(store, submitted))))
 
-    assert submission.read_experiment(other, submitted).created_at == moment
+    assert reading.read_experiment(other, submitted).created_at == moment
 
 
-def test_memory_does_not_grow_with_what_is_exported(sqlite_store):
+def test_memory_does_not_grow_with_what_is_exported(sqlite_store: Store) -> None:
     """Rows are never all there at once."""
     submitted = finished(sqlite_store, repetitions=1)
     with sqlite_store.transaction() as session:

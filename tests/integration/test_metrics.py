@@ -1,5 +1,7 @@
 """/metrics: what is counted, and that it is cheap to ask for."""
 
+from typing import Any
+
 import pytest
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
@@ -8,10 +10,10 @@ from sqlalchemy import event
 from gaplab.api.app import create_app
 from gaplab.api.http import metrics
 from gaplab.services.core.errors import StoreUnavailable
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution, supervisors
 from gaplab.services.store.session import Store
-from tests.experiments import run, toy
+from tests.experiments import cancel, run, toy
 
 
 def read(api: TestClient) -> dict[tuple[str, ...], float]:
@@ -22,9 +24,9 @@ def read(api: TestClient) -> dict[tuple[str, ...], float]:
     return {(each.name, *each.labels.values()): each.value for family in families for each in family.samples}
 
 
-def test_it_counts_what_the_database_holds(store):
+def test_it_counts_what_the_database_holds(store: Store) -> None:
     submission.submit_experiment(store, toy())
-    submission.cancel_experiment(store, submission.submit_experiment(store, toy()).id)
+    cancel(store, submission.submit_experiment(store, toy()).id)
     first, _ = execution.claim(store, "me", 2)
     run(store, first)
     supervisors.heartbeat(store, "me")
@@ -37,7 +39,7 @@ def test_it_counts_what_the_database_holds(store):
     states = {"QUEUED": 1, "RUNNING": 1, "COMPLETED": 1, "FAILED": 0, "CANCELLED": 3}
     assert {state: found["gaplab_repetitions", state] for state in states} == states
     assert found["gaplab_experiments", "RUNNING"] == found["gaplab_experiments", "CANCELLED"] == 1
-    progress = submission.read_experiment(store, first.experiment_id).progress
+    progress = reading.read_experiment(store, first.experiment_id).progress
     assert found["gaplab_rollouts_total",] == progress.rollouts_done
     assert found["gaplab_steps_total",] == 13
     assert found["gaplab_rollouts_queued",] == progress.rollouts * 2 / 3
@@ -47,7 +49,7 @@ def test_it_counts_what_the_database_holds(store):
     assert found["gaplab_event_streams",] == 0
 
 
-def test_requests_are_counted_by_route_and_not_by_what_was_asked(sqlite_store):
+def test_requests_are_counted_by_route_and_not_by_what_was_asked(sqlite_store: Store) -> None:
     api = TestClient(create_app(sqlite_store))
     id_ = submission.submit_experiment(sqlite_store, toy()).id
     for path in (f"/experiments/{id_}", f"/experiments/{id_}", "/experiments/nobody", "/no/such/1", "/no/such/2"):
@@ -68,13 +70,15 @@ _TOKEN = "FROM token"
 """Who asks is looked up for every request."""
 
 
-def test_the_database_is_asked_once_however_often_the_metrics_are_read(sqlite_store, monkeypatch):
+def test_the_database_is_asked_once_however_often_the_metrics_are_read(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(metrics, "CACHED_S", 3600.0)
     api = TestClient(create_app(sqlite_store))
     asked: list[str] = []
 
     @event.listens_for(sqlite_store._engine, "before_cursor_execute")
-    def _(*given):
+    def _(*given: Any) -> None:
         if "SELECT" in given[2] and _TOKEN not in given[2]:
             asked.append(given[2])
 
@@ -86,7 +90,7 @@ def test_the_database_is_asked_once_however_often_the_metrics_are_read(sqlite_st
     assert 0 < first == len(asked)
 
 
-def test_without_a_database_it_says_so_and_counts_the_errors():
+def test_without_a_database_it_says_so_and_counts_the_errors() -> None:
     store = Store("postgresql://nobody@127.0.0.1:1/none")
     with pytest.raises(StoreUnavailable):
         store.check()

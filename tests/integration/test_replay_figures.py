@@ -1,5 +1,7 @@
 """The gait of a controller and the toy of the paper's Fig. 3, from what is stored to every format."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
@@ -17,13 +19,14 @@ from gaplab.services.figures.marks import Arrow, Bars, Line, Points
 from gaplab.services.results.toy import toy_iterations
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
+from gaplab.services.store.session import Store
 from tests.experiments import toy
 
 FORMATS = {"html": b"<!doctype", "svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
 
 
 @pytest.fixture(scope="module")
-def replay():
+def replay() -> Any:
     """Made up: in simulation the one foot is put down twice, in reality the physics failed."""
     world = {
         "engine": "mujoco",
@@ -56,11 +59,11 @@ def replay():
     )
 
 
-def marks(figure, kind):
+def marks(figure: Any, kind: Any) -> Any:
     return [[mark for mark in panel.marks if isinstance(mark, kind)] for panel in figure.panels]
 
 
-def walked(store, **changes):
+def walked(store: Store, **changes: Any) -> Any:
     """The id of an experiment on the toy function that has ended, and the log of its first repetition."""
     submitted = submission.submit_experiment(store, toy(repetitions=1, iterations=3, **changes)).id
     (claim,) = execution.claim(store, "me", 1)
@@ -71,7 +74,7 @@ def walked(store, **changes):
     return submitted, log
 
 
-def test_a_gait_is_footfalls_height_and_speed(replay):
+def test_a_gait_is_footfalls_height_and_speed(replay: Any) -> None:
     figure = gait_figure(replay)
 
     (feet, _, _), (_, (height,), (pace,)) = marks(figure, Bars), marks(figure, Line)
@@ -82,7 +85,7 @@ def test_a_gait_is_footfalls_height_and_speed(replay):
     assert ("Fitness (m/s)", "0.4") in figure.table.rows
 
 
-def test_a_gait_of_which_nothing_moved_is_empty(replay):
+def test_a_gait_of_which_nothing_moved_is_empty(replay: Any) -> None:
     still = replay.model_copy(update={"simulation": replay.reality})
 
     figure = gait_figure(still)
@@ -91,7 +94,7 @@ def test_a_gait_of_which_nothing_moved_is_empty(replay):
     assert figure.nothing == "the physics failed"
 
 
-def test_the_toy_has_what_the_papers_figure_has(store):
+def test_the_toy_has_what_the_papers_figure_has(store: Store) -> None:
     experiment, log = walked(store)
 
     (shown,) = toy_iterations(store, experiment, 0, [2])
@@ -113,7 +116,7 @@ def test_the_toy_has_what_the_papers_figure_has(store):
     assert error == pytest.approx(shown.squared_error, abs=1e-3)
 
 
-def test_the_arrow_goes_from_simulation_to_reality(sqlite_store):
+def test_the_arrow_goes_from_simulation_to_reality(sqlite_store: Store) -> None:
     experiment, _ = walked(sqlite_store)
     (shown,) = toy_iterations(sqlite_store, experiment, 0, [0])
 
@@ -128,7 +131,7 @@ def test_the_arrow_goes_from_simulation_to_reality(sqlite_store):
     assert "Iteration 0: after 0 samples" in figure.caption
 
 
-def test_several_iterations_are_panels_and_none_is_the_last(sqlite_store):
+def test_several_iterations_are_panels_and_none_is_the_last(sqlite_store: Store) -> None:
     experiment, _ = walked(sqlite_store)
 
     figure = toy_figure(toy_iterations(sqlite_store, experiment, 0, [0, 1, 2, 3]))
@@ -139,7 +142,7 @@ def test_several_iterations_are_panels_and_none_is_the_last(sqlite_store):
     assert last.iteration == 3
 
 
-def test_the_true_function_is_hidden_until_the_experiment_has_ended(sqlite_store):
+def test_the_true_function_is_hidden_until_the_experiment_has_ended(sqlite_store: Store) -> None:
     running = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     log = repetition(setting(claim.spec, 0))
@@ -155,7 +158,7 @@ def test_the_true_function_is_hidden_until_the_experiment_has_ended(sqlite_store
     assert "once the experiment has ended" in figure.caption
 
 
-def test_what_is_not_there_is_refused_and_what_is_not_yet_there_is_empty(sqlite_store):
+def test_what_is_not_there_is_refused_and_what_is_not_yet_there_is_empty(sqlite_store: Store) -> None:
     waiting = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
     walking = submission.submit_experiment(sqlite_store, toy(robot="quadruped", repetitions=1)).id
 
@@ -167,7 +170,7 @@ def test_what_is_not_there_is_refused_and_what_is_not_yet_there_is_empty(sqlite_
         toy_iterations(sqlite_store, walking, 0, [])
 
 
-def test_the_direct_baseline_has_no_simulators_and_its_fittest_is_in_reality(sqlite_store):
+def test_the_direct_baseline_has_no_simulators_and_its_fittest_is_in_reality(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, toy(strategy="direct", repetitions=1)).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     for step in repetition(setting(claim.spec, 0)):
@@ -181,7 +184,7 @@ def test_the_direct_baseline_has_no_simulators_and_its_fittest_is_in_reality(sql
     assert not marks(toy_figure([shown]), Arrow)[0]
 
 
-def test_the_toy_is_answered_in_every_format(sqlite_store):
+def test_the_toy_is_answered_in_every_format(sqlite_store: Store) -> None:
     experiment, _ = walked(sqlite_store)
     api = TestClient(create_app(sqlite_store))
 

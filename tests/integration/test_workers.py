@@ -3,8 +3,10 @@
 import os
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 import pytest
 import ray
@@ -16,18 +18,20 @@ from gaplab.services.core.errors import ClusterUnusable, StoreUnavailable
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
-from gaplab.services.experiments import checks, submission
+from gaplab.services.experiments import checks, reading, submission
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import CheckpointRow, RepetitionRow
 from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.session import Store
 from gaplab.workers import repetitions as task
 from gaplab.workers import sensitivity as checking
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
+from tests.experiments import cancel
 from tests.fakes import flat
 from tests.processes import processes_of_ray
 
@@ -35,12 +39,12 @@ DEADLINE_S = 180
 
 
 @pytest.fixture(scope="module", autouse=True)
-def ray_of_our_own():
+def ray_of_our_own() -> Iterator[None]:
     with cluster(Settings(workers=2)):
         yield
 
 
-def toy(**changes):
+def toy(**changes: Any) -> Any:
     return ExperimentSpec.model_validate(
         {
             "strategy": "simulated_fit_and_informative",
@@ -54,25 +58,25 @@ def toy(**changes):
     )
 
 
-def long_toy():
+def long_toy() -> Any:
     """Some seconds of work in each repetition."""
     return toy(repetitions=2, budget={"controller_evaluations": 3_000, "selection_evaluations": 300}, iterations=1)
 
 
-def run(supervisor, store, experiment, until=lambda: False):
+def run(supervisor: Any, store: Store, experiment: Any, until: Any = lambda: False) -> None:
     """Rounds of the supervisor until the experiment has ended, or something else is so."""
     deadline = time.monotonic() + DEADLINE_S
-    while not (submission.read_experiment(store, experiment).state.ended or until()):
+    while not (reading.read_experiment(store, experiment).state.ended or until()):
         assert time.monotonic() < deadline
         supervisor.step()
 
 
-def expected(spec):
+def expected(spec: Any) -> Any:
     resolved = resolve_experiment(spec)
     return [[flat(step) for step in repetition(setting(resolved, number))] for number in range(resolved.repetitions)]
 
 
-def stored(store, experiment):
+def stored(store: Store, experiment: Any) -> Any:
     """The logs of an experiment's repetitions, as the supervisor after this one would read them."""
     with store.reading() as session:
         rows = session.query(RepetitionRow).filter_by(experiment_id=experiment).order_by(RepetitionRow.number).all()
@@ -81,16 +85,16 @@ def stored(store, experiment):
 
 
 @pytest.mark.parametrize("at_once", [1, 2, 4])
-def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store, at_once):
+def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store: Store, at_once: Any) -> None:
     experiment = submission.submit_experiment(store, toy()).id
 
     run(Supervisor(store, lambda: at_once), store, experiment)
 
-    assert submission.read_experiment(store, experiment).state is State.COMPLETED
+    assert reading.read_experiment(store, experiment).state is State.COMPLETED
     assert stored(store, experiment) == expected(toy())
 
 
-def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store):
+def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, long_toy()).id
     supervisor = Supervisor(sqlite_store, lambda: 1)
     run(supervisor, sqlite_store, experiment, until=lambda: processes_of_ray("run"))
@@ -100,15 +104,17 @@ def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store):
         os.kill(pid, signal.SIGKILL)
     run(supervisor, sqlite_store, experiment)
 
-    repetitions = submission.list_repetitions(sqlite_store, experiment)
+    repetitions = reading.list_repetitions(sqlite_store, experiment)
     assert [each.state for each in repetitions] == [State.COMPLETED] * 2
     assert sum(each.attempts for each in repetitions) > 2
     assert stored(sqlite_store, experiment) == expected(long_toy())
 
 
-def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others_go_on(sqlite_store, monkeypatch):
+def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others_go_on(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-    def raising(claim, expected, checkpoint_s):
+    def raising(claim: Any, expected: Any, checkpoint_s: Any) -> Iterator[Any]:
         if claim.number == 1:
             msg = "the second one is broken"
             raise ZeroDivisionError(msg)
@@ -119,18 +125,18 @@ def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others
 
     run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
 
-    read = submission.read_experiment(sqlite_store, experiment)
-    states = [each.state for each in submission.list_repetitions(sqlite_store, experiment)]
+    read = reading.read_experiment(sqlite_store, experiment)
+    states = [each.state for each in reading.list_repetitions(sqlite_store, experiment)]
     assert states == [State.COMPLETED, State.FAILED, State.COMPLETED]
     assert (read.state, read.progress.failed) == (State.COMPLETED, 1)
     assert read.reasons == ("ZeroDivisionError: the second one is broken",)
 
 
-def delivering(left_out, attempts):
+def delivering(left_out: Any, attempts: Any) -> Any:
     """A task whose repetition 1 leaves out some of what it has done in its first attempts."""
 
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-    def task_(claim, expected, checkpoint_s):
+    def task_(claim: Any, expected: Any, checkpoint_s: Any) -> Iterator[Any]:
         delivered = list(recorded(setting(claim.spec, claim.number), claim.log, ()))
         if claim.number == 1 and claim.epoch <= attempts:
             del delivered[left_out]
@@ -146,34 +152,40 @@ def delivering(left_out, attempts):
         (slice(-2, None), "it ended too early: repetition 1"),
     ],
 )
-def test_a_repetition_that_its_log_refuses_is_queued_again_alone(sqlite_store, monkeypatch, left_out, reason):
+def test_a_repetition_that_its_log_refuses_is_queued_again_alone(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, left_out: Any, reason: Any
+) -> None:
     monkeypatch.setattr(task, "run", delivering(left_out, attempts=1))
     experiment = submission.submit_experiment(sqlite_store, toy()).id
 
     run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
 
-    first, second = submission.list_attempts(sqlite_store, experiment, 1)
+    first, second = reading.list_attempts(sqlite_store, experiment, 1)
     assert (first.ending, second.ending) == (Ending.LOST, Ending.COMPLETED)
     assert reason in first.reason
-    assert [each.attempts for each in submission.list_repetitions(sqlite_store, experiment)] == [1, 2, 1]
+    assert [each.attempts for each in reading.list_repetitions(sqlite_store, experiment)] == [1, 2, 1]
     assert stored(sqlite_store, experiment) == expected(toy())
 
 
-def test_a_repetition_that_its_log_refuses_again_and_again_is_failed_alone(sqlite_store, monkeypatch):
+def test_a_repetition_that_its_log_refuses_again_and_again_is_failed_alone(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(task, "run", delivering(slice(0, 1), attempts=99))
     experiment = submission.submit_experiment(sqlite_store, toy()).id
 
     run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
 
-    repetitions = submission.list_repetitions(sqlite_store, experiment)
+    repetitions = reading.list_repetitions(sqlite_store, experiment)
     assert [each.state for each in repetitions] == [State.COMPLETED, State.FAILED, State.COMPLETED]
     assert "cannot be recorded" in repetitions[1].error
 
 
-def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_twice(sqlite_store, monkeypatch):
+def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_twice(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     record_all, calls = execution.record_all, []
 
-    def flaky(store, deliveries):
+    def flaky(store: Store, deliveries: Any) -> Any:
         calls.append(1)
         if len(calls) % 3 == 1:
             raise StoreUnavailable("before anything was written")
@@ -187,7 +199,7 @@ def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_tw
     supervisor = Supervisor(sqlite_store, lambda: 4)
 
     deadline = time.monotonic() + DEADLINE_S
-    while submission.read_experiment(sqlite_store, experiment).state is not State.COMPLETED:
+    while reading.read_experiment(sqlite_store, experiment).state is not State.COMPLETED:
         assert time.monotonic() < deadline
         try:
             supervisor.step()
@@ -198,27 +210,27 @@ def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_tw
     assert stored(sqlite_store, experiment) == expected(toy())
 
 
-def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store):
+def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, long_toy()).id
     supervisor = Supervisor(sqlite_store, lambda: 2)
     run(
         supervisor,
         sqlite_store,
         experiment,
-        until=lambda: submission.read_experiment(sqlite_store, experiment).progress.iterations_done,
+        until=lambda: reading.read_experiment(sqlite_store, experiment).progress.iterations_done,
     )
 
-    submission.cancel_experiment(sqlite_store, experiment)
+    cancel(sqlite_store, experiment)
     deadline = time.monotonic() + DEADLINE_S
     while processes_of_ray("run"):
         assert time.monotonic() < deadline
         supervisor.step()
 
-    assert submission.read_experiment(sqlite_store, experiment).state is State.CANCELLED
-    assert submission.read_experiment(sqlite_store, experiment).progress.iterations_done
+    assert reading.read_experiment(sqlite_store, experiment).state is State.CANCELLED
+    assert reading.read_experiment(sqlite_store, experiment).progress.iterations_done
 
 
-def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_store):
+def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, toy()).id
     first, stop = Supervisor(sqlite_store, lambda: 2), Event()
     first.step()
@@ -227,25 +239,27 @@ def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_sto
     first.serve(stop)
     run(Supervisor(sqlite_store, lambda: 2), sqlite_store, experiment)
 
-    assert submission.read_experiment(sqlite_store, experiment).state is State.COMPLETED
+    assert reading.read_experiment(sqlite_store, experiment).state is State.COMPLETED
     assert stored(sqlite_store, experiment) == expected(toy())
 
 
-def long_steps():
+def long_steps() -> Any:
     """A step of some seconds, twice."""
     budget = {"controller_evaluations": 4_000, "selection_evaluations": 20, "simulator_evaluations": 20}
     return toy(strategy="random", repetitions=1, budget=budget, iterations=1)
 
 
-def parts_stored(store):
+def parts_stored(store: Store) -> Any:
     with store.reading() as session:
         return session.query(CheckpointRow).count()
 
 
-def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(sqlite_store, monkeypatch):
+def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     claim, checkpoints = execution.claim, []
 
-    def watched(store, owner, limit):
+    def watched(store: Store, owner: Any, limit: Any) -> Any:
         claims = claim(store, owner, limit)
         checkpoints.extend(len(each.checkpoints) for each in claims)
         return claims
@@ -265,7 +279,7 @@ def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(
     assert parts_stored(sqlite_store) == 0
 
 
-def test_told_to_stop_in_the_middle_of_a_step_it_hands_over_what_the_step_has(sqlite_store):
+def test_told_to_stop_in_the_middle_of_a_step_it_hands_over_what_the_step_has(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, long_steps()).id
     first, stop = Supervisor(sqlite_store, lambda: 1, checkpoint_s=0.05), Event()
     run(first, sqlite_store, experiment, until=lambda: parts_stored(sqlite_store))
@@ -273,13 +287,13 @@ def test_told_to_stop_in_the_middle_of_a_step_it_hands_over_what_the_step_has(sq
 
     first.serve(stop)
 
-    (left,) = submission.list_repetitions(sqlite_store, experiment)
+    (left,) = reading.list_repetitions(sqlite_store, experiment)
     assert (left.state, left.attempts) == (State.QUEUED, 0)
     run(Supervisor(sqlite_store, lambda: 1), sqlite_store, experiment)
     assert stored(sqlite_store, experiment) == expected(long_steps())
 
 
-def checked(store, check, supervisor):
+def checked(store: Store, check: Any, supervisor: Any) -> Any:
     deadline = time.monotonic() + DEADLINE_S
     while not checks.read(store, check).state.ended:
         assert time.monotonic() < deadline
@@ -287,7 +301,7 @@ def checked(store, check, supervisor):
     return checks.read(store, check)
 
 
-def test_a_sensitivity_check_runs_beside_repetitions_and_tells_the_same_as_in_one_process(store):
+def test_a_sensitivity_check_runs_beside_repetitions_and_tells_the_same_as_in_one_process(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy())
     supervisor = Supervisor(store, lambda: 1)
 
@@ -295,13 +309,13 @@ def test_a_sensitivity_check_runs_beside_repetitions_and_tells_the_same_as_in_on
     run(supervisor, store, experiment.id)
 
     assert found.tunables == check(subject(found.spec), SteadyState(), Effort(17, 100))
-    assert submission.read_experiment(store, experiment.id).state is State.COMPLETED
+    assert reading.read_experiment(store, experiment.id).state is State.COMPLETED
     assert stored(store, experiment.id) == expected(toy())
 
 
-def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store, monkeypatch):
+def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     @ray.remote(num_cpus=0, max_retries=0)
-    def raising(spec, expected):
+    def raising(spec: Any, expected: Any) -> None:
         msg = "the check is broken"
         raise ZeroDivisionError(msg)
 
@@ -313,20 +327,22 @@ def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store, monkeypatch):
     run(supervisor, sqlite_store, experiment.id)
 
     assert (found.state, found.reason) == (State.FAILED, "ZeroDivisionError: the check is broken")
-    read = submission.read_experiment(sqlite_store, experiment.id)
+    read = reading.read_experiment(sqlite_store, experiment.id)
     assert read.state is State.COMPLETED
     assert read.warnings[0].endswith("ZeroDivisionError: the check is broken")
 
 
 @ray.remote(num_cpus=0, max_retries=0)
-def killed_once(spec, mark):
+def killed_once(spec: Any, mark: Any) -> Any:
     if not os.path.exists(mark):
         Path(mark).touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return check(subject(spec), SteadyState(), Effort(spec.points, spec.evaluations))
 
 
-def test_a_sensitivity_check_whose_worker_is_killed_runs_again(sqlite_store, monkeypatch, tmp_path):
+def test_a_sensitivity_check_whose_worker_is_killed_runs_again(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr(checking.check, "remote", lambda spec, _: killed_once.remote(spec, str(tmp_path / "killed")))
     check_id = submission.submit_experiment(sqlite_store, toy()).sensitivity
 
@@ -337,7 +353,9 @@ def test_a_sensitivity_check_whose_worker_is_killed_runs_again(sqlite_store, mon
     assert {each.verdict for each in found.tunables} == {Verdict.SMOOTH}
 
 
-def test_a_supervisor_that_is_told_to_stop_hands_its_check_to_the_next(sqlite_store, monkeypatch):
+def test_a_supervisor_that_is_told_to_stop_hands_its_check_to_the_next(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     check_id = submission.submit_experiment(sqlite_store, toy()).sensitivity
     first, stop = Supervisor(sqlite_store, lambda: 2), Event()
     first.step()
@@ -351,7 +369,7 @@ def test_a_supervisor_that_is_told_to_stop_hands_its_check_to_the_next(sqlite_st
     assert checked(sqlite_store, check_id, Supervisor(sqlite_store, lambda: 2)).state is State.COMPLETED
 
 
-def test_a_check_that_was_taken_over_is_dropped(sqlite_store):
+def test_a_check_that_was_taken_over_is_dropped(sqlite_store: Store) -> None:
     check_id = checks.submit(sqlite_store, SensitivitySpec(robot="toy_function")).id
     first = checking.Checks(sqlite_store, "first")
     first.step()
@@ -364,7 +382,7 @@ def test_a_check_that_was_taken_over_is_dropped(sqlite_store):
     assert checks.read(sqlite_store, check_id).state is State.RUNNING
 
 
-def test_a_check_on_a_node_with_other_versions_is_not_stored(sqlite_store):
+def test_a_check_on_a_node_with_other_versions_is_not_stored(sqlite_store: Store) -> None:
     check_id = checks.submit(sqlite_store, SensitivitySpec(robot="toy_function")).id
     supervisor = Supervisor(sqlite_store, lambda: 2, {"gaplab": "0.0.1"})
 
