@@ -15,11 +15,12 @@ from rich.table import Table
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.core.arrays import FloatArray, Genomes, Parameters
-from gaplab.services.core.counted import Counted
+from gaplab.services.core.answers import Answers
+from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.optimizers import optimizers
-from gaplab.services.core.optimizers.base import Optimizer, maximise
+from gaplab.services.core.optimizers.base import Optimizer
+from gaplab.services.core.search import Evaluate, Question, maximise
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Sample, Space
@@ -47,7 +48,7 @@ class SearchProblem:
     """
 
     space: Space
-    evaluate: Callable[[Genomes, FloatArray], FloatArray]
+    evaluate: Evaluate
     rollouts: Callable[[], int]
     evaluations: int
 
@@ -69,12 +70,12 @@ class BestSoFar:
 
 def controllers(one: Setting, seed: int) -> SearchProblem:
     """Return the search for controllers in a random simulator."""
-    simulate = Counted(one.simulate)
+    answers = Answers(one.simulate)
     simulator = one.parameters.draw(1, stream(seed, "simulator"))
     return SearchProblem(
         one.genomes,
-        lambda genomes, _: simulate(genomes, simulator)[:, 0],
-        lambda: simulate.count.cost_of(0).rollouts,
+        lambda asked: answers(asked.genomes, simulator)[:, 0],
+        lambda: answers.cost_of(0).rollouts,
         CONTROLLERS,
     )
 
@@ -82,8 +83,9 @@ def controllers(one: Setting, seed: int) -> SearchProblem:
 def simulators(one: Setting, seed: int) -> SearchProblem:
     """Return the search for simulators on samples of random controllers."""
     drawn = one.genomes.draw(SAMPLES, stream(seed, "samples"))
-    misfit = Misfit(one.simulate, [Sample(genome, one.reality(genome)) for genome in drawn])
-    return SearchProblem(one.parameters, misfit, lambda: misfit.count.cost_of(0).rollouts, SIMULATORS)
+    answers = Answers(one.simulate)
+    misfit = Misfit(answers, [Sample(genome, one.reality(genome)) for genome in drawn])
+    return SearchProblem(one.parameters, misfit, lambda: answers.cost_of(0).rollouts, SIMULATORS)
 
 
 PROBLEMS = {"controllers": controllers, "simulators": simulators}
@@ -94,8 +96,8 @@ def searched(problem: SearchProblem, optimizer: Optimizer, seed: int) -> BestSoF
     rollouts: list[int] = []
     best: list[float] = []
 
-    def evaluate(genomes: Parameters, bounds: FloatArray) -> FloatArray:
-        fitness = problem.evaluate(genomes, bounds)
+    def evaluate(asked: Question) -> FloatArray:
+        fitness = problem.evaluate(asked)
         rollouts.append(problem.rollouts())
         best.append(max(float(np.nanmax(fitness, initial=-np.inf)), best[-1] if best else -np.inf))
         return fitness

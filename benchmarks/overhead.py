@@ -8,10 +8,10 @@ import numpy as np
 
 from benchmarks.measure import Row
 from benchmarks.physics import genomes, simulation
-from gaplab.services.core.arrays import FloatArray, Genomes
-from gaplab.services.core.optimizers.base import maximise
+from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.search import Question, maximise
 from gaplab.services.core.streams import stream
 
 STEPS = 20_000
@@ -22,8 +22,8 @@ PAGE = resource.getpagesize()
 def evolution_step_s() -> float:
     """Return seconds of one step of the paper's evolution (ask, replacement, tell) without the cost of fitness."""
 
-    def free(asked: Genomes, _: FloatArray) -> FloatArray:
-        return asked[:, 0]
+    def free(asked: Question) -> FloatArray:
+        return asked.genomes[:, 0]
 
     begun = perf_counter()
     maximise(SteadyState(), Quadruped().space, free, STEPS, stream(0, "benchmark"))

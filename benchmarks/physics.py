@@ -8,9 +8,9 @@ import pybullet
 
 from benchmarks.measure import Row, rates, ratio
 from gaplab.services.core.arrays import Genome, Genomes, Parameters
-from gaplab.services.core.optimizers.base import maximise
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.search import maximise
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.world import Motion
 from gaplab.services.engines.base import Engine
@@ -83,7 +83,7 @@ def evolved(engine: Engine, evaluations: int, rng: np.random.Generator) -> Genom
     """Return a controller that was evolved in the robot's own world."""
     simulate = simulation(engine)
     fittest = maximise(
-        SteadyState(), Quadruped().space, lambda drawn, _: simulate(drawn, SWITCHING)[:, 0], evaluations, rng
+        SteadyState(), Quadruped().space, lambda asked: simulate(asked.genomes, SWITCHING)[:, 0], evaluations, rng
     )
     genome: Genome = fittest.genomes[0]
     return genome

@@ -12,10 +12,11 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import FloatArray, Genome
-from gaplab.services.core.optimizers.base import maximise
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import BODY_M, COUNTED_S, PERIOD_S, SETTLING_S, Quadruped, QuadrupedOptions
+from gaplab.services.core.search import maximise
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuning import Misfit, squared_errors, tune
@@ -72,7 +73,7 @@ class Laboratory:
             fittest = maximise(
                 SteadyState(),
                 self.robot.space,
-                lambda genomes, _: self.simulate(genomes, parameters[None])[:, 0],
+                lambda asked: self.simulate(asked.genomes, parameters[None])[:, 0],
                 self.evaluations,
                 stream(0, *address),
             )
@@ -180,7 +181,7 @@ def identifiable(laboratory: Laboratory, arguments: Namespace) -> None:
             for seed in range(arguments.tunings):
                 rng = stream(seed, "tune", count)
                 chosen = [samples[index] for index in rng.permutation(10)[:count]]
-                misfit = Misfit(laboratory.simulate, chosen)
+                misfit = Misfit(Answers(laboratory.simulate), chosen)
                 best = tune(misfit, laboratory.parameters, SteadyState(), arguments.tuning, rng)[0]
                 fitness = laboratory.real(laboratory.evolve(best.parameters, "tuned", arguments.tuning, count, seed))
                 found.setdefault(count, []).append((best.parameters, fitness))

@@ -13,6 +13,7 @@ import numpy as np
 from benchmarks import naive
 from benchmarks.measure import Row, rates, ratio
 from gaplab.api.process.local_service import start_service
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Selected, Transferred, Tuned
@@ -58,7 +59,7 @@ def one_repetition(number: int) -> int:
 
 
 @cache
-def _resolved() -> ExperimentSpec:
+def _resolved() -> ResolvedSpec:
     return resolve_experiment(SPEC)
 
 

@@ -10,7 +10,7 @@ import ray
 from benchmarks.measure import Row
 from gaplab import migrations
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import reading, submission
 from gaplab.services.running.execution import Claim, Delivered
 from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting
@@ -93,7 +93,7 @@ def steps_per_second(url: str, kind: type[WithoutRay] | type[ThroughRay], delive
         ours.step()
         idle = 0 if ours.busy else idle + 1
     seconds = perf_counter() - begun
-    assert submission.read_experiment(store, experiment).progress.completed == SPEC.repetitions
+    assert reading.read_experiment(store, experiment).progress.completed == SPEC.repetitions
     store.dispose()
     return (SPEC.repetitions or 0) * sum(map(len, delivered)) / seconds
 

@@ -7,7 +7,8 @@ from pydantic import Field
 
 from gaplab.schemas.base import Count, Examples, Frozen, Id, Moment, Statistic, TunableName, Unit
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.plugin import PluginRef, TunableRef
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.resolved import ResolvedTunable
 from gaplab.schemas.spec import SharedSettings
 
 POINTS, EVALUATIONS = 17, 100
@@ -46,7 +47,7 @@ class Checked(Frozen):
 
     robot: PluginRef = Field(examples=["quadruped"])
     engine: PluginRef = Field(examples=["pybullet"])
-    tunables: tuple[TunableRef, ...] = Field(examples=[("restitution",)])
+    tunables: tuple[ResolvedTunable, ...] = Field(examples=[("restitution",)])
     points: int = POINTS
     evaluations: int = EVALUATIONS
 

@@ -1,7 +1,7 @@
-"""Logs of every process of the service: lines for people in a terminal, JSON lines for programs anywhere else.
+"""Logs of every process of the service: readable lines in a terminal, JSON lines anywhere else.
 
-A record tells of which experiment and repetition it is by `extra=`. Nothing that is secret gets through, whoever logs
-it: what looks like a token, a password or an Authorization header is left out of messages and tracebacks alike.
+A record names its experiment and repetition by `extra=`. Secrets never get through: what looks like a token, a
+password or an Authorization header is left out of messages and tracebacks.
 """
 
 import json
@@ -14,7 +14,7 @@ from typing import Any, TextIO
 HIDDEN = "…"
 
 _NAME = r"(?<![\w-])(?=[\w-]*(?:token|password|passwd|secret|api_?key))[\w-]*+"
-"""Looked for once in each word, and the word then taken whole: an address of a request may be one very long word."""
+"""Matched once a word, and then takes the whole word: a request's address may be one very long word."""
 
 _SECRETS = (
     (re.compile(r"(?i)(authorization\W{1,6})(?:(?:bearer|basic|token)\s+)?[^\s'\",;)}\]]+"), rf"\1{HIDDEN}"),
@@ -32,18 +32,18 @@ _EXPERIMENT = re.compile(r"^/experiments/([\w-]{1,64})")
 
 
 def configure(stream: TextIO | None = None) -> None:
-    """Let this process log to the stream, or to standard error: in the form that suits who reads there."""
+    """Let this process log to the stream, or to standard error: readable lines on a terminal, else JSON."""
     target = stream or sys.stderr
     handler = logging.StreamHandler(target)
     handler.setFormatter(Readable() if target.isatty() else Json())
-    handler.addFilter(_tell_of_requests)
+    handler.addFilter(_rewrite_requests)
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
     for noisy in ("alembic", "uvicorn.error", "httpx", "httpx2", "asyncio"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
 
 
 def adopt(name: str) -> None:
-    """Let a library that logs by handlers of its own log like the rest, and warnings only."""
+    """Let a library with log handlers of its own log like the rest, and warnings only."""
     logger = logging.getLogger(name)
     logger.handlers.clear()
     logger.propagate = True
@@ -51,17 +51,17 @@ def adopt(name: str) -> None:
 
 
 def without_secrets(text: str) -> str:
-    """The text, with what looks like a secret left out."""
+    """Return the text without what looks like a secret."""
     for pattern, replacement in _SECRETS:
         text = pattern.sub(replacement, text)
     return text
 
 
 class Readable(logging.Formatter):
-    """A line for people: when, how grave, who, of what, and the message."""
+    """A readable line: time, level, logger, experiment and repetition, message."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """The record as a line, and its traceback below."""
+        """Return the record as a line, and its traceback below."""
         when = datetime.fromtimestamp(record.created).astimezone().strftime("%H:%M:%S")
         place = "/".join(str(value) for name in _PLACE if (value := getattr(record, name, None)) is not None)
         line = f"{when} {record.levelname:<7} {record.name}{f' {place}' if place else ''}: {record.getMessage()}"
@@ -70,10 +70,10 @@ class Readable(logging.Formatter):
 
 
 class Json(logging.Formatter):
-    """A JSON object a line: at, level, logger, message, and experiment, repetition, request, exception where known."""
+    """A JSON object a line: at, level, logger, message; experiment, repetition, request and exception where known."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """The record as one line."""
+        """Return the record as one line."""
         found: dict[str, Any] = {
             "at": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
             "level": record.levelname.lower(),
@@ -91,8 +91,8 @@ class Json(logging.Formatter):
         return json.dumps(found, ensure_ascii=False, default=str)
 
 
-def _tell_of_requests(record: logging.LogRecord) -> bool:
-    """Uvicorn's access log as the rest: its parts by name, no queries, and nothing of probes that found all well."""
+def _rewrite_requests(record: logging.LogRecord) -> bool:
+    """Rewrite records of Uvicorn's access log: parts by name, no query, and no record of a successful probe."""
     if record.name != _ACCESS or not isinstance(record.args, tuple) or len(record.args) != 5:
         return True
     client, method, target, _, status = record.args

@@ -5,9 +5,12 @@ from math import inf, isnan, nan
 
 import numpy as np
 
+from gaplab.schemas.lifecycle import Verb
+from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
+from gaplab.services.experiments import lifecycle
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Claim
 from gaplab.services.store.session import Store
@@ -46,6 +49,11 @@ def run(store: Store, claim: Claim, log: Iterator[Step] | None = None) -> None:
     for step in log if log is not None else some_log():
         assert execution.record(store, claim, step, seconds=0.5)
     assert execution.complete(store, claim)
+
+
+def cancel(store: Store, experiment: str) -> ExperimentRead:
+    """Cancel an experiment."""
+    return lifecycle.ask_experiment(store, experiment, Verb.CANCEL)
 
 
 def same(first: object, second: object) -> bool:

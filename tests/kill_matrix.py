@@ -26,7 +26,7 @@ from gaplab.services.running import execution
 from gaplab.services.store.models import CheckpointRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
 from gaplab.services.store.queries import checkpoints, steps
 from gaplab.services.store.session import Store
-from gaplab.workers.checkpoints import Recorder
+from gaplab.workers.checkpoints import StepRecorder
 from gaplab.workers.repetitions import Repetitions
 from tests.kept_databases import Databases
 from tests.postgres import running
@@ -60,7 +60,7 @@ def around(owner: object, name: str) -> Wrap:
 POINTS: dict[str, Wrap] = {
     "claim": around(execution, "claim"),
     "compute": around(loop, "next_step"),
-    "checkpoint is made": around(Recorder, "_checkpoint"),
+    "checkpoint is made": around(StepRecorder, "_checkpoint"),
     "checkpoint is written": around(checkpoints, "write"),
     "steps are written": around(steps, "record"),
     "commit": around(DefaultDialect, "do_commit"),

@@ -16,7 +16,7 @@ from gaplab.services.store.session import Store
 
 
 def serve(settings: Settings) -> int:
-    """Work until SIGTERM or SIGINT; 1 if there is no cluster to work on."""
+    """Work until SIGTERM or SIGINT; return 1 if there is no cluster to work on."""
     choose_authentication(settings)
     from gaplab.workers.cluster import cluster  # Ray takes a second to import
     from gaplab.workers.supervisor import Supervisor
@@ -39,10 +39,10 @@ def serve(settings: Settings) -> int:
 
 
 def choose_authentication(settings: Settings) -> None:
-    """A Ray of our own asks for a token whatever the environment says, and a cluster is shown one unless that says no.
+    """Make a Ray that this process starts ask for a token, and send one to a cluster unless the environment forbids it.
 
-    Ray reads it when it is imported. Of itself it shows its token to a cluster that it started, but to no other; and it
-    keeps that in a file of the home folder which other users may read, where one in the environment is ours alone.
+    Ray reads these variables when it is imported. By default it sends its token only to a cluster that it started, and
+    keeps the token in a file of the home folder that other users may read.
     """
     if settings.ray_address:
         os.environ.setdefault("RAY_AUTH_MODE", "token")
@@ -52,7 +52,7 @@ def choose_authentication(settings: Settings) -> None:
 
 
 def check(settings: Settings) -> int:
-    """0 if the database can be used, and 1 if not."""
+    """Return 0 if the database can be used, else 1."""
     try:
         Store(settings.database_url).check()
     except StoreUnavailable as error:
@@ -65,7 +65,7 @@ COMMANDS: dict[str, Callable[[Settings], int]] = {"serve": serve, "check": check
 
 
 def main(arguments: list[str]) -> int:
-    """Run the command; 2 if it is not understood, or the environment is not."""
+    """Run the command; return 2 if the arguments, the environment or a plug-in cannot be used."""
     if len(arguments) != 1 or arguments[0] not in COMMANDS:
         sys.stderr.write(f"usage: python -m workers {' | '.join(COMMANDS)}\n")
         return 2

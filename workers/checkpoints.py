@@ -1,26 +1,23 @@
-"""A repetition that tells how far it has got while a step is under way."""
+"""Repetitions that deliver checkpoints of a step while it is under way."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from functools import partial
 from queue import SimpleQueue
 from threading import Event, Thread
 from time import perf_counter
 
-import numpy as np
-
-from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
+from gaplab.services.core.answers import Answer, Answers, pack
 from gaplab.services.core.loop import Setting, repetition
-from gaplab.services.core.ports import Simulate
-from gaplab.services.core.recall import Answer, Recall, pack
 from gaplab.services.core.types import Step
 from gaplab.services.running.execution import Checkpoint, Delivered, TimedStep
 
 CHECKPOINT_S = 10.0
-"""Between the checkpoints of a step; shorter ones have none. It bounds what a crash costs, and how long one waits for a
-repetition that is told to stop."""
+"""Seconds between the checkpoints of a step; shorter steps have none.
+
+They bound what a crash costs, and how long a repetition that is told to stop goes on."""
 
 SHARE = 4
-"""A call that would take longer than this part of the time between checkpoints is made in several."""
+"""Calls that would take longer than the time between checkpoints divided by this are split."""
 
 Emit = Callable[[Delivered], None]
 
@@ -28,81 +25,70 @@ Emit = Callable[[Delivered], None]
 def recorded(
     setting: Setting, log: Sequence[Step], checkpoints: Sequence[Checkpoint], every_s: float = CHECKPOINT_S
 ) -> Iterator[Delivered]:
-    """The steps that follow the log, and checkpoints of those that take long, as they come about.
+    """Yield the steps that follow the log, and checkpoints of those that take long, as they come about.
 
     Args:
         setting: of the repetition.
         log: its steps so far.
         checkpoints: of the step that comes next.
-        every_s: between checkpoints of a step.
+        every_s: seconds between checkpoints of a step.
     """
 
     def compute(emit: Emit) -> None:
-        recorder = Recorder(setting.simulate, emit, every_s, len(log), checkpoints)
-        recall = Recall(recorder, setting.batch, (each.answers for each in checkpoints))
-        for step in repetition(replace(setting, simulate=recall, batch=recall.batch), log):
+        recorder = StepRecorder(emit, every_s, len(log), checkpoints)
+        for step in repetition(setting, log, partial(recorder.answers, setting)):
             recorder.end(step)
-            recall.forget()
 
-    return _aside(compute)
+    return _in_a_thread(compute)
 
 
-class Recorder:
-    """A Simulate that keeps what it answered in the step under way, and emits it from time to time.
+class StepRecorder:
+    """Records the answers of the step under way, and emits a checkpoint of them from time to time.
 
     Args:
-        simulate: answers.
         emit: takes steps and checkpoints.
-        every_s: between checkpoints.
+        every_s: seconds between checkpoints.
         step: the place in the log of the step under way.
-        checkpoints: of it, from before.
+        checkpoints: of it, from before an interruption.
     """
 
-    def __init__(
-        self, simulate: Simulate, emit: Emit, every_s: float, step: int, checkpoints: Sequence[Checkpoint] = ()
-    ) -> None:
-        self._simulate = simulate
+    def __init__(self, emit: Emit, every_s: float, step: int, checkpoints: Sequence[Checkpoint] = ()) -> None:
         self._emit = emit
         self._every_s = every_s
         self._step, self._part = step, len(checkpoints)
-        self._before_s = sum(each.seconds for each in checkpoints)
-        self._begun = self._last = perf_counter()
+        self._before = checkpoints
+        self._before_s = sum(checkpoint.seconds for checkpoint in checkpoints)
+        self._begun = self._last = self._called = perf_counter()
         self._answers: list[Answer] = []
         self._rollout_s = 0.0
 
-    def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
-        """`(n, g)` genomes × `(m, p)` parameters -> `(n, m)` fitnesses, as the Simulate that was given."""
-        fitnesses: list[Fitnesses] = []
-        done = 0
-        while done < len(genomes):
-            some = genomes[done : done + self._at_a_time(len(parameters), len(genomes))]
-            fitnesses.append(self._ask(some, parameters))
-            done += len(some)
-        return fitnesses[0] if len(fitnesses) == 1 else np.concatenate(fitnesses)
+    def answers(self, setting: Setting) -> Answers:
+        """Return the answers of the step under way: those of its checkpoints, then new ones, which are recorded."""
+        checkpoints = (checkpoint.answers for checkpoint in self._before)
+        return Answers(setting.simulate, setting.batch_size, checkpoints, self)
 
-    def end(self, step: Step) -> None:
-        """The step is there: emit it, and begin the next."""
-        now = perf_counter()
-        self._emit(TimedStep(step, self._before_s + now - self._begun))
-        self._step, self._part = self._step + 1, 0
-        self._before_s, self._begun, self._last = 0.0, now, now
-        self._answers = []
-
-    def _at_a_time(self, simulators: int, genomes: int) -> int:
-        """Genomes to ask for in one call; one, to learn how long it takes, if nothing is known."""
+    def genomes_per_call(self, simulators: int) -> int:
+        """Return as many genomes as take a part of the time between checkpoints; one while that is unknown."""
+        self._called = perf_counter()
         if not self._rollout_s:
             return 1
-        return max(1, min(genomes, int(self._every_s / SHARE / (self._rollout_s * simulators))))
+        return max(1, int(self._every_s / SHARE / (self._rollout_s * simulators)))
 
-    def _ask(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
-        begun = perf_counter()
-        fitnesses = self._simulate(genomes, parameters)
+    def record(self, answers: Sequence[Answer]) -> None:
+        """Keep the answers of a call that has just ended, and emit a checkpoint if it is time."""
         now = perf_counter()
-        self._rollout_s = (now - begun) / fitnesses.size
-        self._answers.append((genomes, parameters, fitnesses))
+        self._rollout_s = (now - self._called) / sum(len(fitnesses) for _, fitnesses in answers)
+        self._answers += answers
         if now - self._last >= self._every_s:
             self._checkpoint(now)
-        return fitnesses
+
+    def end(self, step: Step) -> None:
+        """Emit the step, which has come to its end, and begin the next."""
+        now = perf_counter()
+        self._emit(TimedStep(step, self._before_s + now - self._begun))
+        self._step, self._part, self._before = self._step + 1, 0, ()
+        self._before_s, self._begun, self._last = 0.0, now, now
+        self._answers = []
 
     def _checkpoint(self, now: float) -> None:
         self._emit(Checkpoint(self._step, self._part, pack(self._answers), now - self._last))
@@ -110,13 +96,13 @@ class Recorder:
 
 
 class _Unwanted(Exception):
-    """Nobody takes what is emitted any more."""
+    """The consumer has closed the iterator, so that nothing takes further items."""
 
 
-def _aside(compute: Callable[[Emit], None]) -> Iterator[Delivered]:
-    """What is emitted in a thread of its own: a checkpoint comes from the depths of a step, where nothing can yield.
+def _in_a_thread(compute: Callable[[Emit], None]) -> Iterator[Delivered]:
+    """Yield what a thread of its own emits: a checkpoint comes from the depths of a step, where nothing can yield.
 
-    The thread ends at the next thing that it emits if nobody wants it any more.
+    Once the iterator is closed, the thread ends at the next item that it emits.
     """
     items: SimpleQueue[Delivered | None] = SimpleQueue()
     raised: list[BaseException] = []
@@ -132,7 +118,7 @@ def _aside(compute: Callable[[Emit], None]) -> Iterator[Delivered]:
             compute(emit)
         except _Unwanted:
             return
-        except Exception as error:  # noqa: BLE001 - it is raised again where the items are taken
+        except Exception as error:  # noqa: BLE001 - it is raised again below, where the items are taken
             raised.append(error)
         items.put(None)
 

@@ -23,18 +23,18 @@ class Cluster:
     """Ray, as it was started or joined.
 
     Attributes:
-        workers: repetitions to run at once; None for as many as there are cores.
-        versions: that each process must have that runs a repetition. A Ray of our own is on this machine, but starts
-            processes whenever it needs some, and files may be edited in between.
+        workers: most repetitions at once; None for as many as there are cores.
+        versions: that a process must have to run a repetition. Even a Ray on this machine starts processes later, and
+            files may be edited meanwhile.
     """
 
     workers: int | None
     versions: Versions
 
     def capacity(self) -> int:
-        """How many repetitions to have at Ray at once: it changes as nodes come and go.
+        """Return the number of repetitions to have at Ray at once, which changes as nodes come and go.
 
-        That is two for each core: while one runs, the next one waits at Ray, and no core idles between them.
+        There are two for each core: while one runs, the next one waits at Ray, and no core idles between them.
 
         Raises:
             ClusterUnusable: this process lost its node, and can run nothing any more.
@@ -45,17 +45,16 @@ class Cluster:
 
 @contextmanager
 def cluster(settings: Settings) -> Iterator[Cluster]:
-    """A connection to Ray for as long as the context lasts.
+    """Open a connection to Ray for as long as the context lasts.
 
-    A Ray of our own listens on loopback only, has no dashboard, and ends with this process, even if it is killed.
+    A Ray that this process starts listens on loopback only, has no dashboard, and ends with the process.
 
     Args:
         settings: `ray_address` names an existing cluster; `workers` limits the cores of a Ray of our own, and how many
             repetitions run at once on a cluster.
 
     Raises:
-        ClusterUnusable: it cannot be joined, a node has other versions than this process, or a Ray of our own would
-            ask nobody for a token.
+        ClusterUnusable: it cannot be joined, a node has other versions, or authentication is switched off.
     """
     logging.getLogger("ray").setLevel(logging.ERROR)
     try:
@@ -71,7 +70,7 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
 
 
 def _refuse_dead_node() -> None:
-    """A process whose node has died has no Ray any more, and never gets another: it has to be started again."""
+    """Refuse to go on when this node's Ray has died; only a new process gets another."""
     here = ray.get_runtime_context().get_node_id()
     if any(node["NodeID"] == here and not node["Alive"] for node in ray.nodes()):
         msg = "Ray died on this machine"
@@ -96,7 +95,7 @@ def _start(cores: int | None) -> None:
 
 @contextmanager
 def _on_loopback() -> Iterator[None]:
-    """Within it, a Ray that starts takes loopback for its address, as it does by itself on a Mac.
+    """Let a Ray that starts within the context listen on loopback, as it does by itself on a Mac.
 
     On Linux it replaces 127.0.0.1 by an address that other machines reach, and listens there: what it offers for that
     is a setting, RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER, which it reads into this constant when it is imported.

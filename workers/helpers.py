@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import ray
 from ray.exceptions import RayError
 
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
 from gaplab.services.core.ports import Simulate
 from gaplab.services.specs.assembly import setting
@@ -42,7 +42,7 @@ class Helper:
 
 @cache
 def _simulation(spec: str) -> Simulate:
-    return setting(ExperimentSpec.model_validate_json(spec), 0).simulate
+    return setting(ResolvedSpec.model_validate_json(spec), 0).simulate
 
 
 class Helpers:
@@ -52,7 +52,7 @@ class Helpers:
     first asked for what nobody waits for, and counts once it has answered.
     """
 
-    def __init__(self, spec: ExperimentSpec, versions: Versions) -> None:
+    def __init__(self, spec: ResolvedSpec, versions: Versions) -> None:
         self._spec = spec.model_dump_json()
         self._versions = versions
         self._starting: dict[ray.ObjectRef[Fitnesses], Handle] = {}

@@ -1,4 +1,4 @@
-"""What the nodes of a cluster must have in common, so that a repetition has the same numbers on each of them."""
+"""Versions that all nodes of a cluster must share, so that a repetition has the same numbers on each of them."""
 
 import platform
 
@@ -11,14 +11,14 @@ from gaplab.services.running.versions import Versions as Versions
 from gaplab.services.running.versions import versions as versions
 
 ANSWER_S = 60.0
-"""How long a node may take to start a process and to say what it has."""
+"""Longest wait for a node to start a process and name its versions."""
 
 
 def check_here(expected: Versions) -> None:
-    """Do nothing if this process has what the supervisor has.
+    """Check that this process has the supervisor's versions.
 
     Raises:
-        ClusterUnusable: it has not, or a plug-in from outside is broken here; the message says what.
+        ClusterUnusable: it lacks them, or an external plug-in is broken here; the message says which.
     """
     try:
         found = versions()
@@ -29,10 +29,10 @@ def check_here(expected: Versions) -> None:
 
 
 def check_nodes() -> None:
-    """Do nothing if every node of the cluster has what this process has.
+    """Check that every node of the cluster has this process's versions.
 
     Raises:
-        ClusterUnusable: one has not, or it does not have gaplab at all.
+        ClusterUnusable: one has other versions, or no gaplab at all.
     """
     alive = [node for node in ray.nodes() if node["Alive"]]
     only = [NodeAffinitySchedulingStrategy(node["NodeID"], soft=False) for node in alive]

@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
 from gaplab.services.core.ports import Simulate
 from gaplab.workers.helpers import LOOK_S, Handle, Helpers
@@ -26,25 +26,25 @@ class Pool:
     Args:
         spec: of the experiment, from which the other cores make the same Simulate.
         here: that Simulate, on this core.
-        batch: rollouts that are best asked of it at a time.
+        per_call: rollouts that one call should ask of it at least.
         versions: that another node must have.
     """
 
-    def __init__(self, spec: ExperimentSpec, here: Simulate, batch: int, versions: Versions | None = None) -> None:
+    def __init__(self, spec: ResolvedSpec, here: Simulate, per_call: int, versions: Versions | None = None) -> None:
         self._simulate = here
-        self._batch = batch
+        self._per_call = per_call
         self._rollout_s = 0.0
         self._helpers = Helpers(spec, versions or {})
         self._last: Part | None = None
 
-    def batch(self) -> int:
+    def batch_size(self) -> int:
         """Rollouts that one call should ask for, if there is a choice: as many as keep all cores busy.
 
         Those of a fast engine are not worth lending a few at a time.
         """
-        if self._last is None or self._rollout_s * self._batch < LEAST_S:
-            return self._batch
-        return self._batch * (1 + len(self._helpers.ready(*self._last)))
+        if self._last is None or self._rollout_s * self._per_call < LEAST_S:
+            return self._per_call
+        return self._per_call * (1 + len(self._helpers.ready(*self._last)))
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
         """`(n, g)` genomes × `(m, p)` parameters -> `(n, m)` fitnesses; nan where the physics failed."""
@@ -70,7 +70,7 @@ class Pool:
 
     def _least(self, across: int) -> int:
         """Rows of a part that is worth lending."""
-        return ceil(max(LEAST_S / self._rollout_s, self._batch) / across) if self._rollout_s else 1
+        return ceil(max(LEAST_S / self._rollout_s, self._per_call) / across) if self._rollout_s else 1
 
     def _done(self, parts: list[Part], helpers: list[Handle]) -> list[Fitnesses]:
         if not helpers or len(parts) == 1:

@@ -42,8 +42,8 @@ def run(claim: Claim, expected: Versions, checkpoint_s: float) -> Iterator[tuple
     check_here(expected)
     yield ()
     alone = setting(claim.spec, claim.number)
-    pool = Pool(claim.spec, alone.simulate, alone.batch(), expected)
-    spread = replace(alone, simulate=pool, batch=pool.batch)
+    pool = Pool(claim.spec, alone.simulate, alone.batch_size(), expected)
+    spread = replace(alone, simulate=pool, batch_size=pool.batch_size)
     yield from batches(recorded(spread, claim.log, claim.checkpoints, checkpoint_s))
 
 

@@ -1,4 +1,4 @@
-"""Sensitivity checks at Ray: one at a time, beside the repetitions, and never in their way."""
+"""Sensitivity checks at Ray: one at a time, beside the repetitions."""
 
 import logging
 from time import monotonic
@@ -20,19 +20,19 @@ from gaplab.services.store.session import Store
 from gaplab.workers.nodes import Versions, check_here
 
 LOOK_S = 0.2
-"""Between looks for a check that is queued."""
+"""Shortest time between two looks for a queued check."""
 
 log = logging.getLogger("gaplab.supervisor")
 
 
 @ray.remote(num_cpus=0, max_retries=0)
 def check(checked: Checked, expected: Versions) -> tuple[Sensitivity, ...]:
-    """What each tunable does to fitness.
+    """Return the effect of each tunable on fitness.
 
-    It reserves no core: it takes seconds, and what it says is wanted before hours of physics, not after them.
+    The task reserves no core: it takes seconds, and its result is useful before hours of physics, not after them.
 
     Raises:
-        ClusterUnusable: this node has not the versions that are expected.
+        ClusterUnusable: this node lacks the expected versions.
     """
     check_here(expected)
     return check_tunables(subject(checked), SteadyState(), Effort(checked.points, checked.evaluations))
@@ -44,7 +44,7 @@ class Checks:
     Args:
         store: the database.
         owner: the supervisor's name in it.
-        lease_s: for how long the holder of a check may be silent before it goes to others.
+        lease_s: silence after which the holder of a check loses it to others.
         versions: that a node must have to run them.
 
     All methods raise StoreUnavailable; nothing is lost by it.
@@ -61,7 +61,7 @@ class Checks:
         self._looked = -LOOK_S
 
     def step(self) -> None:
-        """Store what has ended, and start what is queued.
+        """Store the check that has ended, or start one that is queued.
 
         Raises:
             ClusterUnusable: the node that ran it has other versions; nothing of it is stored.
@@ -73,14 +73,14 @@ class Checks:
             self._claim()
 
     def heartbeat(self) -> None:
-        """Hold on to the check that runs, or stop it if it is no longer ours; requeue those that others have lost."""
+        """Prolong the claim on the running check, or stop the check if it no longer holds; requeue lost checks."""
         if self._run is not None and not sensitivity.heartbeat(self._store, [self._run[0]]):
             ray.cancel(self._run[1], force=True)
             self._run = None
         sensitivity.requeue_lost(self._store, stale_after_s=self._lease_s)
 
     def hand_back(self) -> None:
-        """Give the unfinished check back to whoever comes next."""
+        """Hand the unfinished check back to other supervisors."""
         if self._run is not None:
             sensitivity.hand_back(self._store, self._run[0])
             self._run = None

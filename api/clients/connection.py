@@ -81,11 +81,11 @@ class Connection:
         """Close the connection."""
         self._http.close()
 
-    def get(self, kind: type[T], path: str, **parameters: Parameter) -> T:
+    def get(self, kind: type[T], path: str, /, **parameters: Parameter) -> T:
         """Return the answer to a GET as a value of this type."""
         return self.read(kind, self.get_bytes(path, **parameters))
 
-    def get_bytes(self, path: str, **parameters: Parameter) -> bytes:
+    def get_bytes(self, path: str, /, **parameters: Parameter) -> bytes:
         """Return the answer to a GET as it is."""
         given = {name: value for name, value in parameters.items() if value is not None}
         return self._repeat("GET", path, params=given)

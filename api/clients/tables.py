@@ -103,7 +103,7 @@ class Tables:
         columns = tuple(Prediction.model_fields)
         return _frame([[getattr(item, name) for name in columns] for item in predictions.items], columns, columns)
 
-    def _items(self, page: type[Page[T]], path: str, **filters: str | int | None) -> Iterator[T]:
+    def _items(self, page: type[Page[T]], path: str, /, **filters: str | int | None) -> Iterator[T]:
         """Yield every item of a list, page after page."""
         cursor = None
         while True:

@@ -21,7 +21,7 @@ from gaplab.schemas.records import (
     SimulatorRead,
 )
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.experiments import editing, submission
+from gaplab.services.experiments import editing, listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.results.misfit import misfit
 
@@ -94,7 +94,7 @@ def submit_experiment(
 def list_experiments(store: StoreDep, query: Annotated[ExperimentFilter, Query()]) -> Page[ExperimentRead]:
     """List experiments, by default the newest first. A cursor is valid only for the list that returned it."""
     wanted = ListFilter(**query.model_dump(exclude={"limit", "cursor"}))
-    return submission.list_experiments(store, wanted, limit=query.limit, cursor=query.cursor)
+    return listing.list_experiments(store, wanted, limit=query.limit, cursor=query.cursor)
 
 
 @router.get(
@@ -108,7 +108,7 @@ def read_experiment(
     id: Id, store: StoreDep, caller: CallerDep, request: Request, query: Annotated[Revealing, Query()]
 ) -> Response:
     """Return an experiment with its resolved spec; reality's parameters are null until it has ended."""
-    experiment = submission.read_experiment(store, id, reveal=query.permitted(caller))
+    experiment = reading.read_experiment(store, id, reveal=query.permitted(caller))
     return conditional.tagged(request, experiment, experiment.edits)
 
 
@@ -140,7 +140,7 @@ def edit_experiment(
 )
 def list_repetitions(id: Id, store: StoreDep) -> tuple[RepetitionRead, ...]:
     """List every repetition with its state, and its error if it failed."""
-    return tuple(submission.list_repetitions(store, id))
+    return tuple(reading.list_repetitions(store, id))
 
 
 @router.get(
@@ -151,7 +151,7 @@ def list_repetitions(id: Id, store: StoreDep) -> tuple[RepetitionRead, ...]:
 )
 def list_samples(id: Id, store: StoreDep, query: Annotated[SampleFilter, Query()]) -> Page[SampleRead]:
     """List every genome that was tried in reality, with its real fitness."""
-    return submission.list_samples(store, id, **query.model_dump())
+    return reading.list_samples(store, id, **query.model_dump())
 
 
 @router.get(
@@ -162,7 +162,7 @@ def list_samples(id: Id, store: StoreDep, query: Annotated[SampleFilter, Query()
 )
 def list_simulators(id: Id, store: StoreDep, query: Annotated[SimulatorFilter, Query()]) -> Page[SimulatorRead]:
     """List the simulators that were tuned on the samples; rank 0 is the best of its iteration."""
-    return submission.list_simulators(store, id, **query.model_dump())
+    return reading.list_simulators(store, id, **query.model_dump())
 
 
 @router.get(
@@ -184,4 +184,4 @@ def read_misfit(id: Id, store: StoreDep) -> MisfitRead:
 )
 def list_attempts(id: Id, number: Annotated[int, Path(ge=0, le=1_000_000)], store: StoreDep) -> tuple[AttemptRead, ...]:
     """List the attempts at a repetition: supervisor, start, end, outcome and reason. A lost one is queued again."""
-    return submission.list_attempts(store, id, number)
+    return reading.list_attempts(store, id, number)

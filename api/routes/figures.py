@@ -10,7 +10,7 @@ from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import Drawing, answer, responses
 from gaplab.schemas.figures import FigureRead
 from gaplab.services.core.errors import NotFound
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import reading
 from gaplab.services.figures.kinds.curves import Band, curves_figure
 from gaplab.services.figures.kinds.predictions import predictions_figure
 from gaplab.services.figures.kinds.simulators import simulators_figure
@@ -136,18 +136,18 @@ def _refuse_unknown(kind: str, request: Request) -> None:
 def _title(store: Store, query: ExperimentDrawing) -> str:
     if query.title is not None:
         return query.title
-    return spoken(submission.read_experiment(store, query.experiment).name, TITLE)
+    return spoken(reading.read_experiment(store, query.experiment).name, TITLE)
 
 
 def _explained(store: Store, query: ExperimentDrawing, figure: FigureDefinition) -> FigureDefinition:
     """Return the figure, with an explanation if it will always be empty."""
-    if not figure.empty or not is_direct(spec_of(submission.read_experiment(store, query.experiment).spec)):
+    if not figure.empty or not is_direct(spec_of(reading.read_experiment(store, query.experiment).spec)):
         return figure
     return replace(figure, nothing=DIRECT, alt=f"Nothing: {DIRECT}.")
 
 
 def _curves(store: Store, query: CurvesDrawing) -> FigureDefinition:
-    studies = [submission.read_study(store, id) for id in query.study]
+    studies = [reading.read_study(store, id) for id in query.study]
     drawn = [curve for study in studies for curve in curves.study_curves(store, study.id)]
     drawn += curves.curves(store, query.experiment) if query.experiment else ()
     drawn = list({curve.experiment: curve for curve in drawn}.values())  # each experiment once

@@ -12,7 +12,7 @@ from gaplab.schemas.editing import Edit
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import Page, StudyRead
 from gaplab.schemas.spec import StudySpec
-from gaplab.services.experiments import editing, submission
+from gaplab.services.experiments import editing, listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
 
 router = APIRouter(prefix="/studies", tags=["studies"])
@@ -54,7 +54,7 @@ def submit_study(
 def list_studies(store: StoreDep, query: Annotated[StudyFilter, Query()]) -> Page[StudyRead]:
     """List studies, by default the newest first. A cursor is valid only for the list that returned it."""
     wanted = ListFilter(**query.model_dump(exclude={"limit", "cursor"}))
-    return submission.list_studies(store, wanted, limit=query.limit, cursor=query.cursor)
+    return listing.list_studies(store, wanted, limit=query.limit, cursor=query.cursor)
 
 
 @router.get(
@@ -68,7 +68,7 @@ def read_study(
     id: Id, store: StoreDep, caller: CallerDep, request: Request, query: Annotated[Revealing, Query()]
 ) -> Response:
     """Return a study with its experiments, their states and progress, and the time left."""
-    study = submission.read_study(store, id, reveal=query.permitted(caller))
+    study = reading.read_study(store, id, reveal=query.permitted(caller))
     return conditional.tagged(request, study, study.edits)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pydantic import ValidationError
 
 from gaplab.schemas.provenance import Provenance
-from gaplab.schemas.spec import ExperimentSpec, Schedule
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.archives.checking import Row
 from gaplab.services.archives.columns import EXPERIMENT, REPETITION
 from gaplab.services.archives.opening import OpenedArchive
@@ -18,9 +18,6 @@ from gaplab.services.store.models import SPEC_VERSION
 from gaplab.services.store.queries import provenance
 
 MOST_EXPERIMENTS = 1_000
-
-_RESOLVED = sorted(set(ExperimentSpec.model_fields) - set(Schedule.model_fields))
-"""The fields of a resolved spec, none of which is null."""
 
 
 def checked_experiments(opened: OpenedArchive) -> dict[str, Row]:
@@ -83,11 +80,13 @@ def _checked_spec(row: Row) -> Row:
     try:
         spec = spec_of(given)
         truth = dict.fromkeys(given["reality"]["parameters"])
-    except (ValidationError, KeyError, TypeError, AttributeError) as error:
+    except ValidationError as error:
+        fields = sorted({"/".join(map(str, found["loc"])) for found in error.errors()})
+        raise InvalidArchive(f"{place} is not resolved; missing or invalid: {', '.join(fields)[:200]}") from error
+    except (KeyError, TypeError, AttributeError) as error:
         raise InvalidArchive(f"{place} is not a spec") from error
     names = [each.name for each in spec.tunables]
-    wrong = [*(name for name in _RESOLVED if given.get(name) is None), *_unresolved(spec)]
-    wrong += [name for name in (*truth, *names) if name not in tunables]
+    wrong = [name for name in (*truth, *names) if name not in tunables]
     wrong += [] if spec.robot.name in robots else [spec.robot.name]
     if wrong or len(set(names)) < len(names) or spec.strategy.name != row["strategy"]:
         msg = f"{place} is not resolved, or names plug-ins that are not installed here: {', '.join(wrong)[:200]}"
@@ -99,22 +98,9 @@ def _checked_spec(row: Row) -> Row:
     return stored | {"reality": stored["reality"] | {"parameters": truth | stored["reality"]["parameters"]}}
 
 
-def _unresolved(spec: ExperimentSpec) -> list[str]:
-    """Return the parts that a resolved spec has, whatever is installed, and this one lacks."""
-    return [
-        *(f"budget/{name}" for name, value in spec.budget if value is None),
-        *(
-            f"bounds of {each.name}"
-            for each in spec.tunables
-            if each.lower is None or each.upper is None or each.lower >= each.upper
-        ),
-        *(["reality/engine"] if spec.reality.engine is None else []),
-    ]
-
-
-def _iterations(spec: ExperimentSpec) -> set[int]:
+def _iterations(spec: ResolvedSpec) -> set[int]:
     """Return the permitted iterations of a repetition: both numbers for a strategy that is not installed here."""
-    several = (spec.iterations or 0) + 1
+    several = spec.iterations + 1
     if spec.strategy.name in strategies:
         return {1 if is_direct(spec) else several}
     return {1, several}

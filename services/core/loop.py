@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
+from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import Genome, Parameters
-from gaplab.services.core.counted import Counted
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.core.foresight import Foresight
-from gaplab.services.core.optimizers.base import Ahead, Optimizer, maximise
+from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.ports import Reality, Simulate
+from gaplab.services.core.search import maximise
 from gaplab.services.core.strategies.base import Score, Search, Strategy
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tuning import Misfit, draw_simulators, tune
@@ -52,7 +52,7 @@ class Setting:
         iterations: real-world evaluations to spend; 0 for the direct baseline.
         seed: of the experiment.
         repetition: its number.
-        batch: rollouts that `simulate` likes to be asked for at a time, now; no number depends on it.
+        batch_size: returns how many rollouts one call of `simulate` should ask for now; no number depends on it.
     """
 
     simulate: Simulate
@@ -66,11 +66,15 @@ class Setting:
     iterations: int
     seed: int
     repetition: int
-    batch: Callable[[], int] = lambda: 1
+    batch_size: Callable[[], int] = lambda: 1
 
     def stream(self, iteration: int, phase: str) -> Generator:
-        """The random stream of one phase of one iteration."""
+        """Return the random stream of one phase of one iteration."""
         return stream(self.seed, self.strategy.name, self.repetition, iteration, phase)
+
+    def answers(self) -> Answers:
+        """Return what counts and prefetches the rollouts of one step."""
+        return Answers(self.simulate, self.batch_size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,31 +105,39 @@ class History:
         return replace(self, last=step)
 
 
-def repetition(setting: Setting, log: Iterable[Step] = ()) -> Iterator[Step]:
-    """The steps that follow the log, to the end of the repetition; each is computed when it is asked for."""
+def repetition(
+    setting: Setting, log: Iterable[Step] = (), answers: Callable[[], Answers] | None = None
+) -> Iterator[Step]:
+    """Yield the steps that follow the log, to the end of the repetition; each is computed when it is asked for.
+
+    Args:
+        setting: of the repetition.
+        log: its steps so far.
+        answers: makes the answers of the next step; those of the setting if left out.
+    """
     history = History()
     for step in log:
         history = history.after(step)
-    while (following := next_step(setting, history)) is not None:
+    while (following := next_step(setting, history, (answers or setting.answers)())) is not None:
         yield following
         history = history.after(following)
 
 
-def next_step(setting: Setting, history: History) -> Step | None:  # noqa: PLR0911 - a return for each kind of step
-    """The one step that follows; None at the end."""
+def next_step(setting: Setting, history: History, answers: Answers) -> Step | None:  # noqa: PLR0911 - one a kind of step
+    """Return the one step that follows, whose rollouts `answers` simulates; None at the end."""
     match history.last:
         case None:
             return _draw(setting)
         case Tuned(iteration=iteration):
-            return _transfer(setting, history, iteration)
+            return _transfer(setting, history, iteration, answers)
         case Transferred(iteration=iteration, genome=genome):
             return _probe(setting, history, iteration, genome)
         case Probed(iteration=iteration) if iteration < setting.iterations:
-            return _select(setting, history, iteration + 1)
+            return _select(setting, history, iteration + 1, answers)
         case Selected(iteration=iteration, genome=genome):
             return Measured(iteration, Sample(genome, setting.reality(genome)))
         case Measured(iteration=iteration):
-            return _tune(setting, history, iteration)
+            return _tune(setting, history, iteration, answers)
     return None
 
 
@@ -134,20 +146,18 @@ def _draw(setting: Setting) -> Tuned:
     return Tuned(0, draw_simulators(setting.parameters, setting.strategy.ensemble, setting.stream(0, "tune")))
 
 
-def _select(setting: Setting, history: History, iteration: int) -> Selected:
+def _select(setting: Setting, history: History, iteration: int, answers: Answers) -> Selected:
     searched = setting.budget.selection_evaluations * setting.strategy.ensemble if setting.strategy.searches else 0
     if setting.budget.reuse_transfer and setting.strategy.selects_transferred and history.transferred is not None:
         return Selected(iteration, history.transferred, Cost(saved=searched))
     belief = Belief(setting.genomes, setting.known, history.samples, history.simulators)
-    foresight = Foresight(setting.simulate, setting.batch, len(belief.simulators))
-    simulate = Counted(foresight)
-    search = _search(setting, simulate, foresight, belief.parameters, setting.stream(iteration, "search"))
+    search = _search(setting, answers, belief.parameters, setting.stream(iteration, "search"))
     genome = setting.strategy.select(belief, search, setting.stream(iteration, "select"))
-    return Selected(iteration, genome, simulate.count.cost_of(searched))
+    return Selected(iteration, genome, answers.cost_of(searched))
 
 
-def _search(setting: Setting, simulate: Simulate, ahead: Ahead, parameters: Parameters, rng: Generator) -> Search:
-    """The search of one selection, whose budget is for a single one; there is none for who says not to search."""
+def _search(setting: Setting, answers: Answers, parameters: Parameters, rng: Generator) -> Search:
+    """Return the one search that a selection has a budget for; strategies with `searches = False` get none."""
     name, left = setting.strategy.name, int(setting.strategy.searches)
 
     def search(score: Score) -> Genome:
@@ -160,10 +170,9 @@ def _search(setting: Setting, simulate: Simulate, ahead: Ahead, parameters: Para
         found = maximise(
             setting.optimizer,
             setting.genomes,
-            lambda genomes, _: score(genomes, simulate(genomes, parameters)),
+            lambda asked: score(asked.genomes, answers(asked.genomes, parameters, asked.following)),
             setting.budget.selection_evaluations,
             rng,
-            ahead,
         )
         best: Genome = found.genomes[0]
         return best
@@ -171,7 +180,7 @@ def _search(setting: Setting, simulate: Simulate, ahead: Ahead, parameters: Para
     return search
 
 
-def _tune(setting: Setting, history: History, iteration: int) -> Tuned:
+def _tune(setting: Setting, history: History, iteration: int, answers: Answers) -> Tuned:
     """New simulators fitted to every sample that was measured; random ones while none was.
 
     The budget counts samples before they are measured: what it had for one that failed is saved.
@@ -183,26 +192,22 @@ def _tune(setting: Setting, history: History, iteration: int) -> Tuned:
     if not samples:
         return Tuned(iteration, draw_simulators(setting.parameters, ensemble, rng), Cost(saved=budget))
     optimizer = setting.optimizer.diverse(ensemble) if ensemble > 1 else setting.optimizer
-    misfit = Misfit(setting.simulate, samples, setting.batch)
-    found = tune(misfit, setting.parameters, optimizer, evaluations, rng)
-    return Tuned(iteration, found[:ensemble], misfit.count.cost_of(budget))
+    found = tune(Misfit(answers, samples), setting.parameters, optimizer, evaluations, rng)
+    return Tuned(iteration, found[:ensemble], answers.cost_of(budget))
 
 
-def _transfer(setting: Setting, history: History, iteration: int) -> Transferred:
+def _transfer(setting: Setting, history: History, iteration: int, answers: Answers) -> Transferred:
     """A controller evolved in the best simulator."""
-    foresight = Foresight(setting.simulate, setting.batch, 1)
-    simulate = Counted(foresight)
     best = history.simulators[0].parameters[None, :]
     found = maximise(
         setting.optimizer,
         setting.genomes,
-        lambda genomes, _: simulate(genomes, best)[:, 0],
+        lambda asked: answers(asked.genomes, best, asked.following)[:, 0],
         setting.budget.controller_evaluations,
         setting.stream(iteration, "transfer"),
-        foresight,
     )
     fitness = float(found.fitness[0]) if np.isfinite(found.fitness[0]) else float("nan")
-    cost = simulate.count.cost_of(setting.budget.controller_evaluations)
+    cost = answers.cost_of(setting.budget.controller_evaluations)
     return Transferred(iteration, found.genomes[0], fitness, cost)
 
 

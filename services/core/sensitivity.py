@@ -23,8 +23,9 @@ import numpy as np
 
 from gaplab.schemas.sensitivity import Sensitivity, Verdict
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
-from gaplab.services.core.optimizers.base import Optimizer, maximise
+from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.ports import Simulate
+from gaplab.services.core.search import maximise
 from gaplab.services.core.streams import stream
 from gaplab.services.core.types import Space
 
@@ -111,7 +112,7 @@ def _evolved(subject: Subject, optimizer: Optimizer, evaluations: int, number: i
     found = maximise(
         optimizer,
         subject.genomes,
-        lambda genomes, _: subject.simulate(genomes, simulator)[:, 0],
+        lambda asked: subject.simulate(asked.genomes, simulator)[:, 0],
         evaluations,
         rng,
     )

@@ -1,14 +1,14 @@
 """Simulator tuning: the search for simulators that reproduce the real fitness of the samples."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.random import Generator
 
-from gaplab.services.core.arrays import Fitnesses, FloatArray, Parameters
-from gaplab.services.core.counted import Count
-from gaplab.services.core.optimizers.base import Optimizer, maximise
-from gaplab.services.core.ports import Simulate
+from gaplab.services.core.answers import Answers, Following
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes, Parameters
+from gaplab.services.core.optimizers.base import Optimizer
+from gaplab.services.core.search import Question, maximise
 from gaplab.services.core.types import Sample, Simulator, Space
 
 ROUNDING = 1e-9
@@ -45,60 +45,57 @@ def draw_simulators(space: Space, count: int, rng: Generator) -> tuple[Simulator
 
 
 class Misfit:
-    """−Σe² of simulators on samples, given up as soon as it is sure to be below a bound.
+    """−Σe² of simulators on samples; the sum stops as soon as it is certain to be below a threshold.
 
-    The samples on which simulators have erred most so far are asked first. What the errors add up to is added in the
-    samples' own order, and what was asked in vain, because it was asked together with what settled the matter, counts
-    for nothing: no number, not even a count, depends on how many samples are asked at a time.
+    The samples on which simulators have erred most so far come first. The sum itself is in the samples' own order, and
+    only the rollouts that were needed count. So no number, not even a count, depends on how many rollouts are
+    simulated at once.
 
     Args:
-        simulate: fitness in simulation.
+        answers: of simulators.
         samples: at least one, whose measurement succeeded.
-        batch: how many to ask at a time for a simulator that may be given up.
-
-    Attributes:
-        count: of the rollouts that were needed.
     """
 
-    def __init__(self, simulate: Simulate, samples: Sequence[Sample], batch: Callable[[], int] = lambda: 1) -> None:
-        self.count = Count()
-        self._simulate = simulate
-        self._batch = batch
-        self._genomes = np.array([each.genome for each in samples])
-        self._measured = np.array([each.fitness for each in samples])
+    def __init__(self, answers: Answers, samples: Sequence[Sample]) -> None:
+        self._answers = answers
+        self._genomes = np.array([sample.genome for sample in samples])
+        self._measured = np.array([sample.fitness for sample in samples])
         self._erred = np.zeros(len(samples))
         self._asked = np.zeros(len(samples))
 
-    def __call__(self, parameters: Parameters, bounds: FloatArray) -> FloatArray:
-        """`(m, p)` simulators, `(m,)` bounds -> `(m,)` of −Σe²; -inf for what is below its bound."""
-        if np.all(np.isneginf(bounds)):
-            fitnesses = self._simulate(self._genomes, parameters)
+    def __call__(self, question: Question) -> FloatArray:
+        """Return −Σe², `(m,)`, of simulators `(m, p)`; -inf where it is below the threshold."""
+        simulators, thresholds = question.genomes, question.thresholds
+        if np.all(np.isneginf(thresholds)):
+            fitnesses = self._answers(self._genomes, simulators)
             for index, row in enumerate(fitnesses):
                 self._learn(index, row)
             return -squared_errors(fitnesses, self._measured)
-        return np.array([self._one(row[None, :], -bound) for row, bound in zip(parameters, bounds, strict=True)])
+        return np.array([self._one(row[None, :], -least) for row, least in zip(simulators, thresholds, strict=True)])
 
     def _one(self, parameters: Parameters, limit: float) -> float:
-        """−Σe² of one simulator `(1, p)`, or -inf if Σe² exceeds the limit."""
+        """Return −Σe² of one simulator `(1, p)`, or -inf if Σe² exceeds the limit."""
         fitnesses = np.empty((len(self._measured), 1))
         order = np.argsort(-self._erred / np.maximum(self._asked, 1.0), kind="stable")
-        batch, partial = self._batch(), 0.0
+        genomes, partial = self._genomes[order], 0.0
         for place, index in enumerate(order):
-            if place % batch == 0:
-                together = order[place : place + batch]
-                fitnesses[together] = self._simulate(self._genomes[together], parameters)
+            one = genomes[place : place + 1]
+            fitnesses[index] = self._answers(one, parameters, _first_of(genomes[place + 1 :]))
             partial += self._learn(int(index), fitnesses[index])
             if not partial <= limit * (1.0 + ROUNDING):
                 return -np.inf
         return -float(squared_errors(fitnesses, self._measured)[0])
 
     def _learn(self, sample: int, fitnesses: FloatArray) -> float:
-        """Count rollouts of a sample, remember how far they erred, and give the sum of their squared errors."""
-        self.count.add(fitnesses)
+        """Remember how far simulators err on a sample, and return the sum of their squared errors."""
         squares = (fitnesses - self._measured[sample]) ** 2
         self._erred[sample] += np.nansum(squares)
         self._asked[sample] += len(squares)
         return float(squares.sum())
+
+
+def _first_of(genomes: Genomes) -> Following:
+    return lambda count: genomes[:count]
 
 
 def tune(misfit: Misfit, space: Space, optimizer: Optimizer, evaluations: int, rng: Generator) -> tuple[Simulator, ...]:

@@ -1,11 +1,12 @@
-"""What a study would cost: checked and resolved like one that is submitted, and not stored."""
+"""Estimates: the cost of a study that is checked and resolved as if submitted, and not stored."""
 
 from collections import defaultdict
 from collections.abc import Mapping
 
 from gaplab.schemas.estimates import EngineCost, EstimateRead, ExperimentCost
 from gaplab.schemas.plugin import PluginRef
-from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.spec import StudySpec
 from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import check_extent
 from gaplab.services.settings import Limits
@@ -13,18 +14,18 @@ from gaplab.services.specs.resolution import expected_rollouts, is_direct, resol
 from gaplab.services.store.queries import costs, supervisors
 from gaplab.services.store.session import Store
 
-LOOKED_AT = 100
-"""Experiments, the newest, whose times are what a rollout is expected to take."""
+LATEST = 100
+"""Number of the newest experiments whose times estimate a rollout."""
 
 SILENT_S = 60.0
-"""A supervisor that was not heard of for so long does not work."""
+"""Age of the last sign of life after which a supervisor does not work."""
 
 Key = tuple[str, str]
 """Robot and engine, with their options."""
 
 
 def estimate(store: Store, spec: StudySpec, *, limits: Limits | None = None, cores: int = 1) -> EstimateRead:
-    """What the study would take on so many cores.
+    """Return what the study would take on a number of cores.
 
     Raises:
         InvalidSpec: with everything that is wrong with it, as if it were submitted.
@@ -33,7 +34,7 @@ def estimate(store: Store, spec: StudySpec, *, limits: Limits | None = None, cor
     resolved = resolve_study(spec)
     check_extent(resolved, limits)
     with store.reading() as session:
-        measured = _measured(costs.latest(session, LOOKED_AT))
+        measured = _measured(costs.latest(session, LATEST))
         working = sum(age < SILENT_S for age in supervisors.ages(session))
     found = tuple(_experiment(each, _cost(each, measured)) for each in resolved)
     total = sum(each.core_seconds for each in found)
@@ -50,7 +51,7 @@ def estimate(store: Store, spec: StudySpec, *, limits: Limits | None = None, cor
 
 
 def _measured(found: tuple[tuple[dict[str, object], float, int], ...]) -> dict[Key, float]:
-    """Seconds a rollout; of what was computed by two engines only the simulator's counts, which has nearly all."""
+    """Return the seconds of a rollout by robot and simulator's engine, which computes nearly all of them."""
     seconds: dict[Key, float] = defaultdict(float)
     rollouts: dict[Key, int] = defaultdict(int)
     for stored, took, count in found:
@@ -60,33 +61,30 @@ def _measured(found: tuple[tuple[dict[str, object], float, int], ...]) -> dict[K
     return {key: seconds[key] / count for key, count in rollouts.items() if count and seconds[key]}
 
 
-def _key(spec: ExperimentSpec) -> Key:
+def _key(spec: ResolvedSpec) -> Key:
     return spec.robot.model_dump_json(), _engine(spec).model_dump_json()
 
 
-def _engine(spec: ExperimentSpec) -> PluginRef:
-    """The engine that computes it."""
-    engine = spec.reality.engine if is_direct(spec) else spec.engine
-    assert engine is not None  # the spec is resolved
-    return engine
+def _engine(spec: ResolvedSpec) -> PluginRef:
+    """Return the engine that computes it."""
+    return spec.reality.engine if is_direct(spec) else spec.engine
 
 
-def _cost(spec: ExperimentSpec, measured: Mapping[Key, float]) -> EngineCost:
+def _cost(spec: ResolvedSpec, measured: Mapping[Key, float]) -> EngineCost:
     engine = _engine(spec)
     known = measured.get(_key(spec))
     usual = engines[engine.name].usual_rollout_s
     return EngineCost(engine=engine.name, seconds_per_rollout=known or usual, measured=known is not None)
 
 
-def _experiment(spec: ExperimentSpec, cost: EngineCost) -> ExperimentCost:
-    repetitions = spec.repetitions or 0
-    rollouts = expected_rollouts(spec) * repetitions
+def _experiment(spec: ResolvedSpec, cost: EngineCost) -> ExperimentCost:
+    rollouts = expected_rollouts(spec) * spec.repetitions
     return ExperimentCost(
-        name=spec.name or spec.strategy.name,
+        name=spec.name,
         strategy=spec.strategy.name,
         engine=cost.engine,
-        repetitions=repetitions,
-        iterations=0 if is_direct(spec) else spec.iterations or 0,
+        repetitions=spec.repetitions,
+        iterations=0 if is_direct(spec) else spec.iterations,
         rollouts=rollouts,
         core_seconds=rollouts * cost.seconds_per_rollout,
     )

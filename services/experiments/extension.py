@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import State, Verb
 from gaplab.schemas.records import ExperimentRead
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.schedule import ExtensionSpec
-from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
 from gaplab.services.experiments.lifecycle import get_permitting
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
@@ -40,11 +40,11 @@ def extend_experiment(
     if None in experiment.spec["reality"]["parameters"].values():
         msg = f"experiment {experiment_id!r} was imported before its reality was shown, so it cannot be extended"
         raise Conflict(msg)
-    spec = _extended(ExperimentSpec.model_validate(experiment.spec), extension)
+    spec = _extended(ResolvedSpec.model_validate(experiment.spec), extension)
     check_extent([spec], admitted.limits)
     tally = tallies(session, [experiment_id])[experiment_id]
     check_load(session, [spec], admitted, done=tally.rollouts_done + tally.rollouts_saved)
-    extent, total = extent_of(spec), spec.repetitions or 0
+    extent, total = extent_of(spec), spec.repetitions
     present = len(repetitions_of(session, experiment_id))
     unfinished = (row.experiment_id == experiment_id) & (row.iterations_done < extent.iterations)
     if not move(session, row, unfinished, State.QUEUED, losses=0) and total == present:
@@ -60,13 +60,13 @@ def extend_experiment(
     return view_experiments(session, [experiment])[0]
 
 
-def _extended(spec: ExperimentSpec, extension: ExtensionSpec) -> ExperimentSpec:
+def _extended(spec: ResolvedSpec, extension: ExtensionSpec) -> ResolvedSpec:
     if violations := list(_violations(spec, extension)):
         raise InvalidSpec(violations)
     return spec.model_copy(update=extension.model_dump(exclude_none=True))
 
 
-def _violations(spec: ExperimentSpec, extension: ExtensionSpec) -> Iterator[Violation]:
+def _violations(spec: ResolvedSpec, extension: ExtensionSpec) -> Iterator[Violation]:
     totals = extension.model_dump(exclude_none=True)
     if not totals:
         yield Violation(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from sqlalchemy import case, func, select, text
 
 from gaplab.schemas.lifecycle import OPEN
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import InvalidSpec, LimitReached, Violation
 from gaplab.services.settings import Limits, variable_of
 from gaplab.services.specs.resolution import expected_rollouts
@@ -38,14 +38,14 @@ FREELY = Admission()
 
 
 @dataclass(frozen=True)
-class Load:
+class OpenWork:
     """Experiments that have not ended, and the rollouts that they have left."""
 
     experiments: int
     rollouts: int
 
 
-def check_extent(specs: Sequence[ExperimentSpec], limits: Limits | None) -> None:
+def check_extent(specs: Sequence[ResolvedSpec], limits: Limits | None) -> None:
     """Refuse a submission that is larger than one may be.
 
     Raises:
@@ -53,8 +53,8 @@ def check_extent(specs: Sequence[ExperimentSpec], limits: Limits | None) -> None
     """
     if limits is None:
         return
-    iterations = max(each.iterations or 0 for each in specs)
-    repetitions = sum(each.repetitions or 0 for each in specs)
+    iterations = max(each.iterations for each in specs)
+    repetitions = sum(each.repetitions for each in specs)
     asked = {"iterations": iterations, "repetitions": repetitions}
     violations = [
         Violation(f"/{name}", value, _too_much(name, value, getattr(limits, name)), f"at most {getattr(limits, name)}")
@@ -65,12 +65,12 @@ def check_extent(specs: Sequence[ExperimentSpec], limits: Limits | None) -> None
         raise InvalidSpec(violations)
 
 
-def check_load(session: Session, specs: Sequence[ExperimentSpec], admitted: Admission, *, done: int = 0) -> None:
+def check_load(session: Session, specs: Sequence[ResolvedSpec], admitted: Admission, *, done: int = 0) -> None:
     """Refuse a submission for which there is no room, in the transaction that inserts it.
 
     Args:
         session: of the transaction.
-        specs: resolved specs of the submission.
+        specs: of the submission.
         admitted: the sender and its limits.
         done: rollouts of these specs that are over.
 
@@ -82,15 +82,15 @@ def check_load(session: Session, specs: Sequence[ExperimentSpec], admitted: Admi
     if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write overlap
         session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
     under_way = _load(session)
-    of_token = under_way.get(admitted.token, Load(0, 0))
-    rollouts = max(0, sum(expected_rollouts(each) * (each.repetitions or 0) for each in specs) - done)
+    of_token = under_way.get(admitted.token, OpenWork(0, 0))
+    rollouts = max(0, sum(expected_rollouts(each) * each.repetitions for each in specs) - done)
     _check("experiments_per_token", of_token.experiments, len(specs), limits)
     _check("rollouts_per_token", of_token.rollouts, rollouts, limits)
     _check("experiments", sum(each.experiments for each in under_way.values()), len(specs), limits)
     _check("rollouts", sum(each.rollouts for each in under_way.values()), rollouts, limits)
 
 
-def _load(session: Session) -> dict[str | None, Load]:
+def _load(session: Session) -> dict[str | None, OpenWork]:
     """Return what is under way, by the id of the token that submitted it."""
     row, run = ExperimentRow, RepetitionRow
     left = row.rollouts - run.rollouts_done - run.rollouts_saved
@@ -102,7 +102,7 @@ def _load(session: Session) -> dict[str | None, Load]:
         .group_by(row.token_id)
     )
     sums = {token: int(total) for token, total in session.execute(rollouts)}
-    return {token: Load(count, sums.get(token, 0)) for token, count in session.execute(counts)}
+    return {token: OpenWork(count, sums.get(token, 0)) for token, count in session.execute(counts)}
 
 
 def _check(name: str, present: int, more: int, limits: Limits) -> None:

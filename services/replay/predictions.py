@@ -6,7 +6,7 @@ from time import monotonic
 import numpy as np
 
 from gaplab.schemas.predictions import Prediction, Predictions
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.robots import robots
 from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess
 from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, refuse_missing
@@ -84,7 +84,7 @@ def predict(spec: str, samples: Sequence[TunedSample], seconds: float) -> list[P
         samples: with the simulators around them.
         seconds: time limit.
     """
-    read = ExperimentSpec.model_validate_json(spec)
+    read = ResolvedSpec.model_validate_json(spec)
     robot = robots.create(read.robot)
     simulate = Simulation(robot, engine_of(read.engine), edits_of(ref.name for ref in read.tunables))
     found: list[Pair] = []

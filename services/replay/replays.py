@@ -2,7 +2,7 @@
 
 from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.replays import ControllerKind, Replay
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound, Violation
 from gaplab.services.core.robots import robots
 from gaplab.services.replay.process import Key, RolloutProcess
@@ -48,7 +48,7 @@ def replay_json(store: Store, process: RolloutProcess, experiment_id: str, choic
     return found
 
 
-def _refuse_impossible(row: ExperimentRow, spec: ExperimentSpec, choice: ReplayChoice) -> None:
+def _refuse_impossible(row: ExperimentRow, spec: ResolvedSpec, choice: ReplayChoice) -> None:
     if not robots.create(spec.robot).world.bodies:
         message = f"the robot {spec.robot.name!r} has no body, so it has no motion to replay"
         raise InvalidSpec([Violation("id", row.id, message, "an experiment with a robot that has a body")])
@@ -65,7 +65,7 @@ def _refuse_outside(what: str, number: int, first: int, end: int) -> None:
         raise NotFound(f"the experiment has no {what} {number}; permitted: {permitted}")
 
 
-def _request(session: Session, row: ExperimentRow, spec: ExperimentSpec, choice: ReplayChoice) -> ReplayRequest:
+def _request(session: Session, row: ExperimentRow, spec: ResolvedSpec, choice: ReplayChoice) -> ReplayRequest:
     found = replays.measured_controller(session, row.id, choice.repetition, choice.iteration, _MEASURED_AS[choice.kind])
     if found is None:
         raise Conflict(f"the {_name(choice)} has not been measured in reality yet; try again later")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaplab.schemas.replays import ControllerKind, Interval, Replay, ReplayWorld
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m
 from gaplab.services.core.robots import robots
@@ -73,7 +73,7 @@ def compute_replay(request: ReplayRequest) -> bytes:
     Raises:
         EngineUnavailable: the library of an engine is not installed.
     """
-    spec, choice = ExperimentSpec.model_validate_json(request.spec), request.choice
+    spec, choice = ResolvedSpec.model_validate_json(request.spec), request.choice
     robot = robots.create(spec.robot)
     genome = np.array(request.genome)
     observed = robot.motion(genome).observe_s
@@ -82,11 +82,11 @@ def compute_replay(request: ReplayRequest) -> bytes:
     if request.parameters is not None:
         simulate = Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))
         world, recording = simulate.record(genome, np.array(request.parameters), times)
-        simulation = _shown(robot, spec.engine.name if spec.engine else "", world, recording, request.simulated)
+        simulation = _shown(robot, spec.engine.name, world, recording, request.simulated)
     if request.known:
         truth, real = reality_of(spec, robot)
         world, recording = real.record(genome, truth, times)
-        reality = _shown(robot, spec.reality.engine.name if spec.reality.engine else "", world, recording, request.real)
+        reality = _shown(robot, spec.reality.engine.name, world, recording, request.real)
     return (
         Replay(
             experiment=request.experiment,

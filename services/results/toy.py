@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.toy import ToyIteration, ToySample, ToyTransfer, Values
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
@@ -30,7 +30,7 @@ class _Stored:
     """The stored part of a repetition; `transferred` has the requested iterations."""
 
     row: ExperimentRow
-    spec: ExperimentSpec
+    spec: ResolvedSpec
     robot: Robot
     shown: bool
     measured: tuple[SampleRead, ...]

@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.tunables import tunables
 from gaplab.services.experiments import hiding
 from gaplab.services.figures.kinds.simulators import Dimension, SimulatorPoint
@@ -59,7 +59,7 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
     )
 
 
-def _dimensions(spec: ExperimentSpec) -> tuple[Dimension, ...]:
+def _dimensions(spec: ResolvedSpec) -> tuple[Dimension, ...]:
     space = parameters_of(spec.tunables)
     names = [each.name for each in spec.tunables]
     units = [tunables[name].unit if name in tunables else "" for name in names]  # unknown if not installed here

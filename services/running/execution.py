@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import ASKED, Ending, State
 from gaplab.schemas.provenance import Provenance
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.types import Step
 from gaplab.services.experiments.states import settle
@@ -177,7 +177,7 @@ def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
         .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
         .where(row.id.in_(ids))
     ).all()
-    specs = {experiment: ExperimentSpec.model_validate(spec) for _, _, experiment, _, spec in rows}
+    specs = {experiment: ResolvedSpec.model_validate(spec) for _, _, experiment, _, spec in rows}
     past, parts = logs(session, ids), checkpoints.stored(session, ids)
     claims = {
         id_: Claim(id_, epoch, experiment, number, specs[experiment], past[id_], parts[id_])
@@ -188,10 +188,8 @@ def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
 
 def _record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -> tuple[Claim, ...]:
     requested = _locked_requests(session, deliveries)
-    before = _lengths(session, [claim for claim in deliveries if claim.experiment_id in requested])
     held = steps.record(session, deliveries)
-    after = _lengths(session, [claim for claim in held if claim.experiment_id in requested])
-    leaving = {claim.id for claim in after if after[claim] > before[claim]}
+    leaving = {claim.id for claim, new_steps in held.items() if new_steps and claim.experiment_id in requested}
     if leaving:
         row = RepetitionRow
         iterations = select(ExperimentRow.iterations).where(ExperimentRow.id == row.experiment_id).correlate(row)
@@ -210,15 +208,6 @@ def _locked_requests(session: Session, claims: Iterable[Claim]) -> dict[str, Sta
     requested = select(row.id).where(row.id.in_({claim.experiment_id for claim in claims}), row.state.in_(ASKED))
     states = lock(session, ids) if (ids := session.scalars(requested).all()) else {}
     return {experiment: state for experiment, state in states.items() if state in ASKED}
-
-
-def _lengths(session: Session, claims: Sequence[Claim]) -> dict[Claim, int]:
-    """Return the number of steps in the log of each claim's repetition."""
-    if not claims:
-        return {}
-    row = RepetitionRow
-    lengths = dict(session.execute(select(row.id, row.steps).where(row.id.in_([each.id for each in claims]))).all())
-    return {claim: lengths[claim.id] for claim in claims}
 
 
 def _unwanted(session: Session, waiting: Sequence[Claim], under: Provenance) -> tuple[Claim, ...]:

@@ -1,4 +1,4 @@
-"""What numbers depend on, as it is where this runs: the code, Python, libraries, engines, the kind of processor."""
+"""Versions that numbers depend on, of this process: code, Python, libraries, engines, kind of processor."""
 
 import platform
 import subprocess
@@ -20,18 +20,18 @@ from gaplab.services.store.models import SPEC_VERSION
 CODE = ("schemas", "services", "workers")
 LIBRARIES = ("numpy", "scipy", "cma", "numba")
 DISTRIBUTIONS = {"mujoco": ("mujoco-core", "mujoco")}
-"""Of modules that need not come in a distribution of their name."""
+"""Distributions of modules that may come under another name."""
 
 ROOT = Path(__file__).parents[2]
 GIT_S = 5.0
-"""How long git may take to say which commit this is; large folders on slow disks take a second."""
+"""Longest wait for git to name the commit; large folders on slow disks take a second."""
 
 Versions = dict[str, str]
 
 
 @cache
 def versions() -> Versions:
-    """What two processes must have in common to compute the same numbers."""
+    """Return what two processes must share to compute the same numbers."""
     return {
         "gaplab": f"{_version('gaplab')} ({_digest()})",
         "Python": platform.python_version(),
@@ -44,7 +44,7 @@ def versions() -> Versions:
 
 @cache
 def provenance() -> Provenance:
-    """What this process computes with, for whoever reads its results later."""
+    """Return what this process computes with, for readers of its results."""
     return Provenance(
         gaplab=_version("gaplab"),
         code=_digest(),
@@ -63,7 +63,7 @@ def provenance() -> Provenance:
 
 
 def _engine(engine: type[Engine]) -> str:
-    """What changes when its numbers may."""
+    """Return a text that changes when the engine's numbers may."""
     library = f"{engine.library} {_version(engine.library)}" if engine.library else None
     if (file := file_of(engine)) is not None:
         return f"{file} {digest_of(file)}" + (f", {library}" if library else "")
@@ -80,13 +80,13 @@ def _version(module: str) -> str:
 
 @cache
 def _distributions() -> Mapping[str, list[str]]:
-    """Those that have each module; their names are often others. Looking takes a quarter of a second."""
+    """Return the distributions of each module; their names often differ. The look-up takes a quarter of a second."""
     return packages_distributions()
 
 
 @cache
 def _digest() -> str:
-    """Eight letters that change with the code: a version alone does not say which commit is checked out."""
+    """Return eight letters that change with the code; a version alone does not name the checked-out commit."""
     digest = sha256()
     for path in sorted(path for top in CODE for path in (ROOT / top).rglob("*.py")):
         digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
@@ -94,7 +94,7 @@ def _digest() -> str:
 
 
 def _git(*command: str) -> str | None:
-    """What git says of the folder of this code; None where there is no git, or the folder is no repository's top."""
+    """Return git's answer about this code; None without git, or if the folder is no repository's top."""
     if not (ROOT.parent / ".git").exists():
         return None
     try:
@@ -111,7 +111,7 @@ def _git(*command: str) -> str | None:
 
 
 def _processor() -> str:
-    """Its kind, as Linux names it; elsewhere, as Python does."""
+    """Return the kind of the processor, as Linux names it; elsewhere, as Python does."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:

@@ -5,9 +5,9 @@ from functools import cache, lru_cache, partial
 
 import numpy as np
 
-from gaplab.schemas.plugin import PluginRef, TunableRef
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.resolved import ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked
-from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters
 from gaplab.services.core.errors import gather
 from gaplab.services.core.loop import Setting
@@ -87,7 +87,7 @@ class EvolutionInReality:
         return np.repeat(self._simulate(genomes, self._parameters), len(parameters), axis=1)
 
 
-def setting(spec: ExperimentSpec, repetition: int) -> Setting:
+def setting(spec: ResolvedSpec, repetition: int) -> Setting:
     """Everything that one repetition of a resolved spec depends on.
 
     Args:
@@ -110,11 +110,11 @@ def setting(spec: ExperimentSpec, repetition: int) -> Setting:
         genomes=robot.space,
         parameters=parameters_of(spec.tunables),
         known=robot.known,
-        budget=budget(spec),
-        iterations=0 if strategy.in_reality else spec.iterations or 0,
+        budget=Budget(**spec.budget.model_dump(exclude={"preset"})),
+        iterations=0 if strategy.in_reality else spec.iterations,
         seed=spec.seed,
         repetition=repetition,
-        batch=lambda: engine.batch,
+        batch_size=lambda: engine.batch,
     )
 
 
@@ -131,7 +131,7 @@ def subject(checked: Checked) -> Subject:
     )
 
 
-def reality_of(spec: ExperimentSpec, robot: Robot) -> tuple[FloatArray, Simulation]:
+def reality_of(spec: ResolvedSpec, robot: Robot) -> tuple[FloatArray, Simulation]:
     """The hidden parameters of a resolved spec, and the simulation that they belong in."""
     edits = edits_of(spec.reality.parameters)
     truth = np.array(list(spec.reality.parameters.values()))
@@ -147,26 +147,23 @@ def edits_of(names: Iterable[str]) -> list[Tunable]:
     return [tunables.create(PluginRef(name=name), "/tunables") for name in names]
 
 
-def refuse_missing(spec: ExperimentSpec, *, reality: bool = False) -> None:
+def refuse_missing(spec: ResolvedSpec, *, reality: bool = False) -> None:
     """Do nothing if what a stored spec simulates with, and reality if it is asked for, is installed here.
 
     Raises:
         InvalidSpec: something is not; a plug-in's file may be gone.
     """
-    needed = [(engines, spec.engine, "/engine"), (engines, spec.reality.engine if reality else None, "/reality/engine")]
+    needed = [(spec.engine, "/engine"), *([(spec.reality.engine, "/reality/engine")] if reality else [])]
     names = [*(ref.name for ref in spec.tunables), *(spec.reality.parameters if reality else ())]
     gather(
         lambda: robots.check(spec.robot, "/robot"),
-        *(partial(registry.check, ref, pointer) for registry, ref, pointer in needed if ref is not None),
+        *(partial(engines.check, ref, pointer) for ref, pointer in needed),
         lambda: edits_of(names),
     )
 
 
-def engine_of(ref: PluginRef | None) -> Engine:
-    """The engine of a resolved spec: one instance in this process for equal options, warm from use to use."""
-    if ref is None:
-        msg = "the spec is not resolved: it names no engine"
-        raise ValueError(msg)
+def engine_of(ref: PluginRef) -> Engine:
+    """Return the engine: one instance in this process for equal options, warm from use to use."""
     return _warm_engine(ref.model_dump_json())
 
 
@@ -175,19 +172,6 @@ def _warm_engine(ref: str) -> Engine:
     return engines.create(PluginRef.model_validate_json(ref))
 
 
-def budget(spec: ExperimentSpec) -> Budget:
-    """The numbers of a resolved budget."""
-    numbers = spec.budget.model_dump(exclude={"preset"}, exclude_none=True)
-    return Budget(**numbers)
-
-
-def parameters_of(refs: Sequence[TunableRef]) -> Space:
-    """The space of simulators that resolved tunables span."""
-    return Space.box([_bound(ref.lower) for ref in refs], [_bound(ref.upper) for ref in refs])
-
-
-def _bound(value: float | None) -> float:
-    if value is None:
-        msg = "the spec is not resolved: a tunable has no bounds"
-        raise ValueError(msg)
-    return value
+def parameters_of(refs: Sequence[ResolvedTunable]) -> Space:
+    """Return the space of simulators between the bounds of the tunables."""
+    return Space.box([ref.lower for ref in refs], [ref.upper for ref in refs])

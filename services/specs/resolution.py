@@ -5,8 +5,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef, TunableRef
+from gaplab.schemas.resolved import ResolvedBudget, ResolvedReality, ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked, SensitivitySpec
-from gaplab.schemas.spec import BudgetSpec, ExperimentSpec, RealitySpec, SharedSettings, StudySpec
+from gaplab.schemas.spec import ExperimentSpec, SharedSettings, StudySpec
 from gaplab.services.core.errors import InvalidSpec, Violation, gather, unknown_name
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.optimizers.base import Optimizer
@@ -22,8 +23,8 @@ from gaplab.services.engines.base import Engine
 from gaplab.services.specs.presets import PRESETS
 
 
-def resolve_experiment(spec: ExperimentSpec) -> ExperimentSpec:
-    """The spec with nothing left out: what is stored and run. Resolving it again changes nothing.
+def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
+    """Return the spec with every field, as it is stored and run. Resolving it again changes nothing.
 
     Raises:
         InvalidSpec: with every violation, each with its pointer into the spec.
@@ -33,10 +34,10 @@ def resolve_experiment(spec: ExperimentSpec) -> ExperimentSpec:
         lambda: strategies.create(spec.strategy, "/strategy"),
         lambda: optimizers.create(spec.optimizer, "/optimizer"),
     )
-    own = spec.engine or PluginRef(name=robot.engine)
-    real = spec.reality.engine or own
+    simulated = spec.engine or PluginRef(name=robot.engine)
+    real = spec.reality.engine or simulated
     engine, reality_engine = gather(
-        lambda: _engine(own, robot, "/engine"),
+        lambda: _engine(simulated, robot, "/engine"),
         lambda: _engine(real, robot, "/reality/engine" if spec.reality.engine else "/engine"),
     )
     budget = _budget(spec)
@@ -48,30 +49,31 @@ def resolve_experiment(spec: ExperimentSpec) -> ExperimentSpec:
     if violations:
         raise InvalidSpec(violations)
     preset = PRESETS[budget.preset]
-    return spec.model_copy(
-        update={
-            "name": spec.name or _label(strategy),
-            "iterations": spec.iterations or preset.iterations,
-            "repetitions": spec.repetitions or preset.repetitions,
-            "robot": _completed(robots, spec.robot),
-            "strategy": _completed(strategies, spec.strategy),
-            "optimizer": _completed(optimizers, spec.optimizer),
-            "engine": _completed(engines, own),
-            "tunables": tuple(_with_bounds(ref) for ref in spec.tunables),
-            "reality": RealitySpec(engine=_completed(engines, real), parameters=_truth(spec, robot, reality_engine)),
-            "budget": budget,
-        }
+    return ResolvedSpec(
+        priority=spec.priority,
+        max_parallel=spec.max_parallel,
+        name=spec.name or _label(strategy),
+        iterations=spec.iterations or preset.iterations,
+        repetitions=spec.repetitions or preset.repetitions,
+        robot=_completed(robots, spec.robot),
+        strategy=_completed(strategies, spec.strategy),
+        optimizer=_completed(optimizers, spec.optimizer),
+        engine=_completed(engines, simulated),
+        tunables=tuple(_with_bounds(ref) for ref in spec.tunables),
+        reality=ResolvedReality(engine=_completed(engines, real), parameters=_truth(spec, robot, reality_engine)),
+        budget=budget,
+        seed=spec.seed,
     )
 
 
-def resolve_study(spec: StudySpec) -> tuple[ExperimentSpec, ...]:
-    """The resolved spec of each experiment of a study, in the order of its strategies.
+def resolve_study(spec: StudySpec) -> tuple[ResolvedSpec, ...]:
+    """Return the resolved spec of each experiment of a study, in the order of its strategies.
 
     Raises:
         InvalidSpec: with every violation, each with its pointer into the study's spec, once.
     """
     shared = {name: getattr(spec, name) for name in StudySpec.model_fields if name in ExperimentSpec.model_fields}
-    resolved: list[ExperimentSpec] = []
+    resolved: list[ResolvedSpec] = []
     violations: dict[tuple[str, str], Violation] = {}
     for index, strategy in enumerate(spec.strategies):
         experiment = ExperimentSpec(**{**shared, "name": None}, strategy=strategy)
@@ -95,15 +97,20 @@ def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
     """
     shared = {name: getattr(spec, name) for name in SharedSettings.model_fields}
     resolved = resolve_experiment(ExperimentSpec(**shared, strategy=PluginRef(name="random")))
-    effort = {"points": spec.points, "evaluations": spec.evaluations}
-    return Checked.model_validate({name: getattr(resolved, name) for name in ("robot", "engine", "tunables")} | effort)
+    return Checked(
+        robot=resolved.robot,
+        engine=resolved.engine,
+        tunables=resolved.tunables,
+        points=spec.points,
+        evaluations=spec.evaluations,
+    )
 
 
-def spec_of(stored: Mapping[str, Any]) -> ExperimentSpec:
+def spec_of(stored: Mapping[str, Any]) -> ResolvedSpec:
     """The spec that is stored, to be read and not to be run: what is not known of its reality is left out."""
     reality = stored["reality"]
     known = {name: value for name, value in reality["parameters"].items() if value is not None}
-    return ExperimentSpec.model_validate({**stored, "reality": {**reality, "parameters": known}})
+    return ResolvedSpec.model_validate({**stored, "reality": {**reality, "parameters": known}})
 
 
 def is_direct(spec: ExperimentSpec) -> bool:
@@ -116,19 +123,18 @@ def unit(spec: ExperimentSpec | Checked) -> str:
     return robots[spec.robot.name].unit if spec.robot.name in robots else ""
 
 
-def expected_rollouts(spec: ExperimentSpec) -> int:
+def expected_rollouts(spec: ResolvedSpec) -> int:
     """The rollouts in simulation of one repetition of a resolved spec; real-world evaluations do not count.
 
     The direct baseline's evaluations would be real ones; they count, for they are its whole cost.
     """
     strategy = strategies.create(spec.strategy)
-    controller, selection, simulator = _evaluations(spec.budget)
+    budget, iterations = spec.budget, spec.iterations
     if strategy.in_reality:
-        return controller
-    iterations = spec.iterations or 0
-    selecting = iterations * selection * strategy.ensemble if strategy.searches else 0
-    tuning = simulator * iterations * (iterations + 1) // 2
-    return controller * (iterations + 1) + selecting + tuning
+        return budget.controller_evaluations
+    selecting = iterations * budget.selection_evaluations * strategy.ensemble if strategy.searches else 0
+    tuning = budget.simulator_evaluations * iterations * (iterations + 1) // 2
+    return budget.controller_evaluations * (iterations + 1) + selecting + tuning
 
 
 def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
@@ -158,10 +164,14 @@ def _label(strategy: Strategy) -> str:
     return f"{strategy.name} ({', '.join(changed)})"[:200] if changed else strategy.name
 
 
-def _with_bounds(ref: TunableRef) -> TunableRef:
+def _bounds(ref: TunableRef) -> tuple[float, float]:
     tunable = tunables[ref.name]
-    lower = tunable.lower if ref.lower is None else ref.lower
-    return TunableRef(name=ref.name, lower=lower, upper=tunable.upper if ref.upper is None else ref.upper)
+    return tunable.lower if ref.lower is None else ref.lower, tunable.upper if ref.upper is None else ref.upper
+
+
+def _with_bounds(ref: TunableRef) -> ResolvedTunable:
+    lower, upper = _bounds(ref)
+    return ResolvedTunable(name=ref.name, lower=lower, upper=upper)
 
 
 def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str, float]:
@@ -188,13 +198,12 @@ def _tunable_violations(spec: ExperimentSpec, engine: type[Engine]) -> Iterator[
 
 
 def _bound_violations(ref: TunableRef, pointer: str) -> Iterator[Violation]:
-    completed, tunable = _with_bounds(ref), tunables[ref.name]
+    (lower, upper), tunable = _bounds(ref), tunables[ref.name]
     for side in ("lower", "upper"):
         if (given := getattr(ref, side)) is not None:
             yield from _range_violations(tunable, given, f"{pointer}/{side}")
-    if completed.lower is not None and completed.upper is not None and completed.lower >= completed.upper:
-        message = f"lower must be below upper, not {completed.lower:g} and {completed.upper:g}"
-        yield Violation(pointer, [completed.lower, completed.upper], message)
+    if lower >= upper:
+        yield Violation(pointer, [lower, upper], f"lower must be below upper, not {lower:g} and {upper:g}")
 
 
 def _range_violations(tunable: type[Tunable], value: float, pointer: str) -> Iterator[Violation]:
@@ -221,26 +230,26 @@ def _reality_violations(spec: ExperimentSpec, engine: type[Engine]) -> Iterator[
         yield from _range_violations(tunables[name], value, pointer)
 
 
-def _budget(spec: ExperimentSpec) -> BudgetSpec:
-    """The budget with every number written out."""
+def _budget(spec: ExperimentSpec) -> ResolvedBudget:
+    """Return the budget with every number written out."""
     preset = PRESETS[spec.budget.preset]
-    names = (name for name in BudgetSpec.model_fields if name not in {"preset", "reuse_transfer"})
-    return spec.budget.model_copy(update={name: getattr(spec.budget, name) or getattr(preset, name) for name in names})
+    return ResolvedBudget(
+        preset=spec.budget.preset,
+        controller_evaluations=spec.budget.controller_evaluations or preset.controller_evaluations,
+        selection_evaluations=spec.budget.selection_evaluations or preset.selection_evaluations,
+        simulator_evaluations=spec.budget.simulator_evaluations or preset.simulator_evaluations,
+        reuse_transfer=spec.budget.reuse_transfer,
+    )
 
 
-def _evaluations(budget: BudgetSpec) -> tuple[int, int, int]:
-    return budget.controller_evaluations or 0, budget.selection_evaluations or 0, budget.simulator_evaluations or 0
-
-
-def _budget_violations(budget: BudgetSpec, strategy: Strategy, optimizer: Optimizer) -> Iterator[Violation]:
-    controller, selection, simulator = _evaluations(budget)
+def _budget_violations(budget: ResolvedBudget, strategy: Strategy, optimizer: Optimizer) -> Iterator[Violation]:
     least = optimizer.least_evaluations
     tuning = optimizer.diverse(strategy.ensemble).least_evaluations if strategy.ensemble > 1 else least
-    needed = {"controller_evaluations": (controller, least)}
+    needed = {"controller_evaluations": (budget.controller_evaluations, least)}
     if strategy.searches and not strategy.in_reality:
-        needed["selection_evaluations"] = (selection, least)
+        needed["selection_evaluations"] = (budget.selection_evaluations, least)
     if not strategy.in_reality:
-        needed["simulator_evaluations"] = (simulator, tuning)
+        needed["simulator_evaluations"] = (budget.simulator_evaluations, tuning)
     for name, (given, minimum) in needed.items():
         if given < minimum:
             message = f"{given} evaluations do not fill the population of {minimum} that the search starts with"

@@ -1,4 +1,4 @@
-"""The only SQL: tables, sessions, and every query. Read `models` first, then `repository`.
+"""The database: tables, transactions, and the loads and saves that several rooms share. Read `models` first.
 
-A service opens one `Store`; a use case runs in one of its transactions and calls the functions of `repository` in it.
+A process opens one `Store`. A use case runs in one of its transactions; `session.transaction` makes it one.
 """

@@ -1,4 +1,4 @@
-"""Files that have their name once they are whole, and take it from no other."""
+"""Files that get their name once they are whole, and replace no other."""
 
 import os
 from collections.abc import Iterator
@@ -9,13 +9,13 @@ from secrets import token_hex
 
 @contextmanager
 def appearing(file: Path, mode: int = 0o666) -> Iterator[Path]:
-    """A file beside it to write into, that gets its name when the context ends well, once it is on the disk.
+    """Open a part file to write into; it gets its name when the context ends well, once it is on the disk.
 
-    What somebody leaves there who is killed has a name that nobody else takes, so that it is in no one's way.
+    A killed process leaves a part file whose random name is in nobody's way.
 
     Args:
-        file: that must not be there yet.
-        mode: who may read and write it, as far as the process lets anybody.
+        file: its name, which must be free.
+        mode: permissions, restricted by the process's umask.
 
     Raises:
         OSError: the file is there already, or cannot be written.
@@ -34,7 +34,7 @@ def appearing(file: Path, mode: int = 0o666) -> Iterator[Path]:
 
 
 def _name(part: Path, file: Path) -> None:
-    """Give it its name, but not in place of what has got that name meanwhile."""
+    """Give the part file its name, unless another file has got it meanwhile."""
     try:
         os.link(part, file)
     except FileExistsError as error:
@@ -48,7 +48,7 @@ def _taken(file: Path) -> FileExistsError:
 
 
 def _sync(place: Path) -> None:
-    """Wait until it is on the disk; not every kind of folder can be waited for."""
+    """Wait until the file or folder is on the disk, as far as its file system can tell."""
     descriptor = os.open(place, os.O_RDONLY)
     with suppress(OSError):
         os.fsync(descriptor)

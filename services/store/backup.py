@@ -11,14 +11,14 @@ from gaplab.services.store.atomic_files import appearing
 from gaplab.services.store.engine import open_engine
 
 PG_DUMP = 'pg_dump --format=custom --file={file} "postgresql:${{GAPLAB_DATABASE_URL#*:}}"'
-"""Before its first colon the URL may name a driver, as in postgresql+psycopg://, of which that tool knows nothing."""
+"""The URL may name a driver before its first colon, as in postgresql+psycopg://; pg_dump knows none."""
 
 
 def backup(url: str, file: Path) -> int:
-    """Copy a SQLite database as it is at one moment, though others write to it; the size of the copy in bytes.
+    """Copy a SQLite database as of one moment, while others write to it, and return the size in bytes.
 
-    Writers wait while it is copied, which takes as long as the file takes to be read. The copy appears under its name
-    once it is whole, checked and on the disk, and only its owner may read it.
+    Writers wait as long as the file takes to be read. The copy appears under its name once it is whole, checked and on
+    the disk. Only its owner may read it.
 
     Args:
         url: of the database, at whatever revision it is.

@@ -1,4 +1,4 @@
-"""Time in the database: UTC, to the microsecond's place, by the database's own clock."""
+"""Time in the database: UTC in microseconds, by the database's own clock."""
 
 from datetime import UTC, datetime
 from typing import Any
@@ -18,11 +18,11 @@ class UtcDateTime(TypeDecorator[datetime]):
 
     @property
     def python_type(self) -> type[datetime]:
-        """What its values are."""
+        """Type of the values."""
         return datetime
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002  # the base's signature
-        """Refuse a moment without a time zone: nobody could say when it was."""
+        """Refuse a moment without a time zone, which is ambiguous."""
         if value is None:
             return None
         if value.tzinfo is None:
@@ -31,7 +31,7 @@ class UtcDateTime(TypeDecorator[datetime]):
         return value.astimezone(UTC)
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002  # the base's signature
-        """Say that it is UTC."""
+        """Return the moment in UTC."""
         if value is None:
             return None
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)

@@ -1,4 +1,4 @@
-"""Opaque cursors: the key of the last row of a page, as a client carries it to the next."""
+"""Opaque cursors: the key of a page's last row, which a client sends back for the next page."""
 
 import json
 from base64 import urlsafe_b64decode, urlsafe_b64encode
@@ -18,25 +18,25 @@ _LONGEST = 2_000
 
 
 def encode(*key: str | int | datetime, bound_to: str = "") -> str:
-    """The cursor of a key, good only for the list that `bound_to` describes."""
+    """Return the cursor of a key, valid only for the list that `bound_to` describes."""
     plain = [bound_to] + [part.isoformat() if isinstance(part, datetime) else part for part in key]
     return urlsafe_b64encode(json.dumps(plain, ensure_ascii=False).encode()).decode().rstrip("=")
 
 
 def decode(cursor: str, columns: Sequence[Column], bound_to: str = "") -> Tuple:
-    """The key of a cursor, to be compared with the columns that it was encoded from.
+    """Return the key of a cursor, to compare with the columns that it was encoded from.
 
     Raises:
-        InvalidSpec: no answer of ours had this cursor, or one to another list; its pointer is `cursor`.
+        InvalidSpec: no page of this list gave the cursor; its pointer is `cursor`.
     """
     try:
         bound, *parts = json.loads(urlsafe_b64decode(cursor[:_LONGEST] + "=" * (-len(cursor) % 4)))
         if bound != bound_to:
-            message = "this cursor is of a list with other filters or another order; leave it out to start anew"
+            message = "this cursor is of a list with other filters or another order; leave it out for the first page"
             raise InvalidSpec([Violation("cursor", cursor, message)])
         return tuple_(*(_part(part, column) for part, column in zip(parts, columns, strict=True)))
     except (ValueError, TypeError, OverflowError, RecursionError) as error:
-        message = "this is no cursor that the service gave out; leave it out to start anew"
+        message = "this is no cursor that the service gave out; leave it out for the first page"
         raise InvalidSpec([Violation("cursor", cursor, message)]) from error
 
 
@@ -51,5 +51,5 @@ def _part(part: object, column: Column) -> ColumnElement[Any]:
 
 
 def _storable(text: str) -> bool:
-    """Whether the databases take it: Postgres refuses NULs, and neither takes halves of characters."""
+    """Return whether the databases take the text: Postgres refuses NULs, and neither takes halves of characters."""
     return "\0" not in text and bool(text.encode())

@@ -1,4 +1,4 @@
-"""The one place where a database's troubles become `StoreUnavailable`; what is a mistake of ours passes through."""
+"""The one place where errors of a database become `StoreUnavailable`; programming errors pass through."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,15 +14,15 @@ _CLASHES = {"40001", "40P01"}
 _NO_SCHEMA = {"42P01", "42703"}
 """Postgres knows no such table, or no such column."""
 
-WRONG_SCHEMA = "the database has not the schema of this version: run `python -m migrations`"
+WRONG_SCHEMA = "the database lacks the schema of this version: run `python -m migrations`"
 
 
 @contextmanager
 def named() -> Iterator[None]:
-    """Within it, that the database cannot be used is said in one sentence, without its password.
+    """Turn errors of the database into one sentence without its password.
 
     Raises:
-        StoreUnavailable: unreachable, locked for too long, no database at all, or one with another schema.
+        StoreUnavailable: it is unreachable, locked for too long, no database at all, or has another schema.
     """
     try:
         yield
@@ -39,7 +39,7 @@ def named() -> Iterator[None]:
 
 
 def is_clash(error: DBAPIError) -> bool:
-    """Whether the transaction was given up for another, and may well succeed if it is run anew."""
+    """Return whether the transaction was given up for another, and may succeed if it runs again."""
     return _sqlstate(error) in _CLASHES
 
 

@@ -1,4 +1,4 @@
-"""How a database is opened: one place for the settings that durability and locking rest on."""
+"""Opening of databases, with the settings that durability and locking rest on."""
 
 import sqlite3
 from typing import Any
@@ -12,27 +12,27 @@ WRITES = "gaplab_writes"
 """Execution option of a connection whose transactions will write."""
 
 PATIENCE_S = 30
-"""How long a transaction waits for another's lock."""
+"""Longest wait of a transaction for another's lock."""
 
 CONNECT_S = 5
-"""How long a Postgres server may take to answer before it is unreachable."""
+"""Longest wait for a Postgres server to answer a connection."""
 
 _WAL_IS_SOUND = (3, 51, 3)
 """Before this, SQLite's write-ahead log can be corrupted when it is reset. Source: https://sqlite.org/wal.html.
 
-Its rollback journal is then kept and its header zeroed: that is synced before COMMIT returns. A journal that is deleted
-may be back after a power loss, and takes the last transaction with it. Source: https://sqlite.org/pragma.html, EXTRA.
+The rollback journal is then kept and its header zeroed, which is synced before COMMIT returns. A deleted journal may be
+back after a power loss, and then undoes the last transaction. Source: https://sqlite.org/pragma.html, EXTRA.
 """
 
 
 def open_engine(url: str, *, enforce_foreign_keys: bool = True) -> Engine:
-    """The engine of a SQLite or Postgres URL; nothing is connected yet.
+    """Return the engine of a SQLite or Postgres URL, without connecting.
 
-    Its errors carry no values: a spec among them would tell the log what reality hides.
+    Its errors carry no values, for a spec would tell the log what reality hides.
 
     Args:
         url: SQLAlchemy URL; Postgres without a driver gets psycopg 3.
-        enforce_foreign_keys: in SQLite; a migration that rebuilds tables must not.
+        enforce_foreign_keys: in SQLite; False in a migration that rebuilds tables.
 
     Raises:
         StoreUnavailable: no such kind of database.
@@ -65,10 +65,10 @@ def _parse(url: str) -> URL:
 
 
 def _prepare_sqlite(engine: Engine, *, enforce_foreign_keys: bool) -> None:
-    """Durable and honest about locks.
+    """Make SQLite durable, and let writers wait for each other.
 
-    The driver's own BEGIN comes too late and is deferred: a read that turns into a write would then fail at once,
-    whatever the patience. So it is told to begin nothing, and a transaction that will write begins IMMEDIATE.
+    The driver's own BEGIN is deferred: a read that turns into a write would fail at once, whatever the patience. So the
+    driver begins nothing, and a transaction that will write begins IMMEDIATE.
     """
     journal = "WAL" if sqlite3.sqlite_version_info >= _WAL_IS_SOUND else "PERSIST"
 

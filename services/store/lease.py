@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.sensitivity import Checked
-from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.types import Step
 
 
@@ -45,7 +45,7 @@ class Claim(Lease):
     Attributes:
         experiment_id: of the repetition's experiment.
         number: of the repetition within its experiment, from 0.
-        spec: resolved.
+        spec: of the experiment.
         log: the steps recorded so far, from which to go on.
         checkpoints: of the next step, if it was under way before.
     """
@@ -53,7 +53,7 @@ class Claim(Lease):
     id: int
     experiment_id: str
     number: int
-    spec: ExperimentSpec = field(compare=False)
+    spec: ResolvedSpec = field(compare=False)
     log: tuple[Step, ...] = field(default=(), compare=False)
     checkpoints: tuple[Checkpoint, ...] = field(default=(), compare=False)
 

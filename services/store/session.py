@@ -24,13 +24,13 @@ _TRIES = 5
 
 
 class Store:
-    """One database, SQLite or Postgres; safe to share between threads, and opened without connecting.
+    """One SQLite or Postgres database; safe to share between threads, and opened without connecting.
 
     It recovers by itself: a connection that died is replaced at its next use.
 
     Attributes:
-        errors: times that the database could not be used, since the store was opened.
-        retries: transactions that Postgres gave up for others, and that were run anew.
+        errors: number of times that the database could not be used.
+        retries: number of transactions that Postgres gave up for others, and that ran again.
     """
 
     def __init__(self, url: str) -> None:
@@ -43,7 +43,7 @@ class Store:
 
     @contextmanager
     def transaction(self) -> Iterator[Session]:
-        """A session that may write: all of it is committed at the end, or none of it.
+        """Open a session that may write: all of it is committed at the end, or none of it.
 
         Raises:
             StoreUnavailable: the database cannot be used now.
@@ -53,7 +53,7 @@ class Store:
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
-        """A session for a few reads of one moment; keep it short, for in SQLite it holds up whoever writes.
+        """Open a session that reads one moment of the database; keep it short, for in SQLite it delays writers.
 
         Raises:
             StoreUnavailable: the database cannot be used now.
@@ -83,10 +83,10 @@ class Store:
                 return work(session, *args, **kwargs)
 
     def check(self) -> None:
-        """Do nothing if the database is there and its schema is the one this version needs.
+        """Check that the database can be used and has the schema of this version.
 
         Raises:
-            StoreUnavailable: it is not; the message says which and what to do.
+            StoreUnavailable: it cannot or has not; the message says what to do.
         """
         with self.reading() as session:
             revisions = session.scalars(text("SELECT version_num FROM alembic_version")).all()
@@ -97,7 +97,7 @@ class Store:
 
     @contextmanager
     def _named(self) -> Iterator[None]:
-        """Within it, troubles of the database are named, and counted."""
+        """Name and count errors of the database."""
         try:
             with database_errors.named():
                 yield

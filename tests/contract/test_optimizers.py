@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.optimizers import optimizers
-from gaplab.services.core.optimizers.base import maximise
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
+from gaplab.services.core.search import maximise
 from gaplab.services.core.types import Space
 
 SPACE = Space.box([0.0, -2.0, 0.0], [1.0, 2.0, 5.0], [True, False, False])
@@ -19,8 +19,11 @@ class Hill:
         self.transform = transform
         self.asked = []
 
-    def __call__(self, genomes, bounds=None):
-        self.asked.append(genomes.copy())
+    def __call__(self, question):
+        self.asked.append(question.genomes.copy())
+        return self.of(question.genomes)
+
+    def of(self, genomes):
         return self.transform(-(((genomes - SUMMIT) / SPACE.extent) ** 2).sum(axis=1))
 
 
@@ -39,9 +42,12 @@ class Watched:
         return self.optimizer.tell(state, genomes, fitness)
 
 
-def given_up(fitness, bounds):
-    """-inf for every fitness below its bound, as an evaluation that gave up says."""
-    return np.where(fitness < bounds, -np.inf, fitness)
+class GivingUp(Hill):
+    """The hill, but -inf for every fitness below its threshold."""
+
+    def __call__(self, question):
+        fitness = super().__call__(question)
+        return np.where(fitness < question.thresholds, -np.inf, fitness)
 
 
 def search(name, evaluate, evaluations=300, seed=3):
@@ -61,14 +67,12 @@ class TestEveryOptimizer:
         assert sum(map(len, hill.asked)) == len(np.unique(told, axis=0))
 
     @pytest.mark.parametrize("diverse", [False, True])
-    def test_what_it_calls_hopeless_changes_nothing(self, name, diverse):
-        def search_with(hopeless):
+    def test_fitness_below_a_threshold_changes_nothing(self, name, diverse):
+        def search_on(hill):
             optimizer = optimizers[name]().diverse(9) if diverse else optimizers[name]()
-            hill = Hill()
-            evaluate = (lambda genomes, bounds: given_up(hill(genomes), bounds)) if hopeless else hill
-            return maximise(optimizer, SPACE, evaluate, 400, np.random.default_rng(3))
+            return maximise(optimizer, SPACE, hill, 400, np.random.default_rng(3))
 
-        exact, given = search_with(False), search_with(True)
+        exact, given = search_on(Hill()), search_on(GivingUp())
 
         np.testing.assert_array_equal(exact.genomes, given.genomes)
         np.testing.assert_array_equal(exact.fitness, given.fitness)
@@ -90,14 +94,14 @@ class TestEveryOptimizer:
         found = search(name, Hill())
 
         np.testing.assert_array_equal(found.fitness, np.sort(found.fitness)[::-1])
-        np.testing.assert_allclose(found.fitness, Hill()(found.genomes))
+        np.testing.assert_allclose(found.fitness, Hill().of(found.genomes))
 
     def test_never_loses_the_best_it_was_told(self, name):
         hill = Hill()
 
         found = search(name, hill)
 
-        assert found.fitness[0] == Hill()(np.vstack(hill.asked)).max()
+        assert found.fitness[0] == Hill().of(np.vstack(hill.asked)).max()
 
     def test_repeats_itself_for_the_same_stream(self, name):
         np.testing.assert_array_equal(search(name, Hill()).genomes, search(name, Hill()).genomes)
@@ -129,7 +133,7 @@ class TestEveryOptimizer:
     def test_leaves_the_state_it_was_given_as_it_was(self, name):
         optimizer, rng = optimizers[name](), np.random.default_rng(0)
         state = optimizer.init(SPACE)
-        state = optimizer.tell(state, *(lambda genomes: (genomes, Hill()(genomes)))(optimizer.ask(state, rng)))
+        state = optimizer.tell(state, *(lambda genomes: (genomes, Hill().of(genomes)))(optimizer.ask(state, rng)))
         before = state.genomes.copy(), state.fitness.copy()
 
         genomes = optimizer.ask(state, rng)
@@ -152,7 +156,11 @@ def test_spaces_of_one_and_two_genes_are_searched_too(name, size):
     space = Space.box([0.0] * size, [1.0] * size)
 
     found = maximise(
-        optimizers[name](), space, lambda genomes, _: -((genomes - 0.3) ** 2).sum(axis=1), 400, np.random.default_rng(0)
+        optimizers[name](),
+        space,
+        lambda asked: -((asked.genomes - 0.3) ** 2).sum(axis=1),
+        400,
+        np.random.default_rng(0),
     )
 
     assert found.fitness[0] > -1e-3
@@ -170,7 +178,7 @@ def test_a_newcomer_always_differs_from_every_member():
     optimizer, rng = SteadyState(SteadyStateOptions(mutation=0.001)), np.random.default_rng(0)
     state = optimizer.init(SPACE)
     genomes = optimizer.ask(state, rng)
-    state = optimizer.tell(state, genomes, Hill()(genomes))
+    state = optimizer.tell(state, genomes, Hill().of(genomes))
 
     newcomers = [optimizer.ask(state, rng)[0] for _ in range(100)]
 
@@ -182,7 +190,7 @@ def test_members_are_of_two_parents_gene_by_gene():
     rng = np.random.default_rng(0)
     state = optimizer.init(SPACE)
     genomes = optimizer.ask(state, rng)
-    state = optimizer.tell(state, genomes, Hill()(genomes))
+    state = optimizer.tell(state, genomes, Hill().of(genomes))
 
     newcomer = optimizer.ask(state, rng)[0]
 

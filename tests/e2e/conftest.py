@@ -14,12 +14,12 @@ import pytest
 
 from gaplab.schemas.lifecycle import OPEN
 from gaplab.services.archives import import_archive
-from gaplab.services.experiments.listing import ListFilter
-from gaplab.services.experiments.submission import cancel_experiment, list_experiments
+from gaplab.services.experiments.listing import ListFilter, list_experiments
 from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import Chromium
 from tests.e2e.service import Service
+from tests.experiments import cancel
 from tests.filling import fill
 
 STUDY = Path(__file__).parents[2] / "docs" / "studies" / "mujoco-in-mujoco.zip"
@@ -66,7 +66,7 @@ def written(written_file):
     yield store
     for state in OPEN:
         for each in list_experiments(store, ListFilter(state=state), limit=500, cursor=None).items:
-            cancel_experiment(store, each.id)
+            cancel(store, each.id)
     store.dispose()
 
 

@@ -173,7 +173,7 @@ def test_no_token_is_in_logs_answers_or_problems_whatever_happens(
     headers = bearer(sqlite_store, Role.READER)
     secret = headers["Authorization"].rpartition("_")[2]
     said = [lite.get("/experiments", headers=headers), lite.post("/experiments", json=TOY, headers=headers)]
-    monkeypatch.setattr("gaplab.services.experiments.submission.list_experiments", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("gaplab.services.experiments.listing.list_experiments", lambda *_, **__: 1 / 0)
     said.append(lite.get("/experiments", headers=headers))
     said.append(lite.get("/experiments", headers={"Authorization": f"Bearer gaplab_x_{secret}"}))
 

@@ -339,7 +339,7 @@ def test_an_accident_inside_leaks_nothing_but_a_number_to_find_it_by(
     def fail(*_: object, **__: object) -> None:
         raise RuntimeError("the password is swordfish")
 
-    monkeypatch.setattr("gaplab.services.experiments.submission.read_study", fail)
+    monkeypatch.setattr("gaplab.services.experiments.reading.read_study", fail)
     answer = api.get("/studies/some")
 
     detail = problem(answer, 500)["detail"]

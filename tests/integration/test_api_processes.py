@@ -155,7 +155,7 @@ def test_a_supervisor_that_dies_is_started_again_and_it_is_said(
     assert "ended by itself (exit code 0)" in caplog.text
 
 
-def test_a_supervisor_that_is_stopped_ends_its_supervisor(tmp_path: Path):
+def test_a_supervisor_is_ended_when_its_process_is_stopped(tmp_path: Path):
     supervisor = SupervisorProcess({"PYTHONPATH": str(tmp_path)}, module="sleeper")
     note = tmp_path / "pid"
     (tmp_path / "sleeper.py").write_text(

@@ -24,14 +24,14 @@ from gaplab.services.archives.columns import EXPORTED
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
-from gaplab.services.experiments import extension, submission
+from gaplab.services.experiments import extension, listing, reading, submission
 from gaplab.services.results import curves
 from gaplab.services.results.misfit import misfit
 from gaplab.services.running import execution
 from gaplab.services.store.models import Base, ExperimentRow, RepetitionRow, SimulatorRow
 from gaplab.services.store.queries import archives as repository
 from gaplab.services.store.queries.attempts import attempts_of
-from tests.experiments import AWKWARD, run, some_log, toy
+from tests.experiments import AWKWARD, cancel, run, some_log, toy
 
 EVERY = settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -86,10 +86,10 @@ def finished(store, log=None, **changes):
 def shown(store, experiment):
     """Everything that the service shows of it, but for its sensitivity check, which is its tunables'."""
     return (
-        submission.read_experiment(store, experiment).model_dump(exclude={"sensitivity"}),
-        submission.list_repetitions(store, experiment),
-        submission.list_samples(store, experiment),
-        submission.list_simulators(store, experiment),
+        reading.read_experiment(store, experiment).model_dump(exclude={"sensitivity"}),
+        reading.list_repetitions(store, experiment),
+        reading.list_samples(store, experiment),
+        reading.list_simulators(store, experiment),
         curves.curve(store, experiment),
         misfit(store, experiment),
     )
@@ -172,7 +172,7 @@ def test_the_best_of_repetitions_whose_sum_is_no_number_is_one(store):
     greatest = 1.7e308
     id_ = finished(store, list(some_log(recorded=greatest)))
 
-    assert submission.read_experiment(store, id_).best_fitness == pytest.approx(greatest)
+    assert reading.read_experiment(store, id_).best_fitness == pytest.approx(greatest)
 
 
 def test_a_study_goes_there_with_all_that_is_its_own(store, other):
@@ -194,7 +194,7 @@ def test_a_study_goes_there_with_all_that_is_its_own(store, other):
 
     assert stored.study == study.id
     assert stored.experiments == tuple(each.id for each in study.experiments)
-    assert len(submission.list_experiments(other).items) == 2
+    assert len(listing.list_experiments(other).items) == 2
     assert curves.study_curves(other, study.id) == curves.study_curves(store, study.id)
     assert exported(export_study(other, study.id)) == archive
 
@@ -213,9 +213,9 @@ def test_an_experiment_of_a_study_goes_on_its_own(store, other):
 
     import_archive(other, BytesIO(exported(export_experiment(store, experiment))))
 
-    assert submission.read_experiment(other, experiment).study is None
+    assert reading.read_experiment(other, experiment).study is None
     with pytest.raises(NotFound):
-        submission.read_study(other, study.id)
+        reading.read_study(other, study.id)
 
 
 def test_ids_that_are_taken_become_new_ones_and_the_rest_is_the_same(store):
@@ -241,14 +241,14 @@ def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(sto
     stored = import_archive(other, BytesIO(exported(export_experiment(store, submitted))))
 
     assert stored.called_off == (submitted,)
-    assert submission.read_experiment(other, submitted).state is State.CANCELLED
-    states = [each.state for each in submission.list_repetitions(other, submitted)]
+    assert reading.read_experiment(other, submitted).state is State.CANCELLED
+    states = [each.state for each in reading.list_repetitions(other, submitted)]
     assert states == [State.COMPLETED, State.CANCELLED, State.CANCELLED]
     assert execution.claim(other, "me", 9) == ()
     assert execution.requeue_lost(other, stale_after_s=-1) == 0
     assert curves.curve(other, submitted).points == curves.curve(store, submitted).points
-    assert submission.list_samples(other, submitted) == submission.list_samples(store, submitted)
-    assert submission.read_experiment(store, submitted).state is State.RUNNING
+    assert reading.list_samples(other, submitted) == reading.list_samples(store, submitted)
+    assert reading.read_experiment(store, submitted).state is State.RUNNING
 
 
 @pytest.mark.parametrize("ended", [False, True])
@@ -259,7 +259,7 @@ def test_reality_is_hidden_until_its_study_has_ended(store, other, ended):
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim, some_log(0))
     if ended:
-        submission.cancel_experiment(store, study.experiments[1].id)
+        cancel(store, study.experiments[1].id)
 
     archives = [exported(export_study(store, study.id)), exported(export_experiment(store, study.experiments[0].id))]
 
@@ -269,7 +269,7 @@ def test_reality_is_hidden_until_its_study_has_ended(store, other, ended):
         assert (b"0.98765" in everything) is ended
         stored = import_archive(other, BytesIO(archive))
         first = stored.experiments[0]
-        found = submission.read_experiment(other, first).spec["reality"]["parameters"]["static_friction"]
+        found = reading.read_experiment(other, first).spec["reality"]["parameters"]["static_friction"]
         assert found == (0.98765 if ended else None)
         assert curves.curve(other, first).points == curves.curve(store, study.experiments[0].id).points
         assert misfit(other, first).points == ()
@@ -282,7 +282,7 @@ def test_an_export_is_of_one_moment_while_a_supervisor_writes(store, other):
         archive = export_experiment(store, submitted)
         if claim.number == 3:
             stored = import_archive(other, archive.file)  # which refuses rows that are no whole logs
-            assert submission.read_experiment(other, stored.experiments[0]).progress.completed == claim.number + 1
+            assert reading.read_experiment(other, stored.experiments[0]).progress.completed == claim.number + 1
         archive.file.close()
 
 
@@ -295,7 +295,7 @@ def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store):
         (row,) = map(json.loads, opened.read("experiment.jsonl").splitlines())
         manifest = json.loads(opened.read("manifest.json"))
 
-    samples = submission.list_samples(sqlite_store, submitted).items
+    samples = reading.list_samples(sqlite_store, submitted).items
     assert len(measurements) == len(samples)
     sample = next(each for each in measurements if each["kind"] == "sample")
     assert np.array_equal(sample["genome"], AWKWARD)
@@ -337,7 +337,7 @@ def test_what_came_without_its_reality_cannot_be_extended(store, other):
 
     import_archive(other, BytesIO(exported(export_study(store, study.id))))
 
-    assert submission.read_experiment(other, direct).state is State.COMPLETED
+    assert reading.read_experiment(other, direct).state is State.COMPLETED
     with pytest.raises(Conflict, match="before its reality was shown"):
         extension.extend_experiment(other, direct, ExtensionSpec(repetitions=3))
 
@@ -351,7 +351,7 @@ def test_times_keep_their_microseconds(store, other):
 
     import_archive(other, BytesIO(exported(export_experiment(store, submitted))))
 
-    assert submission.read_experiment(other, submitted).created_at == moment
+    assert reading.read_experiment(other, submitted).created_at == moment
 
 
 def test_memory_does_not_grow_with_what_is_exported(sqlite_store):

@@ -11,7 +11,7 @@ from gaplab.api.commands.cli import main
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import StoreUnavailable, Unsupported
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import listing, submission
 from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
@@ -74,7 +74,7 @@ def test_a_copy_waits_for_whoever_writes_and_has_all_of_it_or_nothing(sqlite_url
     store.dispose()
 
     copied = Store(f"sqlite:///{tmp_path / 'copy.db'}")
-    names = [each.name for each in submission.list_experiments(copied).items]
+    names = [each.name for each in listing.list_experiments(copied).items]
     copied.dispose()
     assert names in (["written"], ["simulated_fit"])
     assert made == [(tmp_path / "copy.db").stat().st_size]

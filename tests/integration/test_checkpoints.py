@@ -7,18 +7,17 @@ import numpy as np
 import pytest
 
 from gaplab.schemas.lifecycle import State
+from gaplab.services.core.answers import unpack
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition
-from gaplab.services.core.recall import unpack
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Checkpoint
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.store.models import CheckpointRow
-from gaplab.workers.checkpoints import Recorder, recorded
-from tests.experiments import same, some_log, toy
-from tests.fakes import Recorder as Calls
-from tests.fakes import flat, paraboloid, small_setting
+from gaplab.workers.checkpoints import StepRecorder, recorded
+from tests.experiments import cancel, same, some_log, toy
+from tests.fakes import Recorder, flat, paraboloid, small_setting
 
 
 def steps_of(told):
@@ -39,7 +38,7 @@ def test_a_repetition_told_at_any_moment_goes_on_from_there():
 
 
 def test_what_a_checkpoint_has_is_not_simulated_again():
-    first, second = Calls(), Calls()
+    first, second = Recorder(), Recorder()
     told = list(recorded(small_setting(simulate=first), (), (), 0.0))
     checkpoints = [each for each in told if isinstance(each, Checkpoint) and each.step == 1]
 
@@ -59,11 +58,11 @@ def test_a_call_that_would_take_long_is_made_in_several():
         time.sleep(0.002 * len(genomes))
         return paraboloid(genomes, parameters)
 
-    calls, told = Calls(slow), []
-    recorder = Recorder(calls, told.append, 0.02, 5)
+    calls, told = Recorder(slow), []
+    answers = StepRecorder(told.append, 0.02, 5).answers(small_setting(simulate=calls))
     genomes = np.random.default_rng(0).random((30, 2))
 
-    fitnesses = recorder(genomes, genomes[:2])
+    fitnesses = answers(genomes, genomes[:2])
 
     np.testing.assert_array_equal(fitnesses, paraboloid(genomes, genomes[:2]))
     assert len(calls.calls) > 2
@@ -172,7 +171,7 @@ def test_one_that_gets_on_within_a_step_may_be_lost_any_number_of_times(store):
         execution.record_all(store, [(claim, [part(0, number)])])
         execution.release(store, claim, "killed")
 
-    assert submission.read_experiment(store, submitted.id).state is State.RUNNING
+    assert reading.read_experiment(store, submitted.id).state is State.RUNNING
 
 
 def test_cancelling_forgets_checkpoints(store):
@@ -180,7 +179,7 @@ def test_cancelling_forgets_checkpoints(store):
     (claim,) = execution.claim(store, "me", 1)
     execution.record_all(store, [(claim, [part(0, 0)])])
 
-    submission.cancel_experiment(store, submitted.id)
+    cancel(store, submitted.id)
 
     assert checkpoints_left(store) == 0
 
@@ -208,6 +207,6 @@ def test_a_claim_that_timed_out_is_handed_back_and_those_that_are_known_stay(sto
 
     assert execution.hand_back_unheard(store, "me", [known]) == 1
 
-    states = [(each.state, each.attempts) for each in submission.list_repetitions(store, submitted.id)]
+    states = [(each.state, each.attempts) for each in reading.list_repetitions(store, submitted.id)]
     assert states == [(State.RUNNING, 1), (State.QUEUED, 0), (State.RUNNING, 1)]
     assert execution.heartbeat(store, [known, others]) == (known, others)

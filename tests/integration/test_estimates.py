@@ -13,7 +13,7 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.types import Probed
 from gaplab.services.engines import engines
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.experiments.estimates import estimate
 from gaplab.services.running.execution import claim
 from gaplab.services.settings import Limits, Settings
@@ -36,7 +36,7 @@ def test_the_rollouts_are_those_that_the_submitted_study_has(store: Store):
 
     found = estimate(store, spec)
 
-    assert submission.list_studies(store).items == ()
+    assert listing.list_studies(store).items == ()
     study = submission.submit_study(store, spec)
     assert found.rollouts == study.progress.rollouts
     assert [each.rollouts for each in found.experiments] == [each.progress.rollouts for each in study.experiments]
@@ -136,14 +136,14 @@ def test_cores_are_the_workers_that_the_service_was_given(sqlite_store: Store):
 
 def test_the_best_fitness_of_an_experiment_is_the_mean_of_its_repetitions_best(store: Store):
     made = submission.submit_experiment(store, toy(repetitions=2))
-    assert submission.read_experiment(store, made.id).best_fitness is None
+    assert reading.read_experiment(store, made.id).best_fitness is None
 
     for recorded in (1.0, 2.0):
         (one,) = claim(store, "me", 1)
         run(store, one, some_log(recorded=recorded))
 
-    (listed,) = submission.list_experiments(store).items
-    assert listed.best_fitness == submission.read_experiment(store, made.id).best_fitness
+    (listed,) = listing.list_experiments(store).items
+    assert listed.best_fitness == reading.read_experiment(store, made.id).best_fitness
     assert listed.best_fitness == pytest.approx((3.0 + 4.0) / 2)
 
 
@@ -153,4 +153,4 @@ def test_a_best_fitness_of_nothing_has_no_sign_whichever_zero_a_database_takes_f
 
     run(store, one, (replace(step, recorded=-0.0) if isinstance(step, Probed) else step for step in some_log()))
 
-    assert copysign(1.0, submission.read_experiment(store, made.id).best_fitness) == 1.0
+    assert copysign(1.0, reading.read_experiment(store, made.id).best_fitness) == 1.0

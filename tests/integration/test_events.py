@@ -35,7 +35,7 @@ from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.queries.events import note, write
 from gaplab.services.store.queries.experiments import insert_experiment
 from gaplab.services.store.session import Store
-from tests.experiments import run, some_log, toy
+from tests.experiments import cancel, run, some_log, toy
 
 DEADLINE_S = 180
 OTHER = own().model_copy(update={"architecture": "riscv64"})
@@ -98,7 +98,7 @@ def everything_that_can_happen(store: Store) -> None:
         execution.release(store, waits, "killed")
     cancelled = submission.submit_experiment(store, toy())
     execution.claim(store, "me", 1)
-    submission.cancel_experiment(store, cancelled.id)
+    cancel(store, cancelled.id)
     all_verbs(store)
     check = sensitivity.claim(store, "me")
     assert check is not None
@@ -501,7 +501,7 @@ def test_a_poll_may_wait_for_what_comes(sqlite_store):
         with ThreadPoolExecutor(1) as pool:
             answer = pool.submit(http.get, "/events/page", params=asked)
             assert within(lambda: feed.open == 1)
-            submission.cancel_experiment(sqlite_store, id_)
+            cancel(sqlite_store, id_)
             found = answer.result(DEADLINE_S).json()
         nothing = http.get("/events/page", params={"after": 2, "wait_s": 0.1}).json()
 

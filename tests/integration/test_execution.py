@@ -8,11 +8,11 @@ from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Cost
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.running import execution
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import setting
-from tests.experiments import run, same, some_log, toy
+from tests.experiments import cancel, run, same, some_log, toy
 
 
 def test_a_claim_has_the_resolved_spec_and_no_log_at_first(store):
@@ -31,9 +31,9 @@ def test_the_first_claim_starts_the_experiment(store):
 
     execution.claim(store, "me", 1)
 
-    assert submission.read_experiment(store, started.id).state is State.RUNNING
-    assert submission.read_experiment(store, started.id).started_at is not None
-    assert submission.read_experiment(store, waiting.id).state is State.QUEUED
+    assert reading.read_experiment(store, started.id).state is State.RUNNING
+    assert reading.read_experiment(store, started.id).started_at is not None
+    assert reading.read_experiment(store, waiting.id).state is State.QUEUED
 
 
 def test_claims_of_many_owners_never_overlap(store):
@@ -76,7 +76,7 @@ def test_a_step_that_is_delivered_twice_is_stored_once(store):
 
     execution.release(store, claim, "killed")
     assert same(execution.claim(store, "me", 1)[0].log, tuple(some_log()))
-    assert submission.read_experiment(store, submitted.id).progress.rollouts_done == 3 * 60 + 2 * 90
+    assert reading.read_experiment(store, submitted.id).progress.rollouts_done == 3 * 60 + 2 * 90
 
 
 def test_a_step_that_would_leave_a_hole_is_refused(store):
@@ -119,7 +119,7 @@ def test_many_repetitions_at_once_are_recorded_as_one_step_after_another_would_b
     again = by_experiment(execution.claim(store, "me", 6), one_by_one, together)
     assert same(tuple(each.log for each in again[:3]), tuple(each.log for each in again[3:]))
     assert [len(each.log) for each in again] == [*ends] * 2
-    first, second = (submission.read_experiment(store, each) for each in (one_by_one, together))
+    first, second = (reading.read_experiment(store, each) for each in (one_by_one, together))
     assert first.progress == second.progress
 
 
@@ -165,7 +165,7 @@ def test_a_holder_who_wakes_up_late_cannot_write(store):
 
     assert refused == (False,) * 5
     assert execution.heartbeat(store, [late, present]) == (present,)
-    assert submission.read_experiment(store, submitted.id).state is State.RUNNING
+    assert reading.read_experiment(store, submitted.id).state is State.RUNNING
     assert execution.record(store, present, second)
 
 
@@ -188,12 +188,12 @@ def test_a_repetition_that_was_lost_is_queued_again_and_goes_on_from_its_log(sto
 
     assert execution.requeue_lost(store, stale_after_s=-1) == 1
 
-    (lost,) = submission.list_repetitions(store, submitted.id)
+    (lost,) = reading.list_repetitions(store, submitted.id)
     (again,) = execution.claim(store, "me", 1)
     assert (lost.state, lost.attempts) == (State.QUEUED, 1)
     assert "not heard of" in lost.error
     assert (again.epoch, len(again.log)) == (2, 1)
-    assert submission.read_experiment(store, submitted.id).state is State.RUNNING
+    assert reading.read_experiment(store, submitted.id).state is State.RUNNING
 
 
 def test_a_repetition_that_kills_its_workers_is_failed_in_the_end(store):
@@ -203,7 +203,7 @@ def test_a_repetition_that_kills_its_workers_is_failed_in_the_end(store):
         (claim,) = execution.claim(store, "me", 1)
         execution.release(store, claim, "its worker ran out of memory\0\udcff")
 
-    found = submission.read_experiment(store, submitted.id)
+    found = reading.read_experiment(store, submitted.id)
     assert execution.claim(store, "me", 1) == ()
     assert found.state is State.FAILED
     assert found.ended_at is not None
@@ -231,7 +231,7 @@ def test_a_repetition_may_be_handed_back_any_number_of_times(store):
         (claim,) = execution.claim(store, "me", 1)
         assert execution.hand_back(store, claim)
 
-    (found,) = submission.list_repetitions(store, experiment)
+    (found,) = reading.list_repetitions(store, experiment)
     assert (found.state, found.attempts, found.error) == (State.QUEUED, 0, None)
     assert not execution.hand_back(store, claim)
 
@@ -242,12 +242,12 @@ def test_the_experiment_is_completed_with_its_last_repetition(store):
     states = []
 
     run(store, claims[0])
-    states.append(submission.read_experiment(store, submitted.id).state)
+    states.append(reading.read_experiment(store, submitted.id).state)
     execution.fail(store, claims[1], "the code raised")
-    states.append(submission.read_experiment(store, submitted.id).state)
+    states.append(reading.read_experiment(store, submitted.id).state)
     run(store, claims[2])
 
-    found = submission.read_experiment(store, submitted.id)
+    found = reading.read_experiment(store, submitted.id)
     assert [*states, found.state] == [State.RUNNING, State.RUNNING, State.COMPLETED]
     assert (found.progress.completed, found.progress.failed, found.reasons) == (2, 1, ("the code raised",))
     assert found.ended_at >= found.started_at >= found.created_at
@@ -259,7 +259,7 @@ def test_an_experiment_fails_when_all_of_its_repetitions_do_and_says_each_reason
     for claim, reason in zip(execution.claim(store, "me", 3), ("zero division", "a key", "zero division"), strict=True):
         assert execution.fail(store, claim, reason)
 
-    found = submission.read_experiment(store, submitted.id)
+    found = reading.read_experiment(store, submitted.id)
     assert found.state is State.FAILED
     assert found.reasons == ("zero division", "a key")
 
@@ -275,7 +275,7 @@ def test_repetitions_that_end_at_once_end_their_experiment(store):
         ended = list(pool.map(lambda claim: execution.complete(store, claim), claims))
 
     assert all(ended)
-    assert submission.read_experiment(store, submitted.id).state is State.COMPLETED
+    assert reading.read_experiment(store, submitted.id).state is State.COMPLETED
 
 
 def test_a_repetition_with_iterations_missing_is_not_completed(store):
@@ -287,7 +287,7 @@ def test_a_repetition_with_iterations_missing_is_not_completed(store):
     with pytest.raises(Conflict, match="1 iterations are missing"):
         execution.complete(store, claim)
 
-    assert submission.read_experiment(store, submitted.id).state is State.RUNNING
+    assert reading.read_experiment(store, submitted.id).state is State.RUNNING
 
 
 def test_a_cancelled_experiment_refuses_its_running_repetitions_and_keeps_what_is_stored(store):
@@ -296,15 +296,15 @@ def test_a_cancelled_experiment_refuses_its_running_repetitions_and_keeps_what_i
     first, second, *_ = some_log()
     execution.record(store, claim, first)
 
-    submission.cancel_experiment(store, submitted.id)
+    cancel(store, submitted.id)
 
     assert not execution.record(store, claim, second)
     assert not execution.complete(store, claim)
     assert not execution.release(store, claim, "cancelled")
     assert execution.heartbeat(store, [claim]) == ()
     assert execution.claim(store, "me", 9) == ()
-    assert {each.state for each in submission.list_repetitions(store, submitted.id)} == {State.CANCELLED}
-    assert len(submission.list_simulators(store, submitted.id).items) == 2
+    assert {each.state for each in reading.list_repetitions(store, submitted.id)} == {State.CANCELLED}
+    assert len(reading.list_simulators(store, submitted.id).items) == 2
 
 
 def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(store):
@@ -313,7 +313,7 @@ def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(st
 
     def cancel(experiment):
         try:
-            submission.cancel_experiment(store, experiment)
+            cancel(store, experiment)
         except Conflict:
             return "ended before"
         return "cancelled"
@@ -323,7 +323,7 @@ def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(st
         cancelled = [pool.submit(cancel, each) for each in ids]
 
     assert [each.result() for each in failed] == [each.result() == "ended before" for each in cancelled]
-    assert all(submission.read_experiment(store, each).state.ended for each in ids)
+    assert all(reading.read_experiment(store, each).state.ended for each in ids)
 
 
 def test_progress_counts_what_the_steps_took(store):
@@ -334,7 +334,7 @@ def test_progress_counts_what_the_steps_took(store):
     for step in list(some_log())[:4]:
         execution.record(store, second, step, seconds=0.5)
 
-    progress = submission.read_experiment(store, submitted.id).progress
+    progress = reading.read_experiment(store, submitted.id).progress
 
     spent = Cost(3 * 60 + 2 * 90, 3 * 3 + 2 * 3)
     assert (waiting.iterations_done, waiting.rollouts_done, waiting.seconds_left) == (0, 0, None)
@@ -352,7 +352,7 @@ def test_nothing_is_left_to_do_at_the_end(store):
 
     run(store, claim)
 
-    assert submission.read_experiment(store, submitted.id).progress.seconds_left == 0
+    assert reading.read_experiment(store, submitted.id).progress.seconds_left == 0
 
 
 @pytest.mark.parametrize("strategy", ["simulated_fit_and_informative", "known_fit", "direct"])
@@ -377,6 +377,6 @@ def test_the_budgeted_rollouts_are_those_that_a_repetition_takes_or_saves(store)
     for claim in execution.claim(store, "me", 3):
         run(store, claim, repetition(setting(claim.spec, claim.number)))
 
-    found = [each.progress for each in submission.list_experiments(store).items]
+    found = [each.progress for each in listing.list_experiments(store).items]
 
     assert [each.rollouts_done + each.rollouts_saved for each in found] == [each.rollouts for each in found]

@@ -9,11 +9,11 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.running import execution
 from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
-from tests.experiments import AWKWARD, run, some_log, toy
+from tests.experiments import AWKWARD, cancel, run, some_log, toy
 
 SECRET = 0.987654321
 
@@ -39,7 +39,7 @@ def every_page(list_page, **filters):
 def test_a_submitted_experiment_is_stored_resolved_and_queued(store):
     submitted = submission.submit_experiment(store, toy(name="mine"))
 
-    found = submission.read_experiment(store, submitted.id)
+    found = reading.read_experiment(store, submitted.id)
 
     resolved = resolve_experiment(toy(name="mine"))
     assert found == submitted
@@ -60,22 +60,22 @@ def test_a_name_may_have_any_character(store):
     experiment = submission.submit_experiment(store, toy(name="nul\0 ü 漢 🤖"))
     study = submission.submit_study(store, small_study(name="'\0'"))
 
-    assert submission.read_experiment(store, experiment.id).name == "nul\ufffd ü 漢 🤖"
-    assert submission.read_study(store, study.id).name == "'\ufffd'"
+    assert reading.read_experiment(store, experiment.id).name == "nul\ufffd ü 漢 🤖"
+    assert reading.read_study(store, study.id).name == "'\ufffd'"
 
 
 def test_an_invalid_spec_stores_nothing(store):
     with pytest.raises(InvalidSpec):
         submission.submit_study(store, small_study(strategies=["random", "no_such"]))
 
-    assert submission.list_studies(store).items == ()
-    assert submission.list_experiments(store).items == ()
+    assert listing.list_studies(store).items == ()
+    assert listing.list_experiments(store).items == ()
 
 
 def test_a_study_has_an_experiment_for_each_strategy_in_its_order(store):
     submitted = submission.submit_study(store, small_study(name="all", direct_repetitions=4))
 
-    found = submission.read_study(store, submitted.id)
+    found = reading.read_study(store, submitted.id)
 
     assert found == submitted
     assert (found.name, found.state) == ("all", State.QUEUED)
@@ -91,16 +91,16 @@ def test_the_state_of_a_study_is_that_of_its_experiments_together(store):
     states = []
 
     (first,) = execution.claim(store, "me", 1)
-    states.append(submission.read_study(store, study).state)
+    states.append(reading.read_study(store, study).state)
     execution.fail(store, first, "x")
-    states.append(submission.read_study(store, study).state)
+    states.append(reading.read_study(store, study).state)
     finish_all(store)
-    states.append(submission.read_study(store, study).state)
+    states.append(reading.read_study(store, study).state)
 
     assert states == [State.RUNNING, State.RUNNING, State.COMPLETED]
 
 
-@pytest.mark.parametrize("look", [submission.read_experiment, submission.cancel_experiment, submission.read_study])
+@pytest.mark.parametrize("look", [reading.read_experiment, cancel, reading.read_study])
 @pytest.mark.parametrize("name", ["no-such", "", "nul\0", "ü" * 1000, "'; DROP TABLE study; --"])
 def test_an_unknown_id_is_not_found_and_the_message_names_it(store, look, name):
     with pytest.raises(NotFound) as caught:
@@ -109,7 +109,7 @@ def test_an_unknown_id_is_not_found_and_the_message_names_it(store, look, name):
     assert repr(name) in str(caught.value)
 
 
-@pytest.mark.parametrize("look", [submission.list_repetitions, submission.list_samples, submission.list_simulators])
+@pytest.mark.parametrize("look", [reading.list_repetitions, reading.list_samples, reading.list_simulators])
 def test_the_results_of_an_unknown_experiment_are_not_found(store, look):
     with pytest.raises(NotFound, match="no-such"):
         look(store, "no-such")
@@ -119,10 +119,10 @@ def test_pages_have_every_experiment_once_newest_first_whatever_is_submitted_mea
     study = submission.submit_study(store, small_study())
     alone = submission.submit_experiment(store, toy())
 
-    first = submission.list_experiments(store, limit=3)
+    first = listing.list_experiments(store, limit=3)
     submission.submit_experiment(store, toy())
-    second = submission.list_experiments(store, limit=3, cursor=first.next)
-    third = submission.list_experiments(store, limit=3, cursor=second.next)
+    second = listing.list_experiments(store, limit=3, cursor=first.next)
+    third = listing.list_experiments(store, limit=3, cursor=second.next)
 
     listed = [each.id for page in (first, second, third) for each in page.items]
     assert listed == [alone.id, *(each.id for each in reversed(study.experiments))]
@@ -132,7 +132,7 @@ def test_pages_have_every_experiment_once_newest_first_whatever_is_submitted_mea
 def test_pages_of_studies_have_every_study_once_newest_first(store):
     submitted = [submission.submit_study(store, small_study(name=str(number))) for number in range(5)]
 
-    found, pages = every_page(lambda **page: submission.list_studies(store, limit=2, **page))
+    found, pages = every_page(lambda **page: listing.list_studies(store, limit=2, **page))
 
     assert found == submitted[::-1]
     assert pages == 3
@@ -141,10 +141,10 @@ def test_pages_of_studies_have_every_study_once_newest_first(store):
 def test_a_list_is_filtered_by_study_state_and_strategy(store):
     study = submission.submit_study(store, small_study())
     alone = submission.submit_experiment(store, toy())
-    submission.cancel_experiment(store, alone.id)
+    cancel(store, alone.id)
 
     def found(**filters):
-        return {each.id for each in submission.list_experiments(store, ListFilter(**filters)).items}
+        return {each.id for each in listing.list_experiments(store, ListFilter(**filters)).items}
 
     assert found(study=study.id) == {each.id for each in study.experiments}
     assert found(state=State.CANCELLED) == {alone.id}
@@ -160,10 +160,10 @@ def test_a_list_is_filtered_by_study_state_and_strategy(store):
 def test_a_cursor_that_no_page_gave_is_refused(store, listed, cursor):
     experiment = submission.submit_experiment(store, toy()).id
     pages = {
-        "experiments": lambda: submission.list_experiments(store, cursor=cursor),
-        "studies": lambda: submission.list_studies(store, cursor=cursor),
-        "samples": lambda: submission.list_samples(store, experiment, cursor=cursor + "a"),
-        "simulators": lambda: submission.list_simulators(store, experiment, cursor=cursor + "a"),
+        "experiments": lambda: listing.list_experiments(store, cursor=cursor),
+        "studies": lambda: listing.list_studies(store, cursor=cursor),
+        "samples": lambda: reading.list_samples(store, experiment, cursor=cursor + "a"),
+        "simulators": lambda: reading.list_simulators(store, experiment, cursor=cursor + "a"),
     }
 
     with pytest.raises(InvalidSpec) as caught:
@@ -178,8 +178,8 @@ def test_a_list_takes_as_many_queries_for_many_as_for_one(store):
 
     def queries():
         counted.clear()
-        submission.list_studies(store)
-        submission.list_experiments(store)
+        listing.list_studies(store)
+        listing.list_experiments(store)
         return len(counted)
 
     submission.submit_study(store, small_study(strategies=["simulated_fit"]))
@@ -195,7 +195,7 @@ def test_samples_and_probes_are_rows_in_the_order_of_the_log(store):
     for claim in execution.claim(store, "me", 2):
         run(store, claim)
 
-    page = submission.list_samples(store, experiment)
+    page = reading.list_samples(store, experiment)
 
     sample, probe = MeasurementKind.SAMPLE, MeasurementKind.PROBE
     kinds = [(0, probe), (1, sample), (1, probe), (2, sample), (2, probe)]
@@ -215,15 +215,15 @@ def test_samples_and_simulators_are_filtered_and_paged(store):
         run(store, claim)
 
     samples, pages = every_page(
-        lambda **page: submission.list_samples(store, experiment, kind=MeasurementKind.SAMPLE, limit=4, **page)
+        lambda **page: reading.list_samples(store, experiment, kind=MeasurementKind.SAMPLE, limit=4, **page)
     )
-    every, _ = every_page(lambda **page: submission.list_samples(store, experiment, limit=4, **page))
-    of_one = submission.list_samples(store, experiment, repetition=1).items
-    simulators, _ = every_page(lambda **page: submission.list_simulators(store, experiment, limit=4, **page))
-    of_iteration = submission.list_simulators(store, experiment, repetition=2, iteration=1).items
+    every, _ = every_page(lambda **page: reading.list_samples(store, experiment, limit=4, **page))
+    of_one = reading.list_samples(store, experiment, repetition=1).items
+    simulators, _ = every_page(lambda **page: reading.list_simulators(store, experiment, limit=4, **page))
+    of_iteration = reading.list_simulators(store, experiment, repetition=2, iteration=1).items
 
     assert (len(samples), pages) == (6, 2)
-    assert tuple(every) == submission.list_samples(store, experiment).items
+    assert tuple(every) == reading.list_samples(store, experiment).items
     assert [each for each in every if each.repetition == 1] == list(of_one)
     assert [(each.repetition, each.iteration, each.rank) for each in simulators] == [
         (repetition, iteration, rank) for repetition in range(3) for iteration in range(3) for rank in range(2)
@@ -235,13 +235,13 @@ def test_samples_and_simulators_are_filtered_and_paged(store):
 def test_realitys_parameters_are_shown_only_after_the_end(store):
     spec = toy(repetitions=1, reality={"parameters": {"static_friction": SECRET}})
     experiment = submission.submit_experiment(store, spec).id
-    before = submission.read_experiment(store, experiment)
+    before = reading.read_experiment(store, experiment)
     (claim,) = execution.claim(store, "me", 1)
-    while_running = submission.list_experiments(store).items[0]
+    while_running = listing.list_experiments(store).items[0]
 
     run(store, claim)
 
-    after = submission.read_experiment(store, experiment)
+    after = reading.read_experiment(store, experiment)
     for found in (before, while_running):
         assert found.spec["reality"]["parameters"] == {"static_friction": None, "dynamic_friction": None}
         assert str(SECRET) not in found.model_dump_json()
@@ -253,26 +253,26 @@ def test_realitys_parameters_are_hidden_while_any_experiment_of_the_study_can_le
     study = submission.submit_study(store, spec)
     first, second = study.experiments
 
-    submission.cancel_experiment(store, first.id)
-    meanwhile = submission.read_study(store, study.id)
-    submission.cancel_experiment(store, second.id)
+    cancel(store, first.id)
+    meanwhile = reading.read_study(store, study.id)
+    cancel(store, second.id)
 
     assert str(SECRET) not in study.model_dump_json() + meanwhile.model_dump_json()
-    assert str(SECRET) not in submission.list_experiments(store, ListFilter(state=State.QUEUED)).model_dump_json()
-    assert submission.read_experiment(store, first.id).spec["reality"]["parameters"]["static_friction"] == SECRET
+    assert str(SECRET) not in listing.list_experiments(store, ListFilter(state=State.QUEUED)).model_dump_json()
+    assert reading.read_experiment(store, first.id).spec["reality"]["parameters"]["static_friction"] == SECRET
 
 
 def test_a_queued_experiment_can_be_cancelled_once(store):
     experiment = submission.submit_experiment(store, toy()).id
 
-    cancelled = submission.cancel_experiment(store, experiment)
+    cancelled = cancel(store, experiment)
 
     assert (cancelled.state, cancelled.started_at) == (State.CANCELLED, None)
     assert cancelled.ended_at is not None
     assert cancelled.progress.seconds_left == 0
-    assert cancelled == submission.read_experiment(store, experiment)
+    assert cancelled == reading.read_experiment(store, experiment)
     with pytest.raises(Conflict, match="CANCELLED"):
-        submission.cancel_experiment(store, experiment)
+        cancel(store, experiment)
 
 
 def test_what_has_ended_cannot_be_cancelled(store):
@@ -280,7 +280,7 @@ def test_what_has_ended_cannot_be_cancelled(store):
     finish_all(store)
 
     with pytest.raises(Conflict, match="COMPLETED"):
-        submission.cancel_experiment(store, experiment)
+        cancel(store, experiment)
 
 
 def test_repetitions_tell_how_far_they_are(store):
@@ -289,7 +289,7 @@ def test_repetitions_tell_how_far_they_are(store):
     run(store, first)
     execution.fail(store, second, "the code raised")
 
-    found = submission.list_repetitions(store, experiment)
+    found = reading.list_repetitions(store, experiment)
 
     assert [each.number for each in found] == [0, 1, 2]
     assert [each.state for each in found] == [State.COMPLETED, State.FAILED, State.QUEUED]

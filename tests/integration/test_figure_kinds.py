@@ -21,7 +21,7 @@ from gaplab.services.results.curve_costs import cost_axis
 from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
-from tests.experiments import run, toy
+from tests.experiments import cancel, run, toy
 from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, curve, point, prediction, tuned
 
 
@@ -259,7 +259,7 @@ def test_time_is_that_of_evaluations_and_of_simulation_as_measured(store: Store,
 
 def test_reality_is_among_the_simulators_only_once_all_of_its_study_have_ended(store: Store, experiment: str):
     running = tuned_simulators(store, experiment)
-    submission.cancel_experiment(store, experiment)
+    cancel(store, experiment)
     ended = tuned_simulators(store, experiment)
 
     assert running.truth is None

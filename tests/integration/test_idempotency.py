@@ -16,7 +16,7 @@ from gaplab.schemas.access import Role
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.access import create_token
 from gaplab.services.core.errors import InvalidSpec
-from gaplab.services.experiments import idempotency, submission
+from gaplab.services.experiments import idempotency, listing, submission
 from gaplab.services.experiments.limits import Admission
 from gaplab.services.store.models import ExperimentRow, IdempotencyRow, RepetitionRow
 from gaplab.services.store.session import Store
@@ -157,4 +157,4 @@ def test_a_client_whose_answer_is_lost_asks_again_and_creates_one(sqlite_store: 
     with Client("http://testserver", transport=Losing(), pauses_s=(0.0, 0.0)) as client:
         made = client.submit(TOY)
 
-    assert [each.id for each in submission.list_experiments(sqlite_store).items] == [made.id]
+    assert [each.id for each in listing.list_experiments(sqlite_store).items] == [made.id]

@@ -7,7 +7,7 @@ from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import extension, lifecycle, submission
+from gaplab.services.experiments import extension, lifecycle, reading, submission
 from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.running.execution import TimedStep
@@ -22,11 +22,11 @@ def submitted(store, **changes):
 
 
 def state(store, experiment):
-    return submission.read_experiment(store, experiment).state
+    return reading.read_experiment(store, experiment).state
 
 
 def states(store, experiment):
-    return [each.state for each in submission.list_repetitions(store, experiment)]
+    return [each.state for each in reading.list_repetitions(store, experiment)]
 
 
 def ask(store, experiment, verb):
@@ -47,7 +47,7 @@ def stored(store, experiment):
 
 
 def endings(store, experiment, number=0):
-    return [each.ending for each in submission.list_attempts(store, experiment, number)]
+    return [each.ending for each in reading.list_attempts(store, experiment, number)]
 
 
 def compute(store, experiment=None):
@@ -93,7 +93,7 @@ def test_a_resumed_experiment_goes_on_from_where_it_was(store):
     assert all(deliver(store, again, 99))
     assert execution.complete(store, again)
     assert endings(store, experiment) == [Ending.PAUSED, Ending.COMPLETED]
-    assert submission.list_repetitions(store, experiment)[0].attempts == 2
+    assert reading.list_repetitions(store, experiment)[0].attempts == 2
 
 
 def test_resuming_before_the_step_is_over_interrupts_nothing(store):
@@ -178,7 +178,7 @@ def test_stopping_keeps_what_is_there(store):
     assert states(store, experiment) == [State.COMPLETED, State.COMPLETED, State.CANCELLED, State.CANCELLED]
     assert [len(each) for each in stored(store, experiment)] == [13, 10, 2, 0]
     assert [point.n for point in curves.curve(store, experiment).points] == [2, 2, 1]
-    assert submission.read_experiment(store, experiment).progress.seconds_left == 0
+    assert reading.read_experiment(store, experiment).progress.seconds_left == 0
     assert endings(store, experiment, 1) == [Ending.STOPPED]
 
 
@@ -195,7 +195,7 @@ def test_an_experiment_stopped_before_its_first_point_is_not_completed_with_noth
 
     assert state(store, experiment) is State.CANCELLED
     assert set(states(store, experiment)) == {State.CANCELLED}
-    assert submission.read_experiment(store, experiment).ended_at is not None
+    assert reading.read_experiment(store, experiment).ended_at is not None
 
 
 def test_cancelling_ends_the_attempts(store):
@@ -241,14 +241,14 @@ def obey(store, experiment, verb):
 @pytest.mark.parametrize("here", list(State))
 def test_a_forbidden_verb_is_refused_and_changes_nothing(store, here):
     experiment = in_state(store, here)
-    before = submission.read_experiment(store, experiment)
+    before = reading.read_experiment(store, experiment)
     able = ", ".join(each for each in Verb if here in PERMITTED[each]) or "nothing"
 
     for verb in (each for each in Verb if here not in PERMITTED[each]):
         with pytest.raises(Conflict, match=f"is {here} and cannot be .*: {able}$"):
             obey(store, experiment, verb)
 
-    after = submission.read_experiment(store, experiment)
+    after = reading.read_experiment(store, experiment)
     assert after.model_copy(update={"progress": before.progress}) == before
 
 
@@ -287,7 +287,7 @@ def test_an_extended_experiment_equals_one_that_was_submitted_with_the_larger_to
     assert queued == [State.QUEUED, State.QUEUED]
     assert same(tuple(found), tuple(expected))
     assert same(found[0][: len(before[0])], before[0])
-    one, other = (submission.read_experiment(store, each) for each in (small, large))
+    one, other = (reading.read_experiment(store, each) for each in (small, large))
     assert (one.spec, one.state) == (other.spec, State.COMPLETED)
     assert one.progress == other.progress
     assert curves.curve(store, small).points == curves.curve(store, large).points
@@ -347,7 +347,7 @@ def test_a_failed_repetition_is_not_tried_again_by_extending(store):
 
 def test_reality_is_hidden_again_while_an_extended_experiment_runs(store):
     experiment = in_state(store, State.COMPLETED)
-    shown = submission.read_experiment(store, experiment).spec["reality"]["parameters"]
+    shown = reading.read_experiment(store, experiment).spec["reality"]["parameters"]
 
     extended = extension.extend_experiment(store, experiment, ExtensionSpec(repetitions=9))
 
@@ -366,7 +366,7 @@ def test_attempts_say_who_had_a_repetition_and_how_it_ended(store):
         (claim,) = execution.claim(store, owner, 1)
         end(claim)
 
-    found = submission.list_attempts(store, experiment, 0)
+    found = reading.list_attempts(store, experiment, 0)
 
     assert [(each.number, each.owner, each.ending, each.reason) for each in found] == [
         (1, "first", Ending.LOST, "its process was killed"),
@@ -376,14 +376,14 @@ def test_attempts_say_who_had_a_repetition_and_how_it_ended(store):
     ]
     assert all(each.started_at <= each.ended_at for each in found)
     with pytest.raises(NotFound, match="no repetition 1"):
-        submission.list_attempts(store, experiment, 1)
+        reading.list_attempts(store, experiment, 1)
 
 
 def test_an_attempt_that_goes_on_has_no_end(store):
     experiment = submitted(store)
     execution.claim(store, "me", 1)
 
-    (found,) = submission.list_attempts(store, experiment, 0)
+    (found,) = reading.list_attempts(store, experiment, 0)
 
     assert (found.ended_at, found.ending) == (None, None)
-    assert submission.list_attempts(store, experiment, 1) == ()
+    assert reading.list_attempts(store, experiment, 1) == ()

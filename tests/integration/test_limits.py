@@ -11,7 +11,7 @@ from gaplab.api.http.limits import Streams
 from gaplab.schemas.access import Role
 from gaplab.services.access import create_token
 from gaplab.services.core.errors import LimitReached
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import reading
 from gaplab.services.running import execution
 from gaplab.services.settings import Limits, Settings, variable_of
 from gaplab.services.store.session import Store
@@ -88,7 +88,7 @@ def test_what_is_extended_counts_with_the_rollouts_that_it_has_left(sqlite_store
     made = served(sqlite_store).post("/experiments", json=TOY | {"repetitions": 3}).json()
     for claim in execution.claim(sqlite_store, "me", 9):
         run(sqlite_store, claim)
-    progress = submission.read_experiment(sqlite_store, made["id"]).progress
+    progress = reading.read_experiment(sqlite_store, made["id"]).progress
     each, done = progress.rollouts // 3, progress.rollouts_done + progress.rollouts_saved
     left = 4 * each - done
 

@@ -7,7 +7,7 @@ from sqlalchemy import event
 
 from gaplab.schemas.lifecycle import State
 from gaplab.services.archives import export_study, import_archive
-from gaplab.services.experiments import listing, submission
+from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.results import curves
 from gaplab.services.running import execution
@@ -20,8 +20,8 @@ READS = {
     "experiments of a study": lambda store: listing.list_experiments(store, ListFilter(study=study_id(0))),
     "experiments in a state": lambda store: listing.list_experiments(store, ListFilter(state=State.COMPLETED)),
     "studies": lambda store: listing.list_studies(store, limit=2),
-    "an experiment": lambda store: submission.read_experiment(store, experiment_id(0)),
-    "samples": lambda store: submission.list_samples(store, experiment_id(0)),
+    "an experiment": lambda store: reading.read_experiment(store, experiment_id(0)),
+    "samples": lambda store: reading.list_samples(store, experiment_id(0)),
     "a curve": lambda store: curves.curve(store, experiment_id(0)),
     "a study's curves": lambda store: curves.study_curves(store, study_id(0)),
 }

@@ -8,10 +8,10 @@ from sqlalchemy import event
 from gaplab.api.app import create_app
 from gaplab.api.http import metrics
 from gaplab.services.core.errors import StoreUnavailable
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution, supervisors
 from gaplab.services.store.session import Store
-from tests.experiments import run, toy
+from tests.experiments import cancel, run, toy
 
 
 def read(api: TestClient) -> dict[tuple[str, ...], float]:
@@ -24,7 +24,7 @@ def read(api: TestClient) -> dict[tuple[str, ...], float]:
 
 def test_it_counts_what_the_database_holds(store):
     submission.submit_experiment(store, toy())
-    submission.cancel_experiment(store, submission.submit_experiment(store, toy()).id)
+    cancel(store, submission.submit_experiment(store, toy()).id)
     first, _ = execution.claim(store, "me", 2)
     run(store, first)
     supervisors.heartbeat(store, "me")
@@ -37,7 +37,7 @@ def test_it_counts_what_the_database_holds(store):
     states = {"QUEUED": 1, "RUNNING": 1, "COMPLETED": 1, "FAILED": 0, "CANCELLED": 3}
     assert {state: found["gaplab_repetitions", state] for state in states} == states
     assert found["gaplab_experiments", "RUNNING"] == found["gaplab_experiments", "CANCELLED"] == 1
-    progress = submission.read_experiment(store, first.experiment_id).progress
+    progress = reading.read_experiment(store, first.experiment_id).progress
     assert found["gaplab_rollouts_total",] == progress.rollouts_done
     assert found["gaplab_steps_total",] == 13
     assert found["gaplab_rollouts_queued",] == progress.rollouts * 2 / 3

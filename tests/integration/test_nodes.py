@@ -12,7 +12,7 @@ from ray.cluster_utils import Cluster
 
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import ClusterUnusable
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import reading, submission
 from gaplab.services.settings import Settings
 from gaplab.workers import nodes
 from gaplab.workers import repetitions as task
@@ -85,7 +85,7 @@ def test_a_node_lost_in_the_middle_costs_no_result(joined, head, sqlite_store, r
     head.remove_node(busy, allow_graceful=False)
     run(supervisor, sqlite_store, experiment)
 
-    repetitions = submission.list_repetitions(sqlite_store, experiment)
+    repetitions = reading.list_repetitions(sqlite_store, experiment)
     assert [each.state for each in repetitions] == [State.COMPLETED] * 4
     assert sum(each.attempts for each in repetitions) > 4
     assert stored(sqlite_store, experiment) == in_one_process
@@ -108,7 +108,7 @@ def test_a_node_that_joins_with_other_versions_ends_the_work_before_a_step_of_it
     with pytest.raises(ClusterUnusable, match=r"the supervisor has gaplab 0\.0\.1"):
         supervisor.serve(Event())
 
-    repetitions = submission.list_repetitions(sqlite_store, experiment)
+    repetitions = reading.list_repetitions(sqlite_store, experiment)
     assert {(each.state, each.attempts) for each in repetitions} == {(State.QUEUED, 0)}
     assert stored(sqlite_store, experiment) == [[], [], []]
 
@@ -117,18 +117,18 @@ WITH_A_TOKEN = """
 import os, subprocess, sys, time
 from ray.cluster_utils import Cluster
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.experiments import submission as experiments
+from gaplab.services.experiments import reading, submission
 from gaplab.services.store.session import Store
 
 spec = ExperimentSpec.model_validate_json(sys.argv[1])
 store = Store(os.environ["GAPLAB_DATABASE_URL"])
-experiment = experiments.submit_experiment(store, spec).id
+experiment = submission.submit_experiment(store, spec).id
 head = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
 os.environ["GAPLAB_RAY_ADDRESS"] = head.address
 del os.environ["RAY_AUTH_MODE"]  # the supervisor's own default
 with subprocess.Popen([sys.executable, "-m", "gaplab.workers", "serve"]) as supervisor:
     deadline = time.monotonic() + 60
-    while not (state := experiments.read_experiment(store, experiment).state).ended and time.monotonic() < deadline:
+    while not (state := reading.read_experiment(store, experiment).state).ended and time.monotonic() < deadline:
         time.sleep(0.1)
     supervisor.terminate()
 head.shutdown()

@@ -45,7 +45,7 @@ def pool(alone):
     """A pool that knows how long a rollout takes, and has a helper."""
     warm = Pool(SPEC, alone.simulate, 1)
     deadline = time.monotonic() + 60
-    while warm.batch() < 2:
+    while warm.batch_size() < 2:
         assert time.monotonic() < deadline
         warm(*asked(alone, 2, 1))
     return warm
@@ -79,7 +79,7 @@ def until(pool, alone, batch):
     """Wait until so many rollouts are what keeps the cores busy; one call has said that there is work for them."""
     deadline = time.monotonic() + 60
     pool(*asked(alone, batch, 1))
-    while pool.batch() != batch:
+    while pool.batch_size() != batch:
         assert time.monotonic() < deadline
         time.sleep(0.05)
 
@@ -109,7 +109,7 @@ def test_a_helper_that_dies_or_dawdles_costs_time_and_no_result(alone, pool, spr
 
     np.testing.assert_array_equal(got, expected)
     assert spreads[-1].lost
-    assert pool.batch() == 1  # it is not asked again
+    assert pool.batch_size() == 1  # it is not asked again
 
 
 def test_one_of_several_helpers_that_dies_is_asked_no_more(alone, pool):

@@ -15,7 +15,7 @@ from gaplab.schemas.lifecycle import State
 from gaplab.services import events
 from gaplab.services.core.errors import Conflict, StoreUnavailable
 from gaplab.services.events import WantedEvents
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution, provenance, versions
 from gaplab.services.store.models import SPEC_VERSION
 from tests.experiments import run, same, some_log, toy
@@ -110,7 +110,7 @@ def test_a_supervisor_with_another_of_what_decides_leaves_it_alone_and_the_exper
     assert execution.claim(store, "other", 9, OTHERS[what]) == ()
     assert execution.claim(store, "other", 9, OTHERS[what]) == ()
 
-    (warning,) = submission.read_experiment(store, id_).warnings
+    (warning,) = reading.read_experiment(store, id_).warnings
     assert "does not go on" in warning
     assert f"gaplab accept-versions {id_}" in warning
     refused = events.page(store, 0, WantedEvents(kinds=frozenset({EventKind.VERSIONS_REFUSED})), limit=9).items
@@ -130,7 +130,7 @@ def test_a_plug_in_of_ones_own_that_was_edited_or_is_gone_decides_too(store, kin
 
     assert execution.claim(store, "other", 9, with_own(**{kind: "own.py ba9876543210"})) == ()
     assert execution.claim(store, "other", 9, HERE) == ()
-    (warning,) = submission.read_experiment(store, id_).warnings
+    (warning,) = reading.read_experiment(store, id_).warnings
     assert f"{kind.replace('__', ' ')} (own.py 0123456789ab)" in warning
     assert "own.py ba9876543210" in warning
 
@@ -211,8 +211,8 @@ def test_a_spec_of_a_later_version_is_not_read_and_not_run(store):
         session.execute(text("UPDATE experiment SET spec_version = 99"))
 
     with pytest.raises(StoreUnavailable, match=rf"'{id_}' is of version 99, .* reads up to {SPEC_VERSION}"):
-        submission.read_experiment(store, id_)
+        reading.read_experiment(store, id_)
     assert execution.claim(store, "me", 9) == ()
     later = submission.submit_experiment(store, toy(repetitions=1))
     assert [each.experiment_id for each in execution.claim(store, "me", 9)] == [later.id]
-    assert submission.read_experiment(store, later.id).state is State.RUNNING
+    assert reading.read_experiment(store, later.id).state is State.RUNNING

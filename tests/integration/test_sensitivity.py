@@ -10,7 +10,7 @@ from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import InvalidSpec, NotFound
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
-from gaplab.services.experiments import checks, submission
+from gaplab.services.experiments import checks, listing, reading, submission
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import subject
@@ -88,7 +88,7 @@ def test_what_was_edited_since_is_checked_anew_and_earlier_experiments_keep_thei
     other = submission.submit_experiment(store, toy(tunables=["static_friction"], robot="toy_function"))
 
     assert before.sensitivity == asked_before.id != after.sensitivity == asked_after.id
-    assert submission.read_experiment(store, before.id).sensitivity == before.sensitivity
+    assert reading.read_experiment(store, before.id).sensitivity == before.sensitivity
     assert other.sensitivity not in {before.sensitivity, after.sensitivity}
 
 
@@ -125,8 +125,8 @@ def test_what_a_check_finds_is_shown_and_warns_the_experiments(store):
         "grip over 0 to 1.5 does nothing: it changes fitness by 0.1 % of what controllers differ by",
         "slip over 0 to 1.5 is rough: 70 % of what it does to fitness jumps from value to value",
     )
-    assert submission.read_experiment(store, experiment).warnings == read.warnings
-    assert submission.list_experiments(store).items[0].warnings == read.warnings
+    assert reading.read_experiment(store, experiment).warnings == read.warnings
+    assert listing.list_experiments(store).items[0].warnings == read.warnings
 
 
 def test_the_toys_tunables_are_smooth_and_warn_of_nothing(store):
@@ -137,7 +137,7 @@ def test_the_toys_tunables_are_smooth_and_warn_of_nothing(store):
     sensitivity.complete(store, claim, found)
 
     assert {each.verdict for each in found} == {Verdict.SMOOTH}
-    assert submission.read_experiment(store, experiment).warnings == ()
+    assert reading.read_experiment(store, experiment).warnings == ()
 
 
 def test_a_tunable_between_bounds_too_narrow_to_matter_does_nothing():
@@ -154,7 +154,7 @@ def test_a_failed_check_fails_no_experiment_and_says_why(store):
 
     assert sensitivity.fail(store, claim, "ValueError: nul\0")
 
-    found = submission.read_experiment(store, experiment)
+    found = reading.read_experiment(store, experiment)
     assert found.state is State.QUEUED
     assert found.warnings == (
         "the sensitivity check failed, so that nothing is known of the tunables: ValueError: nul\ufffd",

@@ -12,7 +12,7 @@ from sqlalchemy import event, text
 
 from gaplab import migrations
 from gaplab.services.core.errors import StoreUnavailable
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import listing, submission
 from gaplab.services.running import execution
 from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.session import Store
@@ -198,7 +198,7 @@ def test_the_store_recovers_from_lost_connections(postgres_store):
             " WHERE datname = current_database() AND pid <> pg_backend_pid()"
         )
 
-    assert len(submission.list_experiments(postgres_store).items) == 1
+    assert len(listing.list_experiments(postgres_store).items) == 1
 
 
 def test_a_connection_lost_in_the_midst_is_unavailability(postgres_store):
@@ -206,7 +206,7 @@ def test_a_connection_lost_in_the_midst_is_unavailability(postgres_store):
         session.execute(text("SELECT pg_terminate_backend(pg_backend_pid())"))
 
 
-@pytest.mark.parametrize("use", [submission.list_studies, lambda store: execution.claim(store, "me", 1)])
+@pytest.mark.parametrize("use", [listing.list_studies, lambda store: execution.claim(store, "me", 1)])
 def test_to_have_no_connection_free_is_unavailability(sqlite_store, monkeypatch, use):
     pool = sqlite_store._engine.pool
     monkeypatch.setattr(pool, "_timeout", 0.01)
@@ -234,7 +234,7 @@ def test_an_unreachable_database_is_unavailable_and_recovers_by_itself(tmp_path)
     store.dispose()
 
 
-@pytest.mark.parametrize("use", [Store.check, submission.list_studies, lambda store: execution.claim(store, "me", 1)])
+@pytest.mark.parametrize("use", [Store.check, listing.list_studies, lambda store: execution.claim(store, "me", 1)])
 def test_an_unreachable_server_is_unavailable_and_the_message_has_no_password(use):
     store = Store("postgresql://me:secret@127.0.0.1:1/none")
 
@@ -244,7 +244,7 @@ def test_an_unreachable_server_is_unavailable_and_the_message_has_no_password(us
     assert "secret" not in str(caught.value)
 
 
-@pytest.mark.parametrize("use", [Store.check, submission.list_studies, lambda store: execution.claim(store, "me", 1)])
+@pytest.mark.parametrize("use", [Store.check, listing.list_studies, lambda store: execution.claim(store, "me", 1)])
 def test_a_database_without_the_schema_is_unavailable(database_url, use):
     store = Store(database_url)
 

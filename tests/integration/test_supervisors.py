@@ -15,7 +15,7 @@ import pytest
 from gaplab.schemas.lifecycle import Ending, State, Verb
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import lifecycle, submission
+from gaplab.services.experiments import lifecycle, reading, submission
 from gaplab.services.running import execution
 from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting
@@ -24,6 +24,7 @@ from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
+from tests.experiments import cancel
 from tests.fakes import flat
 from tests.processes import processes_of_ray
 from tests.supervising import impatient
@@ -72,11 +73,11 @@ def wait(until, do=lambda: time.sleep(0.1)):
 
 
 def state(store, experiment):
-    return submission.read_experiment(store, experiment).state
+    return reading.read_experiment(store, experiment).state
 
 
 def attempts(store, experiment, repetitions):
-    return [each for number in range(repetitions) for each in submission.list_attempts(store, experiment, number)]
+    return [each for number in range(repetitions) for each in reading.list_attempts(store, experiment, number)]
 
 
 def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numbers(store):
@@ -102,7 +103,7 @@ def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numb
 def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sqlite_store):
     experiment = submission.submit_experiment(sqlite_store, spec(3)).id
     supervisor = Supervisor(sqlite_store, lambda: 3)
-    done = lambda: submission.read_experiment(sqlite_store, experiment).progress.iterations_done  # noqa: E731
+    done = lambda: reading.read_experiment(sqlite_store, experiment).progress.iterations_done  # noqa: E731
     wait(done, supervisor.step)
 
     lifecycle.ask_experiment(sqlite_store, experiment, Verb.STOP)
@@ -124,7 +125,7 @@ def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite
     wait(lambda: state(sqlite_store, small).ended, supervisor.step)
 
     begun = [len(each) > 0 for each in stored(sqlite_store, large)]
-    submission.cancel_experiment(sqlite_store, large)
+    cancel(sqlite_store, large)
     wait(lambda: not (supervisor.busy or processes_of_ray("run")), supervisor.step)
     assert sum(begun) <= 4  # the two that ran, and who had the cores that they left
 

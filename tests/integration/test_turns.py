@@ -3,7 +3,7 @@
 from sqlalchemy import text
 
 from gaplab.schemas.schedule import ScheduleChange
-from gaplab.services.experiments import lifecycle, submission
+from gaplab.services.experiments import lifecycle, reading, submission
 from gaplab.services.running import execution, turns
 from tests.experiments import run, toy
 
@@ -63,7 +63,7 @@ def test_no_more_than_max_parallel_run_at_once(store):
 
 def test_the_schedule_can_be_changed_and_is_shown_and_the_spec_is_as_it_was(store):
     first, second = submitted(store, max_parallel=1), submitted(store)
-    spec = submission.read_experiment(store, second).spec
+    spec = reading.read_experiment(store, second).spec
 
     changed = lifecycle.schedule_experiment(store, second, ScheduleChange(priority=3))
     free = lifecycle.schedule_experiment(store, first, ScheduleChange(max_parallel=None))
@@ -76,7 +76,7 @@ def test_the_schedule_can_be_changed_and_is_shown_and_the_spec_is_as_it_was(stor
 def test_two_experiments_that_differ_only_in_their_schedule_have_one_spec(store):
     plain, hurried = submitted(store), submitted(store, priority=9, max_parallel=2)
 
-    assert submission.read_experiment(store, plain).spec == submission.read_experiment(store, hurried).spec
+    assert reading.read_experiment(store, plain).spec == reading.read_experiment(store, hurried).spec
 
 
 def test_what_waits_for_a_core_gives_way_to_who_has_less(store):
@@ -91,7 +91,7 @@ def test_what_waits_for_a_core_gives_way_to_who_has_less(store):
     assert not execution.complete(store, waiting[0])
     assert execution.heartbeat(store, [running]) == (running,)
     assert claimed(store, 3) == [(small, 0), (large, 1), (large, 2)]
-    assert [each.attempts for each in submission.list_repetitions(store, large)][:4] == [1, 1, 1, 0]
+    assert [each.attempts for each in reading.list_repetitions(store, large)][:4] == [1, 1, 1, 0]
 
 
 def test_nobody_gives_way_for_what_would_be_no_fairer(store):

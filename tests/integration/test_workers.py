@@ -16,7 +16,7 @@ from gaplab.services.core.errors import ClusterUnusable, StoreUnavailable
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
-from gaplab.services.experiments import checks, submission
+from gaplab.services.experiments import checks, reading, submission
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting, subject
@@ -28,6 +28,7 @@ from gaplab.workers import sensitivity as checking
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
+from tests.experiments import cancel
 from tests.fakes import flat
 from tests.processes import processes_of_ray
 
@@ -62,7 +63,7 @@ def long_toy():
 def run(supervisor, store, experiment, until=lambda: False):
     """Rounds of the supervisor until the experiment has ended, or something else is so."""
     deadline = time.monotonic() + DEADLINE_S
-    while not (submission.read_experiment(store, experiment).state.ended or until()):
+    while not (reading.read_experiment(store, experiment).state.ended or until()):
         assert time.monotonic() < deadline
         supervisor.step()
 
@@ -86,7 +87,7 @@ def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store, at
 
     run(Supervisor(store, lambda: at_once), store, experiment)
 
-    assert submission.read_experiment(store, experiment).state is State.COMPLETED
+    assert reading.read_experiment(store, experiment).state is State.COMPLETED
     assert stored(store, experiment) == expected(toy())
 
 
@@ -100,7 +101,7 @@ def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store):
         os.kill(pid, signal.SIGKILL)
     run(supervisor, sqlite_store, experiment)
 
-    repetitions = submission.list_repetitions(sqlite_store, experiment)
+    repetitions = reading.list_repetitions(sqlite_store, experiment)
     assert [each.state for each in repetitions] == [State.COMPLETED] * 2
     assert sum(each.attempts for each in repetitions) > 2
     assert stored(sqlite_store, experiment) == expected(long_toy())
@@ -119,8 +120,8 @@ def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others
 
     run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
 
-    read = submission.read_experiment(sqlite_store, experiment)
-    states = [each.state for each in submission.list_repetitions(sqlite_store, experiment)]
+    read = reading.read_experiment(sqlite_store, experiment)
+    states = [each.state for each in reading.list_repetitions(sqlite_store, experiment)]
     assert states == [State.COMPLETED, State.FAILED, State.COMPLETED]
     assert (read.state, read.progress.failed) == (State.COMPLETED, 1)
     assert read.reasons == ("ZeroDivisionError: the second one is broken",)
@@ -152,10 +153,10 @@ def test_a_repetition_that_its_log_refuses_is_queued_again_alone(sqlite_store, m
 
     run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
 
-    first, second = submission.list_attempts(sqlite_store, experiment, 1)
+    first, second = reading.list_attempts(sqlite_store, experiment, 1)
     assert (first.ending, second.ending) == (Ending.LOST, Ending.COMPLETED)
     assert reason in first.reason
-    assert [each.attempts for each in submission.list_repetitions(sqlite_store, experiment)] == [1, 2, 1]
+    assert [each.attempts for each in reading.list_repetitions(sqlite_store, experiment)] == [1, 2, 1]
     assert stored(sqlite_store, experiment) == expected(toy())
 
 
@@ -165,7 +166,7 @@ def test_a_repetition_that_its_log_refuses_again_and_again_is_failed_alone(sqlit
 
     run(Supervisor(sqlite_store, lambda: 4), sqlite_store, experiment)
 
-    repetitions = submission.list_repetitions(sqlite_store, experiment)
+    repetitions = reading.list_repetitions(sqlite_store, experiment)
     assert [each.state for each in repetitions] == [State.COMPLETED, State.FAILED, State.COMPLETED]
     assert "cannot be recorded" in repetitions[1].error
 
@@ -187,7 +188,7 @@ def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_tw
     supervisor = Supervisor(sqlite_store, lambda: 4)
 
     deadline = time.monotonic() + DEADLINE_S
-    while submission.read_experiment(sqlite_store, experiment).state is not State.COMPLETED:
+    while reading.read_experiment(sqlite_store, experiment).state is not State.COMPLETED:
         assert time.monotonic() < deadline
         try:
             supervisor.step()
@@ -205,17 +206,17 @@ def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store):
         supervisor,
         sqlite_store,
         experiment,
-        until=lambda: submission.read_experiment(sqlite_store, experiment).progress.iterations_done,
+        until=lambda: reading.read_experiment(sqlite_store, experiment).progress.iterations_done,
     )
 
-    submission.cancel_experiment(sqlite_store, experiment)
+    cancel(sqlite_store, experiment)
     deadline = time.monotonic() + DEADLINE_S
     while processes_of_ray("run"):
         assert time.monotonic() < deadline
         supervisor.step()
 
-    assert submission.read_experiment(sqlite_store, experiment).state is State.CANCELLED
-    assert submission.read_experiment(sqlite_store, experiment).progress.iterations_done
+    assert reading.read_experiment(sqlite_store, experiment).state is State.CANCELLED
+    assert reading.read_experiment(sqlite_store, experiment).progress.iterations_done
 
 
 def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_store):
@@ -227,7 +228,7 @@ def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_sto
     first.serve(stop)
     run(Supervisor(sqlite_store, lambda: 2), sqlite_store, experiment)
 
-    assert submission.read_experiment(sqlite_store, experiment).state is State.COMPLETED
+    assert reading.read_experiment(sqlite_store, experiment).state is State.COMPLETED
     assert stored(sqlite_store, experiment) == expected(toy())
 
 
@@ -273,7 +274,7 @@ def test_told_to_stop_in_the_middle_of_a_step_it_hands_over_what_the_step_has(sq
 
     first.serve(stop)
 
-    (left,) = submission.list_repetitions(sqlite_store, experiment)
+    (left,) = reading.list_repetitions(sqlite_store, experiment)
     assert (left.state, left.attempts) == (State.QUEUED, 0)
     run(Supervisor(sqlite_store, lambda: 1), sqlite_store, experiment)
     assert stored(sqlite_store, experiment) == expected(long_steps())
@@ -295,7 +296,7 @@ def test_a_sensitivity_check_runs_beside_repetitions_and_tells_the_same_as_in_on
     run(supervisor, store, experiment.id)
 
     assert found.tunables == check(subject(found.spec), SteadyState(), Effort(17, 100))
-    assert submission.read_experiment(store, experiment.id).state is State.COMPLETED
+    assert reading.read_experiment(store, experiment.id).state is State.COMPLETED
     assert stored(store, experiment.id) == expected(toy())
 
 
@@ -313,7 +314,7 @@ def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store, monkeypatch):
     run(supervisor, sqlite_store, experiment.id)
 
     assert (found.state, found.reason) == (State.FAILED, "ZeroDivisionError: the check is broken")
-    read = submission.read_experiment(sqlite_store, experiment.id)
+    read = reading.read_experiment(sqlite_store, experiment.id)
     assert read.state is State.COMPLETED
     assert read.warnings[0].endswith("ZeroDivisionError: the check is broken")
 

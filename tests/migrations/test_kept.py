@@ -9,7 +9,7 @@ from gaplab import migrations
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
@@ -41,17 +41,17 @@ def compute(store):
 
 def numbers(store, experiment):
     """Every number that the experiment found, but for when and by whom it was found."""
-    samples = submission.list_samples(store, experiment).items
+    samples = reading.list_samples(store, experiment).items
     return (
         [each.model_dump(exclude={"measured_at"}) for each in samples],
-        submission.list_simulators(store, experiment).items,
+        reading.list_simulators(store, experiment).items,
         curves.curve(store, experiment).points,
-        [each.rollouts_done for each in submission.list_repetitions(store, experiment)],
+        [each.rollouts_done for each in reading.list_repetitions(store, experiment)],
     )
 
 
 def test_it_goes_on_to_the_same_end_as_a_run_that_never_stopped(store):
-    kept = {each.name: each for each in submission.list_experiments(store).items}
+    kept = {each.name: each for each in listing.list_experiments(store).items}
     before = numbers(store, kept["complete"].id)
     assert kept["complete"].state is State.COMPLETED
     assert kept["half-way"].state is State.RUNNING
@@ -63,13 +63,13 @@ def test_it_goes_on_to_the_same_end_as_a_run_that_never_stopped(store):
 
     assert numbers(store, kept["complete"].id) == before
     for name, again in fresh.items():
-        assert submission.read_experiment(store, kept[name].id).state is State.COMPLETED
+        assert reading.read_experiment(store, kept[name].id).state is State.COMPLETED
         assert numbers(store, kept[name].id) == numbers(store, again)
 
 
 def stored(store, experiment):
     """The spec with nothing hidden, as the repetitions of the experiment have it."""
-    spec = submission.read_experiment(store, experiment).spec
+    spec = reading.read_experiment(store, experiment).spec
     truth = {"static_friction": 1.0, "dynamic_friction": 0.8}
     return ExperimentSpec.model_validate(spec | {"reality": spec["reality"] | {"parameters": truth}})
 

@@ -13,7 +13,7 @@ from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.archives import export_study, import_archive
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Probed, Selected, Transferred, Tuned
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import reading
 from gaplab.services.results import curves
 from gaplab.services.specs.assembly import setting
 from tests.numbers.kept import FOLDER, ITERATION, archive, exact, members, numbers, other_machine, other_versions
@@ -112,9 +112,9 @@ def test_an_import_shows_and_exports_the_kept_numbers(kept, store):
 def assert_shown(store, found):
     for experiment, curve in zip(found["experiment"], found["curves"], strict=True):
         id_ = experiment["id"]
-        assert submission.read_experiment(store, id_).spec == experiment["spec"]
-        assert pages(submission.list_samples, store, id_, SAMPLE) == kept_samples(found, id_)
-        assert pages(submission.list_simulators, store, id_, SIMULATOR) == kept_simulators(found, experiment)
+        assert reading.read_experiment(store, id_).spec == experiment["spec"]
+        assert pages(reading.list_samples, store, id_, SAMPLE) == kept_samples(found, id_)
+        assert pages(reading.list_simulators, store, id_, SIMULATOR) == kept_simulators(found, experiment)
         shown = curves.curve(store, id_)
         assert chosen(shown.model_dump(mode="json"), curve) == exact(curve)
         assert points(shown) == kept_points(found, id_)

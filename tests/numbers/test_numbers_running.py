@@ -12,7 +12,7 @@ from gaplab import migrations
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.archives import export_experiment
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.running import execution
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import Store
@@ -47,7 +47,7 @@ def submit(store, found):
 def run(supervisor, store, ids, until=lambda: False):
     """Let the supervisor work until all experiments have ended, or the condition holds."""
     deadline = time.monotonic() + DEADLINE_S
-    while not (all(submission.read_experiment(store, each).state.ended for each in ids) or until()):
+    while not (all(reading.read_experiment(store, each).state.ended for each in ids) or until()):
         assert time.monotonic() < deadline
         supervisor.step()
 
@@ -74,7 +74,7 @@ def test_any_number_of_workers_computes_the_kept_numbers(store, at_once):
     run(Supervisor(store, lambda: at_once), store, [each for own in ids for each in own])
 
     for own, found in zip(ids, studies, strict=True):
-        assert {submission.read_experiment(store, each).state for each in own} == {State.COMPLETED}
+        assert {reading.read_experiment(store, each).state for each in own} == {State.COMPLETED}
         assert_kept(stored(store, own), numbers(found))
 
 
@@ -98,13 +98,13 @@ def test_workers_killed_in_the_middle_of_a_step_cost_no_number(store):
         os.kill(pid, signal.SIGKILL)
     run(supervisor, store, ids)
 
-    assert sum(each.attempts for each in submission.list_repetitions(store, ids[0])) > 2
+    assert sum(each.attempts for each in reading.list_repetitions(store, ids[0])) > 2
     assert_kept(stored(store, ids), numbers(found))
 
 
 def done(store, ids):
     """Whether a repetition is in the middle, with iteration 0 behind it."""
-    return any(submission.read_experiment(store, each).progress.iterations_done for each in ids)
+    return any(reading.read_experiment(store, each).progress.iterations_done for each in ids)
 
 
 def test_a_database_of_a_killed_supervisor_ends_with_the_kept_numbers(tmp_path):
@@ -115,7 +115,7 @@ def test_a_database_of_a_killed_supervisor_ends_with_the_kept_numbers(tmp_path):
     connection.close()
     migrations.upgrade(f"sqlite:///{file}")
     store = Store(f"sqlite:///{file}")
-    ids = [each.id for each in submission.list_experiments(store).items]
+    ids = [each.id for each in listing.list_experiments(store).items]
     execution.requeue_lost(store, stale_after_s=-1)
 
     run(Supervisor(store, lambda: 2), store, ids)

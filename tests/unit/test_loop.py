@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.core.loop import History, next_step, recorded_fitness, repetition
+from gaplab.services.core.loop import recorded_fitness, repetition
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import EnsembleOptions, Strategy
 from gaplab.services.core.strategies.informative import Informative
@@ -39,7 +39,7 @@ def test_a_resumed_repetition_equals_an_uninterrupted_one_wherever_it_stopped(st
 def test_no_number_depends_on_how_many_rollouts_are_asked_for_at_a_time(strategy, batch):
     one_by_one = [flat(step) for step in repetition(small_setting(strategy))]
 
-    together = repetition(replace(small_setting(strategy), batch=lambda: batch))
+    together = repetition(replace(small_setting(strategy), batch_size=lambda: batch))
 
     assert [flat(step) for step in together] == one_by_one
 
@@ -47,8 +47,10 @@ def test_no_number_depends_on_how_many_rollouts_are_asked_for_at_a_time(strategy
 def test_newcomers_are_foreseen_so_that_fewer_calls_are_waited_for():
     def calls_of_a_transfer(batch):
         simulate = Recorder()
-        setting = small_setting("random", simulate=simulate, batch=lambda: batch)
-        next_step(setting, History().after(next_step(setting, History())))
+        setting = small_setting("random", simulate=simulate, batch_size=lambda: batch)
+        steps = repetition(setting)
+        next(steps)
+        next(steps)
         return len(simulate.calls)
 
     assert calls_of_a_transfer(8) < 0.8 * calls_of_a_transfer(1)
@@ -213,7 +215,7 @@ def test_a_controller_whose_physics_fails_never_wins():
 def test_repetitions_strategies_and_seeds_draw_different_simulators():
     settings = [small_setting(), small_setting(repetition=5), small_setting(seed=12), small_setting("random")]
 
-    drawn = {flat(next_step(setting, History())) for setting in settings}
+    drawn = {flat(next(repetition(setting))) for setting in settings}
 
     assert len(drawn) == len(settings)
 
@@ -233,9 +235,9 @@ def test_the_population_of_a_fit_strategy_yields_its_one_best_simulator():
 def test_the_transfer_evolves_in_the_best_simulator():
     best = np.array([0.3, 0.6])
     setting = small_setting(budget=Budget(500, 10, 10))
-    step = Tuned(1, tuple(replace(each) for each in next_step(setting, History()).simulators))
+    step = Tuned(1, tuple(replace(each) for each in next(repetition(setting)).simulators))
     step = replace(step, simulators=(replace(step.simulators[0], parameters=best),))
 
-    transferred = next_step(setting, History().after(step))
+    transferred = next(repetition(setting, [step]))
 
     np.testing.assert_allclose(transferred.genome, best, atol=0.01)

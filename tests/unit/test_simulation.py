@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gaplab.services.core.counted import Counted
+from gaplab.services.core.answers import Answers
 from gaplab.services.core.robots.toy_function import ToyFunction
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.specs.assembly import HiddenReality, Simulation
@@ -27,13 +27,13 @@ class Endless(ToyFunction):
 def test_a_fitness_that_is_not_finite_is_physics_that_failed_in_simulation_and_in_reality(worth):
     whole, broken = (Simulation(robot, Analytic(), ()) for robot in (ToyFunction(), Endless(worth)))
     genomes, parameters = np.linspace(0.0, 1.0, 50)[:, None], np.empty((1, 0))
-    counted = Counted(broken)
+    answers = Answers(broken)
 
-    fitnesses, expected = counted(genomes, parameters), whole(genomes, parameters)
+    fitnesses, expected = answers(genomes, parameters), whole(genomes, parameters)
 
     failed = expected > 0.3
     assert failed.any()
     assert not failed.all()
     np.testing.assert_array_equal(fitnesses, np.where(failed, np.nan, expected))
-    assert counted.count.cost_of(50).failures == failed.sum()
+    assert answers.cost_of(50).failures == failed.sum()
     assert np.isnan(HiddenReality(broken, np.empty(0))(genomes[failed[:, 0]][0]))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gaplab.services.core.answers import Answers
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
 from gaplab.services.core.tuning import Misfit, draw_simulators, simulator_fitness, squared_errors, tune
 from gaplab.services.core.types import Sample, Space
@@ -29,7 +30,7 @@ def test_a_simulator_that_fails_on_a_sample_has_an_infinite_error():
 
 
 def test_tuning_finds_the_parameters_of_reality():
-    best, *_ = tune(Misfit(paraboloid, SAMPLES), SPACE, SteadyState(), 1000, np.random.default_rng(1))
+    best, *_ = tune(Misfit(Answers(paraboloid), SAMPLES), SPACE, SteadyState(), 1000, np.random.default_rng(1))
 
     np.testing.assert_allclose(best.parameters, TRUTH, atol=0.01)
 
@@ -40,9 +41,9 @@ def many_samples(count):
 
 
 class Thorough(SteadyState):
-    """The same evolution, but it calls nothing hopeless: every simulator is asked for every sample."""
+    """The same evolution, but it knows no threshold: every simulator is asked for every sample."""
 
-    def hopeless(self, state, genomes):
+    def rejection_thresholds(self, state, genomes):
         return np.full(len(genomes), -np.inf)
 
     def diverse(self, size):
@@ -52,13 +53,12 @@ class Thorough(SteadyState):
 @pytest.mark.parametrize("batch", [1, 4])
 @pytest.mark.parametrize("count", [1, 3, 10])
 @pytest.mark.parametrize("diverse", [False, True])
-def test_giving_hopeless_simulators_up_saves_rollouts_and_changes_no_bit(count, diverse, batch):
+def test_giving_up_simulators_below_their_threshold_saves_rollouts_and_changes_no_bit(count, diverse, batch):
     def tuned(optimizer):
         simulate = Recorder()
         optimizer = optimizer.diverse(8) if diverse else optimizer
-        found = tune(
-            Misfit(simulate, many_samples(count), lambda: batch), SPACE, optimizer, 300, np.random.default_rng(1)
-        )
+        misfit = Misfit(Answers(simulate, lambda: batch), many_samples(count))
+        found = tune(misfit, SPACE, optimizer, 300, np.random.default_rng(1))
         return [(each.parameters.tobytes(), each.squared_error) for each in found], simulate.rollouts
 
     thorough, all_rollouts = tuned(Thorough())
@@ -69,12 +69,12 @@ def test_giving_hopeless_simulators_up_saves_rollouts_and_changes_no_bit(count, 
     assert count <= batch or rollouts < 0.9 * all_rollouts
 
 
-def test_failing_physics_makes_a_simulator_hopeless_too():
+def test_a_simulator_whose_physics_fails_is_given_up_too():
     def half_broken(genomes, parameters):
         return np.where(parameters[None, :, 0] < 0.5, np.nan, paraboloid(genomes, parameters))
 
     def tuned(optimizer):
-        found = tune(Misfit(half_broken, many_samples(5)), SPACE, optimizer, 200, np.random.default_rng(1))
+        found = tune(Misfit(Answers(half_broken), many_samples(5)), SPACE, optimizer, 200, np.random.default_rng(1))
         return [(each.parameters.tobytes(), each.squared_error) for each in found]
 
     assert tuned(SteadyState()) == tuned(Thorough())
@@ -90,7 +90,7 @@ def test_a_simulators_error_does_not_depend_on_how_many_are_asked_for_at_once():
 
 
 def test_simulators_come_best_first_with_their_own_error():
-    simulators = tune(Misfit(paraboloid, SAMPLES), SPACE, SteadyState(), 100, np.random.default_rng(1))
+    simulators = tune(Misfit(Answers(paraboloid), SAMPLES), SPACE, SteadyState(), 100, np.random.default_rng(1))
 
     errors = [each.squared_error for each in simulators]
     measured = np.array([each.fitness for each in SAMPLES])
@@ -101,7 +101,7 @@ def test_simulators_come_best_first_with_their_own_error():
 
 def test_a_diverse_ensemble_stays_farther_apart_than_a_converged_population():
     def spread(optimizer):
-        found = tune(Misfit(paraboloid, SAMPLES), SPACE, optimizer, 500, np.random.default_rng(1))
+        found = tune(Misfit(Answers(paraboloid), SAMPLES), SPACE, optimizer, 500, np.random.default_rng(1))
         return np.array([each.parameters for each in found]).std(axis=0).mean()
 
     population = SteadyState(SteadyStateOptions(population=10))
@@ -113,7 +113,7 @@ def test_failing_physics_never_wins():
     def half_broken(genomes, parameters):
         return np.where(parameters[None, :, 0] < 0.5, np.nan, paraboloid(genomes, parameters))
 
-    best, *_ = tune(Misfit(half_broken, SAMPLES), SPACE, SteadyState(), 300, np.random.default_rng(1))
+    best, *_ = tune(Misfit(Answers(half_broken), SAMPLES), SPACE, SteadyState(), 300, np.random.default_rng(1))
 
     assert best.parameters[0] >= 0.5
 

@@ -87,14 +87,14 @@ class SteadyState(Optimizer):
         rule, _ = REPLACEMENTS[self.options.replacement]
         return insert(state, genomes, fitness, self.options.population, rule)
 
-    def hopeless(self, state: Population, genomes: Genomes) -> FloatArray:
-        """`(n,)` fitnesses below which each newcomer is dropped at once.
+    def rejection_thresholds(self, state: Population, genomes: Genomes) -> FloatArray:
+        """Return the fitness, `(n,)`, below which each newcomer is dropped at once; -inf where that is uncertain.
 
-        Of several newcomers, those before one may change which pair is the most similar: then nothing is certain.
+        Of several newcomers, an earlier one may change which pair is the most similar: then nothing is certain.
         """
         uncertain = self.options.replacement != "least_fit" and len(genomes) > 1
         if state.size < self.options.population or uncertain:
-            return super().hopeless(state, genomes)
+            return np.full(len(genomes), -np.inf)
         _, bound = REPLACEMENTS[self.options.replacement]
         return np.array([bound(state, genome) for genome in genomes])
 

@@ -1,4 +1,4 @@
-"""Attempts: a row for each lease of a repetition, written in the transaction that moves the lease."""
+"""Attempts: the history of a repetition's leases, written in the transactions that begin and end them."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ from gaplab.services.store.clock import now
 from gaplab.services.store.models import AttemptRow, RepetitionRow
 from gaplab.services.store.queries.events import note
 
-_TOLD = {
+_EVENTS = {
     Ending.COMPLETED: EventKind.REPETITION_COMPLETED,
     Ending.PAUSED: EventKind.REPETITION_PAUSED,
     Ending.STOPPED: EventKind.REPETITION_STOPPED,
@@ -25,14 +25,14 @@ _TOLD = {
 
 
 def begin(session: Session, repetitions: Sequence[int]) -> None:
-    """These repetitions were claimed: their owner's attempt begins."""
+    """Begin an attempt at each of these claimed repetitions."""
     row = RepetitionRow
     claimed = select(row.id, row.epoch, row.owner, now()).where(row.id.in_(repetitions))
     session.execute(insert(AttemptRow).from_select(["repetition_id", "epoch", "owner", "started_at"], claimed))
 
 
 def end(session: Session, repetitions: Sequence[int], ending: Ending, reason: str | None = None) -> None:
-    """The attempts at these repetitions that go on are over, which is an event of each."""
+    """End the open attempts at these repetitions, and note an event for each."""
     row, repetition = AttemptRow, RepetitionRow
     ended = session.scalars(
         update(row)
@@ -40,16 +40,16 @@ def end(session: Session, repetitions: Sequence[int], ending: Ending, reason: st
         .values(ended_at=now(), ending=ending, reason=reason)
         .returning(row.repetition_id)
     ).all()
-    found = select(repetition).where(repetition.id.in_(ended)).order_by(repetition.id)
-    for each in session.scalars(found, execution_options={"populate_existing": True}):
+    rows = select(repetition).where(repetition.id.in_(ended)).order_by(repetition.id)
+    for each in session.scalars(rows, execution_options={"populate_existing": True}):
         failed = each.state is State.FAILED
         why = each.error if failed else reason
-        kind = EventKind.REPETITION_FAILED if failed else _TOLD[ending]
+        kind = EventKind.REPETITION_FAILED if failed else _EVENTS[ending]
         note(session, kind, each.experiment_id, each.number, **({"reason": why} if why else {}))
 
 
 def latest(session: Session, experiment: str) -> dict[int, int]:
-    """The number of the latest attempt at each repetition of an experiment that has had one."""
+    """Return the number of the latest attempt by repetition, for an experiment's repetitions that have had one."""
     row, repetition = AttemptRow, RepetitionRow
     of_it = select(row.repetition_id, func.max(row.epoch)).join(repetition, repetition.id == row.repetition_id)
     found = of_it.where(repetition.experiment_id == experiment).group_by(row.repetition_id)
@@ -57,7 +57,7 @@ def latest(session: Session, experiment: str) -> dict[int, int]:
 
 
 def attempts_of(session: Session, experiment: str, number: int) -> tuple[AttemptRead, ...]:
-    """The attempts at a repetition of an experiment, by number.
+    """Return the attempts at a repetition, by number.
 
     Raises:
         NotFound: the experiment has no such repetition.

@@ -1,4 +1,4 @@
-"""Checkpoints of the steps under way: stored in parts, read with a claim, and forgotten when the step is recorded."""
+"""Checkpoints of the steps under way: stored in parts, read with a claim, forgotten when the step is recorded."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -13,12 +13,12 @@ from gaplab.services.store.models import CheckpointRow, RepetitionRow
 
 
 def fresh(checkpoints: Sequence[Checkpoint], step: int, parts: int) -> list[Checkpoint]:
-    """Those of the step that are not stored yet; of steps that are over, none.
+    """Return the delivered parts of the step under way that are not stored yet.
 
     Args:
         checkpoints: as delivered, in order.
-        step: the place in the log of the one that is under way.
-        parts: of it that are stored.
+        step: place in the log of the step under way.
+        parts: number of its stored parts.
 
     Raises:
         Conflict: parts, or steps, before a delivered one are missing.
@@ -35,7 +35,7 @@ def fresh(checkpoints: Sequence[Checkpoint], step: int, parts: int) -> list[Chec
 
 
 def write(session: Session, parts: Mapping[Claim, Sequence[Checkpoint]]) -> None:
-    """Add these parts to the steps under way; their repetitions are locked, and the claims hold."""
+    """Store parts of steps under way. The repetitions are locked, and the claims hold."""
     rows = [
         {"repetition_id": claim.id} | {name: getattr(each, name) for name in Checkpoint.__dataclass_fields__}
         for claim, checkpoints in parts.items()
@@ -53,13 +53,13 @@ def write(session: Session, parts: Mapping[Claim, Sequence[Checkpoint]]) -> None
 
 
 def forget(session: Session, repetitions: Sequence[int]) -> None:
-    """The steps that were under way are recorded, or will never be."""
+    """Remove the parts of steps that are recorded or given up."""
     if repetitions:
         session.execute(delete(CheckpointRow).where(CheckpointRow.repetition_id.in_(repetitions)))
 
 
 def stored(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Checkpoint, ...]]:
-    """What there is of the step under way of each of these repetitions."""
+    """Return the stored parts of the step under way, by repetition."""
     row = CheckpointRow
     found = session.scalars(select(row).where(row.repetition_id.in_(repetitions)).order_by(row.step, row.part))
     gathered: dict[int, list[Checkpoint]] = defaultdict(list)

@@ -1,4 +1,4 @@
-"""Events: noted while a transaction does what they tell of, numbered and written as the last thing before its commit.
+"""Events: noted during a transaction, then numbered and written right before its commit.
 
 Numbers come from one row, which is locked from then on until the commit: a number is visible only with all smaller
 ones, and a transaction that is rolled back takes none. Nothing is locked after that row: nobody waits in a circle.
@@ -34,33 +34,33 @@ _INSERT_ON_POSTGRES = text(
     "FROM unnest(CAST(:experiments AS text[]), CAST(:repetitions AS integer[]), CAST(:kinds AS text[]), "
     "CAST(:bodies AS text[])) WITH ORDINALITY AS noted (experiment_id, repetition, kind, body, place)"
 )
-"""A row each, as the other database gets them, costs five times as much there: thousands of steps a second do count."""
+"""One INSERT for each row costs five times as much on Postgres, which counts at thousands of steps a second."""
 
 
 def note(session: Session, kind: EventKind, experiment: str, repetition: int | None = None, /, **body: Any) -> None:  # noqa: ANN401
-    """It is an event once the session's transaction is committed, and never was if it is not.
+    """Note an event, which is stored if and when the session's transaction commits.
 
     Args:
         session: of a transaction that writes.
         kind: what happened.
-        experiment: to which.
-        repetition: to which of its repetitions.
-        body: a few values that JSON has; never reality's parameters.
+        experiment: id of the experiment.
+        repetition: number of the repetition, if it is about one.
+        body: a few JSON values; never reality's parameters.
     """
     values = {"kind": kind.value, "experiment_id": experiment, "repetition": repetition, "body": body}
     session.info.setdefault(_NOTED, []).append(values)
 
 
 def note_steps(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]) -> None:
-    """An event for each of these steps."""
+    """Note an event for each of these steps."""
     for claim, steps in deliveries.items():
         for each in steps:
-            kind, body = _told(each.step)
+            kind, body = _event_of(each.step)
             note(session, kind, claim.experiment_id, claim.number, iteration=each.step.iteration, **body)
 
 
 def write(session: Session) -> None:
-    """Number and store what was noted; for the store, right before it commits."""
+    """Number and store the noted events; the store calls this right before a commit."""
     if not (noted := session.info.pop(_NOTED, None)):
         return
     session.flush()
@@ -82,8 +82,8 @@ def _columns(noted: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
     }
 
 
-def _told(step: Step) -> tuple[EventKind, dict[str, Any]]:
-    """What an event says of a step: what it came to, and no vector."""
+def _event_of(step: Step) -> tuple[EventKind, dict[str, Any]]:
+    """Return the kind and body of a step's event; the body has results, but no vectors."""
     match step:
         case Selected():
             return EventKind.SELECTED, {}

@@ -1,4 +1,4 @@
-"""Experiments and studies: inserted, found, listed."""
+"""Experiments and studies: inserted, found, locked."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,8 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import OPEN, State
-from gaplab.schemas.spec import ExperimentSpec, Schedule
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.spec import Schedule
 from gaplab.services.core.errors import NotFound, StoreUnavailable
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import SPEC_VERSION, ExperimentRow, RepetitionRow, StudyRow
@@ -24,7 +25,7 @@ _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 
 @dataclass(frozen=True)
 class Extent:
-    """How much one repetition is.
+    """The size of one repetition.
 
     Attributes:
         iterations: number 0 included.
@@ -36,16 +37,16 @@ class Extent:
 
 
 def new_id() -> str:
-    """A short random name, without letters that look alike.
+    """Return a short random name, without letters that look alike.
 
-    There are 31 to the tenth of them, 8e14: among a million, the next one is taken with a probability of 1e-9. Then the
-    database refuses it, as an IntegrityError, and nothing of what it was for is stored.
+    There are 31 to the tenth, 8e14: among a million names, the next one is taken with a probability of 1e-9. The
+    database then refuses it with an IntegrityError, and stores nothing of its transaction.
     """
     return "".join(choice(_LETTERS) for _ in range(10))
 
 
 def insert_study(session: Session, name: str) -> StudyRow:
-    """A study without experiments yet."""
+    """Add a study without experiments."""
     study = StudyRow(id=new_id(), name=storable(name), created_at=moment(session))
     session.add(study)
     session.flush()
@@ -54,14 +55,14 @@ def insert_study(session: Session, name: str) -> StudyRow:
 
 def insert_experiment(
     session: Session,
-    spec: ExperimentSpec,
+    spec: ResolvedSpec,
     extent: Extent,
     *,
     study: StudyRow | None = None,
     position: int = 0,
     token: str | None = None,
 ) -> ExperimentRow:
-    """An experiment with its repetitions, all QUEUED.
+    """Add an experiment with its repetitions, all QUEUED.
 
     Args:
         session: of a transaction that writes.
@@ -75,7 +76,7 @@ def insert_experiment(
         id=new_id(),
         study_id=study.id if study else None,
         position=position,
-        name=storable(spec.name or spec.strategy.name),
+        name=storable(spec.name),
         strategy=spec.strategy.name,
         spec=spec.model_dump(mode="json", exclude=set(Schedule.model_fields)),
         iterations=extent.iterations,
@@ -87,13 +88,13 @@ def insert_experiment(
     )
     session.add(experiment)
     session.flush()
-    insert_repetitions(session, experiment.id, range(spec.repetitions or 0))
+    insert_repetitions(session, experiment.id, range(spec.repetitions))
     note(session, EventKind.SUBMITTED, experiment.id, name=experiment.name, repetitions=spec.repetitions)
     return experiment
 
 
 def insert_repetitions(session: Session, experiment_id: str, numbers: range) -> None:
-    """Repetitions of these numbers, QUEUED."""
+    """Add repetitions of these numbers, QUEUED."""
     rows = [{"experiment_id": experiment_id, "number": each} for each in numbers]
     if rows:
         session.execute(insert(RepetitionRow), rows)
@@ -109,10 +110,10 @@ def get_experiment(session: Session, experiment_id: str) -> ExperimentRow:
 
 
 def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow, ...]:
-    """The experiments of these ids, in their order.
+    """Return the experiments of these ids, in their order.
 
     Raises:
-        NotFound: there is none of one of them.
+        NotFound: one of them is not there.
     """
     named = ExperimentRow.id.in_([storable(each) for each in ids])
     found = {row.id: row for row in session.scalars(select(ExperimentRow).where(named))}
@@ -132,20 +133,20 @@ def get_study(session: Session, study_id: str) -> StudyRow:
 
 
 def experiments_of(session: Session, studies: Sequence[str]) -> tuple[ExperimentRow, ...]:
-    """The experiments of these studies, in the order in which each study has them."""
+    """Return the experiments of these studies, by study and position."""
     row = ExperimentRow
     return tuple(session.scalars(select(row).where(row.study_id.in_(studies)).order_by(row.study_id, row.position)))
 
 
 def open_studies(session: Session, studies: Sequence[str]) -> frozenset[str]:
-    """Those of these studies in which an experiment has not ended."""
+    """Return the ids of the studies in which an experiment has not ended."""
     row = ExperimentRow
     found = session.scalars(select(row.study_id).where(row.study_id.in_(studies), row.state.in_(OPEN)).distinct())
     return frozenset(each for each in found if each is not None)
 
 
 def repetitions_of(session: Session, experiment_id: str) -> tuple[RepetitionRow, ...]:
-    """The repetitions of an experiment, by number."""
+    """Return the repetitions of an experiment, by number."""
     row = RepetitionRow
     return tuple(session.scalars(select(row).where(row.experiment_id == experiment_id).order_by(row.number)))
 
@@ -169,7 +170,7 @@ def _get(session: Session, table: type[R], noun: str, id_: str) -> R:
 
 @event.listens_for(ExperimentRow, "load")
 def _refuse_newer(row: ExperimentRow, _: object) -> None:
-    """A spec of a later version may mean something else than what it seems to: it is not read at all."""
+    """Refuse a spec of a later version, which may mean something else than it seems to."""
     if row.spec_version > SPEC_VERSION:
         msg = f"the spec of experiment {row.id!r} is of version {row.spec_version}, and this gaplab reads up to "
         msg += f"{SPEC_VERSION}: use a later gaplab with this database"

@@ -1,4 +1,4 @@
-"""The rows of many steps of many repetitions, written by as few statements as there are kinds of rows."""
+"""Rows of steps: those of many steps of many repetitions are written by a few statements."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
@@ -24,13 +24,13 @@ _ORDER: tuple[type[Step], ...] = (Selected, Measured, Tuned, Transferred, Probed
 
 Row = dict[str, Any]
 Key = tuple[int, int]
-"""A repetition's id and the number of one of its iterations."""
+"""Repetition's id, and number of an iteration."""
 
 
 class StepRows:
-    """Collects what steps say; `write` adds it to the log of their repetitions.
+    """Collects the rows of steps, until `write` stores them.
 
-    Each step may be added once, and only if it is the next one: the batch trusts its caller that this was checked.
+    The caller has checked that each step is new and the next one.
     """
 
     def __init__(self) -> None:
@@ -41,7 +41,7 @@ class StepRows:
         self._measurements: dict[tuple[Key, MeasurementKind], Row] = {}
 
     def add(self, claim: Claim, timed: TimedStep) -> None:
-        """One step of the claim's repetition."""
+        """Add a step of the claim's repetition."""
         step, key = timed.step, (claim.id, timed.step.iteration)
         columns = self._columns[key]
         columns.update(iteration_columns(step))
@@ -56,7 +56,7 @@ class StepRows:
             self._measurements[key, _kind(step)] = measurement_columns(step, _measured_by(claim))
 
     def write(self, session: Session) -> None:
-        """Everything that was added, in the session's transaction."""
+        """Store all rows in the session's transaction."""
         connection = session.connection()
         self._write_iterations(connection)
         if self._simulators:
@@ -65,11 +65,11 @@ class StepRows:
             connection.execute(insert(_MEASUREMENT), self._measured(connection))
 
     def _write_iterations(self, connection: Connection) -> None:
-        """One statement for the iterations that begin or go on alike: there are hardly ever more than three kinds."""
-        alike: dict[tuple[bool, bool, tuple[str, ...]], list[Key]] = defaultdict(list)
+        """Write iterations by one statement for each set of filled columns; there are rarely more than three."""
+        by_columns: dict[tuple[bool, bool, tuple[str, ...]], list[Key]] = defaultdict(list)
         for key, columns in self._columns.items():
-            alike[key in self._opened, key in self._ended, tuple(columns)].append(key)
-        for (opened, ended, names), keys in alike.items():
+            by_columns[key in self._opened, key in self._ended, tuple(columns)].append(key)
+        for (opened, ended, names), keys in by_columns.items():
             if opened:
                 rows = [self._row(key) for key in keys]
                 connection.execute(insert(_ITERATION).values({"ended_at": now()} if ended else {}), rows)
@@ -81,7 +81,7 @@ class StepRows:
         return _named(key, "number") | self._columns[key]
 
     def _measured(self, connection: Connection) -> list[Row]:
-        """A probe is of the genome that its iteration transferred, which may have been stored long before."""
+        """Return the measurements with their genomes; a probe's may have been transferred and stored long before."""
         probed = [key for key, kind in self._measurements if kind is MeasurementKind.PROBE]
         known = {key: self._columns[key].get("transferred_genome") for key in probed}
         known |= _transferred(connection, [key for key in probed if known[key] is None])
@@ -92,22 +92,22 @@ class StepRows:
 
 
 def position(step: Step) -> int:
-    """The step's place in the log of its repetition, from 0; iteration 0 has no Selected and no Measured."""
+    """Return the step's place in the log of its repetition, from 0. Iteration 0 has no Selected and no Measured."""
     return len(_ORDER) * step.iteration + _ORDER.index(type(step)) - _ORDER.index(Tuned)
 
 
 def vector(values: FloatArray) -> list[float]:
-    """A JSON array; its numbers read back exactly."""
+    """Return a JSON array, whose numbers read back exactly."""
     return [float(each) for each in values]
 
 
 def finite(value: float) -> float | None:
-    """NULL for nan and the infinities."""
+    """Return the value; None for nan and the infinities."""
     return float(value) if isfinite(value) else None
 
 
 def iteration_columns(step: Step) -> dict[str, Any]:
-    """The columns of its iteration that the step fills."""
+    """Return the columns of its iteration that the step fills."""
     match step:
         case Selected():
             return {"selected_genome": vector(step.genome), **_phase("selection", step.cost)}
@@ -123,7 +123,7 @@ def iteration_columns(step: Step) -> dict[str, Any]:
 
 
 def simulator_columns(step: Tuned) -> list[dict[str, Any]]:
-    """One row for each simulator of the step."""
+    """Return a row for each simulator of the step."""
     return [
         {"rank": rank, "parameters": vector(each.parameters), "squared_error": finite(each.squared_error)}
         for rank, each in enumerate(step.simulators)
@@ -131,7 +131,7 @@ def simulator_columns(step: Tuned) -> list[dict[str, Any]]:
 
 
 def measurement_columns(step: Measured | Probed, measured_by: str) -> dict[str, Any]:
-    """One row; a probe's genome is the one that was transferred, which its step does not repeat."""
+    """Return the row of a measurement; a probe's step does not repeat the transferred genome."""
     if isinstance(step, Probed):
         return {"fitness": finite(step.fitness), "measured_by": measured_by}
     genome, fitness = vector(step.sample.genome), finite(step.sample.fitness)
@@ -139,7 +139,7 @@ def measurement_columns(step: Measured | Probed, measured_by: str) -> dict[str, 
 
 
 def _opens_iteration(step: Step) -> bool:
-    """Whether the step is the first of its iteration."""
+    """Return whether the step is the first of its iteration."""
     return isinstance(step, Selected) or (isinstance(step, Tuned) and step.iteration == 0)
 
 
@@ -162,7 +162,7 @@ def _measured_by(claim: Claim) -> str:
 
 @cache
 def _fill(names: tuple[str, ...], *, ended: bool) -> Update:
-    """Columns of an iteration that is there already; its seconds add up."""
+    """Return the UPDATE that fills columns of a stored iteration; its seconds add up."""
     columns = _ITERATION.c
     values: Mapping[str, Any] = {name: bindparam(f"of_{name}") for name in names} | {
         "seconds": columns.seconds + bindparam("of_seconds"),

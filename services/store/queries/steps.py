@@ -1,4 +1,4 @@
-"""The log of a repetition: steps are appended in one transaction, and one that is there already stays as it is."""
+"""Logs of repetitions, written: steps are appended in one transaction, and a recorded step stays as it is."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, cast
@@ -37,14 +37,14 @@ _ADVANCE = (
         seconds=_REPETITION.c.seconds + bindparam("more_seconds"),
     )
 )
-"""Built once: for a database that is asked little, to build a statement costs more than to execute it."""
+"""Built once: building a statement costs more than executing it."""
 
 
-def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -> tuple[Claim, ...]:
-    """Append the steps to the logs of their repetitions; the claims that still hold, which alone were written.
+def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -> dict[Claim, int]:
+    """Append steps to the logs of repetitions, and return the number of new steps by claim that still holds.
 
-    The row of a repetition is guard and counter at once: it moves on if the claim holds and its next step is the first
-    that is new, and whoever does not move it writes nothing. Checkpoints are kept until their step is appended.
+    The row of a repetition is guard and counter at once. It moves on if the claim holds and the first new step is the
+    next one; otherwise nothing is written. Checkpoints are kept until their step is appended.
 
     Raises:
         Conflict: steps before a delivered one are missing.
@@ -65,11 +65,11 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
         session, {claim: _parts(deliveries[claim], *lengths[claim], len(fresh[claim])) for claim in fresh}
     )
     events.note_steps(session, fresh)
-    return tuple(fresh)
+    return {claim: len(steps) for claim, steps in fresh.items()}
 
 
 def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, tuple[int, int]]:
-    """How many steps the log of each claim that holds has, and checkpoints of the next; locked for the transaction."""
+    """Lock the repetitions whose claims hold, and return the number of their steps, and of checkpoints of the next."""
     by_key = {(each.id, each.epoch): each for each in claims}
     row = RepetitionRow
     found = session.execute(
@@ -82,7 +82,7 @@ def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, tuple[int
 
 
 def _new(claim: Claim, length: int, delivered: Iterable[Delivered]) -> list[TimedStep]:
-    """The steps that the log does not have yet: those after its first `length`."""
+    """Return the delivered steps that follow the first `length` of the log."""
     found: list[TimedStep] = []
     for each in delivered:
         if isinstance(each, Checkpoint):
@@ -97,7 +97,7 @@ def _new(claim: Claim, length: int, delivered: Iterable[Delivered]) -> list[Time
 
 
 def _parts(delivered: Iterable[Delivered], length: int, parts: int, new: int) -> list[Checkpoint]:
-    """The delivered checkpoints of the step that is under way once the log has its new steps."""
+    """Return the delivered checkpoints of the step under way once the log has its new steps."""
     found = [each for each in delivered if isinstance(each, Checkpoint)]
     return checkpoints.fresh(found, length + new, 0 if new else parts)
 

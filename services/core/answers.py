@@ -1,0 +1,159 @@
+"""The answers of simulators within one step: counted, prefetched, and recorded so that an interrupted step can go on.
+
+A search follows from its random stream and from the answers that it gets. So the answers are a complete checkpoint of a
+step, whichever strategy and optimizer it runs. Each answer has a digest of its genome and its simulators as its key: a
+checkpoint of any other step holds no answer to this one, and never a wrong one.
+
+Answers are also prefetched. A steady-state search asks about one newcomer at a time, because the next one may descend
+from it. But the search rejects most newcomers at once, and then the next one is known beforehand. While cores are idle
+they simulate those next ones too. No number changes: a prefetched answer is used only for a question that comes.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from hashlib import blake2b
+from itertools import groupby
+from math import ceil
+from struct import Struct
+from typing import Protocol, TypeAlias
+
+import numpy as np
+
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes, Parameters
+from gaplab.services.core.ports import Simulate
+from gaplab.services.core.types import Cost
+
+Answer: TypeAlias = tuple[bytes, FloatArray]
+"""The key of a genome in a block of m simulators, and its `(m,)` fitnesses there."""
+
+Following: TypeAlias = Callable[[int], Genomes]
+"""Returns up to n genomes that will probably be asked about next, `(≤ n, g)`."""
+
+BLOCK = 100
+"""Simulators in one call at most: the smallest part of a question that a checkpoint can hold."""
+
+_DIGEST_BYTES = 16
+_HEADER = Struct("<II")
+_FLOAT = np.dtype("<f8")
+
+
+class Recorder(Protocol):
+    """Records new answers, for checkpoints."""
+
+    def genomes_per_call(self, simulators: int) -> int:
+        """Return how many genomes to simulate in the next call, in so many simulators; at least 1."""
+        ...
+
+    def record(self, answers: Iterable[Answer]) -> None:
+        """Take the answers of that call."""
+        ...
+
+
+def nothing(_: int) -> Genomes:
+    """Return no genome: what follows is unknown."""
+    return np.empty((0, 0))
+
+
+class Answers:
+    """A Simulate for one step: it counts rollouts, prefetches answers and reads those of checkpoints.
+
+    Args:
+        simulate: the simulation.
+        batch_size: returns how many rollouts a call should ask for now to keep all cores busy.
+        checkpoints: answers of this step from before an interruption, each as `pack` returns them.
+        recorder: records what `simulate` returns.
+    """
+
+    def __init__(
+        self,
+        simulate: Simulate,
+        batch_size: Callable[[], int] = lambda: 1,
+        checkpoints: Iterable[bytes] = (),
+        recorder: Recorder | None = None,
+    ) -> None:
+        self._simulate = simulate
+        self._batch_size = batch_size
+        self._recorder = recorder
+        self._ahead = {key: row for packed in checkpoints for key, row in unpack(packed)}
+        self._rollouts = self._failures = 0
+
+    def __call__(self, genomes: Genomes, parameters: Parameters, following: Following = nothing) -> Fitnesses:
+        """Return the `(n, m)` fitnesses of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed.
+
+        Args:
+            genomes: asked about now; only these count as rollouts.
+            parameters: of the simulators.
+            following: of the genomes that will probably be asked about next, in the same simulators.
+        """
+        blocks = [parameters[start : start + BLOCK] for start in range(0, len(parameters), BLOCK)]
+        keys = [_keys(genomes, block) for block in blocks]
+        answers = self._ahead
+        if not all(key in answers for column in keys for key in column):
+            answers = self._fetched(genomes, blocks, following)
+            asked = {key for column in keys for key in column}
+            self._ahead = {key: row for key, row in answers.items() if key not in asked}
+        fitnesses = np.hstack([np.array([answers[key] for key in column]) for column in keys])
+        self._rollouts += fitnesses.size
+        self._failures += int(np.isnan(fitnesses).sum())
+        return fitnesses
+
+    def cost_of(self, budget: int) -> Cost:
+        """Return what the step has cost so far, out of a budget of so many rollouts."""
+        return Cost(self._rollouts, self._failures, budget - self._rollouts)
+
+    def _fetched(self, genomes: Genomes, blocks: list[Parameters], following: Following) -> dict[bytes, FloatArray]:
+        """Return the answers about the genomes, and about as many of the following ones as idle cores can simulate."""
+        room = ceil(self._batch_size() / sum(map(len, blocks))) - len(genomes)
+        if room > 0 and len(more := following(room)):
+            genomes = np.vstack([genomes, more])
+        answers: dict[bytes, FloatArray] = {}
+        for block in blocks:
+            keys = _keys(genomes, block)
+            answers.update((key, self._ahead[key]) for key in keys if key in self._ahead)
+            missing = [index for index, key in enumerate(keys) if key not in answers]
+            answers.update(self._simulated(genomes[missing], block, [keys[index] for index in missing]))
+        return answers
+
+    def _simulated(self, genomes: Genomes, parameters: Parameters, keys: list[bytes]) -> Iterator[Answer]:
+        """Yield the answers of the simulation, call by call."""
+        done = 0
+        while done < len(genomes):
+            count = self._recorder.genomes_per_call(len(parameters)) if self._recorder else len(genomes)
+            fitnesses = self._simulate(genomes[done : done + count], parameters)
+            answers = list(zip(keys[done : done + count], fitnesses, strict=True))
+            if self._recorder:
+                self._recorder.record(answers)
+            yield from answers
+            done += count
+
+
+def pack(answers: Iterable[Answer]) -> bytes:
+    """Return the answers as bytes: 16 for each key, 8 for each fitness, and 8 for each run of equally long rows."""
+    packed = []
+    for width, group in groupby(answers, key=lambda answer: len(answer[1])):
+        keys, rows = zip(*group, strict=True)
+        packed += [_HEADER.pack(len(keys), width), *keys, np.array(rows).astype(_FLOAT).tobytes()]
+    return b"".join(packed)
+
+
+def unpack(packed: bytes) -> Iterator[Answer]:
+    """Yield the answers that were packed, equal to the last bit."""
+    start = 0
+    while start < len(packed):
+        count, width = _HEADER.unpack_from(packed, start)
+        keys = start + _HEADER.size
+        values = keys + count * _DIGEST_BYTES
+        start = values + count * width * _FLOAT.itemsize
+        rows = np.frombuffer(packed, _FLOAT, count * width, values).astype(np.float64).reshape(count, width)
+        for index, row in enumerate(rows):
+            key = keys + index * _DIGEST_BYTES
+            yield packed[key : key + _DIGEST_BYTES], row
+
+
+def _keys(genomes: Genomes, parameters: Parameters) -> list[bytes]:
+    simulators = blake2b(np.ascontiguousarray(parameters).tobytes(), digest_size=_DIGEST_BYTES)
+    keys = []
+    for genome in genomes:
+        digest = simulators.copy()
+        digest.update(genome.tobytes())
+        keys.append(digest.digest())
+    return keys

@@ -1,0 +1,91 @@
+"""The one driver that spends a budget of evaluations on an optimizer."""
+
+from collections.abc import Callable
+from copy import deepcopy
+from functools import partial
+from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
+
+import numpy as np
+from numpy.random import Generator
+
+from gaplab.services.core.answers import Following
+from gaplab.services.core.arrays import FloatArray, Genomes
+from gaplab.services.core.optimizers.base import Optimizer, Population
+from gaplab.services.core.types import Space
+
+FARTHEST = 32
+"""Genomes to evaluate at once at most; about one newcomer in ten stays, so that later ones are hardly ever used."""
+
+
+class Question(NamedTuple):
+    """What an optimizer wants to know.
+
+    Attributes:
+        genomes: `(n, g)` to evaluate.
+        thresholds: `(n,)`; the optimizer rejects a genome whose fitness is below its threshold, so that any number
+            below it will do as the answer. -inf where it may keep the genome whatever its fitness.
+        following: returns the genomes that it asks about next if it rejects all of these.
+    """
+
+    genomes: Genomes
+    thresholds: FloatArray
+    following: Following
+
+
+Evaluate: TypeAlias = Callable[[Question], FloatArray]
+"""Returns the fitness of each genome, `(n,)`, to be maximised; not finite where it has none."""
+
+
+@runtime_checkable
+class Rejecting(Protocol):
+    """An optimizer that knows beforehand which newcomers it will reject."""
+
+    def rejection_thresholds(self, state: Population, genomes: Genomes) -> FloatArray:
+        """Return the fitness, `(n,)`, below which each genome would leave the state as it is; -inf if unknown."""
+        ...
+
+
+def maximise(optimizer: Optimizer, space: Space, evaluate: Evaluate, evaluations: int, rng: Generator) -> Population:
+    """Return the population after exactly `evaluations` fitness evaluations, ranked; what is not finite never wins.
+
+    A copy of a genome that the search has evaluated counts, but is not evaluated again unless it was rejected. Copies
+    are common: genes clip at their bounds.
+
+    Args:
+        optimizer: asks for genomes and is told their fitness.
+        space: of the genomes.
+        evaluate: is asked about as many genomes as the optimizer asks for, or as the budget has left.
+        evaluations: the budget, at least 1.
+        rng: all randomness of the search.
+    """
+    thresholds_of = optimizer.rejection_thresholds if isinstance(optimizer, Rejecting) else _unknown
+    state = optimizer.init(space)
+    known: dict[bytes, float] = {}
+    while evaluations > 0:
+        genomes = optimizer.ask(state, rng)[:evaluations]
+        keys = [genome.tobytes() for genome in genomes]
+        new = [index for index, key in enumerate(keys) if key not in known]
+        fitness = np.array([known.get(key, np.nan) for key in keys])
+        if new:
+            thresholds = thresholds_of(state, genomes)[new]
+            following = partial(_following, optimizer, state, thresholds, rng, evaluations - 1)
+            fitness[new] = evaluate(Question(genomes[new], thresholds, following))
+            exact = (index for index, least in zip(new, thresholds, strict=True) if not fitness[index] < least)
+            known.update((keys[index], float(fitness[index])) for index in exact)
+        state = optimizer.tell(state, genomes, np.where(np.isfinite(fitness), fitness, -np.inf))
+        evaluations -= len(genomes)
+    return state.ranked()
+
+
+def _unknown(_: Population, genomes: Genomes) -> FloatArray:
+    return np.full(len(genomes), -np.inf)
+
+
+def _following(
+    optimizer: Optimizer, state: Population, thresholds: FloatArray, rng: Generator, left: int, count: int
+) -> Genomes:
+    """Return up to `count` genomes that the optimizer asks for next if its state stays as it is; none if it cannot."""
+    rng, genomes = deepcopy(rng), np.empty((0, state.space.size))
+    while len(genomes) < min(count, FARTHEST, left) and thresholds.max() > -np.inf:
+        genomes = np.vstack([genomes, optimizer.ask(state, rng)])
+    return genomes

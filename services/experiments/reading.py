@@ -1,0 +1,114 @@
+"""Experiments and studies, read with their repetitions, samples and simulators. Use cases raise StoreUnavailable."""
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+from gaplab.schemas.records import (
+    AttemptRead,
+    ExperimentRead,
+    MeasurementKind,
+    Page,
+    RepetitionRead,
+    SampleRead,
+    SimulatorRead,
+    StudyRead,
+)
+from gaplab.services.experiments.views import view_experiments, view_repetition, view_studies
+from gaplab.services.store.queries import attempts, results
+from gaplab.services.store.queries.experiments import get_experiment, get_study, repetitions_of
+from gaplab.services.store.session import Session, snapshot
+
+R = TypeVar("R")
+
+
+@snapshot
+def read_experiment(session: Session, experiment_id: str, *, reveal: bool = False) -> ExperimentRead:
+    """Return the experiment with its progress; `reveal` shows reality's parameters although they are hidden.
+
+    Raises:
+        NotFound: no such experiment.
+    """
+    return view_experiments(session, [get_experiment(session, experiment_id)], reveal=reveal)[0]
+
+
+@snapshot
+def read_study(session: Session, study_id: str, *, reveal: bool = False) -> StudyRead:
+    """Return the study with its experiments and their progress; `reveal` as of an experiment.
+
+    Raises:
+        NotFound: no such study.
+    """
+    return view_studies(session, [get_study(session, study_id)], reveal=reveal)[0]
+
+
+@snapshot
+def list_repetitions(session: Session, experiment_id: str) -> tuple[RepetitionRead, ...]:
+    """Return the repetitions of an experiment, by number.
+
+    Raises:
+        NotFound: no such experiment.
+    """
+    get_experiment(session, experiment_id)
+    return tuple(map(view_repetition, repetitions_of(session, experiment_id)))
+
+
+@snapshot
+def list_samples(
+    session: Session,
+    experiment_id: str,
+    *,
+    repetition: int | None = None,
+    kind: MeasurementKind | None = None,
+    limit: int = 1000,
+    cursor: str | None = None,
+) -> Page[SampleRead]:
+    """Return a page of real-world evaluations, by repetition and in the order of the log.
+
+    Raises:
+        NotFound: no such experiment.
+        InvalidSpec: a cursor that no page gave.
+    """
+    get_experiment(session, experiment_id)
+    rows = results.page_of_samples(
+        session, experiment_id, repetition=repetition, kind=kind, limit=limit + 1, cursor=cursor
+    )
+    return Page(items=rows[:limit], next=_next(rows, limit, results.cursor_of))
+
+
+@snapshot
+def list_simulators(
+    session: Session,
+    experiment_id: str,
+    *,
+    repetition: int | None = None,
+    iteration: int | None = None,
+    limit: int = 1000,
+    cursor: str | None = None,
+) -> Page[SimulatorRead]:
+    """Return a page of tuned simulators, by repetition, iteration and rank.
+
+    Raises:
+        NotFound: no such experiment.
+        InvalidSpec: a cursor that no page gave.
+    """
+    row = get_experiment(session, experiment_id)
+    rows = results.page_of_simulators(
+        session, row, repetition=repetition, iteration=iteration, limit=limit + 1, cursor=cursor
+    )
+    return Page(items=rows[:limit], next=_next(rows, limit, results.cursor_of))
+
+
+@snapshot
+def list_attempts(session: Session, experiment_id: str, repetition: int) -> tuple[AttemptRead, ...]:
+    """Return the attempts at a repetition: its supervisors, times and endings.
+
+    Raises:
+        NotFound: no such experiment, or no such repetition of it.
+    """
+    get_experiment(session, experiment_id)
+    return attempts.attempts_of(session, experiment_id, repetition)
+
+
+def _next(rows: Sequence[R], limit: int, cursor_of: Callable[[R], str]) -> str | None:
+    """Return the cursor of the next page; `rows` has one row more than the page if there is one."""
+    return cursor_of(rows[limit - 1]) if len(rows) > limit else None
