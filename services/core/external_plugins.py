@@ -35,7 +35,7 @@ def folders() -> tuple[Path, ...]:
     found = tuple(Path(each) for each in sys.modules[PACKAGE].__path__) if PACKAGE in sys.modules else ()
     for each in found:
         if not each.is_dir():
-            msg = f"there is no folder {each} to find plug-ins in"
+            msg = f"there is no plug-in folder {each}"
             raise PluginBroken(msg)
     return found
 
@@ -68,7 +68,7 @@ def _modules() -> list[ModuleType]:
     for folder in folders():
         for name in sorted(info.name for info in iter_modules([str(folder)])):
             if name in found:
-                msg = f"{name}.py is in {found[name]} and in {folder}; a plug-in's file has a name of its own"
+                msg = f"{name}.py is in {found[name]} and in {folder}: rename one of the two files"
                 raise PluginBroken(msg)
             found[name] = str(folder)
     return [_imported(name, folder) for name, folder in found.items() if not name.startswith("_")]

@@ -122,7 +122,7 @@ def test_a_broken_file_is_a_sentence(put: Put, text: str, says: str):
 def test_a_folder_that_is_not_there_is_a_sentence(tmp_path: Path):
     external_plugins.look_in((tmp_path / "nowhere",))
     try:
-        with pytest.raises(PluginBroken, match=r"there is no folder .*nowhere"):
+        with pytest.raises(PluginBroken, match=r"there is no plug-in folder .*nowhere"):
             list(strategies())
     finally:
         external_plugins.look_in(())
