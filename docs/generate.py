@@ -51,7 +51,7 @@ def commands() -> Iterator[str]:
         )
         yield f"## {name}\n\n```text\n{usage}\n```\n\n{_cell(command.help)}\n"
         rows = [_parameter(each) for each in command.params]
-        yield from _table(("argument or option", "meaning", "left out"), rows)
+        yield from _table(("argument or option", "meaning", "left out"), rows)  # type: ignore[arg-type]
     yield "## Exit codes\n"
     yield from _table(("code", "meaning"), [(str(code.value), code.meaning) for code in Exit])
 
@@ -67,7 +67,7 @@ def http() -> Iterator[str]:
                 (f"`{each['name']}` ({each['in']})", _type(each["schema"]), _cell(each.get("description")))
                 for each in operation.get("parameters", ())
             ]
-            yield from _table(("parameter", "type", "meaning"), rows)
+            yield from _table(("parameter", "type", "meaning"), rows)  # type: ignore[arg-type]
             yield f"Answers: {', '.join(sorted(operation['responses']))}.\n"
 
 
@@ -90,8 +90,9 @@ def python() -> Iterator[str]:
     yield "`from gaplab import Client`. Methods raise `ServiceError`, which has the service's `problem`, and"
     yield "`ServiceUnreachable`; some raise `ExperimentFailed` or `ExtraMissing`. Import all of them from `gaplab`.\n"
     yield f"## Client{_signature(Client.__init__)}\n\n{_docstring(Client)}\n"
-    methods = inspect.getmembers(Client, lambda each: inspect.isfunction(each) and not each.__name__.startswith("_"))
-    for name, method in methods:
+    with Client("") as client:
+        methods = inspect.getmembers(client, inspect.ismethod)
+    for name, method in (each for each in methods if not each[0].startswith("_")):
         yield f"## {name}{_signature(method)}\n\n{_docstring(method)}\n"
 
 
@@ -103,7 +104,7 @@ def settings() -> Iterator[str]:
     yield from _table(("variable", "meaning", "left out"), [*rows, (f"`{VARIABLE}`", own, "none")])
     yield "## Limits\n\nWhile no token exists, all clients together count as one token.\n"
     limits = [(f"`{variable_of(name)}`", _attribute(Limits, name), f"{most:,}") for name, most in Limits()]
-    yield from _table(("variable", "at most", "left out"), limits)
+    yield from _table(("variable", "at most", "left out"), limits)  # type: ignore[arg-type]
 
 
 def _commands(command: Any, name: str) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 - of typer's own click
@@ -129,7 +130,7 @@ def _plugin(found: PluginRead) -> Iterator[str]:
         (f"`{name}`", _type(schema), _cell(schema.get("description")), _default(schema.get("default")))
         for name, schema in found.options.get("properties", {}).items()
     ]
-    yield from _table(("option", "type", "meaning", "left out"), rows)
+    yield from _table(("option", "type", "meaning", "left out"), rows)  # type: ignore[arg-type]
 
 
 def _table(heads: tuple[str, ...], rows: list[tuple[str, ...]]) -> Iterator[str]:

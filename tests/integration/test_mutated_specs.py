@@ -20,7 +20,7 @@ def api(store: Store) -> Iterator[TestClient]:
         yield client
 
 
-def test_every_mutated_spec_is_taken_or_refused(api: TestClient):
+def test_every_mutated_spec_is_taken_or_refused(api: TestClient) -> None:
     found = measure(150, seed=1, api=api)
 
     assert found.wrong == []
@@ -29,7 +29,7 @@ def test_every_mutated_spec_is_taken_or_refused(api: TestClient):
     assert found.statuses[422] > 50
 
 
-def test_mutations_follow_from_their_seed():
+def test_mutations_follow_from_their_seed() -> None:
     one, same, other = (mutated(VALID_SPECS["/studies"], random.Random(seed)) for seed in (3, 3, 4))
 
     assert json.dumps(one) == json.dumps(same) != json.dumps(other)
@@ -50,7 +50,7 @@ NAMES = [
 @pytest.mark.parametrize(("place", "pointer"), NAMES)
 def test_a_file_a_class_an_address_or_code_is_no_plugin(
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, place: str, pointer: str
-):
+) -> None:
     api = TestClient(create_app(sqlite_store), raise_server_exceptions=False)
     api.get("/catalogue")  # every plug-in is imported by now
     opened: list[object] = []
@@ -71,7 +71,7 @@ def test_a_file_a_class_an_address_or_code_is_no_plugin(
 
 
 @pytest.mark.parametrize("place", ["options", "path", "url", "class", "module"])
-def test_a_plugin_takes_no_path_address_or_class_beside_its_name(sqlite_store: Store, place: str):
+def test_a_plugin_takes_no_path_address_or_class_beside_its_name(sqlite_store: Store, place: str) -> None:
     api = TestClient(create_app(sqlite_store))
     for kind in ("strategy", "robot", "engine", "optimizer"):
         extra = {"path": FORBIDDEN_NAMES[0]} if place == "options" else FORBIDDEN_NAMES[0]
