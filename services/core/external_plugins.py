@@ -16,12 +16,12 @@ PACKAGE = "gaplab_plugins"
 P = TypeVar("P")
 
 
-def look_in(folders: tuple[Path, ...]) -> None:
-    """Set the plug-in folders; call it before the first use of a registry."""
-    for name in [each for each in sys.modules if each.partition(".")[0] == PACKAGE]:
+def set_folders(folders: tuple[Path, ...]) -> None:
+    """Set the plug-in folders; registries that were used before do not notice."""
+    for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
         del sys.modules[name]
-    package = ModuleType(PACKAGE, "Plug-ins from outside gaplab.")
-    package.__path__ = [str(each) for each in folders]
+    package = ModuleType(PACKAGE, "External plug-ins.")
+    package.__path__ = [str(folder) for folder in folders]
     sys.modules[PACKAGE] = package
     invalidate_caches()
 
@@ -30,14 +30,13 @@ def folders() -> tuple[Path, ...]:
     """Return the plug-in folders.
 
     Raises:
-        PluginBroken: one is not a folder.
+        PluginBroken: one does not exist.
     """
-    found = tuple(Path(each) for each in sys.modules[PACKAGE].__path__) if PACKAGE in sys.modules else ()
-    for each in found:
-        if not each.is_dir():
-            msg = f"there is no plug-in folder {each}"
-            raise PluginBroken(msg)
-    return found
+    named = tuple(Path(path) for path in sys.modules[PACKAGE].__path__) if PACKAGE in sys.modules else ()
+    for folder in named:
+        if not folder.is_dir():
+            raise PluginBroken(f"there is no plug-in folder {folder}")
+    return named
 
 
 def classes(base: type[P]) -> Iterator[type[P]]:
