@@ -19,7 +19,7 @@ class Hill:
 
     def __init__(self, transform: Any = lambda fitness: fitness) -> None:
         self.transform = transform
-        self.asked = []
+        self.asked = []  # type: ignore[var-annotated]
 
     def __call__(self, question: Any) -> Any:
         self.asked.append(question.genomes.copy())
@@ -34,7 +34,7 @@ class Watched:
 
     def __init__(self, optimizer: Any) -> None:
         self.optimizer = optimizer
-        self.told = []
+        self.told = []  # type: ignore[var-annotated]
 
     def __getattr__(self, name: Any) -> Any:
         return getattr(self.optimizer, name)
@@ -62,7 +62,7 @@ class TestEveryOptimizer:
     def test_spends_exactly_its_budget_less_what_it_would_evaluate_again(self, name: Any, evaluations: Any) -> None:
         hill, optimizer = Hill(), Watched(optimizers[name]())
 
-        maximise(optimizer, SPACE, hill, evaluations, np.random.default_rng(3))
+        maximise(optimizer, SPACE, hill, evaluations, np.random.default_rng(3))  # type: ignore[arg-type]
 
         told = np.vstack(optimizer.told)
         assert len(told) == evaluations

@@ -56,10 +56,10 @@ class Chromium:
     def visit(self, url: Any, *, beside: Any = None, **how: Any) -> Any:
         """A page at the address: in another tab of the window of the page `beside`, or in a window of its own."""
         page = (beside.context if beside else self._window(**how)).new_page()
-        page.on("console", lambda said: said.type == "error" and self._note(f"console: {said.text}"))
+        page.on("console", lambda said: said.type == "error" and self._note(f"console: {said.text}"))  # type: ignore[func-returns-value]
         page.on("pageerror", lambda error: self._note(f"error: {error}"))
         page.on("requestfailed", self._failed)
-        page.on("response", lambda answer: answer.status >= 400 and self._note(f"{answer.status} {answer.url}"))
+        page.on("response", lambda answer: answer.status >= 400 and self._note(f"{answer.status} {answer.url}"))  # type: ignore[func-returns-value]
         page.goto(url)
         return page
 

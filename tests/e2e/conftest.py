@@ -42,7 +42,7 @@ def visit(browser: Any) -> Iterator[Any]:
     def open_page(address: Any, **how: Any) -> Any:
         return browser.visit(address, **how)
 
-    open_page.forgive = browser.forgive
+    open_page.forgive = browser.forgive  # type: ignore[attr-defined]
     yield open_page
     browser.end()
 

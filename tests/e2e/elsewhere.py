@@ -63,7 +63,7 @@ class Postgres:
     def _connected(self, database: Any = "postgres") -> Any:
         names = {"host": "PGHOST", "port": "PGPORT", "user": "PGUSER"}
         given = {key: self.environment[name] for key, name in names.items()}
-        return psycopg.connect(dbname=database, autocommit=True, **given)
+        return psycopg.connect(dbname=database, autocommit=True, **given)  # type: ignore[arg-type]
 
 
 class Shell:

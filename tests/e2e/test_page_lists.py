@@ -46,7 +46,7 @@ def test_every_view_can_be_used_in_light_in_dark_and_on_a_phone(
         visit.forgive("404")
     name = view.strip("#/").split("/")[0].split("?")[0] or "list"
     for mode, how in {"light": {}, "dark": {"dark": True}, "phone": {"width": 375, "height": 760}}.items():
-        page = visit(address(archive, view, published), **how)
+        page = visit(address(archive, view, published), **how)  # type: ignore[arg-type]
         page.locator(ready).first.wait_for()
 
         axe(page)

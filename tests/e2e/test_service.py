@@ -88,7 +88,7 @@ def told_by(service: Any, study: Any) -> Any:
     for curve in service.get(f"/studies/{study}/curves"):
         values = [point["values"] for point in curve["points"]]
         samples = service.get(f"/experiments/{curve['experiment']}/samples", kind="sample", limit=1000)["items"]
-        by_repetition = [[] for _ in values[0]]
+        by_repetition = [[] for _ in values[0]]  # type: ignore[var-annotated]
         for each in sorted(samples, key=lambda sample: (sample["repetition"], sample["iteration"])):
             by_repetition[each["repetition"]].append(each["fitness"])
         recorded = [list(row) for row in zip(*values, strict=True)]

@@ -143,7 +143,7 @@ def operations(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]
 
 
 def complaints(document: dict[str, Any], schema: dict[str, Any], value: object) -> list[str]:
-    whole = Resource(contents=document, specification=DRAFT202012)
+    whole = Resource(contents=document, specification=DRAFT202012)  # type: ignore[call-arg]
     registry = Registry().with_resource("urn:api", whole)
     pointed = _absolute(schema)
     return [each.message for each in Draft202012Validator(pointed, registry=registry).iter_errors(value)]
@@ -224,7 +224,7 @@ def test_every_example_of_a_spec_is_accepted(document: dict[str, Any], sqlite_st
 
 def _completed(store: Store) -> str:
     experiment = submission.submit_experiment(store, toy(repetitions=1, priority=10)).id
-    run(store, *execution.claim(store, "me", 1))
+    run(store, *execution.claim(store, "me", 1))  # type: ignore[arg-type]
     return experiment
 
 

@@ -95,10 +95,10 @@ def test_the_command_overwrites_no_file_and_leaves_no_half(gaplab: Gaplab, submi
 def test_an_archive_that_is_being_written_has_not_its_name_yet(
     gaplab: Gaplab, submitted: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    meanwhile, export = [], Client.export
+    meanwhile, export = [], Client.export  # type: ignore[misc, var-annotated]
 
-    def watched(self, id_: Any, file: Any) -> None:
-        export(self, id_, file)
+    def watched(self, id_: Any, file: Any) -> None:  # type: ignore[no-untyped-def]
+        export(self, id_, file)  # type: ignore[call-arg]
         meanwhile.extend(each.name for each in tmp_path.iterdir())
 
     monkeypatch.setattr(Client, "export", watched)

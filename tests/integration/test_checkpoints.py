@@ -44,7 +44,7 @@ def test_what_a_checkpoint_has_is_not_simulated_again() -> None:
     told = list(recorded(small_setting(simulate=first), (), (), 0.0))
     checkpoints = [each for each in told if isinstance(each, Checkpoint) and each.step == 1]
 
-    list(recorded(small_setting(simulate=second, iterations=0), [told[0].step], checkpoints, 3600.0))
+    list(recorded(small_setting(simulate=second, iterations=0), [told[0].step], checkpoints, 3600.0))  # type: ignore[list-item]
 
     answered = sum(len(row) for each in checkpoints for _, row in unpack(each.answers))
     assert answered == 40
@@ -60,7 +60,7 @@ def test_a_call_that_would_take_long_is_made_in_several() -> None:
         time.sleep(0.002 * len(genomes))
         return paraboloid(genomes, parameters)
 
-    calls, told = Recorder(slow), []
+    calls, told = Recorder(slow), []  # type: ignore[var-annotated]
     answers = StepRecorder(told.append, 0.02, 5).answers(small_setting(simulate=calls))
     genomes = np.random.default_rng(0).random((30, 2))
 
@@ -88,7 +88,7 @@ def test_a_repetition_that_nobody_wants_ends() -> None:
     steps = recorded(small_setting(iterations=100_000), (), ())
     next(steps)
 
-    steps.close()
+    steps.close()  # type: ignore[attr-defined]
 
     deadline = time.monotonic() + 180
     while any(each.name == "repetition" for each in threads()):

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
+from gaplab.api.clients import records
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
-from gaplab.api.commands import records
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check

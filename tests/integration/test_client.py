@@ -35,7 +35,7 @@ class InProcess(httpx2.BaseTransport):
     def __init__(self, store: Store) -> None:
         app = create_app(store)
         self._client = TestClient(app, raise_server_exceptions=False)
-        self.close = app.state.rollout_process.close
+        self.close = app.state.rollout_process.close  # type: ignore[method-assign]
         self.asked: list[str] = []
         self.lost = 0
         self.busy = 0
@@ -73,7 +73,7 @@ def test_a_curve_is_a_frame_of_its_points_or_of_its_repetitions(client: Client, 
     points, values = client.curve(study.id), client.curve(study.id, each=True)
 
     (curve, direct) = client.curves([study.id])
-    assert list(points["experiment"].unique()) == [each.id for each in study.experiments]
+    assert list(points["experiment"].unique()) == [each.id for each in study.experiments]  # type: ignore[union-attr]
     assert len(points) == len(curve.points) + len(direct.points)
     assert points["mean"].iloc[0] == curve.points[0].mean
     assert points["evaluations"].dtype.kind == "i"
@@ -120,7 +120,7 @@ def test_curves_are_asked_for_in_parts_that_the_service_takes_and_come_in_order(
     study = client.submit(BOTH)
     finish()
     whole = client.curves_csv([study.id])
-    first, second = (each.id for each in study.experiments)
+    first, second = (each.id for each in study.experiments)  # type: ignore[union-attr]
     many = [first] * 70 + [second] * 70
     network.asked.clear()
 
@@ -396,7 +396,7 @@ def test_events_and_lists_are_values_that_json_can_hold(client: Client) -> None:
 
     kinds = [each.kind for each in client.events(follow=False, study=study.id, after=None)]
 
-    assert kinds.count("submitted") == 2
+    assert kinds.count("submitted") == 2  # type: ignore[arg-type]
     assert [each.number for each in client.events(follow=False, after=1)] == [2]
     assert json.dumps([each.model_dump(mode="json") for each in client.studies().items])
 
@@ -445,7 +445,7 @@ def test_a_stream_that_had_nothing_to_tell_for_long_is_resumed_when_it_breaks(mo
 
     bodies = [quiet(), f"data: {event.model_dump_json()}\n\n".encode()]
     network = httpx2.MockTransport(
-        lambda _: httpx2.Response(200, headers={"Content-Type": "text/event-stream"}, content=bodies.pop(0))
+        lambda _: httpx2.Response(200, headers={"Content-Type": "text/event-stream"}, content=bodies.pop(0))  # type: ignore[arg-type]
     )
 
     with Client("http://gaplab.example", transport=network) as client:

@@ -281,7 +281,7 @@ def test_the_shell_gets_a_script_and_the_script_gets_commands_and_ids(url: str, 
 
 
 def test_completion_installs_itself_for_the_shell_that_it_is_asked_from(tmp_path: Path) -> None:
-    ask = f"'{sys.executable}' -m api.cli --install-completion; true"  # bash would become the last command itself
+    ask = f"'{sys.executable}' -m gaplab --install-completion; true"  # bash would become the last command itself
     environment = os.environ | {"HOME": str(tmp_path)}
 
     done = subprocess.run(["bash", "-c", ask], env=environment, capture_output=True, text=True, check=False)
@@ -317,7 +317,7 @@ def test_in_a_terminal_it_is_a_view_of_curves_and_repetitions(url: str, study: s
         snapshots = Snapshots(client.records, client.results).of(study, every_s=0.1, patience_s=60)
         ended = terminal.show(finishing(snapshots), screen, keep=True)
 
-    shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", screen.file.getvalue())
+    shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", screen.file.getvalue())  # type: ignore[attr-defined]
     assert ended.state == "COMPLETED"
     assert "QUEUED" in shown
     assert "fitness in reality, m/s" in shown
@@ -351,7 +351,7 @@ def test_the_view_survives_a_service_that_is_away_and_says_so(url: str, study: s
         ended = client.watcher.show(study, screen, curves=True, every_s=0.1, patience_s=60)
 
     assert ended.state == "COMPLETED"
-    assert "the service has not answered for" in screen.file.getvalue()
+    assert "the service has not answered for" in screen.file.getvalue()  # type: ignore[attr-defined]
 
 
 def test_it_is_waited_for_only_so_long_and_a_refusal_not_at_all(url: str, study: str) -> None:

@@ -118,7 +118,7 @@ def all_verbs(store: Store) -> None:
         if verb is Verb.PAUSE:
             lifecycle.ask_experiment(store, asked, Verb.RESUME)
     whole = submission.submit_experiment(store, toy(repetitions=1)).id
-    run(store, *execution.claim(store, "me", 1))
+    run(store, *execution.claim(store, "me", 1))  # type: ignore[arg-type]
     extension.extend_experiment(store, whole, ExtensionSpec(repetitions=2))
     with archives.export_experiment(store, asked).file as file:
         archives.import_archive(store, file)
@@ -313,7 +313,7 @@ def test_a_stream_has_what_was_and_what_comes(store: Store) -> None:
         run(store, claim)
         rest = take(stream, 17)
         assert feed.open == 1
-        stream.close()
+        stream.close()  # type: ignore[attr-defined]
         assert within(lambda: feed.open == 0)
 
     assert [each.number for each in (*first, *rest)] == list(range(1, 19))
@@ -405,7 +405,7 @@ def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(
         if failing.pop():
             msg = "a mistake of ours"
             raise ValueError(msg)
-        return page(*asked, **named)
+        return page(*asked, **named)  # type: ignore[arg-type]
 
     async def follow() -> list[int]:
         feed = EventFeed(sqlite_store, every_s=0.01)
@@ -418,8 +418,8 @@ def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(
         await asyncio.sleep(0.05)
         monkeypatch.setattr(feeding.events, "page", page)
         second = await asyncio.wait_for(anext(resumed), DEADLINE_S)
-        await stalled.aclose()
-        await resumed.aclose()
+        await stalled.aclose()  # type: ignore[attr-defined]
+        await resumed.aclose()  # type: ignore[attr-defined]
         return [first.number, second.number]
 
     assert asyncio.run(follow()) == [1, 1]
@@ -452,7 +452,7 @@ def test_an_idle_stream_says_that_it_lives_and_holds_no_transaction(
     monkeypatch.setattr("fastapi.routing._PING_INTERVAL", 0.2)
     with served(store) as (url, _), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
         answer = http.send(http.build_request("GET", "/events"), stream=True)
-        said, held = next(answer.iter_lines()), store._engine.pool.checkedout()
+        said, held = next(answer.iter_lines()), store._engine.pool.checkedout()  # type: ignore[attr-defined]
         answer.close()
 
     assert said == ": ping"
@@ -514,7 +514,7 @@ def test_a_poll_may_wait_for_what_comes(sqlite_store: Store) -> None:
     with served(sqlite_store) as (url, feed), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
         asked = {"after": 1, "kind": "cancelled", "wait_s": 60}
         with ThreadPoolExecutor(1) as pool:
-            answer = pool.submit(http.get, "/events/page", params=asked)
+            answer = pool.submit(http.get, "/events/page", params=asked)  # type: ignore[arg-type]
             assert within(lambda: feed.open == 1)
             cancel(sqlite_store, id_)
             found = answer.result(DEADLINE_S).json()

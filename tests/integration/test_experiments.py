@@ -31,7 +31,7 @@ def finish_all(store: Store) -> None:
 
 
 def every_page(list_page: Any, **filters: Any) -> Any:
-    items, cursor, pages = [], None, 0
+    items, cursor, pages = [], None, 0  # type: ignore[var-annotated]
     while cursor is not None or not pages:
         page = list_page(cursor=cursor, **filters)
         items, cursor, pages = [*items, *page.items], page.next, pages + 1

@@ -28,7 +28,7 @@ from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, curve, point, 
 
 
 def marks(figure: FigureDefinition, panel: int = 0) -> dict[str, Mark]:
-    return {mark.name: mark for mark in figure.panels[panel].marks}
+    return {mark.name: mark for mark in figure.panels[panel].marks}  # type: ignore[union-attr]
 
 
 def test_three_tunables_are_drawn_pair_by_pair_and_iterations_from_light_to_dark() -> None:
@@ -42,10 +42,10 @@ def test_three_tunables_are_drawn_pair_by_pair_and_iterations_from_light_to_dark
         ("Dynamic friction", "Body mass (kg)"),
     ]
     assert all(each.square for each in figure.panels)
-    assert points.shades == (0, 0, 0, 1, 1, 1, 2, 2, 2)
-    assert points.x[:3] == pytest.approx((0.1, 0.2, 0.3))
-    assert points.y[:3] == pytest.approx((0.3, 0.4, 0.5))
-    assert points.hover[4] == "repetition 1, iteration 1"
+    assert points.shades == (0, 0, 0, 1, 1, 1, 2, 2, 2)  # type: ignore[union-attr]
+    assert points.x[:3] == pytest.approx((0.1, 0.2, 0.3))  # type: ignore[index, union-attr]
+    assert points.y[:3] == pytest.approx((0.3, 0.4, 0.5))  # type: ignore[index, union-attr]
+    assert points.hover[4] == "repetition 1, iteration 1"  # type: ignore[union-attr]
     assert "3\N{NO-BREAK SPACE}repetitions" in figure.caption
     assert "once its experiments have ended" in figure.caption
 
@@ -55,8 +55,8 @@ def test_one_tunable_or_very_many_are_drawn_against_iterations(tunables: int) ->
     figure = simulators_figure(tuned(tunables), DIMENSIONS[:tunables], truth=TRUTH)
 
     assert [each.x.label for each in figure.panels] == ["Iteration"] * tunables
-    assert marks(figure)["Best simulator of a repetition"].x == (0, 0, 0, 1, 1, 1, 2, 2, 2)
-    assert marks(figure)[REALITY].value == 1.0
+    assert marks(figure)["Best simulator of a repetition"].x == (0, 0, 0, 1, 1, 1, 2, 2, 2)  # type: ignore[union-attr]
+    assert marks(figure)[REALITY].value == 1.0  # type: ignore[union-attr]
 
 
 def test_reality_is_a_point_where_both_are_known_a_level_where_one_is_and_within_the_frame() -> None:
@@ -76,7 +76,7 @@ def test_reality_is_a_point_where_both_are_known_a_level_where_one_is_and_within
 def test_of_very_many_simulators_the_first_repetitions_are_drawn() -> None:
     figure = simulators_figure(tuned(2, repetitions=4000, iterations=1), DIMENSIONS[:2], truth=None)
 
-    assert len(marks(figure)["Best simulator of a repetition"].x) == MOST
+    assert len(marks(figure)["Best simulator of a repetition"].x) == MOST  # type: ignore[arg-type, union-attr]
     assert "2500\N{NO-BREAK SPACE}repetitions of 4000" in figure.caption
 
 
@@ -92,8 +92,8 @@ def test_predictions_are_drawn_before_and_after_with_the_line_of_agreement() -> 
 
     found = marks(figure)
     (panel,) = figure.panels
-    assert (found[BEFORE].x, found[BEFORE].y) == ((1.0, 1.0), (0.5, 1.5))
-    assert (found[AFTER].x, found[AFTER].y) == ((1.0, 1.0), (0.9, 1.1))
+    assert (found[BEFORE].x, found[BEFORE].y) == ((1.0, 1.0), (0.5, 1.5))  # type: ignore[union-attr]
+    assert (found[AFTER].x, found[AFTER].y) == ((1.0, 1.0), (0.9, 1.1))  # type: ignore[union-attr]
     assert any(isinstance(each, Diagonal) for each in panel.marks)
     assert panel.x.limits == panel.y.limits
     assert (panel.x.label, panel.y.label) == ("Fitness in reality (m/s)", "Fitness in simulation (m/s)")
@@ -116,8 +116,8 @@ def test_squared_errors_have_their_median_and_quartiles_and_failures_are_counted
     figure = squared_error_figure({1: {0: 1.0, 1: 2.0, 2: 9.0}, 2: {0: 4.0, 1: None}}, unit="m/s")
 
     line = marks(figure)["Best simulator"]
-    assert (line.x, line.y) == ((1, 2), (2.0, 4.0))
-    assert (line.lower, line.upper) == ((1.5, None), (5.5, None))
+    assert (line.x, line.y) == ((1, 2), (2.0, 4.0))  # type: ignore[union-attr]
+    assert (line.lower, line.upper) == ((1.5, None), (5.5, None))  # type: ignore[union-attr]
     assert figure.panels[0].y.label == "Squared error ((m/s)²)"
     assert not figure.panels[0].y.log
     told = figure.caption.replace("\N{NO-BREAK SPACE}", " ")
@@ -141,7 +141,7 @@ def test_squared_errors_of_many_magnitudes_are_on_a_logarithmic_axis_without_zer
 def test_squared_errors_that_are_all_zero_or_failed_are_drawn_as_they_are() -> None:
     perfect, failed = squared_error_figure({1: {0: 0.0}}), squared_error_figure({1: {0: None}})
 
-    assert marks(perfect)["Best simulator"].y == (0.0,)
+    assert marks(perfect)["Best simulator"].y == (0.0,)  # type: ignore[union-attr]
     assert not perfect.panels[0].y.log
     assert failed.empty
 
@@ -179,9 +179,9 @@ def test_what_is_too_large_to_be_reckoned_with_is_left_out_as_what_failed() -> N
     predicted = predictions_figure([prediction(huge, -huge, 1.0), prediction(0.5, 1.0, 1.0, 1)])
     tuning = squared_error_figure({1: {0: huge, 1: huge, 2: 1.0}, 2: {0: huge, 1: huge}}, each=True)
 
-    assert marks(predicted)[BEFORE].y == (0.5,)
+    assert marks(predicted)[BEFORE].y == (0.5,)  # type: ignore[union-attr]
     assert "1\N{NO-BREAK SPACE}sample left out" in predicted.caption
-    assert marks(tuning)["Best simulator"].x[0] == 1
+    assert marks(tuning)["Best simulator"].x[0] == 1  # type: ignore[index, union-attr]
     assert "4\N{NO-BREAK SPACE}values left out" in tuning.caption
     assert squared_error_figure({1: {0: huge}}).empty
 

@@ -32,7 +32,7 @@ def render_svg(figure: FigureDefinition) -> str:
 
 
 def pixels(figure: FigureDefinition, **how: object) -> np.ndarray:
-    return matplotlib.image.imread(BytesIO(render_file(figure, "png", **how)))
+    return matplotlib.image.imread(BytesIO(render_file(figure, "png", **how)))  # type: ignore[arg-type]
 
 
 @EVERY

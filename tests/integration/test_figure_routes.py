@@ -80,7 +80,7 @@ def test_curves_are_drawn_against_rollouts_and_time_and_with_each_repetition(api
     asked = {"experiment": experiment, "format": "json"}
 
     plain, rollouts, time, each = (
-        api.get("/figures/curves", params=asked | how).json()
+        api.get("/figures/curves", params=asked | how).json()  # type: ignore[arg-type, operator]
         for how in ({}, {"x": "rollouts"}, {"x": "time", "cost_s": 30}, {"each": True})
     )
 

@@ -28,7 +28,7 @@ STUDY = {
 
 
 def served(store: Store, **limits: int) -> TestClient:
-    return TestClient(create_app(store, limits=Limits(**limits)))
+    return TestClient(create_app(store, limits=Limits(**limits)))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ def restored() -> Iterator[None]:
 
 def logged(stream: io.StringIO, *given: object, **named: object) -> str:
     logs.configure(stream)
-    logging.getLogger("gaplab.test").info(*given, **named)
+    logging.getLogger("gaplab.test").info(*given, **named)  # type: ignore[arg-type]
     return stream.getvalue()
 
 

@@ -84,7 +84,7 @@ def test_the_database_is_asked_once_however_often_the_metrics_are_read(
 
     read(api)
     first = len(asked)
-    for _ in range(5):
+    for _ in range(5):  # type: ignore[assignment]
         read(api)
 
     assert 0 < first == len(asked)

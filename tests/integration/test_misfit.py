@@ -45,13 +45,13 @@ def test_repetitions_that_are_under_way_count_as_far_as_they_are(store: Store) -
 def test_a_coefficient_at_its_bound_is_remarked_on(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy(repetitions=1, iterations=1)).id
     (claim,) = execution.claim(store, "me", 1)
-    simulators = (Simulator([1.5, 0.7], 0.04),)
+    simulators = (Simulator([1.5, 0.7], 0.04),)  # type: ignore[arg-type]
     log = [
         *some_log(0),
-        Selected(1, [0.5]),
-        Measured(1, Sample([0.5], 0.3)),
+        Selected(1, [0.5]),  # type: ignore[arg-type]
+        Measured(1, Sample([0.5], 0.3)),  # type: ignore[arg-type]
         Tuned(1, simulators),
-        Transferred(1, [0.1], 0.5),
+        Transferred(1, [0.1], 0.5),  # type: ignore[arg-type]
     ]
     for step in log:
         execution.record(store, claim, step)

@@ -55,7 +55,7 @@ def in_one_process() -> Any:
 @pytest.fixture
 def ran_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """The ids of the nodes on which a repetition was begun; the latest is the last."""
-    alone = task.run._function
+    alone = task.run._function  # type: ignore[attr-defined]
 
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
     def noted(*given: Any) -> Iterator[Any]:

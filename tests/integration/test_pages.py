@@ -14,7 +14,7 @@ TOY = {"strategy": "random", "robot": "toy_function", "budget": "smoke"}
 
 
 def policy_of(answer: object) -> dict[str, set[str]]:
-    parts = (part.split() for part in answer.headers["content-security-policy"].split(";"))
+    parts = (part.split() for part in answer.headers["content-security-policy"].split(";"))  # type: ignore[attr-defined]
     return {name: set(sources) for name, *sources in parts}
 
 

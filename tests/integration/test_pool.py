@@ -58,7 +58,7 @@ def spreads(monkeypatch: pytest.MonkeyPatch) -> Any:
     """What was spread over cores."""
     spread = []
     run = Spread.run
-    monkeypatch.setattr(Spread, "run", lambda self: spread.append(self) or run(self))
+    monkeypatch.setattr(Spread, "run", lambda self: spread.append(self) or run(self))  # type: ignore[func-returns-value]
     return spread
 
 
@@ -155,9 +155,9 @@ def test_a_task_computes_every_step_of_a_repetition() -> None:
             {"strategy": "random", "robot": "toy_function", "iterations": 2, "repetitions": 1, "budget": "smoke"}
         )
     )
-    claim = Claim(repetition_id=0, epoch=0, experiment_id="none", number=0, spec=spec)
+    claim = Claim(id=0, epoch=0, experiment_id="none", number=0, spec=spec)
 
     stream = task.run.remote(claim, {}, CHECKPOINT_S)
 
-    steps = [each for batch in stream for each in ray.get(batch) if isinstance(each, TimedStep)]
+    steps = [each for batch in stream for each in ray.get(batch) if isinstance(each, TimedStep)]  # type: ignore[attr-defined]
     assert len(steps) == sum(1 for _ in repetition(setting(spec, 0)))

@@ -70,7 +70,7 @@ def walked(store: Store, **changes: Any) -> Any:
         Measured(2, Sample(known, setting_.reality(known))),
     ]
     for step in log:
-        assert execution.record(store, claim, step)
+        assert execution.record(store, claim, step)  # type: ignore[arg-type]
     return submitted, log, claim
 
 
@@ -137,7 +137,7 @@ def test_what_is_not_there_is_not_found_and_what_is_not_yet_there_is_a_conflict(
 
 def test_a_robot_without_a_body_has_nothing_to_show(sqlite_store: Store, api: Any) -> None:
     experiment = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
-    run(sqlite_store, *execution.claim(sqlite_store, "me", 1))
+    run(sqlite_store, *execution.claim(sqlite_store, "me", 1))  # type: ignore[arg-type]
 
     answer = api.get(f"/experiments/{experiment}/replay")
 

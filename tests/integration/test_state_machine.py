@@ -231,7 +231,7 @@ class LifeCycle(RuleBasedStateMachine):
     def fail(self, pick: Any, seldom: Any) -> None:
         if not seldom:
             experiment, each = self.one_of(self.running(), pick)
-            self.end(experiment, each, State.FAILED, Ending.FAILED, lambda *held: execution.fail(*held, "broken"))
+            self.end(experiment, each, State.FAILED, Ending.FAILED, lambda *held: execution.fail(*held, "broken"))  # type: ignore[call-arg]
 
     @precondition(lambda self: self.running())
     @rule(pick=picks)
@@ -248,7 +248,7 @@ class LifeCycle(RuleBasedStateMachine):
         experiment, each = self.one_of(self.running(), pick)
         each.losses += 1
         state = State.FAILED if each.losses == 5 else State.QUEUED
-        self.end(experiment, each, state, Ending.LOST, lambda *held: execution.release(*held, "killed"))
+        self.end(experiment, each, state, Ending.LOST, lambda *held: execution.release(*held, "killed"))  # type: ignore[call-arg]
 
     @precondition(lambda self: self.running())
     @rule()
@@ -283,7 +283,7 @@ class LifeCycle(RuleBasedStateMachine):
 
     def stored(self, experiment: Any) -> Any:
         """The row and the log of each repetition."""
-        with self.store.reading() as session:
+        with self.store.reading() as session:  # type: ignore[attr-defined]
             return self.read(session, experiment)
 
     def read(self, session: Any, experiment: Any) -> Any:
@@ -295,7 +295,7 @@ class LifeCycle(RuleBasedStateMachine):
     @invariant()
     def the_store_says_what_the_model_says(self) -> None:
         for experiment in self.experiments:
-            with self.store.reading() as session:
+            with self.store.reading() as session:  # type: ignore[attr-defined]
                 row, found = session.get_one(ExperimentRow, experiment.id), self.read(session, experiment)
                 ids = [each.id for each, _ in found]
                 tried = session.query(AttemptRow).where(AttemptRow.repetition_id.in_(ids)).order_by(AttemptRow.epoch)

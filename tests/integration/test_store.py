@@ -64,7 +64,7 @@ class KilledAtStatement:
     """Raises at the statement of that number, and says whether it did."""
 
     def __init__(self, store: Store, number: Any) -> None:
-        self.engine, self.left, self.hits = store._engine, number, []
+        self.engine, self.left, self.hits = store._engine, number, []  # type: ignore[var-annotated]
 
     def __enter__(self) -> Any:
         event.listen(self.engine, "before_cursor_execute", self.strike)
@@ -213,7 +213,7 @@ def test_to_have_no_connection_free_is_unavailability(
 ) -> None:
     pool = sqlite_store._engine.pool
     monkeypatch.setattr(pool, "_timeout", 0.01)
-    taken = [sqlite_store._engine.connect() for _ in range(pool.size() + pool._max_overflow)]
+    taken = [sqlite_store._engine.connect() for _ in range(pool.size() + pool._max_overflow)]  # type: ignore[attr-defined]
 
     with pytest.raises(StoreUnavailable, match="all connections"):
         use(sqlite_store)

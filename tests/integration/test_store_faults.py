@@ -74,7 +74,7 @@ class Trying(Here):
 
     repetitions = TryingRepetitions
     lost = False
-    late: ClassVar = set()
+    late: ClassVar = set()  # type: ignore[var-annotated]
     """The modules whose leases have run out: much time passes before each supervisor, and none while it works."""
 
     def __init__(self, store: Store) -> None:
@@ -131,7 +131,8 @@ def outcome(store: Store) -> Any:
     rounds = 0
     while unfinished(store):
         assert rounds < 100
-        Trying(store).serve(Stop(12 if rounds else 2))  # the first is stopped while a check is under way
+        # the first is stopped while a check is under way
+        Trying(store).serve(Stop(12 if rounds else 2))  # type: ignore[arg-type]
         rounds += 1
     with store.reading() as session:
         rows = session.query(RepetitionRow).all()
@@ -217,7 +218,7 @@ def test_a_fault_of_the_store_loses_nothing_and_does_nothing_twice(
 
     monkeypatch.setattr(MODULES[module], name, faulty)
     if name == "hand_back_unheard":  # is asked only when a claim could not be heard of
-        claim, claims = execution.claim, []
+        claim, claims = execution.claim, []  # type: ignore[var-annotated]
         monkeypatch.setattr(execution, "claim", lambda *arguments: times_out_at_first(claims, claim(*arguments)))
 
     assert outcome(store) == undisturbed

@@ -257,7 +257,7 @@ def parts_stored(store: Store) -> Any:
 def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    claim, checkpoints = execution.claim, []
+    claim, checkpoints = execution.claim, []  # type: ignore[var-annotated]
 
     def watched(store: Store, owner: Any, limit: Any) -> Any:
         claims = claim(store, owner, limit)

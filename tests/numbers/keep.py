@@ -75,7 +75,7 @@ def interrupt(store: Store) -> None:
         assert execution.record_all(store, [(claim, (item,))])
         if checkpoints == CHECKPOINTS:
             break
-    delivered.close()
+    delivered.close()  # type: ignore[attr-defined]
     store.dispose()
 
 

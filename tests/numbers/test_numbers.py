@@ -28,7 +28,7 @@ KEPT = sorted(file.stem for file in FOLDER.glob("*.zip"))
 
 def rows(steps: Any) -> Any:
     """The rows that an archive has of the steps of one repetition, in exact floats."""
-    iterations, samples, simulators = {}, [], []
+    iterations, samples, simulators = {}, [], []  # type: ignore[var-annotated]
     for step in steps:
         row = iterations.setdefault(step.iteration, {"number": step.iteration, **dict.fromkeys(ITERATION)})
         match step:
@@ -85,7 +85,7 @@ def test_the_pure_loop_computes_the_kept_numbers(name: Any) -> None:
     found = members(archive(name))
     specs = [ExperimentSpec.model_validate(each["spec"]) for each in found["experiment"]]
 
-    computed = [[rows(list(repetition(setting(spec, each)))) for each in range(spec.repetitions)] for spec in specs]
+    computed = [[rows(list(repetition(setting(spec, each)))) for each in range(spec.repetitions)] for spec in specs]  # type: ignore[arg-type]
 
     if computed != numbers(found) and (other := other_machine()):
         pytest.skip(f"the numbers differ, and so does the machine: {other}")

@@ -175,7 +175,7 @@ def results(history: Any, evidence: Any, expected: Any) -> Iterator[Any]:
 
 def epochs(evidence: Any) -> Iterator[Any]:
     """One winner an epoch, no step by anybody else, and no forbidden move."""
-    winners, steps = {}, Counter()
+    winners, steps = {}, Counter()  # type: ignore[var-annotated]
     for move in evidence.moves:
         where = f"move {move.id} of repetition {move.repetition}"
         yield from (f"{where}: {wrong}" for wrong in (*_of_state(move, winners), *_of_steps(move, winners, steps)))

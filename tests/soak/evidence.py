@@ -70,7 +70,7 @@ def gather(store: Store, database: Any) -> Evidence:
         studies = dict(session.execute(select(StudyRow.id, StudyRow.name)).all())
         checks = dict(session.execute(select(SensitivityRow.id, SensitivityRow.state)).all())
         experiments = tuple(_experiment(session, row) for row in session.scalars(select(ExperimentRow)).all())
-    return Evidence(experiments, studies, checks, tuple(witness.moves(store)), tuple(database.complaints()))
+    return Evidence(experiments, studies, checks, tuple(witness.moves(store)), tuple(database.complaints()))  # type: ignore[arg-type]
 
 
 def checks_under_way(store: Store) -> bool:
@@ -109,7 +109,7 @@ def undisturbed(spec: dict, number: int) -> tuple[str, ...]:
 
 @cache
 def _undisturbed(spec: str, number: int) -> tuple[str, ...]:
-    return tuple(map(digest, repetition(setting(ExperimentSpec.model_validate_json(spec), number))))
+    return tuple(map(digest, repetition(setting(ExperimentSpec.model_validate_json(spec), number))))  # type: ignore[arg-type]
 
 
 def digest(step: Step) -> str:

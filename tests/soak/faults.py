@@ -45,7 +45,7 @@ def _pause(role: Any) -> Any:
 def _signal(stage: Any, role: Any, number: Any) -> Any:
     """Send it to one of those that play the role; its id, or None if there is none to be found in a while."""
     found = []
-    until(lambda: found.extend(stage.of(role)) or found, 20)
+    until(lambda: found.extend(stage.of(role)) or found, 20)  # type: ignore[func-returns-value]
     pid = random.choice(found) if found else None
     return pid if pid and send(pid, number) else None
 
@@ -87,7 +87,7 @@ def faults(database: Any) -> Any:
 
 def volleys(database: Any, rng: Any, at_once: Any) -> Iterator[Any]:
     """Faults without end, one to so many at a time, each kind in turn, in an order that is shuffled."""
-    kinds, order = faults(database), []
+    kinds, order = faults(database), []  # type: ignore[var-annotated]
     while True:
         size = rng.randint(1, at_once)
         while len(order) < size:
@@ -115,7 +115,7 @@ def recovered(stage: Any, store: Store, within_s: Any) -> Any:
     """
     begun = time.monotonic()
     for _ in range(2):
-        since, left_s = [], within_s - (time.monotonic() - begun)
+        since, left_s = [], within_s - (time.monotonic() - begun)  # type: ignore[var-annotated]
         if not until(lambda since=since: _well(stage, store, since), left_s):
             return None
     return time.monotonic() - begun

@@ -26,7 +26,7 @@ class Interruption:
 
     def __init__(self, calls: Any) -> None:
         self.left = calls
-        self.answers = []
+        self.answers = []  # type: ignore[var-annotated]
 
     def genomes_per_call(self, simulators: Any) -> int:
         if not self.left:
@@ -101,7 +101,7 @@ def test_a_step_may_be_interrupted_again_and_again() -> None:
     setting = setting_of("informative", "steady_state", batch=8)
     history = History()
     for step in repetition(setting):
-        answers = []
+        answers = []  # type: ignore[var-annotated]
         while (more := interrupted(setting, history, 3, answers)) is not None:
             answers.append(more)
         again, left = resumed(setting, history, answers)

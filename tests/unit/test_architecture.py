@@ -26,7 +26,7 @@ ROOMS = {
     "experiments": (("core", "engines", "store", "specs", "plugins", "settings"), {"sqlalchemy"}),
     "running": (("core", "engines", "store", "plugins", "experiments"), {"sqlalchemy"}),
     "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
-    "replay": (("core", "store", "specs", "experiments"), {"numpy", "cachetools"}),
+    "replay": (("core", "store", "specs", "plugins", "experiments"), {"numpy", "cachetools"}),
     "archives": (("core", "store", "specs", "experiments", "results"), {"pydantic", "pyarrow"}),
 }
 """Rooms of services, each below those that may import it: what of services each may import, and what of others."""

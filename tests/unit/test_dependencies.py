@@ -44,7 +44,7 @@ def test_everything_that_is_needed_is_pinned_to_what_is_installed() -> None:
     found = needed()
 
     assert len(found) > 50
-    assert {name: (PINS.get(name), version) for name, version in found.items() if PINS.get(name) != version} == {}
+    assert {name: (PINS.get(name), version) for name, version in found.items() if PINS.get(name) != version} == {}  # type: ignore[call-overload]
 
 
 def test_every_line_of_the_constraints_is_a_version() -> None:

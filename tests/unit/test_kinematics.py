@@ -64,9 +64,9 @@ def test_bullet_has_the_bodies_at_the_same_places() -> None:
 
     positions, orientations = body_poses(robot.world, scene.pose()[None], scene.angles()[None])
 
-    for link, joint in enumerate(robot.world.joints):
+    for link, joint in enumerate(robot.world.joints):  # type: ignore[assignment]
         state = scene.bullet.getLinkState(scene.robot, link, 0, 1, physicsClientId=scene.client)
-        place = [body.name for body in robot.world.bodies].index(joint.child)
+        place = [body.name for body in robot.world.bodies].index(joint.child)  # type: ignore[attr-defined]
         assert positions[0, place] == pytest.approx(state[4], abs=1e-6)
         assert abs(orientations[0, place] @ state[5]) == pytest.approx(1, abs=1e-6)
     engine.close()

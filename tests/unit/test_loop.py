@@ -102,7 +102,7 @@ def test_budgets_are_honoured_to_the_rollout_and_reported_in_the_steps(
 
 @pytest.mark.parametrize("failed", [{2}, {1, 2}, {1, 2, 3}])
 def test_what_a_failed_measurement_does_not_take_of_the_budget_is_saved(failed: Any) -> None:
-    reality = CountedReality(lambda genome: float("nan") if reality.asked // 2 in failed else float(genome.sum()))
+    reality = CountedReality(lambda genome: float("nan") if reality.asked // 2 in failed else float(genome.sum()))  # type: ignore[has-type]
 
     steps = list(repetition(small_setting("random", reality=reality)))
 
@@ -238,9 +238,9 @@ def test_the_population_of_a_fit_strategy_yields_its_one_best_simulator() -> Non
 def test_the_transfer_evolves_in_the_best_simulator() -> None:
     best = np.array([0.3, 0.6])
     setting = small_setting(budget=Budget(500, 10, 10))
-    step = Tuned(1, tuple(replace(each) for each in next(repetition(setting)).simulators))
+    step = Tuned(1, tuple(replace(each) for each in next(repetition(setting)).simulators))  # type: ignore[union-attr]
     step = replace(step, simulators=(replace(step.simulators[0], parameters=best),))
 
     transferred = next(repetition(setting, [step]))
 
-    np.testing.assert_allclose(transferred.genome, best, atol=0.01)
+    np.testing.assert_allclose(transferred.genome, best, atol=0.01)  # type: ignore[union-attr]

@@ -48,15 +48,15 @@ def put(tmp_path: Path) -> Iterator[Put]:
         home.mkdir(exist_ok=True)
         for name, text in files.items():
             (home / f"{name}.py").write_text(text)
-        external_plugins.look_in((*external_plugins.folders(), home))
+        external_plugins.set_folders((*external_plugins.folders(), home))
         return home
 
     yield write
-    external_plugins.look_in(())
+    external_plugins.set_folders(())
 
 
 def strategies() -> Registry[Strategy]:
-    return Registry("strategy", "gaplab.services.core.strategies", Strategy)
+    return Registry("strategy", "gaplab.services.core.strategies", Strategy)  # type: ignore[type-abstract]
 
 
 def test_a_file_in_the_folder_is_a_plug_in_among_gaplabs_own(put: Put) -> None:
@@ -75,7 +75,7 @@ def test_a_file_in_the_folder_is_a_plug_in_among_gaplabs_own(put: Put) -> None:
 def test_it_belongs_to_its_kind_only(put: Put) -> None:
     put(careful=CAREFUL)
 
-    assert "careful" not in Registry("tunable", "gaplab.services.core.tunables", Tunable)
+    assert "careful" not in Registry("tunable", "gaplab.services.core.tunables", Tunable)  # type: ignore[type-abstract]
 
 
 def test_files_import_from_each_other_and_one_with_an_underscore_is_only_for_that(put: Put) -> None:
@@ -120,12 +120,12 @@ def test_a_broken_file_is_a_sentence(put: Put, text: str, says: str) -> None:
 
 
 def test_a_folder_that_is_not_there_is_a_sentence(tmp_path: Path) -> None:
-    external_plugins.look_in((tmp_path / "nowhere",))
+    external_plugins.set_folders((tmp_path / "nowhere",))
     try:
         with pytest.raises(PluginBroken, match=r"there is no folder .*nowhere"):
             list(strategies())
     finally:
-        external_plugins.look_in(())
+        external_plugins.set_folders(())
 
 
 def test_what_is_in_the_folder_has_a_hash_and_files_that_python_keeps_have_none(put: Put) -> None:
@@ -181,10 +181,15 @@ def test_without_folders_there_is_nothing_to_tell() -> None:
 
 
 ELSEWHERE = """
+import os
+
+from gaplab.services.plugins import folders
 from gaplab.services.running.versions import provenance, versions
 from gaplab.services.plugins.catalogue import catalogue
 from gaplab.services.running.provenance import decisive
 
+assert os.environ["GAPLAB_PLUGINS"] == "mine", "an import has changed the environment"
+folders.find()
 found = provenance()
 print("careful" in [each.name for each in catalogue().strategies])
 print(sorted(found.plugins) == ["careful.py", "glide.py"])

@@ -33,7 +33,7 @@ def move(
     at: Any = 10.0,
     repetition: Any = 1,
 ) -> Any:
-    return Move(number, repetition, was, state, *epochs, owner, *steps, at)
+    return Move(number, repetition, was, state, *epochs, owner, *steps, at)  # type: ignore[call-arg]
 
 
 CLAIMED = move(1, "QUEUED", "RUNNING", epochs=(0, 1), at=3.0)
