@@ -12,7 +12,7 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.tunables import tunables
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.mujoco import MuJoCo
-from gaplab.services.engines.mujoco.scene import Scene, _in_force
+from gaplab.services.engines.mujoco.scene import MuJoCoScene, _in_force
 from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.specs.assembly import Simulation
 
@@ -63,7 +63,7 @@ def at_once(engine: Engine) -> Callable[[], int]:
 def bare(threads: int) -> Callable[[], int]:
     """`mujoco.rollout` of the same motions in the same model under the same law, its inputs made beforehand."""
     engine = MuJoCo(MuJoCo.Options(threads=threads))
-    scene: Scene = engine._scene(ROBOT.world)
+    scene: MuJoCoScene = engine._scene(ROBOT.world)
     motions = [ROBOT.motion(genome) for genome in genomes(MANY)]
     steps = int(scene._steps(motions[0].observe_s)[-1])
     controls = scene._controls(motions, steps)

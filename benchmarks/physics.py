@@ -12,7 +12,7 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.world import Motion
 from gaplab.services.engines.pybullet import PyBullet
-from gaplab.services.engines.pybullet.scene import Scene
+from gaplab.services.engines.pybullet.scene import PyBulletScene
 from gaplab.services.specs.assembly import Simulation
 
 TUNED = ("static_friction", "dynamic_friction", "restitution")
@@ -48,7 +48,7 @@ def through_simulate(parameters: Parameters) -> Callable[[], int]:
 def bare() -> Callable[[], int]:
     """`stepSimulation` in a loop, motors commanded at pulse edges only: what the physics alone costs."""
     robot = Quadruped()
-    scene = Scene(pybullet, robot.world)
+    scene = PyBulletScene(pybullet, robot.world)
     motions = [robot.motion(genome) for genome in genomes()]
 
     def work() -> int:

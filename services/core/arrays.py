@@ -21,7 +21,7 @@ Fitnesses: TypeAlias = FloatArray
 
 
 def frozen(values: object) -> FloatArray:
-    """A read-only float64 copy, for arrays that live inside frozen values."""
+    """Return a read-only float64 copy, for arrays inside frozen values."""
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
     return array

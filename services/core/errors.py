@@ -1,25 +1,25 @@
-"""Everything that gaplab refuses or fails at.
+"""All errors of gaplab.
 
     GaplabError
-    ├── InvalidSpec          what was asked for cannot be done; carries every violation with its place in the spec
+    ├── InvalidSpec          the spec cannot be run; has every violation with its place in the spec
     ├── NotFound             no such study, experiment or plug-in
-    ├── Conflict             not now: the state forbids it
-    │   └── Changed              somebody else changed it since it was looked at
-    ├── ConditionMissing     a change that does not say which state it starts from
-    ├── KeyReused            an idempotency key that stands for something else already
-    ├── LimitReached         not now: too much is under way
-    ├── Unauthenticated      no token, or one that admits nobody
-    ├── Forbidden            the token's role does not permit it
-    ├── StoreUnavailable     the database is unreachable, or its schema is not the one this version needs
-    ├── InvalidArchive       a file that is no archive of ours, or one that was damaged or made to harm
-    ├── Unsupported          another kind of database is needed for what was asked
+    ├── Conflict             the present state forbids the request
+    │   └── Changed              the resource has changed since the sender read it
+    ├── ConditionMissing     the change does not name the version that it starts from
+    ├── KeyReused            the idempotency key belongs to another request
+    ├── LimitReached         too much is under way; try again later
+    ├── Unauthenticated      the token is missing or invalid
+    ├── Forbidden            the role of the token does not permit the request
+    ├── StoreUnavailable     the database is unreachable, or has another schema than this version needs
+    ├── InvalidArchive       the file is damaged, harmful or not an archive
+    ├── Unsupported          this kind of database cannot do it
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
-    ├── PluginBroken         a file of plug-ins from outside cannot be used
+    ├── PluginBroken         an external plug-in cannot be used
     └── EngineError
         ├── EngineUnavailable    the engine's library is not installed
-        └── EngineInterrupted    its process died, or was ended for taking too long
+        └── EngineInterrupted    its process died, or took too long and was ended
 
-Physics that blows up is no error: it is a fitness of nan, which never wins.
+Failed physics is not an error: its fitness is nan, which never wins.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -29,19 +29,19 @@ from typing import Any
 
 
 class GaplabError(Exception):
-    """The root: its message is one readable sentence."""
+    """The root of all errors; the message is one sentence."""
 
 
 @dataclass(frozen=True)
 class Violation:
-    """One thing wrong with a spec.
+    """One fault of a spec.
 
     Attributes:
         pointer: JSON pointer of the offending value within the spec, like `/strategy/options/fit_weight`.
-        value: the offending value as it was given.
+        value: the offending value.
         message: one sentence that says what is wrong.
-        permitted: what would have been right, where that can be listed or phrased.
-        nearest: the permitted name that is most alike, for a misspelt name.
+        permitted: the permitted values, as a list or in words; None if neither is possible.
+        nearest: the most similar permitted name, for a misspelt name.
     """
 
     pointer: str
@@ -51,14 +51,14 @@ class Violation:
     nearest: str | None = None
 
     def moved(self, prefix: str, to: str) -> "Violation":
-        """The same violation where what stood at `prefix` stands elsewhere."""
+        """Return the violation with the pointer `prefix` replaced by `to`."""
         if not self.pointer.startswith(prefix):
             return self
         return replace(self, pointer=to + self.pointer.removeprefix(prefix))
 
 
 class InvalidSpec(GaplabError):
-    """A spec that cannot be run, with everything that is wrong with it."""
+    """The spec cannot be run; the error has every violation."""
 
     def __init__(self, violations: Iterable[Violation]) -> None:
         self.violations = tuple(violations)
@@ -66,30 +66,30 @@ class InvalidSpec(GaplabError):
 
 
 class NotFound(GaplabError):
-    """There is nothing of that name or id."""
+    """Nothing has this name or id."""
 
 
 class Conflict(GaplabError):
-    """The present state forbids what was asked."""
+    """The present state forbids the request."""
 
 
 class Changed(Conflict):
-    """It is not what it was when the sender of the change looked at it."""
+    """The resource has changed since the sender of the change read it."""
 
 
 class ConditionMissing(GaplabError):
-    """A change does not say which state it starts from."""
+    """The change does not name the version that it starts from."""
 
 
 class KeyReused(GaplabError):
-    """An idempotency key stands for another request already."""
+    """The idempotency key belongs to another request."""
 
 
 class LimitReached(GaplabError):
     """Too much is under way; the message names the limit.
 
     Attributes:
-        retry_after_s: when it may be worth trying again; None where nobody knows.
+        retry_after_s: seconds after which another attempt may succeed; None if unknown.
     """
 
     def __init__(self, message: str, retry_after_s: int | None = None) -> None:
@@ -98,35 +98,35 @@ class LimitReached(GaplabError):
 
 
 class Unauthenticated(GaplabError):
-    """No token was shown, or one that admits nobody."""
+    """The token is missing or invalid."""
 
 
 class Forbidden(GaplabError):
-    """The role of the token does not permit this."""
+    """The role of the token does not permit the request."""
 
 
 class StoreUnavailable(GaplabError):
-    """The database cannot be used now."""
+    """The database cannot be used at the moment."""
 
 
 class InvalidArchive(GaplabError):
-    """What was sent is no archive of experiments that can be read; the message says where it is wrong."""
+    """The file is damaged, harmful or not an archive; the message says where."""
 
 
 class Unsupported(GaplabError):
-    """This kind of database cannot do what was asked; the message says what can."""
+    """This kind of database cannot do it; the message names the alternative."""
 
 
 class ClusterUnusable(GaplabError):
-    """Ray is unreachable, or one of its nodes would compute other numbers, or none."""
+    """Ray is unreachable, or one of its nodes would compute other numbers or fail."""
 
 
 class PluginBroken(GaplabError):
-    """A file of plug-ins cannot be used; the message says which, and why."""
+    """An external plug-in cannot be used; the message names the file and the reason."""
 
 
 class EngineError(GaplabError):
-    """An engine cannot do its work."""
+    """An engine cannot simulate."""
 
 
 class EngineUnavailable(EngineError):
@@ -134,11 +134,11 @@ class EngineUnavailable(EngineError):
 
 
 class EngineInterrupted(EngineError):
-    """Physics ended before it answered; nothing else did."""
+    """The process of a rollout ended before it answered; nothing else is affected."""
 
 
 def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -> Violation:
-    """The violation of naming something that is not there, with the nearest name that is."""
+    """Return the violation for an unknown name, with the most similar permitted one."""
     nearest = next(iter(get_close_matches(name, permitted, n=1, cutoff=0.5)), None)
     hint = f" (did you mean {nearest!r}?)" if nearest else ""
     message = f"there is no {kind} called {name!r}{hint}; there is {', '.join(permitted)}"
@@ -146,10 +146,10 @@ def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -
 
 
 def gather(*checks: Callable[[], Any]) -> tuple[Any, ...]:
-    """What each check gives, in order; if any refuses, everything that all of them find wrong.
+    """Return the result of each check, in order, or raise the violations of all checks together.
 
     Raises:
-        InvalidSpec: with the violations of every check, each once.
+        InvalidSpec: with every violation, each once.
     """
     results, violations = [], []
     for check in checks:

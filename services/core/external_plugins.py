@@ -1,4 +1,4 @@
-"""Plug-ins from outside this package: every module of some folders, imported as `gaplab_plugins.NAME`."""
+"""External plug-ins: every module of the plug-in folders, imported as `gaplab_plugins.NAME`."""
 
 import sys
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from typing import TypeGuard, TypeVar
 from gaplab.services.core.errors import PluginBroken
 
 PACKAGE = "gaplab_plugins"
-"""Has no file of its own. A file of a folder imports another as `from gaplab_plugins.other import …`."""
+"""A package without a file. A module of a folder imports another by `from gaplab_plugins.other import …`."""
 
 P = TypeVar("P")
 
@@ -40,10 +40,10 @@ def folders() -> tuple[Path, ...]:
 
 
 def classes(base: type[P]) -> Iterator[type[P]]:
-    """The plug-ins of one kind.
+    """Yield the external plug-ins of one kind.
 
     Raises:
-        PluginBroken: a file cannot be imported, or a class of this kind lacks something.
+        PluginBroken: a module cannot be imported, or a class is not a valid plug-in.
     """
     for module in _modules():
         for each in vars(module).values():
@@ -53,7 +53,7 @@ def classes(base: type[P]) -> Iterator[type[P]]:
 
 
 def file_of(plugin: type) -> str | None:
-    """The file that the class is from, relative to its folder; None for one of gaplab's own."""
+    """Return the file of an external plug-in, relative to its folder; None for a built-in one."""
     package, _, name = plugin.__module__.partition(".")
     if package != PACKAGE:
         return None
@@ -62,13 +62,12 @@ def file_of(plugin: type) -> str | None:
 
 
 def _modules() -> list[ModuleType]:
-    """Every module of the folders, by name; those that begin with an underscore are only there for others."""
+    """Return every module of the folders, by name, except those that begin with an underscore."""
     found: dict[str, str] = {}
     for folder in folders():
         for name in sorted(info.name for info in iter_modules([str(folder)])):
             if name in found:
-                msg = f"{name}.py is in {found[name]} and in {folder}; a plug-in's file has a name of its own"
-                raise PluginBroken(msg)
+                raise PluginBroken(f"{name}.py is in {found[name]} and in {folder}; rename one of them")
             found[name] = str(folder)
     return [_imported(name, folder) for name, folder in found.items() if not name.startswith("_")]
 
@@ -76,13 +75,13 @@ def _modules() -> list[ModuleType]:
 def _imported(name: str, folder: str) -> ModuleType:
     try:
         return import_module(f"{PACKAGE}.{name}")
-    except Exception as error:  # whatever somebody's file does
+    except Exception as error:  # a file may raise anything
         msg = f"{folder}/{name}.py cannot be imported: {type(error).__name__}: {error}"
         raise PluginBroken(msg) from error
 
 
 def _is_of(module: ModuleType, found: object) -> TypeGuard[type]:
-    """Whether it is a class of this module or package, and not only there for others, as an underscore says."""
+    """Return whether it is a class of this module or package whose name has no leading underscore."""
     if not isinstance(found, type) or found.__name__.startswith("_"):
         return False
     return found.__module__ == module.__name__ or found.__module__.startswith(f"{module.__name__}.")

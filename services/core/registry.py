@@ -1,4 +1,4 @@
-"""Plug-ins: one file in a folder is one plug-in, found by being there; `outside` finds those that are not gaplab's."""
+"""Plug-ins and their registries: each file in a folder is one plug-in, and needs no registration."""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -20,12 +20,12 @@ class NoOptions(Frozen):
 
 
 class Plugin:
-    """What every plug-in is: a class with a name, a docstring and a frozen model of its options.
+    """Base of all plug-ins: a class with a name, a docstring and a frozen model of its options.
 
     Attributes:
-        name: how specs call it; also the name of its file.
-        source: where its idea or its numbers come from.
-        Options: a frozen model in which everything has a default.
+        name: its name in specs, and the name of its file.
+        source: the origin of its idea or its numbers.
+        Options: a frozen model; every field has a default.
     """
 
     name: ClassVar[str]
@@ -37,7 +37,7 @@ class Plugin:
 
     @classmethod
     def describe(cls) -> PluginRead:
-        """The plug-in as the catalogue lists it."""
+        """Return the entry of the plug-in in the catalogue."""
         summary = (getdoc(cls) or "").split("\n\n", maxsplit=1)[0].replace("\n", " ")
         return PluginRead(
             name=cls.name,
@@ -49,7 +49,7 @@ class Plugin:
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """What else a reader of the catalogue should know; plain JSON."""
+        """Return further facts for the catalogue, as plain JSON."""
         return {}
 
 
@@ -59,7 +59,8 @@ P = TypeVar("P", bound=Plugin)
 class Registry(Mapping[str, type[P]], Generic[P]):
     """The plug-ins of one kind, by name, in alphabetical order.
 
-    At first use every module of `package` is imported, and every one from outside; that raises PluginBroken.
+    The first use imports every module of `package` and every external plug-in. It raises PluginBroken if one of these
+    is not valid.
     """
 
     def __init__(self, kind: str, package: str, base: type[P]) -> None:
@@ -100,14 +101,14 @@ class Registry(Mapping[str, type[P]], Generic[P]):
         return len(self._plugins)
 
     def check(self, ref: PluginRef, pointer: str = "") -> tuple[type[P], Frozen]:
-        """The plug-in that a spec names, and its options completed; nothing is constructed.
+        """Return the class of the plug-in that a spec names, and its complete options.
 
         Args:
             ref: name and options.
-            pointer: where in the spec it stands, for the error.
+            pointer: its place in the spec, for the error.
 
         Raises:
-            InvalidSpec: no such name, or options that the plug-in refuses.
+            InvalidSpec: the name is unknown, or the plug-in refuses the options.
         """
         if ref.name not in self:
             raise InvalidSpec([unknown_name(pointer, self.kind, ref.name, list(self))])
@@ -120,17 +121,17 @@ class Registry(Mapping[str, type[P]], Generic[P]):
             ) from error
 
     def create(self, ref: PluginRef, pointer: str = "") -> P:
-        """The plug-in that a spec names, with its options; raises as `check` does."""
+        """Return the plug-in that a spec names, with its options; raise as `check` does."""
         plugin, options = self.check(ref, pointer)
         return plugin(options)
 
     def describe(self) -> tuple[PluginRead, ...]:
-        """Every plug-in, as the catalogue lists it."""
+        """Return the catalogue entry of every plug-in."""
         return tuple(plugin.describe() for plugin in self.values())
 
 
 def _source(plugin: type[Plugin]) -> str:
-    """Where it says that it comes from, or its file, for one from outside that does not say."""
+    """Return the stated source, or the file of an external plug-in that states none."""
     file = external_plugins.file_of(plugin)
     return f"{file} of GAPLAB_PLUGINS" if file and plugin.source == Plugin.source else plugin.source
 

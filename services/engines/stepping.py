@@ -1,4 +1,4 @@
-"""What engines share that go on step by step: a motion in whole time steps, and scenes that are kept warm."""
+"""Parts of engines that advance in time steps: motions in whole steps, and scenes that stay warm."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -13,37 +13,37 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.world import Motion, Recording, Trajectory, World
 
 WARM_SCENES = 4
-"""Worlds that differ in more than their material are kept warm up to this number; the longest unused one goes."""
+"""Number of scenes that stay warm, one for each world up to its material; the least recently used one goes."""
 
 FARTHEST_M = 100.0
-"""A base that is farther than this from where it started was thrown there by numbers, not by physics: it failed."""
+"""Greatest plausible distance of the base from the origin; beyond it the physics has failed."""
 
 DEEPEST_M = 1.0
-"""So was one that is deeper than this in the ground."""
+"""Greatest plausible depth of the base in the ground."""
 
 
 class Warm(Protocol):
-    """A world in an engine, kept for the next rollout."""
+    """A scene in an engine that stays for the next rollout."""
 
     def close(self) -> None:
-        """Give up what the engine holds for it."""
+        """Free the memory that the engine holds for the scene."""
 
 
-class Scene(Warm, Protocol):
-    """A world that goes on step by step."""
+class SteppedScene(Warm, Protocol):
+    """A world that advances in time steps."""
 
     @property
     def world(self) -> World:
-        """What it was built from."""
+        """The world of the scene."""
 
     def command(self, actuator: int, target: float) -> None:
-        """A new target for an actuator, rad."""
+        """Set the target of an actuator, rad."""
 
     def pose(self) -> FloatArray:
-        """`(7,)`: position and quaternion x, y, z, w of the base's frame."""
+        """Return position and quaternion x, y, z, w of the base's frame, `(7,)`."""
 
     def angles(self) -> FloatArray:
-        """`(joints,)`, rad, in the world's order."""
+        """Return the angles of the joints, `(joints,)`, rad, in the world's order."""
 
 
 S = TypeVar("S", bound=Warm)
@@ -53,7 +53,7 @@ class WarmScenes(Generic[S]):
     """The scenes of the latest worlds.
 
     Args:
-        build: makes the scene of a world.
+        build: builds the scene of a world.
     """
 
     def __init__(self, build: Callable[[World], S]) -> None:
@@ -68,52 +68,54 @@ class WarmScenes(Generic[S]):
         return scene
 
     def drop(self, world: World) -> None:
-        """Give up a scene that was spoilt; the next one of its world is built anew."""
+        """Close a scene that is damaged; the next rollout builds another."""
         self._scenes.pop(world).close()
 
     def close(self) -> None:
-        """Give all scenes up."""
+        """Close all scenes."""
         while self._scenes:
             self._scenes.popitem()[1].close()
 
 
-def watch(scene: Scene, advance: Callable[[int], None], motion: Motion) -> FloatArray:
-    """`(t, 7)`: position and quaternion of the base at each observation of a motion; times in whole time steps.
+def watch(scene: SteppedScene, advance: Callable[[int], None], motion: Motion) -> FloatArray:
+    """Return position and quaternion of the base at each observation, `(t, 7)`; times are rounded to whole steps.
 
     Args:
         scene: at time 0.
-        advance: goes on by so many time steps.
-        motion: its targets are commanded when they change, and only those that do.
+        advance: advances the scene by a number of time steps.
+        motion: its targets are set when they change.
     """
     return _watch(scene, advance, motion, scene.pose)
 
 
 def record(
-    scene: Scene, advance: Callable[[int], None], motion: Motion, times_s: FloatArray
+    scene: SteppedScene, advance: Callable[[int], None], motion: Motion, times_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """What `watch` sees, `(t, 7)`, and base and joints at other times, `(k, 7 + joints)`.
+    """Return what `watch` returns, `(t, 7)`, and base and joints at other times, `(k, 7 + joints)`.
 
     Args:
-        scene: as of `watch`.
-        advance: as of `watch`.
-        motion: as of `watch`.
+        scene: at time 0.
+        advance: advances the scene by a number of time steps.
+        motion: its targets are set when they change.
         times_s: `(k,)`, ascending, up to the last observation.
     """
     often = replace(motion, observe_s=np.union1d(motion.observe_s, times_s))
     seen = _watch(scene, advance, often, lambda: np.append(scene.pose(), scene.angles()))
-    observed, looked = (np.searchsorted(often.observe_s, each) for each in (motion.observe_s, times_s))
-    return seen[observed, :7], seen[looked]
+    observed, recorded = (np.searchsorted(often.observe_s, times) for times in (motion.observe_s, times_s))
+    return seen[observed, :7], seen[recorded]
 
 
 def recording(motion: Motion, times_s: FloatArray, poses: FloatArray, seen: FloatArray) -> Recording:
-    """What `record` returned, put together; nan throughout if no physics can have led to the poses."""
+    """Return the recording of what `record` returned; nan throughout if the poses are not plausible."""
     if not plausible(poses):
         poses, seen = np.full_like(poses, np.nan), np.full_like(seen, np.nan)
     trajectory = Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
     return Recording(trajectory, times_s, seen[:, :7], seen[:, 7:])
 
 
-def _watch(scene: Scene, advance: Callable[[int], None], motion: Motion, look: Callable[[], FloatArray]) -> FloatArray:
+def _watch(
+    scene: SteppedScene, advance: Callable[[int], None], motion: Motion, look: Callable[[], FloatArray]
+) -> FloatArray:
     commands = _commands(motion, scene.world.time_step_s)
     observed = _steps(motion.observe_s, scene.world.time_step_s)
     poses: dict[int, FloatArray] = {}
@@ -128,13 +130,13 @@ def _watch(scene: Scene, advance: Callable[[int], None], motion: Motion, look: C
 
 
 def plausible(poses: FloatArray) -> NDArray[np.bool_]:
-    """`(...)`: whether physics can have led to all of the poses `(..., t, 7)`; nan is not plausible."""
+    """Return for each trajectory of poses `(..., t, 7)` whether it is plausible, `(...)`; nan is not."""
     near = np.all(np.abs(poses[..., :3]) < FARTHEST_M, axis=(-2, -1))
     return np.asarray(near & np.all(poses[..., 2] > -DEEPEST_M, axis=-1))
 
 
 def _commands(motion: Motion, time_step_s: float) -> dict[int, list[tuple[int, float]]]:
-    """By time step: the actuators whose targets change then, with their new targets; at step 0, all of them."""
+    """Return by time step the actuators whose targets change, with the new targets; at step 0, all of them."""
     changed = np.vstack([np.ones_like(motion.targets[:1], bool), motion.targets[1:] != motion.targets[:-1]])
     rows, actuators = np.nonzero(changed)
     steps, targets = _steps(motion.times_s[rows], time_step_s), motion.targets[rows, actuators].tolist()

@@ -17,8 +17,8 @@ from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.workers import repetitions as task
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.cluster import cluster
+from gaplab.workers.lending import SharedCall, sizes
 from gaplab.workers.pool import Pool
-from gaplab.workers.spread import Spread, sizes
 from tests.processes import processes_of_ray
 
 SPEC = resolve_experiment(ExperimentSpec.model_validate({"strategy": "informative", "budget": "smoke"}))
@@ -55,8 +55,8 @@ def pool(alone):
 def spreads(monkeypatch):
     """What was spread over cores."""
     spread = []
-    run = Spread.run
-    monkeypatch.setattr(Spread, "run", lambda self: spread.append(self) or run(self))
+    run = SharedCall.run
+    monkeypatch.setattr(SharedCall, "run", lambda self: spread.append(self) or run(self))
     return spread
 
 
@@ -118,7 +118,7 @@ def test_one_of_several_helpers_that_dies_is_asked_no_more(alone, pool):
     live, dead = pool._helpers.ready(*question)
     ray.kill(dead)
 
-    spread = Spread([question] * 6, alone.simulate, [live, dead], rollout_s=10.0)
+    spread = SharedCall([question] * 6, alone.simulate, [live, dead], rollout_s=10.0)
     spread.run()
     pool._helpers.helped(but_for=spread.dead)
 

@@ -27,7 +27,7 @@ TURNED = np.array((0, 1, 2, 4, 5, 6, 3))
 """MuJoCo's poses have w first, a Trajectory's have it last."""
 
 
-class Scene:
+class MuJoCoScene:
     """A world in any material.
 
     Nothing is carried from one rollout to the next: each sets the whole state, and the solver begins anew each step.

@@ -34,8 +34,8 @@ MOST_ITERATIONS = 255
 
 
 @dataclass(frozen=True)
-class Robot:
-    """What a World became.
+class PhysXRobot:
+    """A World's robot in PhysX.
 
     Attributes:
         links: the bodies, by name, the base first.
@@ -50,7 +50,7 @@ class Robot:
     motors: tuple[Handle, ...]
 
 
-def build_robot(sapien: ModuleType, world: World, material: Handle) -> Robot:
+def build_robot(sapien: ModuleType, world: World, material: Handle) -> PhysXRobot:
     """The robot of the world at its start, its surfaces of the one material, not yet in a scene."""
     bodies = {body.name: body for body in world.bodies}
     base = world.bodies[0]
@@ -64,7 +64,7 @@ def build_robot(sapien: ModuleType, world: World, material: Handle) -> Robot:
     articulation.solver_position_iterations = min(world.solver_iterations, MOST_ITERATIONS)
     articulation.solver_velocity_iterations = 1  # takes out the speed that pushing bodies apart has added
     articulation.sleep_threshold = 0.0
-    return Robot(links, entities, articulation, tuple(links[joint.child].joint for joint in world.actuators))
+    return PhysXRobot(links, entities, articulation, tuple(links[joint.child].joint for joint in world.actuators))
 
 
 def _outwards(world: World) -> Iterator[Joint]:

@@ -15,7 +15,7 @@ LARGEST = float(np.finfo(np.float32).max)
 """PhysX computes in single precision."""
 
 
-class Scene:
+class PhysXScene:
     """One world in one scene, with its state at time 0 kept.
 
     Robot and ground share one material, as in the paper: PhysX averages the coefficients of two surfaces, and the

@@ -13,7 +13,7 @@ BASE = -1
 """Bullet's index of the base; the links count from 0, and link i hangs on joint i."""
 
 
-class Scene:
+class PyBulletScene:
     """One world in one server, with its state at time 0 kept.
 
     Source: the PyBullet Quickstart Guide. `restoreState` puts back positions, speeds and contacts, but not what

@@ -4,7 +4,7 @@ from math import hypot
 from typing import Any
 
 from gaplab.services.core.world import Material
-from gaplab.services.engines.pybullet.scene import Scene
+from gaplab.services.engines.pybullet.scene import PyBulletScene
 
 SLIDES = 0.999
 """A sticking link slides when its friction reaches this share of what the static coefficient allows."""
@@ -26,7 +26,7 @@ class StickSlip:
     once it bears no load. Of a link with several contact points the sums count.
     """
 
-    def __init__(self, scene: Scene, material: Material) -> None:
+    def __init__(self, scene: PyBulletScene, material: Material) -> None:
         self._scene = scene
         self._material = material
         self._slides_from = SLIDES * material.static_friction
