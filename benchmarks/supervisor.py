@@ -52,8 +52,8 @@ class WithoutRay(Repetitions):
         self._delivered = delivered
 
     def launch(self, claim: Claim) -> Run:
-        """Deliver what was computed beforehand; the claim's log is empty."""
-        return Run(claim, iter(self._delivered))  # type: ignore[arg-type]
+        """Deliver precomputed batches; the claim's log is empty."""
+        return Run(claim, iter(self._delivered))
 
     def receive(self) -> None:
         """Take the next batch of each run."""

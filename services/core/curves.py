@@ -1,4 +1,4 @@
-"""The points of a curve, from the recorded fitness of many repetitions."""
+"""Curves: points computed from the recorded fitness of many repetitions."""
 
 from functools import lru_cache
 from math import isfinite
@@ -16,8 +16,8 @@ def curve_points(recorded: FloatArray) -> tuple[CurvePoint, ...]:
     """Return one point for each number of real-world evaluations, from 0 on.
 
     Args:
-        recorded: `(r, k)`, by repetition and real-world evaluations; nan where a repetition has not got there or all
-            of its measurements failed. No statistic counts such a value.
+        recorded: `(r, k)`: a row for each repetition, a column for each number of real-world evaluations. It is nan if
+            the repetition has not reached it or all its measurements failed; nan counts in no statistic.
     """
     return tuple(curve_point(evaluations, column) for evaluations, column in enumerate(recorded.T))
 
@@ -26,7 +26,7 @@ def curve_points(recorded: FloatArray) -> tuple[CurvePoint, ...]:
 def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
     """Return mean, sample standard deviation and 95 % interval of the mean by Student's t, over the finite values.
 
-    A statistic is None if it overflows, or if there are too few values.
+    A statistic is None if there are too few values, or if it overflows.
 
     Args:
         evaluations: number of real-world evaluations.
@@ -49,7 +49,7 @@ def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
 
 
 def _deviation(values: FloatArray) -> float:
-    """Return the sample standard deviation; exactly 0 for equal values, although their mean may be rounded."""
+    """Return the standard deviation; exactly 0 for equal values, whose mean may be rounded."""
     return float(values.std(ddof=1)) if not equal(values) else 0.0
 
 
@@ -61,7 +61,7 @@ def _interval(mean: float | None, sd: float | None, n: int) -> tuple[float | Non
 
 
 def equal(values: FloatArray) -> bool:
-    """Return whether all values `(n,)` are the same."""
+    """Return whether all values `(n,)` are equal."""
     return bool(np.all(values == values[:1]))
 
 
@@ -72,5 +72,5 @@ def known(value: float) -> float | None:
 
 @lru_cache(maxsize=1024)
 def _quantile(degrees_of_freedom: int) -> float:
-    """Return the two-sided quantile of Student's t. The cache matters: it takes longer than the rest of a curve."""
+    """Return the quantile of Student's t for a two-sided interval; cached, because it dominates the time of a curve."""
     return float(stats.t.ppf(0.5 + CONFIDENCE / 2, degrees_of_freedom))

@@ -1,25 +1,25 @@
 """All errors of gaplab.
 
     GaplabError
-    ├── InvalidSpec          the spec cannot be run; has every violation with its place in the spec
+    ├── InvalidSpec          a spec or request is invalid; has every violation with its place
     ├── NotFound             no such study, experiment or plug-in
-    ├── Conflict             the present state forbids the request
-    │   └── Changed              the resource has changed since the sender read it
-    ├── ConditionMissing     the change does not name the version that it starts from
-    ├── KeyReused            the idempotency key belongs to another request
-    ├── LimitReached         too much is under way; try again later
-    ├── Unauthenticated      the token is missing or invalid
+    ├── Conflict             the current state forbids the request
+    │   └── Changed              someone changed the object since it was read
+    ├── ConditionMissing     a change without the condition `If-Match`
+    ├── KeyReused            an idempotency key was used for another request
+    ├── LimitReached         too much work is in progress
+    ├── Unauthenticated      no token, or an invalid one
     ├── Forbidden            the role of the token does not permit the request
-    ├── StoreUnavailable     the database is unreachable, or has another schema than this version needs
-    ├── InvalidArchive       the file is damaged, harmful or not an archive
-    ├── Unsupported          this kind of database cannot do it
+    ├── StoreUnavailable     the database is unreachable, or has another schema
+    ├── InvalidArchive       a file is not an archive of gaplab, or is damaged or malicious
+    ├── Unsupported          the request needs another kind of database
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
-    ├── PluginBroken         an external plug-in cannot be used
+    ├── PluginBroken         an external plug-in file is unusable
     └── EngineError
         ├── EngineUnavailable    the engine's library is not installed
-        └── EngineInterrupted    its process died, or took too long and was ended
+        └── EngineInterrupted    the process died, or exceeded its time
 
-Failed physics is not an error: its fitness is nan, which never wins.
+Diverged physics is not an error: its fitness is nan, which never wins.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -29,19 +29,19 @@ from typing import Any
 
 
 class GaplabError(Exception):
-    """The root of all errors; the message is one sentence."""
+    """Base of all errors; the message is one sentence."""
 
 
 @dataclass(frozen=True)
 class Violation:
-    """One fault of a spec.
+    """One error in a spec.
 
     Attributes:
         pointer: JSON pointer of the offending value within the spec, like `/strategy/options/fit_weight`.
-        value: the offending value.
-        message: one sentence that says what is wrong.
-        permitted: the permitted values, as a list or in words; None if neither is possible.
-        nearest: the most similar permitted name, for a misspelt name.
+        value: the offending value, as given.
+        message: one sentence.
+        permitted: permitted values, as a list or a phrase.
+        nearest: the permitted name nearest to a misspelt one.
     """
 
     pointer: str
@@ -51,14 +51,14 @@ class Violation:
     nearest: str | None = None
 
     def moved(self, prefix: str, to: str) -> "Violation":
-        """Return the violation with the pointer `prefix` replaced by `to`."""
+        """Return the violation with another prefix of its pointer."""
         if not self.pointer.startswith(prefix):
             return self
         return replace(self, pointer=to + self.pointer.removeprefix(prefix))
 
 
 class InvalidSpec(GaplabError):
-    """The spec cannot be run; the error has every violation."""
+    """A spec that cannot run, with all its violations."""
 
     def __init__(self, violations: Iterable[Violation]) -> None:
         self.violations = tuple(violations)
@@ -66,30 +66,30 @@ class InvalidSpec(GaplabError):
 
 
 class NotFound(GaplabError):
-    """Nothing has this name or id."""
+    """No object has this name or id."""
 
 
 class Conflict(GaplabError):
-    """The present state forbids the request."""
+    """The current state forbids the request."""
 
 
 class Changed(Conflict):
-    """The resource has changed since the sender of the change read it."""
+    """The object has changed since the client read it."""
 
 
 class ConditionMissing(GaplabError):
-    """The change does not name the version that it starts from."""
+    """A change lacks the condition `If-Match`."""
 
 
 class KeyReused(GaplabError):
-    """The idempotency key belongs to another request."""
+    """The idempotency key was used for another request."""
 
 
 class LimitReached(GaplabError):
-    """Too much is under way; the message names the limit.
+    """Too much work is in progress; the message names the limit.
 
     Attributes:
-        retry_after_s: seconds after which another attempt may succeed; None if unknown.
+        retry_after_s: seconds after which to try again; None if unknown.
     """
 
     def __init__(self, message: str, retry_after_s: int | None = None) -> None:
@@ -98,7 +98,7 @@ class LimitReached(GaplabError):
 
 
 class Unauthenticated(GaplabError):
-    """The token is missing or invalid."""
+    """The request has no token, or an invalid one."""
 
 
 class Forbidden(GaplabError):
@@ -106,15 +106,15 @@ class Forbidden(GaplabError):
 
 
 class StoreUnavailable(GaplabError):
-    """The database cannot be used at the moment."""
+    """The database is not usable now."""
 
 
 class InvalidArchive(GaplabError):
-    """The file is damaged, harmful or not an archive; the message says where."""
+    """The file is not a valid archive; the message says where."""
 
 
 class Unsupported(GaplabError):
-    """This kind of database cannot do it; the message names the alternative."""
+    """This kind of database does not support the request; the message names an alternative."""
 
 
 class ClusterUnusable(GaplabError):
@@ -122,11 +122,11 @@ class ClusterUnusable(GaplabError):
 
 
 class PluginBroken(GaplabError):
-    """An external plug-in cannot be used; the message names the file and the reason."""
+    """A plug-in file is unusable; the message says which, and why."""
 
 
 class EngineError(GaplabError):
-    """An engine cannot simulate."""
+    """An engine failed."""
 
 
 class EngineUnavailable(EngineError):
@@ -134,11 +134,11 @@ class EngineUnavailable(EngineError):
 
 
 class EngineInterrupted(EngineError):
-    """The process of a rollout ended before it answered; nothing else is affected."""
+    """The process that runs the physics ended before it answered."""
 
 
 def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -> Violation:
-    """Return the violation for an unknown name, with the most similar permitted one."""
+    """Return the violation of an unknown name, with the nearest permitted one."""
     nearest = next(iter(get_close_matches(name, permitted, n=1, cutoff=0.5)), None)
     hint = f" (did you mean {nearest!r}?)" if nearest else ""
     message = f"there is no {kind} called {name!r}{hint}; there is {', '.join(permitted)}"
@@ -146,7 +146,7 @@ def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -
 
 
 def gather(*checks: Callable[[], Any]) -> tuple[Any, ...]:
-    """Return the result of each check, in order, or raise the violations of all checks together.
+    """Run all checks and return their results in order; if any fails, raise all violations together.
 
     Raises:
         InvalidSpec: with every violation, each once.

@@ -11,7 +11,7 @@ from typing import TypeGuard, TypeVar
 from gaplab.services.core.errors import PluginBroken
 
 PACKAGE = "gaplab_plugins"
-"""A package without a file. A module of a folder imports another by `from gaplab_plugins.other import …`."""
+"""Name of a package without a file; plug-in files import each other as `from gaplab_plugins.other import …`."""
 
 P = TypeVar("P")
 
@@ -40,7 +40,7 @@ def folders() -> tuple[Path, ...]:
 
 
 def classes(base: type[P]) -> Iterator[type[P]]:
-    """Yield the external plug-ins of one kind.
+    """Return the external plug-ins of one kind.
 
     Raises:
         PluginBroken: a module cannot be imported, or a class is not a valid plug-in.
@@ -53,7 +53,7 @@ def classes(base: type[P]) -> Iterator[type[P]]:
 
 
 def file_of(plugin: type) -> str | None:
-    """Return the file of an external plug-in, relative to its folder; None for a built-in one."""
+    """Return the file of a plug-in relative to its folder; None for gaplab's own plug-ins."""
     package, _, name = plugin.__module__.partition(".")
     if package != PACKAGE:
         return None
@@ -62,7 +62,7 @@ def file_of(plugin: type) -> str | None:
 
 
 def _modules() -> list[ModuleType]:
-    """Return every module of the folders, by name, except those that begin with an underscore."""
+    """Return the modules of the folders by name, without those that begin with an underscore."""
     found: dict[str, str] = {}
     for folder in folders():
         for name in sorted(info.name for info in iter_modules([str(folder)])):
@@ -75,13 +75,13 @@ def _modules() -> list[ModuleType]:
 def _imported(name: str, folder: str) -> ModuleType:
     try:
         return import_module(f"{PACKAGE}.{name}")
-    except Exception as error:  # a file may raise anything
+    except Exception as error:  # a plug-in file may raise anything
         msg = f"{folder}/{name}.py cannot be imported: {type(error).__name__}: {error}"
         raise PluginBroken(msg) from error
 
 
 def _is_of(module: ModuleType, found: object) -> TypeGuard[type]:
-    """Return whether it is a class of this module or package whose name has no leading underscore."""
+    """Return whether a class is defined in this module or package, and its name has no leading underscore."""
     if not isinstance(found, type) or found.__name__.startswith("_"):
         return False
     return found.__module__ == module.__name__ or found.__module__.startswith(f"{module.__name__}.")

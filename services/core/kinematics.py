@@ -1,7 +1,4 @@
-"""Forward kinematics: the poses of all bodies from base and joints. Quaternions are x, y, z, w.
-
-Quaternions are used as they come: PhysX rounds to single precision, and scipy's `Rotation` would normalise them.
-"""
+"""Poses of a world's bodies, given its base and joint angles. Quaternions are x, y, z, w."""
 
 import numpy as np
 
@@ -9,16 +6,16 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.world import Body, Box, World
 
 TOUCHING_M = 0.002
-"""Greatest distance from the ground at which a body touches it: engines push surfaces apart by less."""
+"""Height of the lowest point below which a body touches the ground: engines separate surfaces by less."""
 
 
 def body_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return positions `(k, bodies, 3)` in m and quaternions `(k, bodies, 4)` of all bodies, in the world's order.
+    """Return positions `(k, bodies, 3)` and orientations `(k, bodies, 4)` of the bodies' frames, in the world's order.
 
     Args:
         world: bodies and hinges.
-        poses: positions and quaternions of the base, `(k, 7)`.
-        angles_rad: angles of the hinges, `(k, joints)`, in the world's order.
+        poses: `(k, 7)`: poses of the base.
+        angles_rad: `(k, joints)`, in the world's order.
     """
     names = [body.name for body in world.bodies]
     positions = np.empty((len(poses), len(names), 3))
@@ -37,12 +34,12 @@ def body_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> tuple
 
 
 def clearances_m(body: Body, positions: FloatArray, orientations: FloatArray) -> FloatArray:
-    """Return the height of the lowest point of a body above the ground, `(k,)`; negative in the ground.
+    """Return `(k,)`: the height of the lowest point of a body above the ground, negative inside it.
 
     Args:
-        body: its shape and where that is in its frame.
-        positions: `(k, 3)` of its frame.
-        orientations: `(k, 4)` of its frame.
+        body: body with its shape.
+        positions: `(k, 3)`: positions of the body's frame.
+        orientations: `(k, 4)`: orientations of the body's frame.
     """
     center = positions[:, 2] + rotated(orientations, np.array(body.center_m))[:, 2]
     if isinstance(body.shape, Box):
@@ -53,19 +50,19 @@ def clearances_m(body: Body, positions: FloatArray, orientations: FloatArray) ->
 
 
 def about(axis: FloatArray, angles_rad: FloatArray) -> FloatArray:
-    """Return the quaternions `(k, 4)` of rotations by angles `(k,)` about a unit vector `(3,)`."""
+    """`(k, 4)`: turns by `(k,)` angles about a unit vector `(3,)`."""
     half = angles_rad[:, None] / 2
     return np.hstack([np.sin(half) * axis, np.cos(half)])
 
 
 def product(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the Hamilton product `(..., 4)`: the rotation `second` in the frame that `first` has rotated."""
+    """`(..., 4)`: the turn `second` within the frame that `first` turned."""
     (v, w), (u, s) = (first[..., :3], first[..., 3:]), (second[..., :3], second[..., 3:])
     return np.concatenate([w * u + s * v + np.cross(v, u), w * s - np.sum(v * u, axis=-1, keepdims=True)], axis=-1)
 
 
 def rotated(turns: FloatArray, vector: FloatArray) -> FloatArray:
-    """Return the vector `(3,)` rotated by quaternions `(..., 4)`, as `(..., 3)`."""
+    """`(..., 3)`: the vector `(3,)` turned by `(..., 4)`."""
     v, w = turns[..., :3], turns[..., 3:]
     across = 2 * np.cross(v, vector)
     return np.asarray(vector + w * across + np.cross(v, across))

@@ -1,4 +1,4 @@
-"""The two evaluations of a controller, in simulation and in reality. That they are two types is the reality gap."""
+"""The two ways to evaluate a controller. The reality gap is the difference between these two types."""
 
 from typing import Protocol
 
@@ -6,19 +6,19 @@ from gaplab.services.core.arrays import Fitnesses, Genome, Genomes, Parameters
 
 
 class Simulate(Protocol):
-    """Fitness of every genome in every simulator: the hot path.
+    """The fitness of every genome in every simulator: the one hot path.
 
-    The result depends on the arguments alone, not on earlier calls or the number of workers.
+    The result depends only on the arguments, in their order: not on earlier calls or the number of workers.
     """
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
-        """Return the `(n, m)` fitnesses of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed."""
+        """Return fitnesses `(n, m)` of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed."""
         ...
 
 
 class Reality(Protocol):
-    """Fitness in reality: slow, hidden and counted, one genome at a time."""
+    """The real world: slow and hidden; evaluates one genome at a time, and each evaluation counts."""
 
     def __call__(self, genome: Genome) -> float:
-        """Return the fitness of a genome `(g,)` in reality; nan if the measurement failed."""
+        """Return the fitness of the genome `(g,)` in reality; nan if the measurement failed."""
         ...

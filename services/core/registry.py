@@ -1,4 +1,4 @@
-"""Plug-ins and their registries: each file in a folder is one plug-in, and needs no registration."""
+"""Plug-ins: each file in a plug-in folder is one plug-in; `external_plugins` imports those outside gaplab."""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -16,16 +16,16 @@ from gaplab.services.core.errors import InvalidSpec, PluginBroken, Violation, un
 
 
 class NoOptions(Frozen):
-    """The options of a plug-in that has none."""
+    """Options of a plug-in without options."""
 
 
 class Plugin:
     """Base of all plug-ins: a class with a name, a docstring and a frozen model of its options.
 
     Attributes:
-        name: its name in specs, and the name of its file.
-        source: the origin of its idea or its numbers.
-        Options: a frozen model; every field has a default.
+        name: name in specs, and of the file.
+        source: origin of its idea or its numbers.
+        Options: frozen model whose fields all have defaults.
     """
 
     name: ClassVar[str]
@@ -37,7 +37,7 @@ class Plugin:
 
     @classmethod
     def describe(cls) -> PluginRead:
-        """Return the entry of the plug-in in the catalogue."""
+        """Return the catalogue's entry of the plug-in."""
         summary = (getdoc(cls) or "").split("\n\n", maxsplit=1)[0].replace("\n", " ")
         return PluginRead(
             name=cls.name,
@@ -49,7 +49,7 @@ class Plugin:
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return further facts for the catalogue, as plain JSON."""
+        """Return further details for the catalogue, as JSON."""
         return {}
 
 
@@ -59,8 +59,7 @@ P = TypeVar("P", bound=Plugin)
 class Registry(Mapping[str, type[P]], Generic[P]):
     """The plug-ins of one kind, by name, in alphabetical order.
 
-    The first use imports every module of `package` and every external plug-in. It raises PluginBroken if one of these
-    is not valid.
+    The first use imports every module of `package` and every external plug-in, and may raise PluginBroken.
     """
 
     def __init__(self, kind: str, package: str, base: type[P]) -> None:
@@ -101,11 +100,11 @@ class Registry(Mapping[str, type[P]], Generic[P]):
         return len(self._plugins)
 
     def check(self, ref: PluginRef, pointer: str = "") -> tuple[type[P], Frozen]:
-        """Return the class of the plug-in that a spec names, and its complete options.
+        """Return the plug-in class that a spec names, and its complete options.
 
         Args:
             ref: name and options.
-            pointer: its place in the spec, for the error.
+            pointer: place in the spec, for errors.
 
         Raises:
             InvalidSpec: the name is unknown, or the plug-in refuses the options.
@@ -121,17 +120,17 @@ class Registry(Mapping[str, type[P]], Generic[P]):
             ) from error
 
     def create(self, ref: PluginRef, pointer: str = "") -> P:
-        """Return the plug-in that a spec names, with its options; raise as `check` does."""
+        """Create the plug-in that a spec names; raise as `check` does."""
         plugin, options = self.check(ref, pointer)
         return plugin(options)
 
     def describe(self) -> tuple[PluginRead, ...]:
-        """Return the catalogue entry of every plug-in."""
+        """Return the catalogue's entries of all plug-ins."""
         return tuple(plugin.describe() for plugin in self.values())
 
 
 def _source(plugin: type[Plugin]) -> str:
-    """Return the stated source, or the file of an external plug-in that states none."""
+    """Return the stated source of a plug-in, or else the file of an external one."""
     file = external_plugins.file_of(plugin)
     return f"{file} of GAPLAB_PLUGINS" if file and plugin.source == Plugin.source else plugin.source
 

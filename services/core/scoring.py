@@ -1,8 +1,8 @@
-"""The paper's formulas for the value of a controller as the next sample.
+"""The paper's formulas for the worth of a controller as the next sample, and nothing else.
 
-Each maps the fitnesses of n controllers in m simulators, `(n, m)`, to scores, `(n,)`. A nan among the fitnesses of a
-controller makes its score nan, which never wins. A simulator with weight 0 is ignored: its physics failed on a sample,
-and may fail on every controller, but a diverse ensemble keeps it.
+All take the fitness of n controllers in m simulators, `(n, m)`, and return `(n,)`. A nan fitness makes the controller's
+score nan, which never wins. The exception is a simulator of weight 0, whose physics failed on a sample: it is ignored,
+because a diverse ensemble may keep it although it fails on every controller.
 """
 
 from collections.abc import Sequence
@@ -13,11 +13,11 @@ from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes
 from gaplab.services.core.types import Sample
 
 NEAREST = 1e-6
-"""The least distance between a controller and a sample: at 0 the paper's 1/d is infinite."""
+"""Smallest distance between a controller and a sample: at 0 the paper's 1/d is infinite."""
 
 
 def weighted_mean(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
-    """Return the expected fitness: mean over simulators, weighted by how well they fit. Source: paper, section 2.
+    """Return the expected fitness: the mean over simulators, weighted by accuracy. Source: paper, section 2.
 
     Args:
         fitnesses: `(n, m)`.
@@ -27,7 +27,7 @@ def weighted_mean(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
 
 
 def weighted_deviation(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
-    """Return the disagreement: standard deviation over simulators, weighted by how well they fit.
+    """Return the disagreement: the standard deviation over simulators, weighted by accuracy.
 
     Source: paper, section 2, *Informative*.
     """
@@ -38,8 +38,8 @@ def weighted_deviation(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
 def uniqueness_penalty(genomes: Genomes, fitness: FloatArray, samples: Sequence[Sample]) -> FloatArray:
     """Return 1/(100 N) Σ 1/d(x, y) over the N samples y; 0 before the first sample.
 
-    d is the Euclidean distance of genome and fitness together, with the simulated fitness of the controller and the
-    real fitness of the sample.
+    d is the Euclidean distance over genome and fitness together: the controller's fitness is the simulated one, the
+    sample's the real one.
 
     Source: paper, section 2, *Simulated fit and unique*.
 
@@ -58,11 +58,11 @@ def uniqueness_penalty(genomes: Genomes, fitness: FloatArray, samples: Sequence[
 
 
 def simulator_weights(squared_errors: FloatArray, floor: float) -> FloatArray:
-    """Return weights of simulators, `(m,)`, with sum 1: their fitness 1/Σe², with a floor under Σe².
+    """Return weights `(m,)` of simulators, with sum 1: their fitness 1/Σe², with a floor under Σe².
 
-    In the paper, the weights are the fitnesses themselves. Without the floor, one near-perfect simulator takes all the
-    weight, and no disagreement is left. The weights are equal before the first sample, when all errors are 0, and when
-    every simulator fails.
+    The paper's weights are the fitnesses themselves. Without the floor, one near-perfect simulator takes all the
+    weight, and no disagreement is left. Weights are equal before any sample, when all errors are 0, and if all
+    simulators fail.
 
     Source: paper, section 2, *Informative*; the floor is gaplab's.
 
@@ -76,5 +76,5 @@ def simulator_weights(squared_errors: FloatArray, floor: float) -> FloatArray:
 
 
 def _weighty(fitnesses: Fitnesses, weights: FloatArray) -> Fitnesses:
-    """Return the fitnesses with 0 for simulators of weight 0, because nan · 0 is nan."""
+    """Return the fitnesses with 0 for simulators of weight 0, whose nan would remain in a sum."""
     return fitnesses if np.all(weights > 0) else np.where(weights > 0, fitnesses, 0.0)

@@ -1,4 +1,4 @@
-"""Random numbers by address: a stream depends on the place of its use, not on earlier draws."""
+"""Random numbers by address: a stream depends on where it is used, not on earlier draws."""
 
 from hashlib import sha256
 
@@ -9,11 +9,11 @@ def stream(seed: int, *path: str | int) -> Generator:
     """Return the random generator at an address such as `(strategy, repetition, iteration, phase)`.
 
     Equal addresses give equal streams, in any order and on any machine; different addresses give independent ones.
-    That makes a resumed repetition bit-equal to one that never stopped.
+    Therefore a resumed repetition is bit-equal to an uninterrupted one.
 
     Args:
         seed: the experiment's seed, below 2**64.
-        path: names and non-negative numbers; of a name, the SHA-256 counts, so any string is permitted.
+        path: names and non-negative numbers; any name is allowed, because its SHA-256 is used.
     """
     return Generator(PCG64(SeedSequence(seed, spawn_key=tuple(_word(part) for part in path))))
 

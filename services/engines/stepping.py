@@ -1,4 +1,4 @@
-"""Parts of engines that advance in time steps: motions in whole steps, and scenes that stay warm."""
+"""Shared parts of engines that advance step by step: motions in whole time steps, and a cache of scenes."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -13,47 +13,47 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.world import Motion, Recording, Trajectory, World
 
 WARM_SCENES = 4
-"""Number of scenes that stay warm, one for each world up to its material; the least recently used one goes."""
+"""Largest number of cached scenes. Worlds that differ only in material share a scene."""
 
 FARTHEST_M = 100.0
-"""Greatest plausible distance of the base from the origin; beyond it the physics has failed."""
+"""Largest plausible distance of the base from its start; beyond it, the rollout failed numerically."""
 
 DEEPEST_M = 1.0
-"""Greatest plausible depth of the base in the ground."""
+"""Largest plausible depth of the base in the ground."""
 
 
 class Warm(Protocol):
-    """A scene in an engine that stays for the next rollout."""
+    """A scene that is kept for the next rollout."""
 
     def close(self) -> None:
-        """Free the memory that the engine holds for the scene."""
+        """Release the engine's resources."""
 
 
 class SteppedScene(Warm, Protocol):
-    """A world that advances in time steps."""
+    """A world that advances step by step."""
 
     @property
     def world(self) -> World:
-        """The world of the scene."""
+        """Return the world that the scene was built from."""
 
     def command(self, actuator: int, target: float) -> None:
-        """Set the target of an actuator, rad."""
+        """Set a new target for an actuator, rad."""
 
     def pose(self) -> FloatArray:
-        """Return position and quaternion x, y, z, w of the base's frame, `(7,)`."""
+        """Return `(7,)`: position and quaternion x, y, z, w of the base's frame."""
 
     def angles(self) -> FloatArray:
-        """Return the angles of the joints, `(joints,)`, rad, in the world's order."""
+        """Return the joint angles `(joints,)`, rad, in the world's order."""
 
 
 S = TypeVar("S", bound=Warm)
 
 
 class WarmScenes(Generic[S]):
-    """The scenes of the latest worlds.
+    """A cache of scenes by world.
 
     Args:
-        build: builds the scene of a world.
+        build: function that builds the scene of a world.
     """
 
     def __init__(self, build: Callable[[World], S]) -> None:
@@ -68,7 +68,7 @@ class WarmScenes(Generic[S]):
         return scene
 
     def drop(self, world: World) -> None:
-        """Close a scene that is damaged; the next rollout builds another."""
+        """Drop a broken scene; the next call rebuilds it."""
         self._scenes.pop(world).close()
 
     def close(self) -> None:
@@ -78,12 +78,12 @@ class WarmScenes(Generic[S]):
 
 
 def watch(scene: SteppedScene, advance: Callable[[int], None], motion: Motion) -> FloatArray:
-    """Return position and quaternion of the base at each observation, `(t, 7)`; times are rounded to whole steps.
+    """Run a motion; return `(t, 7)`: position and quaternion of the base at each observation, in whole time steps.
 
     Args:
-        scene: at time 0.
-        advance: advances the scene by a number of time steps.
-        motion: its targets are set when they change.
+        scene: scene at time 0.
+        advance: function that advances the scene by a number of time steps.
+        motion: motion to run; a target is commanded only when it changes.
     """
     return _watch(scene, advance, motion, scene.pose)
 
@@ -91,12 +91,12 @@ def watch(scene: SteppedScene, advance: Callable[[int], None], motion: Motion) -
 def record(
     scene: SteppedScene, advance: Callable[[int], None], motion: Motion, times_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return what `watch` returns, `(t, 7)`, and base and joints at other times, `(k, 7 + joints)`.
+    """Run a motion; return the result of `watch`, `(t, 7)`, and base and joints at other times, `(k, 7 + joints)`.
 
     Args:
-        scene: at time 0.
-        advance: advances the scene by a number of time steps.
-        motion: its targets are set when they change.
+        scene: as in `watch`.
+        advance: as in `watch`.
+        motion: as in `watch`.
         times_s: `(k,)`, ascending, up to the last observation.
     """
     often = replace(motion, observe_s=np.union1d(motion.observe_s, times_s))
@@ -106,7 +106,7 @@ def record(
 
 
 def recording(motion: Motion, times_s: FloatArray, poses: FloatArray, seen: FloatArray) -> Recording:
-    """Return the recording of what `record` returned; nan throughout if the poses are not plausible."""
+    """Return a Recording of the poses from `record`; all nan if they are implausible."""
     if not plausible(poses):
         poses, seen = np.full_like(poses, np.nan), np.full_like(seen, np.nan)
     trajectory = Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
@@ -130,13 +130,13 @@ def _watch(
 
 
 def plausible(poses: FloatArray) -> NDArray[np.bool_]:
-    """Return for each trajectory of poses `(..., t, 7)` whether it is plausible, `(...)`; nan is not."""
+    """Return `(...)`: whether all poses `(..., t, 7)` are plausible; nan is not."""
     near = np.all(np.abs(poses[..., :3]) < FARTHEST_M, axis=(-2, -1))
     return np.asarray(near & np.all(poses[..., 2] > -DEEPEST_M, axis=-1))
 
 
 def _commands(motion: Motion, time_step_s: float) -> dict[int, list[tuple[int, float]]]:
-    """Return by time step the actuators whose targets change, with the new targets; at step 0, all of them."""
+    """Return the actuators whose targets change, with the new targets, by time step; at step 0, all."""
     changed = np.vstack([np.ones_like(motion.targets[:1], bool), motion.targets[1:] != motion.targets[:-1]])
     rows, actuators = np.nonzero(changed)
     steps, targets = _steps(motion.times_s[rows], time_step_s), motion.targets[rows, actuators].tolist()
