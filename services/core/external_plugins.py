@@ -43,7 +43,7 @@ def classes(base: type[P]) -> Iterator[type[P]]:
     """Return the external plug-ins of one kind.
 
     Raises:
-        PluginBroken: a file cannot be imported, or a class of this kind lacks something.
+        PluginBroken: a module cannot be imported, or a class is not a valid plug-in.
     """
     for module in _modules():
         for each in vars(module).values():
@@ -67,8 +67,7 @@ def _modules() -> list[ModuleType]:
     for folder in folders():
         for name in sorted(info.name for info in iter_modules([str(folder)])):
             if name in found:
-                msg = f"{name}.py is in {found[name]} and in {folder}: rename one of the two files"
-                raise PluginBroken(msg)
+                raise PluginBroken(f"{name}.py is in {found[name]} and in {folder}; rename one of them")
             found[name] = str(folder)
     return [_imported(name, folder) for name, folder in found.items() if not name.startswith("_")]
 
