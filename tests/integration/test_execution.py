@@ -311,7 +311,7 @@ def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(st
     ids = [submission.submit_experiment(store, toy(repetitions=1)).id for _ in range(10)]
     claims = execution.claim(store, "me", 10)
 
-    def cancel(experiment):
+    def try_to_cancel(experiment):
         try:
             cancel(store, experiment)
         except Conflict:
@@ -320,7 +320,7 @@ def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(st
 
     with ThreadPoolExecutor(4) as pool:
         failed = [pool.submit(execution.fail, store, each, "x") for each in claims]
-        cancelled = [pool.submit(cancel, each) for each in ids]
+        cancelled = [pool.submit(try_to_cancel, each) for each in ids]
 
     assert [each.result() for each in failed] == [each.result() == "ended before" for each in cancelled]
     assert all(reading.read_experiment(store, each).state.ended for each in ids)
