@@ -83,7 +83,7 @@ def _start(cores: int | None) -> None:
         raise ClusterUnusable(msg)
     with _on_loopback():
         ray.init(
-            address="local",  # not whatever else may run on this machine
+            address="local",  # not another Ray on this machine
             num_cpus=cores,
             include_dashboard=False,
             log_to_driver=False,

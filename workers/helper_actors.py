@@ -46,17 +46,10 @@ def _simulation(spec: str) -> Simulate:
 
 
 class Helpers:
-<<<<<<< HEAD:workers/helpers.py
-    """Helper processes, one for each idle core; they end with this object.
-
-    A process must start and load an engine, and other programs may use its core. Therefore each first computes a test
-    call that nobody waits for, and is used once it has answered.
-=======
     """The helpers of a repetition, one for each idle core; they end with this object.
 
     A helper has to start and load an engine, and a program that Ray does not know may use its core. So each helper
     first gets a rollout that nothing waits for, and is ready once it has answered.
->>>>>>> core:workers/helper_actors.py
     """
 
     def __init__(self, spec: ResolvedSpec, versions: Versions) -> None:

@@ -41,7 +41,7 @@ def read(session: Session, experiment_id: str) -> ProvenanceRead:
 
 @transaction
 def accept_versions(session: Session, experiment_id: str) -> ExperimentRead:
-    """Let the next supervisor go on with the experiment whatever its versions, which bind it from then on.
+    """Let the next supervisor go on with the experiment under any versions, which bind it from then on.
 
     Raises:
         NotFound: no such experiment.

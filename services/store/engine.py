@@ -65,7 +65,7 @@ def _parse(url: str) -> URL:
 def _prepare_sqlite(engine: Engine, *, enforce_foreign_keys: bool) -> None:
     """Make SQLite durable, and let writers wait for each other.
 
-    The driver's own BEGIN is deferred: a read that turns into a write would fail at once, whatever the patience. So the
+    The driver's own BEGIN is deferred: a read that turns into a write would fail at once, without patience. So the
     driver begins nothing, and a transaction that will write begins IMMEDIATE.
     """
     journal = "WAL" if sqlite3.sqlite_version_info >= _WAL_IS_SOUND else "PERSIST"

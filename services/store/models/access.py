@@ -44,7 +44,7 @@ class IdempotencyRow(Base):
     """A request that created something under a key of its sender's, with the answer that it got.
 
     Attributes:
-        caller: id of the sender's token; empty where none is needed. Keys of one caller are not those of another.
+        caller: id of the sender's token; empty where none is needed. Each caller has keys of its own.
         digest: SHA-256 of what was asked: the endpoint and the body.
         answer: as it was sent; NULL only within the transaction that makes it.
     """
