@@ -1,4 +1,4 @@
-# One image for every part of the service; docker-compose.yml says which command each part runs.
+# One image for all services of docker-compose.yml, which says what each runs.
 FROM python:3.11-slim
 
 WORKDIR /app

@@ -1,40 +1,41 @@
-# Everything runs in .venv, made from constraints.txt at first use. `make` alone lists what there is.
+# Everything runs in .venv, which is created from constraints.txt at first use. `make` alone lists the commands.
 
 PYTHON ?= python3.11
 BIN := .venv/bin
 DENO := DENO_DIR=.venv/deno DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
-help:  ## this list
+help:  ## list the commands
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
 
-demo: .venv/installed  ## tune a toy and a quadruped with every strategy, and see the curves
+demo: .venv/installed  ## tune a toy and a quadruped with every strategy, and draw the curves
 	$(BIN)/gaplab demo
 
-serve: .venv/installed  ## the service on http://127.0.0.1:8000, with its workers
+serve: .venv/installed  ## start the service on http://127.0.0.1:8000, with its workers
 	$(BIN)/gaplab serve
 
-test: .venv/prepared  ## all tests, on SQLite and on a real Postgres, the page's in a real Chromium
+test: .venv/prepared  ## run all tests: on SQLite, on a real Postgres, and of the page in a real Chromium
 	$(BIN)/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
-lint: .venv/installed-dev  ## style, types, dependencies and the arrows between the layers
+lint: .venv/installed-dev  ## check style, types, dependencies and the imports between layers
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/mypy --config-file tests/mypy.ini
 	$(DENO) lint --quiet
 	$(DENO) check --quiet api/dashboard
 	$(BIN)/python -m pip check --disable-pip-version-check
 	$(BIN)/python -m pytest tests/unit/test_architecture.py tests/unit/test_dependencies.py
 
-bench: .venv/installed-dev  ## the table of speeds, as ratios within one run
+bench: .venv/installed-dev  ## measure speeds, as ratios within one run
 	$(BIN)/python -m benchmarks
 
-docs: .venv/installed-dev  ## the reference in docs/reference/, written out of the code
+docs: .venv/installed-dev  ## generate docs/reference/ from the code
 	$(BIN)/python -m docs.generate
 
-soak: .venv/installed-dev  ## a thousand random faults on the real service, and whether it kept its word: three quarters of an hour
+soak: .venv/installed-dev  ## inject a thousand random faults into the real service and check every acknowledgement: three quarters of an hour
 	$(BIN)/python -m tests.soak $(if $(FAULTS),--faults $(FAULTS)) $(if $(SEED),--seed $(SEED))
 
-clean:  ## remove the environment and what tools cached; results stay
+clean:  ## remove the environment and caches; results stay
 	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 .venv/bin/pip:

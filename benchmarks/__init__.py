@@ -1,1 +1,1 @@
-"""Commands that print figures: `python -m benchmarks` for speed, `python -m benchmarks.robot` for the robot."""
+"""Commands that print measurements: `python -m benchmarks` for speed, `python -m benchmarks.robot` for the robot."""

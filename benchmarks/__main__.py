@@ -1,8 +1,9 @@
-"""`python -m benchmarks`: the table of speeds. Absolute numbers are this machine's; the ratios are what counts."""
+"""`python -m benchmarks`: the table of speeds. Compare ratios; absolute numbers depend on the machine."""
 
 import argparse
 import os
 import platform
+from collections.abc import Callable
 
 from rich.console import Console
 from rich.table import Table
@@ -16,13 +17,13 @@ from gaplab.services.engines.physx import PhysX
 def main() -> None:
     """Measure everything, and print one table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=5, help="turns that the rivals of a ratio take")
+    parser.add_argument("--rounds", type=int, default=5, help="rounds in which the parts of a ratio take turns")
     rounds = parser.parse_args().rounds
     console = Console()
     table = Table(title=f"gaplab on {os.cpu_count()} cores of {platform.machine()}, Python {platform.python_version()}")
-    for column in ("figure", "value", "ratio", "to", "aim"):
+    for column in ("figure", "value", "ratio", "to", "target"):
         table.add_column(column, justify="right" if column == "ratio" else "left")
-    for name, measure in (
+    measurements: tuple[tuple[str, Callable[[], list[Row]]], ...] = (
         ("physics", lambda: physics.rows(rounds)),
         ("physx", lambda: physx.rows(rounds) if PhysX.available() else []),
         ("mujoco", lambda: mujoco.rows(rounds) if MuJoCo.available() else []),
@@ -33,7 +34,8 @@ def main() -> None:
         ("turns", turns.rows),
         ("overhead", overhead.rows),
         ("curves", curves.rows),
-    ):
+    )
+    for name, measure in measurements:
         console.print(f"measuring {name} ...")
         for row in measure():
             table.add_row(*_cells(row))

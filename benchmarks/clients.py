@@ -1,4 +1,4 @@
-"""Many clients of one service at once, and how long each of their requests took."""
+"""Many simultaneous clients of one service, and the durations of their requests."""
 
 import json
 import random
@@ -18,10 +18,10 @@ READERS, SUBMITTERS, STREAMS = 50, 20, 10
 SPEC = json.dumps({"strategy": "simulated_fit", "robot": "toy_function", "budget": "smoke", "repetitions": 2})
 PATIENCE_S = 60.0
 KEPT_ALIVE_S = 2.0
-"""Longer than two and a half times that, and the server closes a connection on which nothing happens."""
+"""Longest pause for which a connection is reused: the server closes it after two and a half times that."""
 
 Path_ = Callable[[int], str]
-"""The address of a request, in a database with so many experiments."""
+"""A function from the number of stored experiments to the path of a request."""
 
 READS: dict[str, Path_] = {
     "experiments, newest 50": lambda _: "/experiments?limit=50",
@@ -38,12 +38,13 @@ SUBMIT, FOLLOW = "submit an experiment", "events on a stream"
 
 
 @dataclass
-class Measured:
-    """What the clients saw; of a stream, how long after the one before an event came is not counted, only that it did.
+class RequestTimes:
+    """Durations and errors of the clients' requests.
 
     Attributes:
-        seconds: of each answer, by kind of request.
-        errors: by kind of request: answers that are no success, and broken connections.
+        seconds: duration of each answer, by kind of request.
+        errors: number of unsuccessful answers and broken connections, by kind of request.
+        events: number of events received on streams.
     """
 
     seconds: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
@@ -51,44 +52,44 @@ class Measured:
     events: int = 0
 
     def of(self, kind: str) -> str:
-        """Median, 99th percentile and errors."""
-        found = self.seconds[kind]
-        if len(found) < 2:
+        """Return median, 99th percentile and errors as text."""
+        seconds = self.seconds[kind]
+        if len(seconds) < 2:
             return f"- / - / {self.errors[kind]}"
-        hundredths = quantiles(found, n=100, method="inclusive")
+        hundredths = quantiles(seconds, n=100, method="inclusive")
         return f"{hundredths[49] * 1e3:.0f} / {hundredths[98] * 1e3:.0f} / {self.errors[kind]}"
 
     def median(self, kind: str) -> float:
-        """In seconds; nan if there is none."""
-        found = sorted(self.seconds[kind])
-        return found[len(found) // 2] if found else float("nan")
+        """Return the median in seconds; nan without answers."""
+        seconds = sorted(self.seconds[kind])
+        return seconds[len(seconds) // 2] if seconds else float("nan")
 
 
-class Load:
-    """All clients of one service at once.
+class Clients:
+    """Simultaneous clients of one service.
 
     Args:
-        url: of the service.
-        experiments: that are stored.
-        seconds: that it lasts.
-        pause_s: of a client between an answer and its next request.
+        url: address of the service.
+        experiments: number of stored experiments.
+        seconds: duration of the load.
+        pause_s: pause of a client between an answer and its next request.
     """
 
     def __init__(self, url: str, experiments: int, seconds: float, pause_s: float) -> None:
         self._address, self._experiments, self._pause_s = urlsplit(url).netloc, experiments, pause_s
         self._end = time.monotonic() + seconds
-        self._measured = Measured()
+        self._measured = RequestTimes()
 
-    def run(self) -> Measured:
-        """What the clients measured."""
-        clients = [threading.Thread(target=self._read, args=(each,)) for each in range(READERS)]
+    def run(self) -> RequestTimes:
+        """Run all clients, and return their measurements."""
+        clients = [threading.Thread(target=self._read, args=(number,)) for number in range(READERS)]
         clients += [threading.Thread(target=self._submit) for _ in range(SUBMITTERS)]
         if self._streams():
             clients += [threading.Thread(target=self._follow) for _ in range(STREAMS)]
-        for each in clients:
-            each.start()
-        for each in clients:
-            each.join()
+        for client in clients:
+            client.start()
+        for client in clients:
+            client.join()
         return self._measured
 
     def _read(self, number: int) -> None:
@@ -106,13 +107,13 @@ class Load:
                 self._ask(connection, SUBMIT, "POST", "/experiments", SPEC)
 
     def _going_on(self) -> bool:
-        """After a pause, of which the length differs, so that clients do not march in step."""
+        """Pause for a random time, so that clients do not synchronise; return whether the load continues."""
         time.sleep(self._pause_s * random.uniform(0.5, 1.5))
         return time.monotonic() < self._end
 
     def _ask(self, connection: HTTPConnection, kind: str, method: str, path: str, body: str | None = None) -> None:
         if self._pause_s > KEPT_ALIVE_S:
-            connection.close()  # the service did so already; the next request opens it again
+            connection.close()  # the service has closed it; the next request opens it again
         begun = time.perf_counter()
         try:
             connection.request(method, path, body, {"Content-Type": "application/json"} if body else {})
@@ -127,7 +128,7 @@ class Load:
             self._measured.errors[kind] += 1
 
     def _streams(self) -> bool:
-        """Whether the service has events to follow."""
+        """Return whether the service streams events."""
         with self._connected() as connection:
             connection.request("GET", "/events", headers={"Accept": "text/event-stream"})
             return connection.getresponse().status == 200
@@ -149,7 +150,7 @@ class Load:
                         self._measured.errors[FOLLOW] += 1
                         return
                 except TimeoutError:
-                    return  # a socket that timed out once cannot be read any more
+                    return  # a socket that timed out cannot be read again
                 except (OSError, HTTPException):
                     self._measured.errors[FOLLOW] += 1
                     return

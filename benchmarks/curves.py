@@ -1,4 +1,4 @@
-"""How long the curves of the paper's Fig. 4 take to read over HTTP, once they are stored."""
+"""Duration of reading the stored curves of the paper's Fig. 4 over HTTP."""
 
 import threading
 from collections.abc import Iterator
@@ -31,11 +31,11 @@ SPEC = StudySpec.model_validate(
         "budget": {"controller_evaluations": 20, "selection_evaluations": 20, "simulator_evaluations": 20},
     }
 )
-"""The paper's protocol in numbers of rows, on the smallest budgets."""
+"""A study with as many rows as the paper's, at the smallest budgets."""
 
 
 def fill(store: Store) -> str:
-    """A finished study of seven experiments × 40 repetitions × 10 iterations; its id."""
+    """Store a finished study of seven experiments × 40 repetitions × 10 iterations; return its id."""
     study = submission.submit_study(store, SPEC).id
     while claims := execution.claim(store, "benchmark", 40):
         for claim in claims:
@@ -47,7 +47,7 @@ def fill(store: Store) -> str:
 
 @contextmanager
 def served(store: Store) -> Iterator[str]:
-    """The API on a free port of loopback; its address."""
+    """Serve the API on a free port of loopback; yield its address."""
     server = uvicorn.Server(uvicorn.Config(create_app(store), port=0, log_level="error"))
     thread = threading.Thread(target=server.run)
     thread.start()
@@ -60,7 +60,7 @@ def served(store: Store) -> Iterator[str]:
 
 
 def rows() -> list[Row]:
-    """Median and worst of many calls."""
+    """Measure the median and the longest duration of many calls."""
     with TemporaryDirectory() as folder:
         url = f"sqlite:///{Path(folder) / 'bench.db'}"
         migrations.upgrade(url)
@@ -73,5 +73,5 @@ def rows() -> list[Row]:
                 client.get(f"/studies/{study}/curves").raise_for_status()
                 seconds.append(perf_counter() - begun)
         store.dispose()
-    value = f"median {1e3 * median(seconds):.1f} ms, worst {1e3 * max(seconds):.1f} ms"
+    value = f"median {1e3 * median(seconds):.1f} ms, longest {1e3 * max(seconds):.1f} ms"
     return [Row(f"GET /studies/{{id}}/curves, 7 × 40 × 10 stored, {CALLS} calls", value)]

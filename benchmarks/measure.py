@@ -1,4 +1,4 @@
-"""Timing that a shared, noisy machine cannot fool: rivals take turns, and ratios are taken turn by turn."""
+"""Timing on a shared, noisy machine: competitors take turns, and ratios are computed within each round."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ class Row:
     """One line of the table.
 
     Attributes:
-        figure: what was measured.
-        value: as it is printed, with its unit.
-        ratio: to `reference`, if it is a ratio.
-        reference: what it is compared with.
-        target: what was aimed at, as it is printed.
+        figure: name of the measurement.
+        value: printed value with its unit.
+        ratio: ratio to `reference`, if any.
+        reference: name of the measurement to compare with.
+        target: printed target.
     """
 
     figure: str
@@ -25,23 +25,23 @@ class Row:
     target: str = ""
 
 
-def rates(rivals: dict[str, Callable[[], int]], rounds: int) -> dict[str, list[float]]:
-    """Each rival's rate in units of work per second, turn by turn; a first turn warms up and does not count.
+def rates(competitors: dict[str, Callable[[], int]], rounds: int) -> dict[str, list[float]]:
+    """Return each competitor's rate in units of work per second, by round. A first round warms up and does not count.
 
     Args:
-        rivals: each does some work and says how many units it was.
-        rounds: turns that count.
+        competitors: functions that do some work and return its number of units.
+        rounds: rounds that count.
     """
-    measured: dict[str, list[float]] = {name: [] for name in rivals}
-    for turn in range(rounds + 1):
-        for name, work in rivals.items():
+    measured: dict[str, list[float]] = {name: [] for name in competitors}
+    for round_number in range(rounds + 1):
+        for name, work in competitors.items():
             begun = perf_counter()
             units = work()
-            if turn:
+            if round_number:
                 measured[name].append(units / (perf_counter() - begun))
     return measured
 
 
 def ratio(ours: Sequence[float], theirs: Sequence[float]) -> float:
-    """The median of the ratios turn by turn."""
+    """Return the median of the ratios in each round."""
     return median(our / their for our, their in zip(ours, theirs, strict=True))

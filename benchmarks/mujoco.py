@@ -1,4 +1,4 @@
-"""MuJoCo through `Simulate`, against PyBullet's on one core and against a bare `mujoco.rollout`, on one and on two."""
+"""Speed of MuJoCo through `Simulate`, against PyBullet and against bare `mujoco.rollout` on one and two threads."""
 
 from collections.abc import Callable
 
@@ -7,39 +7,19 @@ from mujoco import mjtState
 from mujoco import rollout as library
 
 from benchmarks.measure import Row, rates, ratio
-from benchmarks.physics import SWITCHING, TUNED, genomes
+from benchmarks.physics import SWITCHING, genomes, simulation, through_simulate
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.tunables import tunables
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.mujoco import MuJoCo
 from gaplab.services.engines.mujoco.scene import Scene, _in_force
-from gaplab.services.engines.pybullet import PyBullet
-from gaplab.services.specs.assembly import Simulation
 
 ROBOT = Quadruped()
 MANY = 96
-"""Genomes of a batch: enough for two threads to be busy to the end."""
-
-
-def simulation(engine: Engine) -> Simulation:
-    """The quadruped under the paper's three tunables."""
-    return Simulation(ROBOT, engine, [tunables[name]() for name in TUNED])
-
-
-def one_by_one(engine: Engine, count: int) -> Callable[[], int]:
-    """Rollouts through `Simulate`, one genome a call as the paper's evolution asks for them."""
-    simulate, drawn = simulation(engine), genomes(count)
-
-    def work() -> int:
-        for genome in drawn:
-            simulate(genome[None], SWITCHING)
-        return len(drawn)
-
-    return work
+"""Genomes of a batch: enough to keep two threads busy to the end."""
 
 
 def call_by_call() -> Callable[[], int]:
-    """The engine alone, one motion a call, the motions made beforehand: what its own work costs."""
+    """Return work: rollouts by the engine alone, one precomputed motion a call."""
     engine, motions = MuJoCo(), [ROBOT.motion(genome) for genome in genomes(MANY)]
 
     def work() -> int:
@@ -51,7 +31,7 @@ def call_by_call() -> Callable[[], int]:
 
 
 def at_once(engine: Engine) -> Callable[[], int]:
-    """The same through `Simulate` in one call."""
+    """Return work: rollouts through `Simulate` in one call."""
     simulate, drawn = simulation(engine), genomes(MANY)
 
     def work() -> int:
@@ -61,7 +41,7 @@ def at_once(engine: Engine) -> Callable[[], int]:
 
 
 def bare(threads: int) -> Callable[[], int]:
-    """`mujoco.rollout` of the same motions in the same model under the same law, its inputs made beforehand."""
+    """Return work: `mujoco.rollout` of the same motions, model and contact law, with precomputed inputs."""
     engine = MuJoCo(MuJoCo.Options(threads=threads))
     scene: Scene = engine._scene(ROBOT.world)
     motions = [ROBOT.motion(genome) for genome in genomes(MANY)]
@@ -80,17 +60,17 @@ def bare(threads: int) -> Callable[[], int]:
 
 
 def rows(rounds: int) -> list[Row]:
-    """One by one and in batches, beside PyBullet and beside MuJoCo alone."""
-    rivals = {
-        "pybullet": one_by_one(PyBullet(), 12),
-        "single": one_by_one(MuJoCo(), MANY),
+    """Measure the engine one by one and in batches, against PyBullet and bare MuJoCo."""
+    competitors = {
+        "pybullet": through_simulate(SWITCHING),
+        "single": through_simulate(SWITCHING, MuJoCo(), MANY),
         "calls": call_by_call(),
         "batch": at_once(MuJoCo()),
         "bare": bare(1),
         "batch on 2": at_once(MuJoCo(MuJoCo.Options(threads=2))),
         "bare on 2": bare(2),
     }
-    measured = rates(rivals, rounds)
+    measured = rates(competitors, rounds)
 
     def row(figure: str, ours: str, theirs: str, reference: str, target: str) -> Row:
         value = f"{1e3 / float(np.median(measured[ours])):.2f} ms a rollout"

@@ -1,4 +1,4 @@
-"""What a user would write: the same robot and episode, in the ways that PyBullet's examples show."""
+"""The same robot and episode as a user would write them, after PyBullet's examples."""
 
 from collections.abc import Callable
 from multiprocessing import get_context
@@ -15,11 +15,11 @@ from gaplab.services.core.arrays import Genome
 from gaplab.services.core.robots.quadruped import Quadruped
 
 STEP_S = 1 / 240
-"""PyBullet's default; its default of 50 solver iterations stays as well."""
+"""Time step, PyBullet's default; its default of 50 solver iterations applies too."""
 
 
 def evaluate(file: str, genome: Genome) -> float:
-    """A simulation from scratch: URDF loaded, every motor commanded at every step, Bullet's defaults otherwise."""
+    """Simulate from scratch: load the URDF file and command every motor in every step, with Bullet's defaults."""
     robot = Quadruped()
     pybullet.resetSimulation()
     pybullet.setGravity(0, 0, -robot.world.gravity_m_s2)
@@ -41,16 +41,16 @@ def evaluate(file: str, genome: Genome) -> float:
 
 
 def work(pool: Pool) -> Callable[[], int]:
-    """All genomes, spread over the pool."""
+    """Return work: all genomes, distributed over the pool."""
     file = Path(mkdtemp()) / "quadruped.urdf"
     file.write_text(urdf(Quadruped().world))
 
-    def spread() -> int:
+    def run() -> int:
         return len(pool.starmap(evaluate, [(str(file), genome) for genome in genomes()], chunksize=1))
 
-    return spread
+    return run
 
 
 def pool(processes: int) -> Pool:
-    """Processes with a Bullet server each."""
+    """Return a pool of processes with a Bullet server each."""
     return get_context("spawn").Pool(processes, pybullet.connect, (pybullet.DIRECT,))

@@ -1,7 +1,7 @@
-"""How many rollouts each optimizer needs to reach what the paper's evolution reaches with the paper's budgets.
+"""Rollouts that each optimizer needs to reach the fitness of the paper's evolution at the paper's budgets.
 
-`python -m benchmarks.optimizers` takes some minutes: it searches for controllers with 10 000 evaluations, and for
-simulators, on five samples, with 2 000, on the toy function and on the quadruped in MuJoCo.
+`python -m benchmarks.optimizers` takes some minutes. It searches for controllers with 10 000 evaluations, and for
+simulators on five samples with 2 000, on the toy function and on the quadruped in MuJoCo.
 """
 
 from argparse import ArgumentParser
@@ -32,18 +32,18 @@ SIMULATORS = 2_000
 SAMPLES = 5
 SEARCHES = 10
 PAPERS = "steady_state"
-COLUMNS = ("robot", "search for", "optimizer", "rollouts", "best fitness", "reach the paper's", "rollouts until")
+COLUMNS = ("robot", "search for", "optimizer", "rollouts", "best fitness", "reach the paper's", "rollouts until then")
 ROBOTS = {"toy_function": "analytic", "quadruped": "mujoco"}
 
 
 @dataclass(frozen=True)
-class Problem:
-    """Something to maximise.
+class SearchProblem:
+    """A fitness to maximise.
 
     Attributes:
-        space: of what is searched for.
-        evaluate: the fitness, as an optimizer asks for it.
-        rollouts: that were simulated so far.
+        space: search space.
+        evaluate: function from genomes and bounds to fitness.
+        rollouts: function that returns the number of rollouts so far.
         evaluations: the paper's budget.
     """
 
@@ -54,25 +54,25 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Trace:
-    """The best fitness after so many rollouts, whenever either has changed."""
+class BestSoFar:
+    """The best fitness by number of rollouts, after each call."""
 
     rollouts: tuple[int, ...]
     best: tuple[float, ...]
 
     def until(self, fitness: float) -> float:
-        """Rollouts until it was reached; infinite if it never was."""
+        """Return the number of rollouts until a fitness is reached; infinity if it never is."""
         return next(
             (float(rollouts) for rollouts, best in zip(self.rollouts, self.best, strict=True) if best >= fitness),
             float("inf"),
         )
 
 
-def controllers(one: Setting, seed: int) -> Problem:
-    """Controllers, in a simulator drawn at random."""
+def controllers(one: Setting, seed: int) -> SearchProblem:
+    """Return the search for controllers in a random simulator."""
     answers = Answers(one.simulate)
     simulator = one.parameters.draw(1, stream(seed, "simulator"))
-    return Problem(
+    return SearchProblem(
         one.genomes,
         lambda asked: answers(asked.genomes, simulator)[:, 0],
         lambda: answers.cost_of(0).rollouts,
@@ -80,19 +80,19 @@ def controllers(one: Setting, seed: int) -> Problem:
     )
 
 
-def simulators(one: Setting, seed: int) -> Problem:
-    """Simulators, on what reality says of controllers drawn at random."""
+def simulators(one: Setting, seed: int) -> SearchProblem:
+    """Return the search for simulators on samples of random controllers."""
     drawn = one.genomes.draw(SAMPLES, stream(seed, "samples"))
     answers = Answers(one.simulate)
     misfit = Misfit(answers, [Sample(genome, one.reality(genome)) for genome in drawn])
-    return Problem(one.parameters, misfit, lambda: answers.cost_of(0).rollouts, SIMULATORS)
+    return SearchProblem(one.parameters, misfit, lambda: answers.cost_of(0).rollouts, SIMULATORS)
 
 
 PROBLEMS = {"controllers": controllers, "simulators": simulators}
 
 
-def traced(problem: Problem, optimizer: Optimizer, seed: int) -> Trace:
-    """One search."""
+def searched(problem: SearchProblem, optimizer: Optimizer, seed: int) -> BestSoFar:
+    """Run one search."""
     rollouts: list[int] = []
     best: list[float] = []
 
@@ -103,50 +103,42 @@ def traced(problem: Problem, optimizer: Optimizer, seed: int) -> Trace:
         return fitness
 
     maximise(optimizer, problem.space, evaluate, problem.evaluations, stream(seed, "search"))
-    return Trace(tuple(rollouts), tuple(best))
+    return BestSoFar(tuple(rollouts), tuple(best))
 
 
 def compared(robot: str, kind: str, searches: int) -> Iterator[tuple[str, ...]]:
-    """A row of the table for each optimizer."""
+    """Yield a row of the table for each optimizer."""
     spec = resolve_experiment(
         ExperimentSpec(
             strategy=PluginRef(name="random"), robot=PluginRef(name=robot), engine=PluginRef(name=ROBOTS[robot])
         )
     )
     one = setting(spec, 0)
-    traces = {
-        name: [traced(PROBLEMS[kind](one, seed), each(), seed) for seed in range(searches)]
-        for name, each in optimizers.items()
+    results = {
+        name: [searched(PROBLEMS[kind](one, seed), optimizer(), seed) for seed in range(searches)]
+        for name, optimizer in optimizers.items()
     }
-    for name, found in traces.items():
-        needed = [trace.until(papers.best[-1]) for trace, papers in zip(found, traces[PAPERS], strict=True)]
+    for name, found in results.items():
+        needed = [search.until(papers.best[-1]) for search, papers in zip(found, results[PAPERS], strict=True)]
         reached = sum(np.isfinite(needed))
         yield (
             robot,
             kind,
             name,
-            f"{median(trace.rollouts[-1] for trace in found):,.0f}",
-            f"{median(trace.best[-1] for trace in found):.4g}",
+            f"{median(search.rollouts[-1] for search in found):,.0f}",
+            f"{median(search.best[-1] for search in found):.4g}",
             f"{reached} of {searches}",
             f"{median(needed):,.0f}" if np.isfinite(median(needed)) else "more",
         )
 
 
 def main() -> None:
-    """Search, and print the table."""
+    """Run all searches, and print the table."""
     parser = ArgumentParser(description=__doc__)
-    parser.add_argument("--searches", type=int, default=SEARCHES, help="of each kind with each optimizer")
+    parser.add_argument("--searches", type=int, default=SEARCHES, help="searches of each kind with each optimizer")
     searches = parser.parse_args().searches
     table = Table(title=f"medians of {searches} searches")
-    for column in (
-        "robot",
-        "search for",
-        "optimizer",
-        "rollouts",
-        "best fitness",
-        "reach the paper's",
-        "rollouts until",
-    ):
+    for column in COLUMNS:
         table.add_column(column)
     for robot in ROBOTS:
         for kind in PROBLEMS:

@@ -1,4 +1,4 @@
-"""What gaplab itself adds to the physics: time for each step of the evolution, and memory of a worker."""
+"""Overhead of gaplab beside physics: time of an evolution step, and memory of a worker."""
 
 import resource
 from pathlib import Path
@@ -20,7 +20,7 @@ PAGE = resource.getpagesize()
 
 
 def evolution_step_s() -> float:
-    """Seconds of one step of the paper's evolution (ask, replacement, tell) where fitness costs nothing."""
+    """Return seconds of one step of the paper's evolution (ask, replacement, tell) without the cost of fitness."""
 
     def free(asked: Question) -> FloatArray:
         return asked.genomes[:, 0]
@@ -31,12 +31,12 @@ def evolution_step_s() -> float:
 
 
 def resident_bytes() -> int:
-    """Memory of this process now."""
+    """Return the current memory of this process."""
     return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE
 
 
 def memory(rollouts: int = ROLLOUTS) -> tuple[int, int, float]:
-    """Bytes after a tenth of the rollouts and after all, in simulators that differ each time; seconds a rollout."""
+    """Return bytes after a tenth of the rollouts, bytes after all, and seconds a rollout; each simulator differs."""
     simulate, drawn, rng = simulation(), genomes(100), np.random.default_rng(0)
     early, begun = 0, perf_counter()
     for index in range(rollouts):
@@ -47,7 +47,7 @@ def memory(rollouts: int = ROLLOUTS) -> tuple[int, int, float]:
 
 
 def rows() -> list[Row]:
-    """The evolution's own cost as a share of a rollout, and memory over many rollouts."""
+    """Measure an evolution step as a share of a rollout, and memory over many rollouts."""
     step_s = evolution_step_s()
     early, late, rollout_s = memory()
     mebibyte = 2**20

@@ -1,4 +1,4 @@
-"""Rollouts per second on one core: a bare loop of Bullet steps against the same episode through `Simulate`."""
+"""Speed of PyBullet on one core: a bare loop of steps against the same episode through `Simulate`."""
 
 from collections import defaultdict
 from collections.abc import Callable
@@ -7,10 +7,13 @@ import numpy as np
 import pybullet
 
 from benchmarks.measure import Row, rates, ratio
-from gaplab.services.core.arrays import Genomes, Parameters
+from gaplab.services.core.arrays import Genome, Genomes, Parameters
+from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.search import maximise
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.world import Motion
+from gaplab.services.engines.base import Engine
 from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.engines.pybullet.scene import Scene
 from gaplab.services.specs.assembly import Simulation
@@ -22,20 +25,20 @@ EQUAL = np.array([[0.8, 0.8, 0.0]])
 
 
 def genomes(count: int = GENOMES) -> Genomes:
-    """The known genome and random ones: what a search evaluates."""
+    """Return the hand-designed genome and random ones."""
     robot = Quadruped()
     drawn: Genomes = np.vstack([robot.known, robot.space.draw(count - 1, np.random.default_rng(0))])
     return drawn
 
 
-def simulation() -> Simulation:
-    """The quadruped on PyBullet, under the paper's three tunables."""
-    return Simulation(Quadruped(), PyBullet(), [tunables[name]() for name in TUNED])
+def simulation(engine: Engine | None = None) -> Simulation:
+    """Return the quadruped with the paper's three tunables, by default in PyBullet."""
+    return Simulation(Quadruped(), engine or PyBullet(), [tunables[name]() for name in TUNED])
 
 
-def through_simulate(parameters: Parameters) -> Callable[[], int]:
-    """Rollouts through `Simulate`, one genome a call as an evolution asks for them."""
-    simulate, drawn = simulation(), genomes()
+def through_simulate(parameters: Parameters, engine: Engine | None = None, count: int = GENOMES) -> Callable[[], int]:
+    """Return work: rollouts through `Simulate`, one genome a call, as the paper's evolution does."""
+    simulate, drawn = simulation(engine), genomes(count)
 
     def work() -> int:
         for genome in drawn:
@@ -46,7 +49,7 @@ def through_simulate(parameters: Parameters) -> Callable[[], int]:
 
 
 def bare() -> Callable[[], int]:
-    """`stepSimulation` in a loop, motors commanded at pulse edges only: what the physics alone costs."""
+    """Return work: `stepSimulation` in a loop, with motor commands at pulse edges only."""
     robot = Quadruped()
     scene = Scene(pybullet, robot.world)
     motions = [robot.motion(genome) for genome in genomes()]
@@ -66,7 +69,7 @@ def bare() -> Callable[[], int]:
 
 
 def edges(motion: Motion, time_step_s: float) -> tuple[dict[int, list[tuple[int, float]]], int]:
-    """Which motors get which new target at which step, and the number of steps."""
+    """Return the new targets of motors by step, and the number of steps."""
     commands: dict[int, list[tuple[int, float]]] = defaultdict(list)
     before = np.full(motion.targets.shape[1], np.nan)
     for time_s, targets in zip(motion.times_s, motion.targets, strict=True):
@@ -76,8 +79,18 @@ def edges(motion: Motion, time_step_s: float) -> tuple[dict[int, list[tuple[int,
     return commands, round(motion.observe_s[-1] / time_step_s)
 
 
+def evolved(engine: Engine, evaluations: int, rng: np.random.Generator) -> Genome:
+    """Return a controller that was evolved in the robot's own world."""
+    simulate = simulation(engine)
+    fittest = maximise(
+        SteadyState(), Quadruped().space, lambda asked: simulate(asked.genomes, SWITCHING)[:, 0], evaluations, rng
+    )
+    genome: Genome = fittest.genomes[0]
+    return genome
+
+
 def rows(rounds: int) -> list[Row]:
-    """Bare, and the engine with and without switching."""
+    """Measure bare steps, and the engine with and without stick-slip switching."""
     measured = rates(
         {"bare": bare(), "switching": through_simulate(SWITCHING), "equal": through_simulate(EQUAL)}, rounds
     )

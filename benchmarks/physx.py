@@ -1,4 +1,4 @@
-"""PhysX: its speed against a bare loop of steps, and, by `python -m benchmarks.physx`, its robot against PyBullet's."""
+"""PhysX: its speed against a bare loop of steps; `python -m benchmarks.physx` compares the robot with PyBullet's."""
 
 from argparse import ArgumentParser
 from collections.abc import Callable
@@ -7,13 +7,10 @@ import numpy as np
 from scipy import stats
 
 from benchmarks.measure import Row, rates, ratio
-from benchmarks.physics import SWITCHING, TUNED, edges, genomes
-from gaplab.services.core.arrays import Fitnesses, Genome, Genomes
-from gaplab.services.core.optimizers.steady_state import SteadyState
+from benchmarks.physics import SWITCHING, edges, evolved, genomes, simulation, through_simulate
+from gaplab.services.core.arrays import Fitnesses, Genomes
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.search import maximise
 from gaplab.services.core.streams import stream
-from gaplab.services.core.tunables import tunables
 from gaplab.services.core.world import Motion
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.physx import PhysX
@@ -24,25 +21,8 @@ ROBOT = Quadruped()
 NEARBY = [np.array([values]) for values in ((1.02, 0.8, 0.0), (1.0, 0.81, 0.0), (1.0, 0.8, 0.02), (0.5, 0.5, 0.0))]
 
 
-def simulation(engine: Engine) -> Simulation:
-    """The quadruped under the paper's three tunables."""
-    return Simulation(ROBOT, engine, [tunables[name]() for name in TUNED])
-
-
-def through_simulate(engine: Engine) -> Callable[[], int]:
-    """Rollouts through `Simulate`, one genome a call as an evolution asks for them."""
-    simulate, drawn = simulation(engine), genomes()
-
-    def work() -> int:
-        for genome in drawn:
-            simulate(genome[None], SWITCHING)
-        return len(drawn)
-
-    return work
-
-
 def bare() -> Callable[[], int]:
-    """`PhysxCpuSystem.step` in a loop, drives given targets at pulse edges only: what the physics alone costs."""
+    """Return work: `PhysxCpuSystem.step` in a loop, with new drive targets at pulse edges only."""
     world = ROBOT.world
     scene = PhysX()._scenes[world]
     system, joints, start = scene._system, scene.robot.motors, scene._initial
@@ -63,9 +43,13 @@ def bare() -> Callable[[], int]:
 
 
 def rows(rounds: int) -> list[Row]:
-    """Bare, through `Simulate`, and PyBullet through `Simulate`."""
-    rivals = {"bare": bare(), "physx": through_simulate(PhysX()), "pybullet": through_simulate(PyBullet())}
-    measured = rates(rivals, rounds)
+    """Measure bare steps, and PhysX and PyBullet through `Simulate`."""
+    competitors = {
+        "bare": bare(),
+        "physx": through_simulate(SWITCHING, PhysX()),
+        "pybullet": through_simulate(SWITCHING, PyBullet()),
+    }
+    measured = rates(competitors, rounds)
     milliseconds = {name: f"{1e3 / float(np.median(each)):.1f} ms a rollout" for name, each in measured.items()}
     against = {name: ratio(measured["physx"], measured[name]) for name in ("bare", "pybullet")}
     return [
@@ -76,40 +60,29 @@ def rows(rounds: int) -> list[Row]:
 
 
 def main() -> None:
-    """Stand, and walk with the same genomes, in PhysX and in PyBullet."""
+    """Print height at rest and fitness of the same genomes, in PhysX and in PyBullet."""
     parser = ArgumentParser(prog="python -m benchmarks.physx", description=__doc__)
     parser.add_argument("--random", type=int, default=100, help="genomes drawn uniformly")
     parser.add_argument("--evolved", type=int, default=5, help="genomes evolved in each engine")
-    parser.add_argument("--evaluations", type=int, default=300, help="of each evolution")
-    asked = parser.parse_args()
+    parser.add_argument("--evaluations", type=int, default=300, help="evaluations of each evolution")
+    arguments = parser.parse_args()
     engines: dict[str, Engine] = {"physx": PhysX(), "pybullet": PyBullet()}
     still = Motion(np.zeros(1), np.zeros((1, len(ROBOT.world.actuators))), np.array([2.0]))
     for name, engine in engines.items():
         height = engine.rollout(ROBOT.world, still).positions_m[-1, 2]
-        print(f"{name}: left alone, the trunk is {1e3 * height:.1f} mm above the ground after 2 s")
-    sets = {"random": ROBOT.space.draw(asked.random, stream(0, "random genomes"))}
+        print(f"{name}: at rest, the trunk is {1e3 * height:.1f} mm above the ground after 2 s")
+    sets = {"random": ROBOT.space.draw(arguments.random, stream(0, "random genomes"))}
     for name, engine in engines.items():
         sets[f"evolved in {name}"] = np.array(
-            [evolved(engine, asked.evaluations, name, seed) for seed in range(asked.evolved)]
+            [evolved(engine, arguments.evaluations, stream(0, name, seed)) for seed in range(arguments.evolved)]
         )
     simulates = {name: simulation(engine) for name, engine in engines.items()}
     compare(sets, simulates)
     nearby(sets["random"], simulates)
 
 
-def evolved(engine: Engine, evaluations: int, *address: str | int) -> Genome:
-    """A controller evolved in the robot's own world."""
-    simulate = simulation(engine)
-    rng = stream(0, *address)
-    found = maximise(
-        SteadyState(), ROBOT.space, lambda asked: simulate(asked.genomes, SWITCHING)[:, 0], evaluations, rng
-    )
-    best: Genome = found.genomes[0]
-    return best
-
-
 def compare(sets: dict[str, Genomes], simulates: dict[str, Simulation]) -> None:
-    """A Markdown table of fitnesses side by side; the last line is over all sets."""
+    """Print a Markdown table of fitness in both engines; the last line is over all sets."""
     print("\n| genomes | PhysX m/s | PyBullet m/s | Spearman | Pearson |\n|---|---|---|---|---|")
     sides: dict[str, tuple[Fitnesses, Fitnesses]] = {}
     for name, drawn in sets.items():
@@ -123,7 +96,7 @@ def compare(sets: dict[str, Genomes], simulates: dict[str, Simulation]) -> None:
 
 
 def nearby(drawn: Genomes, simulates: dict[str, Simulation]) -> None:
-    """A Markdown table of how well an engine agrees with itself when one coefficient is changed a little."""
+    """Print a Markdown table of rank correlations of each engine with itself in changed materials."""
     print("\n| static, dynamic friction, restitution | PhysX Spearman | PyBullet Spearman |\n|---|---|---|")
     truth = {name: simulate(drawn, SWITCHING)[:, 0] for name, simulate in simulates.items()}
     for changed in NEARBY:

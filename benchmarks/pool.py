@@ -1,8 +1,9 @@
-"""One repetition of *informative* on two cores against one, and what two bare processes gain on this machine."""
+"""Speed-up of one repetition of *informative* on two cores, beside that of two bare processes on this machine."""
 
 from collections.abc import Callable
 from statistics import median
 from time import perf_counter, sleep
+from typing import Any
 
 import ray
 
@@ -26,7 +27,7 @@ SPEC = ExperimentSpec.model_validate(
         "budget": {"controller_evaluations": 160, "selection_evaluations": 160, "simulator_evaluations": 40},
     }
 )
-"""Nine tenths of its rollouts are the selection's, 20 for each newcomer, as at the paper's budgets."""
+"""A spec whose selection has nine tenths of the rollouts, 20 for each newcomer, as at the paper's budgets."""
 
 ROLLOUTS = 120
 SETTLE_S = 1.0
@@ -34,13 +35,13 @@ SETTLE_S = 1.0
 
 @ray.remote(num_cpus=1)
 def _alone() -> int:
-    """The repetition on one core, whatever else is idle."""
+    """Run the repetition on one core, even if others are idle."""
     return sum(1 for _ in repetition(setting(resolve_experiment(SPEC), 0)))
 
 
 @ray.remote(num_cpus=1)
 def _rollouts(count: int) -> int:
-    """Rollouts of one process."""
+    """Run rollouts in one process."""
     simulate, drawn = simulation(), genomes()
     for index in range(count):
         simulate(drawn[[index % len(drawn)]], SWITCHING)
@@ -48,24 +49,24 @@ def _rollouts(count: int) -> int:
 
 
 def alone() -> int:
-    """The steps of the repetition, in one process."""
+    """Run the repetition in one process; return its number of steps."""
     return int(ray.get(_alone.remote()))
 
 
-def spread() -> int:
-    """The steps of the repetition, as the service runs it."""
+def on_all_cores() -> int:
+    """Run the repetition as the service does; return its number of steps."""
     claim = Claim(id=0, epoch=0, experiment_id="none", number=0, spec=resolve_experiment(SPEC))
-    stream = task.run.remote(claim, {}, CHECKPOINT_S)
+    stream: Any = task.run.remote(claim, {}, CHECKPOINT_S)
     return sum(isinstance(each, TimedStep) for batch in stream for each in ray.get(batch))
 
 
 def bare(processes: int) -> Callable[[], int]:
-    """Rollouts shared by processes that need nothing of each other."""
+    """Return work: rollouts divided among independent processes."""
     return lambda: sum(ray.get([_rollouts.remote(ROLLOUTS // processes) for _ in range(processes)]))
 
 
 def settled(work: Callable[[], int]) -> float:
-    """The seconds that the work takes, once Ray knows that the cores of what was before are idle."""
+    """Return the duration of work in seconds, after Ray has noticed that the cores are idle."""
     sleep(SETTLE_S)
     begun = perf_counter()
     work()
@@ -73,16 +74,16 @@ def settled(work: Callable[[], int]) -> float:
 
 
 def rows(rounds: int) -> list[Row]:
-    """The speed-up of a repetition beside that of bare processes, in the same turns."""
-    rivals = {"one": alone, "two": spread, "bare one": bare(1), "bare two": bare(2)}
-    taken: dict[str, list[float]] = {name: [] for name in rivals}
+    """Measure the speed-up of a repetition and of bare processes in the same rounds."""
+    competitors = {"one": alone, "two": on_all_cores, "bare one": bare(1), "bare two": bare(2)}
+    taken: dict[str, list[float]] = {name: [] for name in competitors}
     with cluster(Settings(workers=2)):
-        bare(2)()  # loads engines
-        if spread() != alone():
+        bare(2)()  # load the engines
+        if on_all_cores() != alone():
             msg = "the service's task computes other steps than the repetition"
             raise RuntimeError(msg)
         for _ in range(rounds):
-            for name, work in rivals.items():
+            for name, work in competitors.items():
                 taken[name].append(settled(work))
     possible, ours = ratio(taken["bare one"], taken["bare two"]), ratio(taken["one"], taken["two"])
     value = f"{median(taken['two']):.1f} s; on one {median(taken['one']):.1f} s"

@@ -1,4 +1,4 @@
-"""Rollouts that a whole study at desk budgets is spared, none of which could have changed a number."""
+"""Rollouts saved in a whole study at desk budgets; none of them could have changed a number."""
 
 from benchmarks.measure import Row
 from gaplab.schemas.spec import ExperimentSpec
@@ -12,11 +12,11 @@ REPETITIONS = 3
 
 
 def costs() -> list[tuple[type, Cost]]:
-    """The kind and the cost of every step of six strategies on the toy function."""
+    """Return kind and cost of every step of six strategies on the toy function."""
     specs = [
         resolve_experiment(ExperimentSpec.model_validate({"strategy": name, "robot": "toy_function", "budget": "desk"}))
-        for name, each in strategies.items()
-        if not each.in_reality
+        for name, strategy in strategies.items()
+        if not strategy.in_reality
     ]
     return [
         (type(step), step.cost)
@@ -28,16 +28,16 @@ def costs() -> list[tuple[type, Cost]]:
 
 
 def rows() -> list[Row]:
-    """How many times as many rollouts there would have been, in tuning and in all."""
-    found = costs()
+    """Measure the ratio of rollouts without and with savings, in tuning and in all phases."""
+    all_costs = costs()
     return [
-        _row("rollouts of tuning, toy at desk budgets", [cost for kind, cost in found if kind is Tuned], "aim 2"),
-        _row("rollouts of all phases", [cost for _, cost in found], "aim 1.4"),
+        _row("rollouts of tuning, toy at desk budgets", [cost for kind, cost in all_costs if kind is Tuned], "2"),
+        _row("rollouts of all phases", [cost for _, cost in all_costs], "1.4"),
     ]
 
 
-def _row(figure: str, found: list[Cost], target: str) -> Row:
-    done, saved = sum(each.rollouts for each in found), sum(each.saved for each in found)
+def _row(figure: str, steps: list[Cost], target: str) -> Row:
+    done, saved = sum(each.rollouts for each in steps), sum(each.saved for each in steps)
     return Row(figure, f"{done:,} simulated, {saved:,} saved", (done + saved) / done, "without saving", target)
 
 

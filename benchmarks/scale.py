@@ -1,9 +1,9 @@
-"""`python -m benchmarks.scale`: how long the paper's Fig. 4 takes on how many cores, from each engine's measured speed.
+"""`python -m benchmarks.scale`: duration of the paper's Fig. 4 by number of cores, from measured speeds of engines.
 
-Physics is all that is counted. A computation of W core-seconds, whose longest chain of steps that wait for each other
-takes S seconds, takes at least max(W / P, S) on P cores, and at most W / P + S if no core idles while there is work
-(Brent 1974). The longest chain is that of a repetition of *informative*: one newcomer after another, and within a
-newcomer as many rollouts at a time as `gaplab.workers.pool` spreads.
+Only physics is counted. Let W be the work of a computation in core-seconds, and S the seconds of its longest chain of
+dependent steps. On P cores it takes at least max(W / P, S), and at most W / P + S if no core idles while there is work
+(Brent 1974). The longest chain is a repetition of *informative*: one newcomer after another, where
+`gaplab.workers.pool` distributes the rollouts of one newcomer.
 """
 
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ from gaplab.workers.pool import LEAST_S
 CORES = (2, 16, 64, 1_000)
 FIGURE_4 = StudySpec(direct_repetitions=100)
 LEND_S = 0.001
-"""To lend a part to another core and have it back. Measured: 0.4 to 1 ms."""
+"""Time to send work to another core and receive the result. Measured: 0.4 to 1 ms."""
 
 TURNS = 12
 MANY = 20
@@ -42,8 +42,8 @@ class Speed:
     """Core-seconds of one rollout.
 
     Attributes:
-        alone_s: when it is asked for by itself.
-        together_s: when many are asked for at once.
+        alone_s: in a call of its own.
+        together_s: in a call with many rollouts.
     """
 
     alone_s: float
@@ -52,17 +52,22 @@ class Speed:
 
 @dataclass(frozen=True)
 class Calls:
-    """A phase of a repetition: so many calls of `Simulate`, each of which waits for the one before."""
+    """A phase of a repetition: calls of `Simulate`, each of which waits for the one before.
+
+    Attributes:
+        count: number of calls.
+        rollouts: rollouts in each call.
+    """
 
     count: int
     rollouts: int
 
     def work_s(self, speed: Speed) -> float:
-        """Core-seconds."""
+        """Return the work in core-seconds."""
         return self.count * self.rollouts * (speed.alone_s if self.rollouts == 1 else speed.together_s)
 
     def chain_s(self, speed: Speed) -> float:
-        """Seconds with as many cores as can be of use."""
+        """Return the duration in seconds with as many cores as are useful."""
         parts = max(1, min(self.rollouts, int(self.rollouts * speed.together_s / LEAST_S)))
         together = ceil(self.rollouts / parts)
         each_s = speed.alone_s if together == 1 else speed.together_s
@@ -70,7 +75,7 @@ class Calls:
 
 
 def phases(spec: ExperimentSpec) -> Iterator[Calls]:
-    """What one repetition of a resolved spec asks for, as budgeted: what is saved comes on top."""
+    """Yield the phases of one repetition of a resolved spec, as budgeted, without savings."""
     strategy, iterations = strategies.create(spec.strategy), spec.iterations or 0
     if strategy.in_reality:
         yield Calls(spec.budget.controller_evaluations or 0, 1)
@@ -83,25 +88,26 @@ def phases(spec: ExperimentSpec) -> Iterator[Calls]:
 
 
 def figure() -> Iterator[tuple[int, tuple[Calls, ...]]]:
-    """Each experiment of the paper's Fig. 4, the direct baseline included: repetitions, and what one asks for."""
+    """Yield repetitions and phases of each experiment of the paper's Fig. 4, including the direct baseline."""
     for spec in resolve_study(FIGURE_4):
         yield spec.repetitions or 0, tuple(phases(spec))
 
 
 def steps() -> int:
-    """Steps that the supervisor stores for it: five in an iteration, three in number 0."""
+    """Return the steps that the supervisor stores for the figure: five in an iteration, three in iteration 0."""
     specs = resolve_study(FIGURE_4)
     ends = ((spec, 0 if strategies.create(spec.strategy).in_reality else spec.iterations or 0) for spec in specs)
     return sum((spec.repetitions or 0) * (5 * iterations + 3) for spec, iterations in ends)
 
 
 def measured(engine: type[Engine]) -> Speed:
-    """Of the genomes and simulators that searches meet."""
+    """Measure the speed of an engine with the kinds of genomes and simulators that occur in searches."""
     simulate = Simulation(Quadruped(), engine(), [tunables[name]() for name in TUNED])
     ranges = [[tunables[name].lower or 0.0, tunables[name].upper or 1.0] for name in TUNED]
-    drawn = np.random.default_rng(0).uniform(*np.transpose(ranges), (MANY, len(TUNED)))
+    lower, upper = np.transpose(ranges)
+    drawn = np.random.default_rng(0).uniform(lower, upper, (MANY, len(TUNED)))
     drawn_genomes = genomes(TURNS + 1)
-    simulate(drawn_genomes, drawn)  # the first one loads the engine
+    simulate(drawn_genomes, drawn)  # loads the engine
 
     def seconds(simulators: Parameters) -> float:
         taken = []
@@ -115,14 +121,14 @@ def measured(engine: type[Engine]) -> Speed:
 
 
 def main() -> None:
-    """Measure the engines that are installed, and print the table."""
+    """Measure the installed engines, and print the table."""
     console = Console(width=140)
     total = sum(repetitions * each.count * each.rollouts for repetitions, calls in figure() for each in calls)
     table = Table(title=f"the paper's Fig. 4: {total / 1e6:.1f} million rollouts, {steps():,} steps to store")
     for column in (
         "engine",
-        "a rollout alone",
-        f"of {MANY}",
+        "rollout alone",
+        f"in a batch of {MANY}",
         *(f"{cores:,} cores" for cores in CORES),
         "longest chain",
     ):
@@ -130,13 +136,13 @@ def main() -> None:
     for engine in engines.values():
         if engine.runs(Quadruped().world) and engine.available():
             speed = measured(engine)
-            each = (f"{1e3 * speed.alone_s:.1f} ms", f"{1e3 * speed.together_s:.1f} ms")
-            table.add_row(engine.name, *each, *_durations(speed))
+            rollout = (f"{1e3 * speed.alone_s:.1f} ms", f"{1e3 * speed.together_s:.1f} ms")
+            table.add_row(engine.name, *rollout, *_durations(speed))
     console.print(table)
 
 
 def _durations(speed: Speed) -> Iterator[str]:
-    """On each number of cores, at least and at most; and the longest chain."""
+    """Yield lower and upper bound for each number of cores, and the longest chain."""
     work = sum(repetitions * each.work_s(speed) for repetitions, calls in figure() for each in calls)
     chain = max(sum(each.chain_s(speed) for each in calls) for _, calls in figure())
     for cores in CORES:

@@ -1,4 +1,4 @@
-"""A whole study through HTTP, Ray and the database on two cores, against the same through `Simulate` alone."""
+"""A whole experiment through HTTP, Ray and the database on two cores, against the same through `Simulate` alone."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,6 +13,7 @@ import numpy as np
 from benchmarks import naive
 from benchmarks.measure import Row, rates, ratio
 from gaplab.api.process.local_service import start_service
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Selected, Transferred, Tuned
@@ -33,11 +34,11 @@ LOOK_S = 0.05
 
 @contextmanager
 def service() -> Iterator[Callable[[], int]]:
-    """The whole experiment, submitted to a real service; its rollouts."""
+    """Start a real service; yield work that runs the experiment and returns its rollouts."""
     with TemporaryDirectory() as name:
         folder = Path(name)
         with start_service(f"sqlite:///{folder / 'bench.db'}", folder / "service.log") as client:
-            client.check({})  # comes with the first such experiment, and is no part of what is measured
+            client.check({})  # the sensitivity check would run with the first experiment, and is not measured
 
             def work() -> int:
                 submitted = client.submit(SPEC.model_dump(mode="json", exclude_unset=True)).id
@@ -49,7 +50,7 @@ def service() -> Iterator[Callable[[], int]]:
 
 
 def one_repetition(number: int) -> int:
-    """A repetition through `Simulate`, with nothing around it; its rollouts."""
+    """Run a repetition through `Simulate` alone; return its rollouts."""
     return sum(
         step.cost.rollouts
         for step in repetition(setting(_resolved(), number))
@@ -58,21 +59,21 @@ def one_repetition(number: int) -> int:
 
 
 @cache
-def _resolved() -> ExperimentSpec:
+def _resolved() -> ResolvedSpec:
     return resolve_experiment(SPEC)
 
 
 def rows(rounds: int) -> list[Row]:
-    """The service against one core, two cores with nothing around, and what a user would write for two."""
+    """Measure the service against one core, two bare cores, and a user's own script on two cores."""
     numbers = range(SPEC.repetitions or 0)
     with service() as through_the_service, naive.pool(CORES) as users, get_context("spawn").Pool(CORES) as bare:
-        rivals = {
+        competitors = {
             "one": lambda: sum(map(one_repetition, numbers)),
             "two": lambda: sum(bare.map(one_repetition, numbers, chunksize=1)),
             "service": through_the_service,
             "naive": naive.work(users),
         }
-        measured = rates(rivals, rounds)
+        measured = rates(competitors, rounds)
     rate = {name: f"{float(np.median(each)):.1f} rollouts/s" for name, each in measured.items()}
     whole, two = measured["service"], measured["two"]
     return [
@@ -84,8 +85,8 @@ def rows(rounds: int) -> list[Row]:
             "service: the same through HTTP, Ray, SQLite", rate["service"], ratio(whole, two), "two processes", "≥ 0.93"
         ),
         Row("service, as above", rate["service"], ratio(whole, measured["one"]), "engine, one core", "≥ 1.85"),
-        Row("what a user would write, two processes", rate["naive"]),
-        Row("service, as above", rate["service"], ratio(whole, measured["naive"]), "what a user would write", "≥ 3"),
+        Row("a user's own script, two processes", rate["naive"]),
+        Row("service, as above", rate["service"], ratio(whole, measured["naive"]), "a user's own script", "≥ 3"),
     ]
 
 

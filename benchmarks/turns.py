@@ -1,4 +1,4 @@
-"""How long a claim takes when 10 000 experiments of 40 repetitions wait, and when only one does: SQLite, Postgres."""
+"""Duration of a claim while 10 000 experiments of 40 repetitions wait, or only one, on SQLite and Postgres."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,40 +20,40 @@ from tests.postgres import running
 WAITING = 10_000
 REPETITIONS = 40
 CLAIMS = 20
-"""Timed; the median counts."""
+"""Number of timed claims, for the median."""
 
 SPEC = ExperimentSpec.model_validate({"strategy": "random", "robot": "toy_function", "budget": "smoke"})
 
 
 def fill(store: Store, count: int) -> None:
-    """One experiment that is submitted, and so many like it."""
-    like = submission.submit_experiment(store, SPEC).id
+    """Submit one experiment, and insert copies of it."""
+    original = submission.submit_experiment(store, SPEC).id
     if not count:
         return
     with store.transaction() as session:
-        spec = session.get_one(ExperimentRow, like).spec
+        spec = session.get_one(ExperimentRow, original).spec
         ids = [f"bench{each}" for each in range(count)]
         common = {"position": 0, "name": "x", "strategy": "random", "spec": spec, "iterations": 3, "rollouts": 100}
         session.execute(insert(ExperimentRow).values(created_at=now()), [{"id": each} | common for each in ids])
         for number in range(REPETITIONS):
             session.execute(insert(RepetitionRow), [{"experiment_id": each, "number": number} for each in ids])
-        session.execute(text("ANALYZE"))  # as Postgres does by itself within a minute
+        session.execute(text("ANALYZE"))  # Postgres does it itself within a minute
 
 
 def milliseconds(store: Store) -> Sequence[float]:
-    """Of claims of four repetitions, after each of which they are handed back; sorted."""
+    """Return the sorted durations of claims of four repetitions, each of which is then released."""
     measured = []
     for _ in range(CLAIMS):
         begun = perf_counter()
         claims = execution.claim(store, "bench", 4)
         measured.append(1000 * (perf_counter() - begun))
-        for each in claims:
-            execution.hand_back(store, each)
+        for claim in claims:
+            execution.hand_back(store, claim)
     return sorted(measured)
 
 
 def rows() -> list[Row]:
-    """The median of a claim."""
+    """Measure the median duration of a claim."""
     measured = []
     with TemporaryDirectory() as folder, running(Path(folder)) as server:
         for database, url in (("SQLite", f"sqlite:///{Path(folder) / 'bench.db'}"), ("Postgres", server)):

@@ -1,10 +1,10 @@
-"""A World as a URDF file: what a user would hand to PyBullet."""
+"""A World as a URDF file, as users give it to PyBullet."""
 
 from gaplab.services.core.world import Body, Box, Joint, World
 
 
 def urdf(world: World) -> str:
-    """The robot of the world, with its material on every link; Bullet's file format for robots."""
+    """Return the robot of the world as URDF, with the material on every link."""
     links = "".join(_link(body, world) for body in world.bodies)
     return f'<?xml version="1.0"?>\n<robot name="robot">{links}{"".join(map(_joint, world.joints))}</robot>\n'
 

@@ -1,4 +1,4 @@
-"""The names that programs and notebooks import.
+"""The Python API of gaplab, for programs and notebooks.
 
 from gaplab import Client
 
@@ -7,7 +7,7 @@ with Client() as gaplab:
     gaplab.wait(study.id)
     gaplab.figure(study.id).save("curves.pdf")
 
-Your own plug-ins import from `gaplab.plugins`.
+Your own plug-ins import from `gaplab.plugins`. The other modules are internal.
 """
 
 from importlib import import_module
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from gaplab.api.process.errors import CommandError as CommandError
     from gaplab.api.process.local_service import local_service as local_service
 
-_HOMES = {
+_MODULES = {
     "Client": "gaplab.api.clients.client",
     "CommandError": "gaplab.api.process.errors",
     "ExperimentFailed": "gaplab.api.clients.errors",
@@ -34,15 +34,15 @@ _HOMES = {
     "local_service": "gaplab.api.process.local_service",
 }
 
-__all__ = sorted(_HOMES)
+__all__ = sorted(_MODULES)
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - a class or a function
     """Import a name when it is first used: a worker that loads a plug-in needs no client."""
-    if name not in _HOMES:
+    if name not in _MODULES:
         msg = f"module {__name__!r} has no attribute {name!r}"
         raise AttributeError(msg)
-    return getattr(import_module(_HOMES[name]), name)
+    return getattr(import_module(_MODULES[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -1,6 +1,6 @@
-"""What a plug-in of one's own is written with: a strategy, robot, tunable, optimizer or engine, each in one file.
+"""Names for your own plug-ins: a strategy, robot, tunable, optimizer or engine, each in one file.
 
-Put the file into the folder that GAPLAB_PLUGINS names, and start the service: docs/how-to says more of each kind.
+Put the file into a folder that GAPLAB_PLUGINS names, and start the service. docs/how-to describes each kind.
 """
 
 from gaplab.schemas.base import Frozen as Frozen

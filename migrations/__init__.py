@@ -1,4 +1,4 @@
-"""The history of the database's schema. `upgrade(url)` brings a database to the revision that this version needs."""
+"""The revisions of the database's schema. `upgrade(url)` brings a database to the latest revision."""
 
 from pathlib import Path
 
@@ -12,24 +12,22 @@ from gaplab.services.store import database_errors
 from gaplab.services.store.engine import WRITES, open_engine
 
 _LOCK = 0x6761706C6162
-"""Of the migration, among the advisory locks of a Postgres database: "gaplab"."""
+"""Key of the advisory lock on Postgres: "gaplab" in ASCII."""
 
 
 def configuration(connection: Connection | None = None) -> Config:
-    """Alembic's configuration; with a connection, its commands run in the transaction of that connection."""
+    """Return Alembic's configuration. With a connection, commands run in its transaction."""
     config = Config(Path(__file__).parent / "alembic.ini")
     config.attributes["connection"] = connection
     return config
 
 
 def upgrade(url: str) -> None:
-    """Bring the database to the head revision, in one transaction; a second process waits until the first is done.
-
-    At head it changes nothing.
+    """Bring the database to the latest revision, in one transaction; a second process waits for the first.
 
     Raises:
-        StoreUnavailable: no such kind of database, unreachable, or at a revision of a later version; nothing was
-            changed.
+        StoreUnavailable: the kind of database is unknown, it is unreachable, or it has a revision of a later
+            version; nothing was changed.
     """
     engine = open_engine(url, enforce_foreign_keys=False)
     try:
@@ -38,7 +36,7 @@ def upgrade(url: str) -> None:
                 connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
             command.upgrade(configuration(connection), "head")
     except CommandError as error:
-        msg = f"the database cannot be migrated by this version: {error}"
+        msg = f"this version of gaplab cannot migrate the database: {error}"
         raise StoreUnavailable(msg) from error
     finally:
         engine.dispose()

@@ -1,4 +1,4 @@
-"""`python -m migrations`: bring the database of `GAPLAB_DATABASE_URL` to the revision that this version needs."""
+"""`python -m migrations`: bring the database of `GAPLAB_DATABASE_URL` to the latest revision."""
 
 import sys
 
@@ -8,7 +8,7 @@ from gaplab.services.settings import Settings
 
 
 def main() -> None:
-    """Migrate; where that cannot be, say why in one sentence and exit with 1."""
+    """Migrate; on failure, print the reason and exit with 1."""
     try:
         upgrade(Settings.from_environment().database_url)
     except StoreUnavailable as error:

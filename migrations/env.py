@@ -1,4 +1,4 @@
-"""Alembic's entry: compares and migrates the tables of `gaplab.services.store.models`."""
+"""Alembic's entry point: compare and migrate the tables of `gaplab.services.store.models`."""
 
 from alembic import context
 from sqlalchemy import Connection
@@ -15,15 +15,15 @@ def migrate(connection: Connection) -> None:
         context.run_migrations()
 
 
-def migrate_the_environments_database() -> None:
-    """For Alembic's own command."""
+def migrate_configured_database() -> None:
+    """Run the migrations on the database of the environment, for Alembic's own command."""
     engine = open_engine(Settings.from_environment().database_url, enforce_foreign_keys=False)
     with engine.execution_options(**{WRITES: True}).begin() as connection:
         migrate(connection)
     engine.dispose()
 
 
-if (given := context.config.attributes.get("connection")) is not None:
-    migrate(given)
+if (connection := context.config.attributes.get("connection")) is not None:
+    migrate(connection)
 else:
-    migrate_the_environments_database()
+    migrate_configured_database()

@@ -18,5 +18,5 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Take it back."""
+    """Revert: ${message}."""
     ${downgrades if downgrades else "pass"}

@@ -1,6 +1,7 @@
 """Stand-ins of a few lines: simulations that are formulas, and settings that run in milliseconds."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from gaplab.services.core.types import Budget, Space
 TRUTH = np.array([0.7, 0.2])
 
 
-def paraboloid(genomes, parameters):
+def paraboloid(genomes: Any, parameters: Any) -> Any:
     """`(n, 2)` × `(m, 2)` -> `(n, m)`: a hill whose summit is where the parameters say; in reality, at TRUTH."""
     return 1.0 - ((genomes[:, None, :] - parameters[None, :, :]) ** 2).sum(axis=2)
 
@@ -21,32 +22,32 @@ def paraboloid(genomes, parameters):
 class Recorder:
     """A Simulate that remembers the shape of every call."""
 
-    def __init__(self, simulate=paraboloid):
+    def __init__(self, simulate: Any = paraboloid) -> None:
         self.simulate = simulate
-        self.calls = []
+        self.calls: list[Any] = []
 
-    def __call__(self, genomes, parameters):
+    def __call__(self, genomes: Any, parameters: Any) -> Any:
         self.calls.append((len(genomes), len(parameters)))
         return self.simulate(genomes, parameters)
 
     @property
-    def rollouts(self):
+    def rollouts(self) -> Any:
         return sum(n * m for n, m in self.calls)
 
 
 class CountedReality:
     """A Reality at TRUTH that counts how often it was asked."""
 
-    def __init__(self, fitness=lambda genome: float(paraboloid(genome[None], TRUTH[None])[0, 0])):
+    def __init__(self, fitness: Any = lambda genome: float(paraboloid(genome[None], TRUTH[None])[0, 0])) -> None:
         self.fitness = fitness
         self.asked = 0
 
-    def __call__(self, genome):
+    def __call__(self, genome: Any) -> Any:
         self.asked += 1
         return self.fitness(genome)
 
 
-def small_setting(strategy="simulated_fit", options=None, **changes):
+def small_setting(strategy: Any = "simulated_fit", options: Any = None, **changes: Any) -> Any:
     """A repetition of three iterations on the paraboloid, with a population of 5."""
     chosen = strategies.create(PluginRef(name=strategy, options=options or {}))
     setting = Setting(
@@ -65,7 +66,7 @@ def small_setting(strategy="simulated_fit", options=None, **changes):
     return replace(setting, **changes)
 
 
-def flat(step):
+def flat(step: Any) -> Any:
     """Everything in a step as plain numbers and names, so that steps compare by content to the last bit."""
     if isinstance(step, np.ndarray):
         return step.tobytes()

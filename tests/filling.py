@@ -1,4 +1,4 @@
-"""A database as years of use leave it behind: studies with their results, written in bulk through the models."""
+"""A database as after years of use: studies with results, written in bulk through the models."""
 
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
@@ -25,10 +25,10 @@ from gaplab.services.store.models import (
 from gaplab.services.store.session import Store
 
 IN_A_STUDY = 7
-"""Experiments, as in the paper's Fig. 4."""
+"""Experiments in a study, as in the paper's Fig. 4."""
 
 REPETITIONS, SAMPLES = 4, 10
-"""Of an experiment, and of each of its repetitions: 10 000 experiments have 400 000 samples."""
+"""Repetitions of an experiment, and samples of a repetition: 10 000 experiments have 400 000 samples."""
 
 SPEC = {
     "strategy": "simulated_fit",
@@ -45,29 +45,31 @@ _AT_ONCE = 500
 
 
 def fill(store: Store, experiments: int) -> None:
-    """Add so many experiments, all of them COMPLETED, in studies of `IN_A_STUDY`; each has its 40 samples.
+    """Add COMPLETED experiments with 40 samples each, in studies of `IN_A_STUDY`.
 
     Args:
-        store: at head, without repetitions so far.
-        experiments: how many.
+        store: store at the latest revision, without repetitions.
+        experiments: number of experiments to add.
     """
     spec = resolve_experiment(ExperimentSpec.model_validate(SPEC))
     stored, rollouts = spec.model_dump(mode="json"), expected_rollouts(spec)
     rng = np.random.default_rng(0)
     numbers = iter(range(experiments))
-    while some := list(islice(numbers, _AT_ONCE)):
+    while batch := list(islice(numbers, _AT_ONCE)):
         with store.transaction() as session:
-            studies = sorted({each // IN_A_STUDY for each in some if each % IN_A_STUDY == 0})
+            studies = sorted({each // IN_A_STUDY for each in batch if each % IN_A_STUDY == 0})
             _insert(session, StudyRow, [_study(each) for each in studies])
-            _insert(session, ExperimentRow, [_experiment(each, stored, rollouts) for each in some])
-            of_them = [(each, number) for each in some for number in range(REPETITIONS)]
-            _insert(session, RepetitionRow, [_repetition(*each, rollouts) for each in of_them])
-            cells = [(_id_of(*each), iteration) for each in of_them for iteration in range(SAMPLES + 1)]
-            _insert(session, IterationRow, [_iteration(*each, rng.random(3)) for each in cells])
-            _insert(session, MeasurementRow, [row for each in cells for row in _measurements(*each, rng.random(4))])
-            _insert(session, SimulatorRow, [_simulator(*each, rng.random(4)) for each in cells])
+            _insert(session, ExperimentRow, [_experiment(each, stored, rollouts) for each in batch])
+            repetitions = [(experiment, number) for experiment in batch for number in range(REPETITIONS)]
+            _insert(session, RepetitionRow, [_repetition(*each, rollouts) for each in repetitions])
+            iterations = [(_id_of(*each), iteration) for each in repetitions for iteration in range(SAMPLES + 1)]
+            _insert(session, IterationRow, [_iteration(*each, rng.random(3)) for each in iterations])
+            _insert(
+                session, MeasurementRow, [row for each in iterations for row in _measurements(*each, rng.random(4))]
+            )
+            _insert(session, SimulatorRow, [_simulator(*each, rng.random(4)) for each in iterations])
     with store.transaction() as session:
-        if session.get_bind().dialect.name == "postgresql":  # its sequence does not know the ids that were given
+        if session.get_bind().dialect.name == "postgresql":  # its sequence does not know the inserted ids
             session.connection().exec_driver_sql(
                 f"SELECT setval('repetition_id_seq', {max(1, experiments * REPETITIONS)})"
             )
@@ -75,12 +77,12 @@ def fill(store: Store, experiments: int) -> None:
 
 
 def study_id(number: int) -> str:
-    """Of the study of that number."""
+    """Return the id of a study."""
     return f"study{number:06d}"
 
 
 def experiment_id(number: int) -> str:
-    """Of the experiment of that number."""
+    """Return the id of an experiment."""
     return f"experiment{number:06d}"
 
 

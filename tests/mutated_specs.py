@@ -1,7 +1,7 @@
-"""`python -m tests.mutated_specs`: specs with random mistakes; each is taken or refused, and each within a second.
+"""`python -m tests.mutated_specs`: specs with random errors, each accepted or refused within a second.
 
-A mutation puts a value where it does not belong, removes one, or adds one; among the values are the names of files,
-classes and addresses. Exits with 1 if one was answered otherwise, or too late.
+A mutation replaces, removes or adds a value. Some values are names of files, classes and addresses. The command exits
+with 1 if any other answer came, or if an answer took too long.
 """
 
 import argparse
@@ -13,7 +13,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -27,7 +27,7 @@ from gaplab.services.store.session import Store
 
 WITHIN_S = 1.0
 
-OUTSIDE = (
+FORBIDDEN_NAMES = (
     "/etc/passwd",
     "../../../etc/passwd",
     "file:///etc/passwd",
@@ -41,10 +41,10 @@ OUTSIDE = (
     "{{7*7}}",
     "'; DROP TABLE experiment; --",
 )
-"""What a spec cannot name: files, addresses, classes, code."""
+"""Names of files, addresses, classes and code, which no spec may use."""
 
 VALUES: tuple[Any, ...] = (
-    *OUTSIDE,
+    *FORBIDDEN_NAMES,
     *(
         None,
         True,
@@ -87,19 +87,19 @@ STUDY = {name: value for name, value in EXPERIMENT.items() if name != "strategy"
     "direct_repetitions": 3,
 }
 SENSITIVITY = {name: value for name, value in EXPERIMENT.items() if name not in {"name", "strategy"}} | {"points": 9}
-WHOLE = {"/experiments": EXPERIMENT, "/studies": STUDY, "/sensitivity": SENSITIVITY}
+VALID_SPECS = {"/experiments": EXPERIMENT, "/studies": STUDY, "/sensitivity": SENSITIVITY}
 
 
 @dataclass
-class Found:
-    """How the specs were answered.
+class Tally:
+    """Answers to the mutated specs.
 
     Attributes:
-        statuses: how often each.
-        wrong: what was answered otherwise than it must be.
-        slowest_s: the longest answer.
-        late: answers that took more than a second.
-        seconds: of all answers.
+        statuses: number of answers by HTTP status.
+        wrong: answers that neither accept nor refuse.
+        slowest_s: duration of the slowest answer.
+        late: number of answers that took more than a second.
+        seconds: total duration of all answers.
     """
 
     statuses: Counter[int] = field(default_factory=Counter)
@@ -110,7 +110,7 @@ class Found:
 
 
 def places(value: object) -> Iterator[tuple[Any, Any]]:
-    """Every place inside the spec: what holds it, and its key there."""
+    """Yield every place inside the spec, as its container and key."""
     if isinstance(value, dict | list):
         for key in list(value) if isinstance(value, dict) else range(len(value)):
             yield value, key
@@ -118,12 +118,12 @@ def places(value: object) -> Iterator[tuple[Any, Any]]:
 
 
 def mutated(spec: dict[str, Any], rng: random.Random) -> dict[str, Any]:
-    """The spec with one to three mutations."""
-    found = copy.deepcopy(spec)
+    """Return a copy of the spec with one to three mutations."""
+    mutant = copy.deepcopy(spec)
     for _ in range(rng.randint(1, 3)):
-        if not (found_places := list(places(found))):
+        if not (all_places := list(places(mutant))):
             break
-        parent, key = rng.choice(found_places)
+        parent, key = rng.choice(all_places)
         match rng.choice(("replace", "replace", "remove", "add", "swap")):
             case "replace":
                 parent[key] = copy.deepcopy(rng.choice(VALUES))
@@ -131,62 +131,63 @@ def mutated(spec: dict[str, Any], rng: random.Random) -> dict[str, Any]:
                 del parent[key]
             case "add" if isinstance(parent, dict):
                 parent[rng.choice(("options", "path", "class", "url", "name", "é", "__class__", "x" * 50))] = (
-                    rng.choice(OUTSIDE)
+                    rng.choice(FORBIDDEN_NAMES)
                 )
             case _:
-                other, place = rng.choice(found_places)
+                other, place = rng.choice(all_places)
                 parent[key] = copy.deepcopy(other[place])
-    return found
+    return mutant
 
 
-def measure(count: int, seed: int, api: TestClient) -> Found:
-    """Send so many mutated specs, in turn to each endpoint that takes one."""
-    rng, found = random.Random(seed), Found()
+def measure(count: int, seed: int, api: TestClient) -> Tally:
+    """Send mutated specs, in turn to each endpoint that takes one."""
+    rng, tally = random.Random(seed), Tally()
     for number in range(count):
-        path = list(WHOLE)[number % len(WHOLE)]
-        body = json.dumps(mutated(WHOLE[path], rng))
+        path = list(VALID_SPECS)[number % len(VALID_SPECS)]
+        body = json.dumps(mutated(VALID_SPECS[path], rng))
         began = time.perf_counter()
         answer = api.post(path, content=body, headers={"content-type": "application/json"})
         took = time.perf_counter() - began
-        found.statuses[answer.status_code] += 1
-        found.seconds += took
-        found.late += took > WITHIN_S
-        found.slowest_s = max(found.slowest_s, took)
+        tally.statuses[answer.status_code] += 1
+        tally.seconds += took
+        tally.late += took > WITHIN_S
+        tally.slowest_s = max(tally.slowest_s, took)
         refused = 400 <= answer.status_code < 500 and answer.headers["content-type"] == "application/problem+json"
         if answer.status_code != 202 and not refused:
-            found.wrong.append(f"{answer.status_code} to {body[:500]}")
-    return found
+            tally.wrong.append(f"{answer.status_code} to {body[:500]}")
+    return tally
 
 
 @contextmanager
 def service(database_url: str | None) -> Iterator[TestClient]:
-    """The API over a database, by default a SQLite file that goes away; room for all that is accepted."""
-    room = replace(Limits(), experiments=10**9, experiments_per_token=10**9, rollouts=10**18, rollouts_per_token=10**18)
+    """Serve the API on a database, by default a temporary SQLite file, with limits that no run reaches."""
+    many, more = 10**9, 10**18
+    limits = Limits(experiments=many, experiments_per_token=many, rollouts=more, rollouts_per_token=more)
     with TemporaryDirectory() as folder:
         url = database_url or f"sqlite:///{Path(folder) / 'mutated.db'}"
         migrations.upgrade(url)
         store = Store(url)
-        yield TestClient(create_app(store, limits=room), raise_server_exceptions=False)
+        yield TestClient(create_app(store, limits=limits), raise_server_exceptions=False)
         store.dispose()
 
 
 def main() -> int:
-    """Print the figure; 1 if it is not as it must be."""
+    """Print the tally; return 1 if an answer was wrong or late."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--database", help="URL of an empty database; left out: SQLite in a temporary folder")
+    parser.add_argument("--database", help="URL of an empty database; default: SQLite in a temporary folder")
     given = parser.parse_args()
     with service(given.database) as api:
-        found = measure(given.count, given.seed, api)
-    statuses = ", ".join(f"{number:,} × {status}" for status, number in sorted(found.statuses.items()))
+        tally = measure(given.count, given.seed, api)
+    statuses = ", ".join(f"{number:,} × {status}" for status, number in sorted(tally.statuses.items()))
     print(
-        f"{given.count:,} mutated specs: {statuses}; otherwise: {len(found.wrong)}; "
-        f"later than {WITHIN_S:g} s: {found.late}; "
-        f"slowest {found.slowest_s:.2f} s, mean {1000 * found.seconds / given.count:.1f} ms"
+        f"{given.count:,} mutated specs: {statuses}; wrong: {len(tally.wrong)}; "
+        f"later than {WITHIN_S:g} s: {tally.late}; "
+        f"slowest {tally.slowest_s:.2f} s, mean {1000 * tally.seconds / given.count:.1f} ms"
     )
-    print(*found.wrong[:10], sep="\n")
-    return int(bool(found.wrong or found.late))
+    print(*tally.wrong[:10], sep="\n")
+    return int(bool(tally.wrong or tally.late))
 
 
 if __name__ == "__main__":

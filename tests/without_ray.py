@@ -68,7 +68,7 @@ class HereRepetitions(Repetitions):
     def launch(self, claim: Claim) -> Run:
         """Compute the repetition in this process."""
         stream = batches(recorded(setting(claim.spec, claim.number), claim.log, claim.checkpoints, 0.0))
-        return HereRun(claim, stream)  # type: ignore[arg-type]
+        return HereRun(claim, stream)
 
     def receive(self) -> None:
         """Take the next batch of each run."""

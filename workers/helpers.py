@@ -46,10 +46,10 @@ def _simulation(spec: str) -> Simulate:
 
 
 class Helpers:
-    """As many as there are idle cores; they end with this object.
+    """Helper processes, one for each idle core; they end with this object.
 
-    A process has to start and to load an engine, and its core may be taken by what Ray knows nothing of. So each is
-    first asked for what nobody waits for, and counts once it has answered.
+    A process must start and load an engine, and other programs may use its core. Therefore each first computes a test
+    call that nobody waits for, and is used once it has answered.
     """
 
     def __init__(self, spec: ResolvedSpec, versions: Versions) -> None:
@@ -90,7 +90,7 @@ class Helpers:
         del self._ready[max(before, self._idle) :]  # Ray counts a core as taken for a moment now and then
         useful = len(genomes) * len(parameters) - 1
         for _ in range(min(self._idle, useful) - len(self._ready) - len(self._starting)):
-            helper = Helper.remote(self._spec, self._versions)
+            helper = Helper.remote(self._spec, self._versions)  # type: ignore[attr-defined]  # Ray adds it
             self._starting[helper.part.remote(genomes[:1], parameters[:1])] = helper
 
     def _meet(self, answer: "ray.ObjectRef[Fitnesses]") -> None:

@@ -7,6 +7,7 @@ from ray.exceptions import RayError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from gaplab.services.core.errors import ClusterUnusable, PluginBroken
+from gaplab.services.plugins import folders
 from gaplab.services.running.versions import Versions as Versions
 from gaplab.services.running.versions import versions as versions
 
@@ -21,7 +22,7 @@ def check_here(expected: Versions) -> None:
         ClusterUnusable: it lacks them, or an external plug-in is broken here; the message says which.
     """
     try:
-        found = versions()
+        found = _versions_here()
     except PluginBroken as error:
         msg = f"the node {platform.node()} cannot use a plug-in that the supervisor has: {error}"
         raise ClusterUnusable(msg) from error
@@ -49,6 +50,12 @@ def check_nodes() -> None:
 
 @ray.remote(num_cpus=0, max_retries=0)
 def _versions_of_node() -> Versions:
+    return _versions_here()
+
+
+def _versions_here() -> Versions:
+    """Return the versions of this process; one that Ray started has not found its plug-ins yet."""
+    folders.find()
     return versions()
 
 

@@ -69,7 +69,7 @@ class Pool:
         return max(1, int(cores * LOOK_S / (self._rollout_s * across))) if self._rollout_s else 1
 
     def _least(self, across: int) -> int:
-        """Rows of a part that is worth lending."""
+        """Return the smallest number of rows that is worth lending."""
         return ceil(max(LEAST_S / self._rollout_s, self._per_call) / across) if self._rollout_s else 1
 
     def _done(self, parts: list[Part], helpers: list[Handle]) -> list[Fitnesses]:

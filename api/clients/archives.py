@@ -1,6 +1,6 @@
 """Archives of studies and experiments, sent and received in parts of bounded size."""
 
-from collections.abc import Iterator
+from functools import partial
 from typing import IO
 
 from gaplab.api.clients.connection import Connection
@@ -25,10 +25,5 @@ class Archives:
 
     def import_(self, file: IO[bytes]) -> ImportRead:
         """Store the content of an archive; the answer has its ids."""
-        headers = {"Content-Type": "application/zip"}
-        return self._connection.change(ImportRead, "POST", "/import", content=_chunks(file), headers=headers)
-
-
-def _chunks(file: IO[bytes]) -> Iterator[bytes]:
-    while chunk := file.read(_CHUNK):
-        yield chunk
+        headers, content = {"Content-Type": "application/zip"}, iter(partial(file.read, _CHUNK), b"")
+        return self._connection.change(ImportRead, "POST", "/import", content=content, headers=headers)

@@ -9,7 +9,6 @@ Programs import it from `gaplab`.
 """
 
 from collections.abc import Sequence
-from types import TracebackType
 from typing import Self
 
 import httpx2
@@ -83,9 +82,7 @@ class Client:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

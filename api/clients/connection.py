@@ -12,6 +12,7 @@ import httpx2
 from pydantic import TypeAdapter, ValidationError
 
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, UnknownService, problem_of
+from gaplab.schemas.records import Page
 from gaplab.services.settings import Settings
 
 T = TypeVar("T")
@@ -81,14 +82,23 @@ class Connection:
         """Close the connection."""
         self._http.close()
 
-    def get(self, kind: type[T], path: str, **parameters: Parameter) -> T:
+    def get(self, kind: type[T], path: str, /, **parameters: Parameter) -> T:
         """Return the answer to a GET as a value of this type."""
         return self.read(kind, self.get_bytes(path, **parameters))
 
-    def get_bytes(self, path: str, **parameters: Parameter) -> bytes:
+    def get_bytes(self, path: str, /, **parameters: Parameter) -> bytes:
         """Return the answer to a GET as it is."""
         given = {name: value for name, value in parameters.items() if value is not None}
         return self._repeat("GET", path, params=given)
+
+    def items(self, page: type[Page[T]], path: str, /, **parameters: Parameter) -> Iterator[T]:
+        """Yield every item of a list, page after page."""
+        cursor = None
+        while True:
+            answer = self.get(page, path, cursor=cursor, **parameters)
+            yield from answer.items
+            if (cursor := answer.next) is None:
+                return
 
     def post(self, kind: type[T], path: str, body: object) -> T:
         """Return the answer to a POST that may be repeated: with its idempotency key, the service does it only once."""

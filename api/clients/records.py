@@ -1,5 +1,6 @@
 """Studies and experiments, and what the service stores of them."""
 
+from collections.abc import Iterator
 from typing import TypeAlias
 
 import httpx2
@@ -9,6 +10,9 @@ from gaplab.api.clients.errors import ServiceError
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.provenance import ProvenanceRead
 from gaplab.schemas.records import AttemptRead, ExperimentRead, Page, RepetitionRead, StudyRead
+
+PAGE = 100
+"""Experiments of one request of `all_experiments`."""
 
 Record: TypeAlias = ExperimentRead | StudyRead
 
@@ -53,6 +57,10 @@ class Records:
     def experiments(self, **filters: str | int | None) -> Page[ExperimentRead]:
         """Return experiments, newest first; filters: those of `studies`, and study."""
         return self._connection.get(Page[ExperimentRead], "/experiments", **filters)
+
+    def all_experiments(self) -> Iterator[ExperimentRead]:
+        """Yield all experiments, newest first."""
+        return self._connection.items(Page[ExperimentRead], "/experiments", limit=PAGE)
 
     def edit(self, id: str, edit: Edit) -> ExperimentRead | StudyRead:
         """Replace the name or the notes of a study or an experiment, and return it."""

@@ -1,9 +1,9 @@
 """Results as tables: pandas frames with one row per observation, complete however many pages the service sends."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.errors import ExtraMissing
@@ -14,8 +14,6 @@ from gaplab.schemas.records import MeasurementKind, Page, SampleRead, SimulatorR
 
 if TYPE_CHECKING:
     import pandas
-
-T = TypeVar("T")
 
 PAGE = 5_000
 """Items of a page: the most that the service permits."""
@@ -37,7 +35,6 @@ class Tables:
             ids: ids of experiments, or of studies for all of their experiments.
             each: one row per repetition, instead of one with their mean, SD, n and 95 % interval.
         """
-        _pandas()
         numbers = ("repetition", "evaluations", "fitness") if each else STATISTICS
         rows = [
             (curve.experiment, curve.name, curve.strategy, *row)
@@ -55,9 +52,8 @@ class Tables:
             repetition: only this repetition.
             kind: only "sample" (learned from) or "probe" (only recorded).
         """
-        _pandas()
         path, wanted = f"/experiments/{segment(id)}/samples", None if kind is None else MeasurementKind(kind)
-        samples = list(self._items(Page[SampleRead], path, repetition=repetition, kind=wanted))
+        samples = list(self._connection.items(Page[SampleRead], path, limit=PAGE, repetition=repetition, kind=wanted))
         columns = ("repetition", "iteration", "kind", "fitness", "measured_by", "measured_at")
         frame = _frame([[getattr(sample, name) for name in columns] for sample in samples], columns, ("fitness",))
         frame["kind"] = frame["kind"].astype(str)
@@ -72,9 +68,9 @@ class Tables:
             repetition: only this repetition.
             iteration: only this iteration; 0 is the untuned start.
         """
-        _pandas()
         path = f"/experiments/{segment(id)}/simulators"
-        simulators = list(self._items(Page[SimulatorRead], path, repetition=repetition, iteration=iteration))
+        filters = {"limit": PAGE, "repetition": repetition, "iteration": iteration}
+        simulators = list(self._connection.items(Page[SimulatorRead], path, **filters))
         columns = ("repetition", "iteration", "rank", "squared_error")
         frame = _frame([[getattr(row, name) for name in columns] for row in simulators], columns, columns)
         return frame.join(_pandas().DataFrame([row.parameters for row in simulators], index=frame.index))
@@ -102,15 +98,6 @@ class Tables:
             time.sleep(every_s)
         columns = tuple(Prediction.model_fields)
         return _frame([[getattr(item, name) for name in columns] for item in predictions.items], columns, columns)
-
-    def _items(self, page: type[Page[T]], path: str, **filters: str | int | None) -> Iterator[T]:
-        """Yield every item of a list, page after page."""
-        cursor = None
-        while True:
-            answer = self._connection.get(page, path, limit=PAGE, cursor=cursor, **filters)
-            yield from answer.items
-            if (cursor := answer.next) is None:
-                return
 
 
 def _rows(point: CurvePoint, *, each: bool) -> list[tuple[float | None, ...]]:

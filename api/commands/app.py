@@ -8,7 +8,6 @@ from gaplab.api.clients.client import Client
 from gaplab.api.clients.records import Record, experiments_of
 from gaplab.api.commands import completion
 from gaplab.api.commands.exit_codes import Exit
-from gaplab.services.settings import Settings
 
 app = typer.Typer(
     help="Close the reality gap: tune a robot simulator from a few real-world evaluations.",
@@ -23,7 +22,6 @@ ExperimentId = Annotated[str, typer.Argument(metavar="ID", help="an experiment",
 Ids = Annotated[
     list[str], typer.Argument(metavar="ID...", help="studies or experiments", autocompletion=completion.ids)
 ]
-SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or - for standard input")]
 AsJson = Annotated[bool, typer.Option("--json", help="print one JSON document, for programs")]
 Url = Annotated[
     str | None,
@@ -33,8 +31,7 @@ Url = Annotated[
 
 def connect(url: str | None) -> Client:
     """Return a client of the service at this address."""
-    settings = Settings.from_environment()
-    return Client(url or settings.url, token=settings.token)
+    return Client(url or None)
 
 
 def print_warnings(record: Record) -> None:

@@ -6,23 +6,13 @@ import typer
 
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, lines_of
 
+# the order of the commands in `gaplab --help`
 # isort: off
-from gaplab.api.commands import (  # noqa: F401 - the order of the commands in `gaplab --help`
-    service,
-    submission,
-    progress,
-    records,
-    figures,
-    life_cycle,
-    events,
-    catalogue,
-    archives,
-    tokens,
-    help,  # noqa: A004 - a module
-)
+from gaplab.api.commands import service, submission, records, figures, life_cycle, events  # noqa: F401
+from gaplab.api.commands import catalogue, archives, tokens, help  # noqa: A004, F401
 
 # isort: on
-from gaplab.api.commands.app import app
+from gaplab.api.commands.app import app as app
 from gaplab.api.commands.exit_codes import CommandError, Exit, code_of
 from gaplab.services.core.errors import GaplabError, NotFound
 

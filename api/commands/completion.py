@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
-from gaplab.api.clients.records import Record
+from gaplab.schemas.records import ExperimentRead, Page, StudyRead
 
 PATIENCE_S = 1.5
 """Longest wait for an answer; a shell that waits longer seems to hang."""
@@ -15,12 +15,12 @@ KINDS = ("strategies", "robots", "engines", "tunables", "optimizers")
 
 def ids(incomplete: str) -> list[tuple[str, str]]:
     """Return the newest studies and experiments, each with its name and state."""
-    return _completions(incomplete, lambda client: [*_studies(client), *_experiments(client)])
+    return _completions(incomplete, lambda client: [*_named(client.studies), *_named(client.experiments)])
 
 
 def experiments(incomplete: str) -> list[tuple[str, str]]:
     """Return the newest experiments, each with its name and state."""
-    return _completions(incomplete, _experiments)
+    return _completions(incomplete, lambda client: _named(client.experiments))
 
 
 def plugins(incomplete: str) -> list[tuple[str, str]]:
@@ -42,16 +42,8 @@ def _completions(incomplete: str, candidates: Callable[[Client], Iterable[tuple[
         return []
 
 
-def _studies(client: Client) -> list[tuple[str, str]]:
-    return _named(client.studies(limit=MOST).items)
-
-
-def _experiments(client: Client) -> list[tuple[str, str]]:
-    return _named(client.experiments(limit=MOST).items)
-
-
-def _named(records: Iterable[Record]) -> list[tuple[str, str]]:
-    return [(record.id, f"{record.name} ({record.state})") for record in records]
+def _named(records: Callable[..., Page[ExperimentRead] | Page[StudyRead]]) -> list[tuple[str, str]]:
+    return [(record.id, f"{record.name} ({record.state})") for record in records(limit=MOST).items]
 
 
 def _plugins(client: Client) -> Iterator[tuple[str, str]]:

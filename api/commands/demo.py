@@ -8,8 +8,6 @@ a complete run, the next one submits both studies again and keeps the old result
 import json
 import signal
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -47,9 +45,10 @@ def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
     specs = {name: _spec(specs_from / f"{name}.json") for name in STUDIES}
     folder.mkdir(parents=True, exist_ok=True)
     started_at = time.monotonic()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the demo in order, like Ctrl-C
     database, log = f"sqlite:///{folder / 'gaplab.db'}", folder / "service.log"
     try:
-        with _interruptible(), start_service(database, log) as client:
+        with start_service(database, log) as client:
             _print(f"Service: {client.url}, database {database}, log {log}", console)
             for name, spec in specs.items():
                 _run_study(name, spec, client, folder, console)
@@ -114,35 +113,19 @@ def _print(line: str, console: Console, style: str = "none") -> None:
     console.print(line, style=style, markup=False, emoji=False, highlight=False, soft_wrap=True)
 
 
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Let SIGTERM end the demo in order, like Ctrl-C."""
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
 def _spec(path: Path) -> dict[str, Any]:
     if not path.is_file():
         msg = f"{path} does not exist; run the demo from a clone of the repository"
         raise CommandError(msg, Exit.FILE)
-    spec: dict[str, Any] = json.loads(path.read_text("utf-8"))
-    return spec
+    return dict(json.loads(path.read_text("utf-8")))
 
 
 def _notes(folder: Path) -> dict[str, dict[str, Any]]:
     """Return the studies that earlier runs in this folder submitted, by name."""
     try:
-        notes: dict[str, dict[str, Any]] = json.loads((folder / "demo.json").read_text("utf-8"))
+        return dict(json.loads((folder / "demo.json").read_text("utf-8")))
     except (OSError, ValueError):
         return {}
-    return notes
 
 
 def _resumed(name: str, spec: dict[str, Any], client: Client, folder: Path) -> StudyRead | None:

@@ -31,18 +31,12 @@ class Exit(IntEnum):
     INTERRUPTED = 130, "interrupted"
 
 
-BY_STATUS = {
-    401: Exit.DENIED,
-    403: Exit.DENIED,
-    404: Exit.NOT_FOUND,
-    409: Exit.CONFLICT,
-    412: Exit.CONFLICT,
-    413: Exit.INVALID,
-    415: Exit.INVALID,
-    422: Exit.INVALID,
-    428: Exit.INVALID,
-    429: Exit.CONFLICT,
-}
+BY_STATUS = (
+    dict.fromkeys((401, 403), Exit.DENIED)
+    | dict.fromkeys((404,), Exit.NOT_FOUND)
+    | dict.fromkeys((409, 412, 429), Exit.CONFLICT)
+    | dict.fromkeys((413, 415, 422, 428), Exit.INVALID)
+)
 
 
 def code_of(error: ServiceError | ServiceUnreachable | CommandError) -> int:

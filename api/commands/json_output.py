@@ -5,9 +5,11 @@ from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
 import typer
-from pydantic import BaseModel
+from pydantic import BaseModel, TypeAdapter
 
 Value: TypeAlias = "BaseModel | Mapping[str, Any] | Iterable[Any] | str | int | float | bool | None"
+
+_PLAIN: TypeAdapter[object] = TypeAdapter(Any)
 
 
 def print_result(value: Value, text: str, *, as_json: bool) -> None:
@@ -25,15 +27,5 @@ def print_json(value: Value, *, line: bool = False) -> None:
         value: schemas, mappings, lists and plain values.
         line: on one line, for several documents in one output.
     """
-    typer.echo(json.dumps(plain(value), ensure_ascii=False, allow_nan=False, indent=None if line else 2))
-
-
-def plain(value: Value) -> Any:  # noqa: ANN401 - JSON
-    """Return the value with dictionaries, lists and plain values only."""
-    if isinstance(value, BaseModel):
-        return value.model_dump(mode="json")
-    if isinstance(value, Mapping):
-        return {str(name): plain(item) for name, item in value.items()}
-    if value is None or isinstance(value, str | int | float):
-        return value
-    return [plain(item) for item in value]
+    plain = _PLAIN.dump_python(value, mode="json")
+    typer.echo(json.dumps(plain, ensure_ascii=False, allow_nan=False, indent=None if line else 2))

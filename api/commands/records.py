@@ -1,6 +1,5 @@
 """Commands that list, show and edit studies and experiments."""
 
-from collections.abc import Iterator
 from itertools import islice, takewhile
 from typing import Annotated
 
@@ -17,9 +16,6 @@ from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.provenance import ProvenanceUse
 from gaplab.schemas.records import ExperimentRead, StudyRead
-
-PAGE = 100
-"""Experiments of one request."""
 
 
 @app.command("list")
@@ -110,16 +106,7 @@ def _newest(client: Client, limit: int) -> list[Record]:
     """Return the newest studies, and the experiments without a study that are as new."""
     studies = client.studies(limit=limit).items
     oldest = studies[-1].created_at if len(studies) == limit else None
-    as_new = takewhile(lambda each: oldest is None or each.created_at >= oldest, _experiments(client))
+    as_new = takewhile(lambda each: oldest is None or each.created_at >= oldest, client.records.all_experiments())
     alone = islice((experiment for experiment in as_new if experiment.study is None), limit)
     newest: list[Record] = [*studies, *alone]
     return sorted(newest, key=lambda record: record.created_at, reverse=True)[:limit]
-
-
-def _experiments(client: Client) -> Iterator[ExperimentRead]:
-    """Yield all experiments, newest first, page after page."""
-    page = client.experiments(limit=PAGE)
-    yield from page.items
-    while page.next is not None:
-        page = client.experiments(limit=PAGE, cursor=page.next)
-        yield from page.items

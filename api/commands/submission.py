@@ -1,17 +1,22 @@
-"""Commands that submit a spec."""
+"""Commands that submit a spec, and the one that shows the progress of what runs."""
 
-from typing import Annotated
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
 
 import typer
 
-from gaplab.api.clients.progress.text import console
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.progress.text import console, counts
+from gaplab.api.clients.records import experiments_of
 from gaplab.api.commands import tables
-from gaplab.api.commands.app import AsJson, SpecFile, Url, app, connect
+from gaplab.api.commands.app import AsJson, Id, Url, app, connect, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json
-from gaplab.api.commands.progress import print_ending, show_progress
-from gaplab.api.commands.spec_files import read_spec
 from gaplab.schemas.lifecycle import State
+
+SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or - for standard input")]
 
 
 @app.command()
@@ -23,22 +28,33 @@ def submit(
 ) -> None:
     """Submit an experiment, or a study if the spec names several strategies or none."""
     with connect(url) as client:
-        record = client.submit(read_spec(spec))
+        record = client.submit(_read(spec))
         if not as_json:
             typer.echo(record.id)
         if watch:
-            record = show_progress(client, record.id, quiet=as_json)
-    if as_json:
+            _watch(client, record.id, as_json=as_json)
+    if as_json and not watch:
         print_json(record)
-    if watch:
-        print_ending(record, quiet=as_json)
+
+
+@app.command()
+def watch(
+    id: Id,
+    every: Annotated[float, typer.Option(min=0.1, max=3600, help="seconds between requests")] = 1.0,
+    patience: Annotated[float, typer.Option(min=0, help="longest time in seconds without a service")] = 600.0,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Watch a study or an experiment until it ends: live curves and repetitions in a terminal, lines in a log."""
+    with connect(url) as client:
+        _watch(client, id, as_json=as_json, curves=True, every_s=every, patience_s=patience)
 
 
 @app.command()
 def sensitivity(spec: SpecFile, as_json: AsJson = False, url: Url = None) -> None:
     """Check the tunables of a spec: whether they change fitness, how much, and how smoothly."""
     with connect(url) as client:
-        check = client.check(read_spec(spec))
+        check = client.check(_read(spec))
     if as_json:
         print_json(check)
     if check.state is not State.COMPLETED:
@@ -48,3 +64,47 @@ def sensitivity(spec: SpecFile, as_json: AsJson = False, url: Url = None) -> Non
         console().print(tables.sensitivity(check))
         for warning in check.warnings:
             typer.echo(warning)
+
+
+def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  # noqa: ANN401 - those of `show`
+    """Show the progress until the end, then the result; exit with an error if it did not complete."""
+    try:
+        record = client.watcher.show(id, console(stderr=as_json), **options)
+    except KeyboardInterrupt:
+        msg = f"the service continues with it; `gaplab watch {id}` shows the progress again"
+        raise CommandError(msg, Exit.INTERRUPTED) from None
+    if as_json:
+        print_json(record)
+    else:
+        typer.echo(f"{record.name}: {record.state}; {counts(record.progress)}.")
+    for reason in sorted({reason for experiment in experiments_of(record) for reason in experiment.reasons}):
+        typer.echo(f"  {reason}", err=True)
+    print_warnings(record)
+    if record.state is not State.COMPLETED:
+        raise typer.Exit(Exit.FAILED)
+
+
+def _read(name: str) -> dict[str, Any]:
+    """Return the spec in a JSON file, or in standard input if the name is "-".
+
+    Raises:
+        CommandError: the file cannot be read, or does not hold a JSON object.
+    """
+    try:
+        text = sys.stdin.read() if name == "-" else Path(name).read_text("utf-8")
+        spec = json.loads(text, parse_constant=_refuse)
+    except OSError as error:
+        msg = f"{name}: {error.strerror or error}"
+        raise CommandError(msg, Exit.FILE) from error
+    except (ValueError, RecursionError) as error:
+        msg = f"{name} is not JSON: {error}"
+        raise CommandError(msg, Exit.FILE) from error
+    if not isinstance(spec, dict):
+        msg = f'{name} holds no JSON object; write one, like {{"strategy": "simulated_fit"}}'
+        raise CommandError(msg, Exit.FILE)
+    return spec
+
+
+def _refuse(constant: str) -> NoReturn:
+    msg = f"JSON has no {constant}; use a number or null"
+    raise ValueError(msg)

@@ -8,43 +8,23 @@ from rich.table import Table
 
 from gaplab.api.clients.progress.text import colored, percent
 from gaplab.api.clients.records import Record
+from gaplab.api.commands.completion import KINDS
 from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.schemas.misfit import MisfitRead, TunableDistribution
 from gaplab.schemas.plugin import Catalogue, PluginRead
-from gaplab.schemas.records import Progress, RepetitionRead, StudyRead
-from gaplab.schemas.sensitivity import SensitivityRead
+from gaplab.schemas.records import RepetitionRead, StudyRead
+from gaplab.schemas.sensitivity import Sensitivity, SensitivityRead
 
 
 def overview(records: Iterable[Record]) -> Table:
     """Return a table of studies and experiments."""
-    rows = [
-        (
-            record.id,
-            escape(record.name) + (f" ({len(record.experiments)})" if isinstance(record, StudyRead) else ""),
-            colored(record.state),
-            percent(record.progress),
-            time_left(record.progress),
-            record.created_at.astimezone().strftime("%Y-%m-%d %H:%M"),
-        )
-        for record in records
-    ]
-    return table(("id", "name", "state", "progress", "left", "created"), rows)
+    return table(("id", "name", "state", "progress", "left", "created"), map(_record, records))
 
 
 def repetitions(found: Iterable[RepetitionRead]) -> Table:
     """Return a table of the repetitions of an experiment."""
-    rows = [
-        (
-            f"{each.number}",
-            colored(each.state),
-            f"{each.iterations_done}",
-            f"{each.rollouts_done:,}",
-            f"{each.attempts}",
-            escape(each.error or ""),
-        )
-        for each in found
-    ]
-    return table(("repetition", "state", "iterations", "rollouts", "attempts", "reason of failure"), rows)
+    columns = ("repetition", "state", "iterations", "rollouts", "attempts", "reason of failure")
+    return table(columns, map(_repetition, found))
 
 
 def curves(found: Sequence[Curve]) -> Table:
@@ -75,21 +55,7 @@ def baselines(found: Sequence[Curve]) -> list[str]:
 
 def catalogue(plugins: Catalogue) -> list[Table]:
     """Return a table for each kind of plug-in."""
-    return [
-        table(
-            (kind, "summary", "options"),
-            [
-                (
-                    plugin.name if plugin.available else f"{plugin.name} (not installed)",
-                    escape(plugin.summary),
-                    ", ".join(plugin.options.get("properties", {})),
-                )
-                for plugin in getattr(plugins, kind)
-            ],
-        )
-        for kind in type(plugins).model_fields
-        if kind != "budgets"
-    ]
+    return [table((kind, "summary", "options"), map(_plugin, getattr(plugins, kind))) for kind in KINDS]
 
 
 def plugin(found: PluginRead) -> list[Table | str]:
@@ -106,44 +72,15 @@ def plugin(found: PluginRead) -> list[Table | str]:
 
 def sensitivity(found: SensitivityRead) -> Table:
     """Return a table of the effect of each tunable on fitness."""
-    rows = [
-        (
-            each.name,
-            f"{each.values[0]:g} to {each.values[-1]:g}",
-            _number(each.effect),
-            _number(each.relative_effect),
-            _number(each.roughness),
-            f"{each.failures}",
-            each.verdict,
-        )
-        for each in found.tunables
-    ]
-    return table(("tunable", "over", f"effect, {found.unit}", "of the spread", "roughness", "nan", "verdict"), rows)
+    columns = ("tunable", "over", f"effect, {found.unit}", "of the spread", "roughness", "nan", "verdict")
+    return table(columns, map(_effect, found.tunables))
 
 
 def tuned(found: MisfitRead) -> Table:
     """Return a table of the tunables of the best simulators at the latest iteration, over repetitions."""
     last = found.points[-1]
-    rows = [
-        (
-            each.name,
-            f"{_number(each.mean)}±{_number(each.sd)}",
-            _number(each.least),
-            _number(each.greatest),
-            _bounds(each),
-        )
-        for each in last.tunables
-    ]
-    return table((f"tuned at {last.iteration}", "mean±SD", "least", "greatest", "at a bound"), rows)
-
-
-def time_left(progress: Progress) -> str:
-    """Return the expected time left, like "1 h 05 min" or "3:20"; a dash while unknown."""
-    if progress.seconds_left is None:
-        return "-"
-    minutes, seconds = divmod(round(progress.seconds_left), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes:02} min" if hours else f"{minutes}:{seconds:02}"
+    columns = (f"tuned at {last.iteration}", "mean±SD", "least", "greatest", "at a bound")
+    return table(columns, map(_tuned, last.tunables))
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
@@ -156,9 +93,41 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
     return made
 
 
-def _bounds(found: TunableDistribution) -> str:
+def _record(record: Record) -> tuple[str, ...]:
+    many = f" ({len(record.experiments)})" if isinstance(record, StudyRead) else ""
+    created = record.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
+    progress = (percent(record.progress), _time_left(record.progress.seconds_left))
+    return record.id, escape(record.name) + many, colored(record.state), *progress, created
+
+
+def _time_left(seconds: float | None) -> str:
+    if seconds is None:
+        return "-"
+    minutes, seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02} min" if hours else f"{minutes}:{seconds:02}"
+
+
+def _repetition(found: RepetitionRead) -> tuple[str, ...]:
+    counts = (f"{found.iterations_done}", f"{found.rollouts_done:,}", f"{found.attempts}")
+    return f"{found.number}", colored(found.state), *counts, escape(found.error or "")
+
+
+def _plugin(found: PluginRead) -> tuple[str, ...]:
+    name = found.name if found.available else f"{found.name} (not installed)"
+    return name, escape(found.summary), ", ".join(found.options.get("properties", {}))
+
+
+def _effect(found: Sensitivity) -> tuple[str, ...]:
+    numbers = map(_number, (found.effect, found.relative_effect, found.roughness))
+    return found.name, f"{found.values[0]:g} to {found.values[-1]:g}", *numbers, f"{found.failures}", found.verdict
+
+
+def _tuned(found: TunableDistribution) -> tuple[str, ...]:
     sides = ((found.lower, found.at_lower), (found.upper, found.at_upper))
-    return ", ".join(f"{100 * share:.0f} % at {bound:g}" for bound, share in sides if share) or "-"
+    bounds = ", ".join(f"{100 * share:.0f} % at {bound:g}" for bound, share in sides if share) or "-"
+    spread = f"{_number(found.mean)}±{_number(found.sd)}"
+    return found.name, spread, _number(found.least), _number(found.greatest), bounds
 
 
 def _number(value: float | None) -> str:

@@ -12,7 +12,7 @@ from gaplab.api.clients.progress.text import console
 from gaplab.api.commands.app import AsJson, app
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.api.commands.tables import table
-from gaplab.schemas.access import Role
+from gaplab.schemas.access import Role, TokenRead
 from gaplab.services import access
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import Store
@@ -50,17 +50,8 @@ def list_(as_json: AsJson = False) -> None:
     if as_json:
         print_json(found)
         return
-    rows = [
-        (
-            token.id,
-            escape(token.name),
-            token.role.value,
-            *map(_minute, (token.created_at, token.last_used_at, token.revoked_at)),
-        )
-        for token in found
-    ]
     columns = ("id", "name", "role", "created", "last used", "revoked")
-    console().print(table(columns, rows) if rows else "No tokens yet; `gaplab token create` makes one.")
+    console().print(table(columns, map(_row, found)) if found else "No tokens yet; `gaplab token create` makes one.")
 
 
 @tokens.command()
@@ -79,6 +70,11 @@ def _store() -> Iterator[Store]:
         yield store
     finally:
         store.dispose()
+
+
+def _row(token: TokenRead) -> tuple[str, ...]:
+    moments = (token.created_at, token.last_used_at, token.revoked_at)
+    return token.id, escape(token.name), token.role.value, *map(_minute, moments)
 
 
 def _minute(moment: datetime | None) -> str:

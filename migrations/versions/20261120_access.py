@@ -1,4 +1,4 @@
-"""Tokens, idempotency keys, notes, and the orders in which lists are read.
+"""Tokens, idempotency keys, notes, and indexes for sorted lists.
 
 Revision: 0006, after 0005.
 """
@@ -16,7 +16,7 @@ ORDERS = {"experiment": ("name", "strategy", "state"), "study": ("name",)}
 
 
 def upgrade() -> None:
-    """Add tables and columns; what is stored stays as it is."""
+    """Add tables and columns; existing rows stay unchanged."""
     role = sa.Enum("reader", "runner", "admin", name="role", native_enum=False, create_constraint=True, length=16)
     op.create_table(
         "token",
@@ -49,7 +49,7 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Take them back."""
+    """Remove the tables, columns and indexes."""
     for table, columns in ORDERS.items():
         for column in columns:
             op.drop_index(f"ix_{table}_{column}_id", table)

@@ -1,4 +1,4 @@
-"""Checkpoints of steps that are under way.
+"""Checkpoints of current steps.
 
 Revision: 0004, after 0003.
 """
@@ -13,7 +13,7 @@ depends_on = None
 
 
 def upgrade() -> None:
-    """Create their table, and count them in each repetition."""
+    """Create the table of checkpoints, and count them in each repetition."""
     op.create_table(
         "checkpoint",
         sa.Column("repetition_id", sa.Integer(), nullable=False),
@@ -29,7 +29,7 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Take them back; what was under way is simulated again."""
+    """Drop the checkpoints; current steps are simulated again."""
     with op.batch_alter_table("repetition") as table:
         table.drop_column("checkpoints")
     op.drop_table("checkpoint")

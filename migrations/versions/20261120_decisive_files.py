@@ -1,4 +1,4 @@
-"""What decides who goes on with an experiment may be of any length, for it names files of people's own.
+"""Decisive versions of any length, because they name external plug-in files.
 
 Revision: 0008, after 0007.
 """
@@ -17,14 +17,14 @@ EXPERIMENT = sa.table("experiment", *map(sa.column, COLUMNS))
 
 
 def upgrade() -> None:
-    """Lift the limit of 300 letters."""
+    """Remove the limit of 300 characters."""
     with op.batch_alter_table("experiment") as table:
         for column in COLUMNS:
             table.alter_column(column, existing_type=SHORT, type_=sa.Text(), existing_nullable=True)
 
 
 def downgrade() -> None:
-    """Take it back; what is longer is cut, and then bound to nothing that anybody has."""
+    """Restore the limit; longer values are truncated, and then match no supervisor."""
     for column in COLUMNS:
         op.execute(sa.update(EXPERIMENT).values({column: sa.func.substr(sa.column(column), 1, 300)}))
     with op.batch_alter_table("experiment") as table:

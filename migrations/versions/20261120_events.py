@@ -16,7 +16,7 @@ NUMBER = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
 
 
 def upgrade() -> None:
-    """Create their tables, and begin to count: what happened before has no events."""
+    """Create the tables, and start the counter; earlier changes have no events."""
     op.create_table(
         "event",
         sa.Column("number", NUMBER, nullable=False, autoincrement=False),
@@ -51,7 +51,7 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Take it back."""
+    """Remove the tables and columns."""
     op.drop_column("repetition", "provenance_id")
     op.drop_index("ix_experiment_sensitivity_id", "experiment")
     for column in ("sensitivity_id", "refused_by", "computed_with"):

@@ -16,12 +16,12 @@ STATES = ("QUEUED", "RUNNING", "COMPLETED", "FAILED", "CANCELLED")
 
 
 def choice(name: str, *permitted: str) -> sa.Enum:
-    """A text that a named constraint holds to some words."""
+    """Return a text column type with a named constraint on its values."""
     return sa.Enum(*permitted, name=name, native_enum=False, create_constraint=True, length=16)
 
 
 def upgrade() -> None:
-    """Create them."""
+    """Create the tables."""
     op.create_table(
         "study",
         sa.Column("id", sa.String(length=32), nullable=False),
@@ -133,7 +133,7 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Take it back."""
+    """Drop the tables."""
     op.drop_table("simulator")
     op.drop_table("measurement")
     op.drop_table("iteration")

@@ -1,4 +1,4 @@
-"""Indexes of the filtered lists.
+"""Indexes for filtered lists.
 
 Revision: 0007, after 0006.
 """
@@ -15,12 +15,12 @@ ORDER = ["created_at", "position", "id"]
 
 
 def upgrade() -> None:
-    """Let a list of experiments that is filtered be read in its order, however few of all it shows."""
+    """Create indexes that read a filtered list of experiments in its order."""
     for column in FILTERED:
         op.create_index(f"ix_experiment_{column}_created_at_position_id", "experiment", [column, *ORDER])
 
 
 def downgrade() -> None:
-    """Take it back."""
+    """Drop the indexes."""
     for column in FILTERED:
         op.drop_index(f"ix_experiment_{column}_created_at_position_id", "experiment")

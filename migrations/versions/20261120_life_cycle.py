@@ -1,4 +1,4 @@
-"""The life cycle's verbs, the order of turns, and attempts.
+"""States of the life cycle, scheduling, and attempts.
 
 Revision: 0003, after 0002.
 """
@@ -34,7 +34,7 @@ ATTEMPTS = """
 
 
 def upgrade() -> None:
-    """Add states, turns and attempts; what was submitted before has its turn as before."""
+    """Add states, scheduling columns and attempts; earlier experiments keep their order."""
     _permit(NEW)
     with op.batch_alter_table("experiment") as table:
         table.add_column(sa.Column("precedence", sa.Integer(), nullable=False, server_default="0"))
@@ -62,7 +62,7 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Take it back: what is paused or being stopped goes on."""
+    """Remove them; paused and stopping experiments continue."""
     op.drop_table("attempt")
     op.drop_index("ix_repetition_experiment_id_state_number", "repetition")
     op.drop_index("ix_experiment_turn", "experiment")
@@ -74,7 +74,7 @@ def downgrade() -> None:
 
 
 def _permit(states: tuple[str, ...]) -> None:
-    words = ", ".join(f"'{each}'" for each in states)
+    words = ", ".join(f"'{state}'" for state in states)
     for name in WITH_STATE:
         with op.batch_alter_table(name) as table:
             table.drop_constraint(op.f(f"ck_{name}_state"), type_="check")

@@ -16,7 +16,7 @@ STATES = ("QUEUED", "RUNNING", "COMPLETED", "FAILED", "CANCELLED")
 
 
 def upgrade() -> None:
-    """Create their table; those of experiments stay as they are."""
+    """Create the table of checks."""
     state = sa.Enum(*STATES, name="state", native_enum=False, create_constraint=True, length=16)
     op.create_table(
         "sensitivity",
@@ -39,5 +39,5 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Take it back."""
+    """Drop the table."""
     op.drop_table("sensitivity")

@@ -1,4 +1,4 @@
-"""Names for arrays, with their shapes; every number in the core is a float64."""
+"""Array types by shape; every number in the core is a float64."""
 
 from typing import TypeAlias
 
@@ -21,7 +21,7 @@ Fitnesses: TypeAlias = FloatArray
 
 
 def frozen(values: object) -> FloatArray:
-    """A read-only float64 copy, for arrays that live inside frozen values."""
+    """Return a read-only float64 copy, for arrays in frozen values."""
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
     return array

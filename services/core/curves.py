@@ -1,4 +1,4 @@
-"""Recorded fitness of many repetitions -> the points of a curve."""
+"""Curves: points computed from the recorded fitness of many repetitions."""
 
 from functools import lru_cache
 from math import isfinite
@@ -13,20 +13,20 @@ CONFIDENCE = 0.95
 
 
 def curve_points(recorded: FloatArray) -> tuple[CurvePoint, ...]:
-    """One point for each number of real-world evaluations, from 0 on.
+    """Return one point for each number of real-world evaluations, from 0 on.
 
     Args:
-        recorded: `(r, k)`: row = repetition, column = real-world evaluations; nan where a repetition has not got there
-            or every measurement of it failed. Such a value counts in no statistic.
+        recorded: `(r, k)`: a row for each repetition, a column for each number of real-world evaluations. It is nan if
+            the repetition has not reached it or all its measurements failed; nan counts in no statistic.
     """
     return tuple(curve_point(evaluations, column) for evaluations, column in enumerate(recorded.T))
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
-    """Mean, sample standard deviation and the 95 % interval of the mean by Student's t, over the finite values.
+    """Return mean, sample standard deviation and 95 % interval of the mean by Student's t, over the finite values.
 
-    A statistic of values so large that it has no number is None, as one of too few values is.
+    A statistic is None if there are too few values, or if it overflows.
 
     Args:
         evaluations: number of real-world evaluations.
@@ -49,7 +49,7 @@ def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
 
 
 def _deviation(values: FloatArray) -> float:
-    """Exactly 0 of equal values, whose mean may be rounded."""
+    """Return the standard deviation; exactly 0 for equal values, whose mean may be rounded."""
     return float(values.std(ddof=1)) if not equal(values) else 0.0
 
 
@@ -61,16 +61,16 @@ def _interval(mean: float | None, sd: float | None, n: int) -> tuple[float | Non
 
 
 def equal(values: FloatArray) -> bool:
-    """Whether all of the values `(n,)` are the same."""
+    """Return whether all values `(n,)` are equal."""
     return bool(np.all(values == values[:1]))
 
 
 def known(value: float) -> float | None:
-    """The value; None if it is no finite number."""
+    """Return the value, or None if it is not finite."""
     return float(value) if isfinite(value) else None
 
 
 @lru_cache(maxsize=1024)
 def _quantile(degrees_of_freedom: int) -> float:
-    """Of Student's t, for the interval on both sides; kept, for it takes longer than all else in a curve."""
+    """Return the quantile of Student's t for a two-sided interval; cached, because it dominates the time of a curve."""
     return float(stats.t.ppf(0.5 + CONFIDENCE / 2, degrees_of_freedom))

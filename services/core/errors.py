@@ -1,25 +1,25 @@
-"""Everything that gaplab refuses or fails at.
+"""All errors of gaplab.
 
     GaplabError
-    ├── InvalidSpec          what was asked for cannot be done; carries every violation with its place in the spec
+    ├── InvalidSpec          a spec or request is invalid; has every violation with its place
     ├── NotFound             no such study, experiment or plug-in
-    ├── Conflict             not now: the state forbids it
-    │   └── Changed              somebody else changed it since it was looked at
-    ├── ConditionMissing     a change that does not say which state it starts from
-    ├── KeyReused            an idempotency key that stands for something else already
-    ├── LimitReached         not now: too much is under way
-    ├── Unauthenticated      no token, or one that admits nobody
+    ├── Conflict             the current state forbids the request
+    │   └── Changed              someone changed the object since it was read
+    ├── ConditionMissing     a change without the condition `If-Match`
+    ├── KeyReused            an idempotency key was used for another request
+    ├── LimitReached         too much work is in progress
+    ├── Unauthenticated      no token, or an invalid one
     ├── Forbidden            the token's role does not permit it
-    ├── StoreUnavailable     the database is unreachable, or its schema is not the one this version needs
-    ├── InvalidArchive       a file that is no archive of ours, or one that was damaged or made to harm
-    ├── Unsupported          another kind of database is needed for what was asked
+    ├── StoreUnavailable     the database is unreachable, or has another schema
+    ├── InvalidArchive       a file is not an archive of gaplab, or is damaged or malicious
+    ├── Unsupported          the request needs another kind of database
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
-    ├── PluginBroken         a file of plug-ins from outside cannot be used
+    ├── PluginBroken         an external plug-in file is unusable
     └── EngineError
         ├── EngineUnavailable    the engine's library is not installed
-        └── EngineInterrupted    its process died, or was ended for taking too long
+        └── EngineInterrupted    the process died, or exceeded its time
 
-Physics that blows up is no error: it is a fitness of nan, which never wins.
+Diverged physics is not an error: its fitness is nan, which never wins.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -29,19 +29,19 @@ from typing import Any
 
 
 class GaplabError(Exception):
-    """The root: its message is one readable sentence."""
+    """Base of all errors; the message is one sentence."""
 
 
 @dataclass(frozen=True)
 class Violation:
-    """One thing wrong with a spec.
+    """One error in a spec.
 
     Attributes:
         pointer: JSON pointer of the offending value within the spec, like `/strategy/options/fit_weight`.
-        value: the offending value as it was given.
-        message: one sentence that says what is wrong.
-        permitted: what would have been right, where that can be listed or phrased.
-        nearest: the permitted name that is most alike, for a misspelt name.
+        value: the offending value, as given.
+        message: one sentence.
+        permitted: permitted values, as a list or a phrase.
+        nearest: the permitted name nearest to a misspelt one.
     """
 
     pointer: str
@@ -51,14 +51,14 @@ class Violation:
     nearest: str | None = None
 
     def moved(self, prefix: str, to: str) -> "Violation":
-        """The same violation where what stood at `prefix` stands elsewhere."""
+        """Return the violation with another prefix of its pointer."""
         if not self.pointer.startswith(prefix):
             return self
         return replace(self, pointer=to + self.pointer.removeprefix(prefix))
 
 
 class InvalidSpec(GaplabError):
-    """A spec that cannot be run, with everything that is wrong with it."""
+    """A spec that cannot run, with all its violations."""
 
     def __init__(self, violations: Iterable[Violation]) -> None:
         self.violations = tuple(violations)
@@ -66,30 +66,30 @@ class InvalidSpec(GaplabError):
 
 
 class NotFound(GaplabError):
-    """There is nothing of that name or id."""
+    """No object has this name or id."""
 
 
 class Conflict(GaplabError):
-    """The present state forbids what was asked."""
+    """The current state forbids the request."""
 
 
 class Changed(Conflict):
-    """It is not what it was when the sender of the change looked at it."""
+    """The object has changed since the client read it."""
 
 
 class ConditionMissing(GaplabError):
-    """A change does not say which state it starts from."""
+    """A change lacks the condition `If-Match`."""
 
 
 class KeyReused(GaplabError):
-    """An idempotency key stands for another request already."""
+    """The idempotency key was used for another request."""
 
 
 class LimitReached(GaplabError):
-    """Too much is under way; the message names the limit.
+    """Too much work is in progress; the message names the limit.
 
     Attributes:
-        retry_after_s: when it may be worth trying again; None where nobody knows.
+        retry_after_s: seconds after which to try again; None if unknown.
     """
 
     def __init__(self, message: str, retry_after_s: int | None = None) -> None:
@@ -98,23 +98,23 @@ class LimitReached(GaplabError):
 
 
 class Unauthenticated(GaplabError):
-    """No token was shown, or one that admits nobody."""
+    """The request has no token, or an invalid one."""
 
 
 class Forbidden(GaplabError):
-    """The role of the token does not permit this."""
+    """The role of the token does not permit the request."""
 
 
 class StoreUnavailable(GaplabError):
-    """The database cannot be used now."""
+    """The database is not usable now."""
 
 
 class InvalidArchive(GaplabError):
-    """What was sent is no archive of experiments that can be read; the message says where it is wrong."""
+    """The file is not a valid archive; the message says where."""
 
 
 class Unsupported(GaplabError):
-    """This kind of database cannot do what was asked; the message says what can."""
+    """This kind of database does not support the request; the message names an alternative."""
 
 
 class ClusterUnusable(GaplabError):
@@ -122,11 +122,11 @@ class ClusterUnusable(GaplabError):
 
 
 class PluginBroken(GaplabError):
-    """A file of plug-ins cannot be used; the message says which, and why."""
+    """A plug-in file is unusable; the message says which, and why."""
 
 
 class EngineError(GaplabError):
-    """An engine cannot do its work."""
+    """An engine failed."""
 
 
 class EngineUnavailable(EngineError):
@@ -134,11 +134,11 @@ class EngineUnavailable(EngineError):
 
 
 class EngineInterrupted(EngineError):
-    """Physics ended before it answered; nothing else did."""
+    """The process that runs the physics ended before it answered."""
 
 
 def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -> Violation:
-    """The violation of naming something that is not there, with the nearest name that is."""
+    """Return the violation of an unknown name, with the nearest permitted one."""
     nearest = next(iter(get_close_matches(name, permitted, n=1, cutoff=0.5)), None)
     hint = f" (did you mean {nearest!r}?)" if nearest else ""
     message = f"there is no {kind} called {name!r}{hint}; there is {', '.join(permitted)}"
@@ -146,7 +146,7 @@ def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -
 
 
 def gather(*checks: Callable[[], Any]) -> tuple[Any, ...]:
-    """What each check gives, in order; if any refuses, everything that all of them find wrong.
+    """Run all checks and return their results in order; if any fails, raise all violations together.
 
     Raises:
         InvalidSpec: with the violations of every check, each once.

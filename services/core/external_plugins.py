@@ -1,4 +1,4 @@
-"""Plug-ins from outside this package: every module of some folders, imported as `gaplab_plugins.NAME`."""
+"""External plug-ins: every module of the plug-in folders, imported as `gaplab_plugins.NAME`."""
 
 import sys
 from collections.abc import Iterator
@@ -11,37 +11,36 @@ from typing import TypeGuard, TypeVar
 from gaplab.services.core.errors import PluginBroken
 
 PACKAGE = "gaplab_plugins"
-"""Has no file of its own. A file of a folder imports another as `from gaplab_plugins.other import …`."""
+"""Name of a package without a file; plug-in files import each other as `from gaplab_plugins.other import …`."""
 
 P = TypeVar("P")
 
 
-def look_in(folders: tuple[Path, ...]) -> None:
-    """From now on these folders are looked in, before registries are used for the first time."""
-    for name in [each for each in sys.modules if each.partition(".")[0] == PACKAGE]:
+def set_folders(folders: tuple[Path, ...]) -> None:
+    """Set the plug-in folders; registries that were used before do not notice."""
+    for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
         del sys.modules[name]
-    package = ModuleType(PACKAGE, "Plug-ins from outside gaplab.")
-    package.__path__ = [str(each) for each in folders]
+    package = ModuleType(PACKAGE, "External plug-ins.")
+    package.__path__ = [str(folder) for folder in folders]
     sys.modules[PACKAGE] = package
     invalidate_caches()
 
 
 def folders() -> tuple[Path, ...]:
-    """Those that are looked in.
+    """Return the plug-in folders.
 
     Raises:
-        PluginBroken: one is no folder.
+        PluginBroken: one does not exist.
     """
-    found = tuple(Path(each) for each in sys.modules[PACKAGE].__path__) if PACKAGE in sys.modules else ()
-    for each in found:
-        if not each.is_dir():
-            msg = f"there is no folder {each} to find plug-ins in"
-            raise PluginBroken(msg)
-    return found
+    named = tuple(Path(path) for path in sys.modules[PACKAGE].__path__) if PACKAGE in sys.modules else ()
+    for folder in named:
+        if not folder.is_dir():
+            raise PluginBroken(f"there is no plug-in folder {folder}")
+    return named
 
 
 def classes(base: type[P]) -> Iterator[type[P]]:
-    """The plug-ins of one kind.
+    """Return the external plug-ins of one kind.
 
     Raises:
         PluginBroken: a file cannot be imported, or a class of this kind lacks something.
@@ -54,7 +53,7 @@ def classes(base: type[P]) -> Iterator[type[P]]:
 
 
 def file_of(plugin: type) -> str | None:
-    """The file that the class is from, relative to its folder; None for one of gaplab's own."""
+    """Return the file of a plug-in relative to its folder; None for gaplab's own plug-ins."""
     package, _, name = plugin.__module__.partition(".")
     if package != PACKAGE:
         return None
@@ -63,12 +62,12 @@ def file_of(plugin: type) -> str | None:
 
 
 def _modules() -> list[ModuleType]:
-    """Every module of the folders, by name; those that begin with an underscore are only there for others."""
+    """Return the modules of the folders by name, without those that begin with an underscore."""
     found: dict[str, str] = {}
     for folder in folders():
         for name in sorted(info.name for info in iter_modules([str(folder)])):
             if name in found:
-                msg = f"{name}.py is in {found[name]} and in {folder}; a plug-in's file has a name of its own"
+                msg = f"{name}.py is in {found[name]} and in {folder}: rename one of the two files"
                 raise PluginBroken(msg)
             found[name] = str(folder)
     return [_imported(name, folder) for name, folder in found.items() if not name.startswith("_")]
@@ -77,13 +76,13 @@ def _modules() -> list[ModuleType]:
 def _imported(name: str, folder: str) -> ModuleType:
     try:
         return import_module(f"{PACKAGE}.{name}")
-    except Exception as error:  # whatever somebody's file does
+    except Exception as error:  # a plug-in file may raise anything
         msg = f"{folder}/{name}.py cannot be imported: {type(error).__name__}: {error}"
         raise PluginBroken(msg) from error
 
 
 def _is_of(module: ModuleType, found: object) -> TypeGuard[type]:
-    """Whether it is a class of this module or package, and not only there for others, as an underscore says."""
+    """Return whether a class is defined in this module or package, and its name has no leading underscore."""
     if not isinstance(found, type) or found.__name__.startswith("_"):
         return False
     return found.__module__ == module.__name__ or found.__module__.startswith(f"{module.__name__}.")

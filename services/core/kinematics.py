@@ -1,4 +1,4 @@
-"""Where the bodies of a world are when its base and its joints are known. Quaternions are x, y, z, w."""
+"""Poses of a world's bodies, given its base and joint angles. Quaternions are x, y, z, w."""
 
 import numpy as np
 
@@ -6,15 +6,15 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.world import Body, Box, World
 
 TOUCHING_M = 0.002
-"""A body whose lowest point is nearer to the ground than this touches it: engines push surfaces apart by less."""
+"""Height of the lowest point below which a body touches the ground: engines separate surfaces by less."""
 
 
 def body_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Positions `(k, bodies, 3)` and orientations `(k, bodies, 4)` of the bodies' frames, in the world's order.
+    """Return positions `(k, bodies, 3)` and orientations `(k, bodies, 4)` of the bodies' frames, in the world's order.
 
     Args:
-        world: its bodies and joints, which are hinges.
-        poses: `(k, 7)` of the base.
+        world: bodies and hinges.
+        poses: `(k, 7)`: poses of the base.
         angles_rad: `(k, joints)`, in the world's order.
     """
     names = [body.name for body in world.bodies]
@@ -34,12 +34,12 @@ def body_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> tuple
 
 
 def clearances_m(body: Body, positions: FloatArray, orientations: FloatArray) -> FloatArray:
-    """`(k,)`: the height above the ground of the lowest point of the body's shape; below 0 in the ground.
+    """Return `(k,)`: the height of the lowest point of a body above the ground, negative inside it.
 
     Args:
-        body: its shape and where that is in its frame.
-        positions: `(k, 3)` of its frame.
-        orientations: `(k, 4)` of its frame.
+        body: body with its shape.
+        positions: `(k, 3)`: positions of the body's frame.
+        orientations: `(k, 4)`: orientations of the body's frame.
     """
     center = positions[:, 2] + rotated(orientations, np.array(body.center_m))[:, 2]
     if isinstance(body.shape, Box):

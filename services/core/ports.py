@@ -1,4 +1,4 @@
-"""The two ways to ask what a controller is worth. That they are two types is the reality gap."""
+"""The two ways to evaluate a controller. The reality gap is the difference between these two types."""
 
 from typing import Protocol
 
@@ -6,19 +6,19 @@ from gaplab.services.core.arrays import Fitnesses, Genome, Genomes, Parameters
 
 
 class Simulate(Protocol):
-    """Fitness of every genome in every simulator: the one hot path.
+    """The fitness of every genome in every simulator: the one hot path.
 
-    It depends on its arguments alone and keeps their order, whatever ran before and however many workers there are.
+    The result depends only on the arguments, in their order: not on earlier calls or the number of workers.
     """
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
-        """`(n, g)` genomes × `(m, p)` parameters -> `(n, m)` fitnesses; nan where the physics failed."""
+        """Return fitnesses `(n, m)` of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed."""
         ...
 
 
 class Reality(Protocol):
-    """The real world: slow, hidden and counted, asked one genome at a time."""
+    """The real world: slow and hidden; evaluates one genome at a time, and each evaluation counts."""
 
     def __call__(self, genome: Genome) -> float:
-        """The fitness of the genome `(g,)` in reality; nan if the measurement failed."""
+        """Return the fitness of the genome `(g,)` in reality; nan if the measurement failed."""
         ...

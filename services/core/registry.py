@@ -1,4 +1,4 @@
-"""Plug-ins: one file in a folder is one plug-in, found by being there; `outside` finds those that are not gaplab's."""
+"""Plug-ins: each file in a plug-in folder is one plug-in; `external_plugins` imports those outside gaplab."""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -16,16 +16,16 @@ from gaplab.services.core.errors import InvalidSpec, PluginBroken, Violation, un
 
 
 class NoOptions(Frozen):
-    """The options of a plug-in that has none."""
+    """Options of a plug-in without options."""
 
 
 class Plugin:
-    """What every plug-in is: a class with a name, a docstring and a frozen model of its options.
+    """Base of all plug-ins: a class with a name, a docstring and a frozen model of its options.
 
     Attributes:
-        name: how specs call it; also the name of its file.
-        source: where its idea or its numbers come from.
-        Options: a frozen model in which everything has a default.
+        name: name in specs, and of the file.
+        source: origin of its idea or its numbers.
+        Options: frozen model whose fields all have defaults.
     """
 
     name: ClassVar[str]
@@ -37,7 +37,7 @@ class Plugin:
 
     @classmethod
     def describe(cls) -> PluginRead:
-        """The plug-in as the catalogue lists it."""
+        """Return the catalogue's entry of the plug-in."""
         summary = (getdoc(cls) or "").split("\n\n", maxsplit=1)[0].replace("\n", " ")
         return PluginRead(
             name=cls.name,
@@ -49,7 +49,7 @@ class Plugin:
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """What else a reader of the catalogue should know; plain JSON."""
+        """Return further details for the catalogue, as JSON."""
         return {}
 
 
@@ -59,7 +59,7 @@ P = TypeVar("P", bound=Plugin)
 class Registry(Mapping[str, type[P]], Generic[P]):
     """The plug-ins of one kind, by name, in alphabetical order.
 
-    At first use every module of `package` is imported, and every one from outside; that raises PluginBroken.
+    The first use imports every module of `package` and every external plug-in, and may raise PluginBroken.
     """
 
     def __init__(self, kind: str, package: str, base: type[P]) -> None:
@@ -85,7 +85,7 @@ class Registry(Mapping[str, type[P]], Generic[P]):
         for each in external_plugins.classes(self._base):
             if each.name in found:
                 file, other = (external_plugins.file_of(plugin) for plugin in (each, found[each.name]))
-                msg = f"{file} has a {self.kind} called {each.name!r}, as {other or 'gaplab itself'} has: rename it"
+                msg = f"{file} has a {self.kind} called {each.name!r}, but so has {other or 'gaplab'}: rename it"
                 raise PluginBroken(msg)
             found[each.name] = each
         return dict(sorted(found.items()))
@@ -100,14 +100,14 @@ class Registry(Mapping[str, type[P]], Generic[P]):
         return len(self._plugins)
 
     def check(self, ref: PluginRef, pointer: str = "") -> tuple[type[P], Frozen]:
-        """The plug-in that a spec names, and its options completed; nothing is constructed.
+        """Return the plug-in class that a spec names, and its complete options.
 
         Args:
             ref: name and options.
-            pointer: where in the spec it stands, for the error.
+            pointer: place in the spec, for errors.
 
         Raises:
-            InvalidSpec: no such name, or options that the plug-in refuses.
+            InvalidSpec: the name is unknown, or the plug-in refuses the options.
         """
         if ref.name not in self:
             raise InvalidSpec([unknown_name(pointer, self.kind, ref.name, list(self))])
@@ -120,17 +120,17 @@ class Registry(Mapping[str, type[P]], Generic[P]):
             ) from error
 
     def create(self, ref: PluginRef, pointer: str = "") -> P:
-        """The plug-in that a spec names, with its options; raises as `check` does."""
+        """Create the plug-in that a spec names; raise as `check` does."""
         plugin, options = self.check(ref, pointer)
         return plugin(options)
 
     def describe(self) -> tuple[PluginRead, ...]:
-        """Every plug-in, as the catalogue lists it."""
+        """Return the catalogue's entries of all plug-ins."""
         return tuple(plugin.describe() for plugin in self.values())
 
 
 def _source(plugin: type[Plugin]) -> str:
-    """Where it says that it comes from, or its file, for one from outside that does not say."""
+    """Return the stated source of a plug-in, or else the file of an external one."""
     file = external_plugins.file_of(plugin)
     return f"{file} of GAPLAB_PLUGINS" if file and plugin.source == Plugin.source else plugin.source
 

@@ -1,8 +1,8 @@
 """The paper's formulas for the worth of a controller as the next sample, and nothing else.
 
-All take the fitness of n controllers in m simulators, `(n, m)`, and give `(n,)`; a nan among a controller's fitnesses
-makes its score nan, which never wins. Only a simulator of no weight, whose physics failed on a sample, has no say: an
-ensemble that is kept diverse keeps it, and it may fail on every controller there is.
+All take the fitness of n controllers in m simulators, `(n, m)`, and return `(n,)`. A nan fitness makes the controller's
+score nan, which never wins. The exception is a simulator of weight 0, whose physics failed on a sample: it is ignored,
+because a diverse ensemble may keep it although it fails on every controller.
 """
 
 from collections.abc import Sequence
@@ -13,11 +13,11 @@ from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes
 from gaplab.services.core.types import Sample
 
 NEAREST = 1e-6
-"""The least distance between a controller and a sample: at 0 the paper's 1/d is infinite."""
+"""Smallest distance between a controller and a sample: at 0 the paper's 1/d is infinite."""
 
 
 def weighted_mean(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
-    """The expected fitness: mean over simulators, weighted by how well they fit. Source: paper, section 2.
+    """Return the expected fitness: the mean over simulators, weighted by accuracy. Source: paper, section 2.
 
     Args:
         fitnesses: `(n, m)`.
@@ -27,7 +27,7 @@ def weighted_mean(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
 
 
 def weighted_deviation(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
-    """The disagreement: standard deviation over simulators, weighted by how well they fit.
+    """Return the disagreement: the standard deviation over simulators, weighted by accuracy.
 
     Source: paper, section 2, *Informative*.
     """
@@ -36,7 +36,7 @@ def weighted_deviation(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
 
 
 def uniqueness_penalty(genomes: Genomes, fitness: FloatArray, samples: Sequence[Sample]) -> FloatArray:
-    """1/(100 N) Σ 1/d(x, y) over the N samples y; 0 before the first sample.
+    """Return 1/(100 N) Σ 1/d(x, y) over the N samples y; 0 before the first sample.
 
     d is the Euclidean distance over genome and fitness together: the controller's fitness is the simulated one, the
     sample's the real one.
@@ -46,7 +46,7 @@ def uniqueness_penalty(genomes: Genomes, fitness: FloatArray, samples: Sequence[
     Args:
         genomes: `(n, g)`.
         fitness: `(n,)` in the simulator.
-        samples: whose measurement succeeded.
+        samples: samples whose measurement succeeded.
     """
     if not samples:
         return np.zeros(len(genomes))
@@ -58,11 +58,11 @@ def uniqueness_penalty(genomes: Genomes, fitness: FloatArray, samples: Sequence[
 
 
 def simulator_weights(squared_errors: FloatArray, floor: float) -> FloatArray:
-    """`(m,)` weights of simulators, summing to 1: their fitness 1/Σe², with a floor under Σe².
+    """Return weights `(m,)` of simulators, with sum 1: their fitness 1/Σe², with a floor under Σe².
 
-    The paper's weights are the fitnesses themselves; without the floor one near-perfect simulator takes all the weight
-    and there is no disagreement left. Before any sample all errors are 0 and the weights equal, as they are when every
-    simulator fails.
+    The paper's weights are the fitnesses themselves. Without the floor, one near-perfect simulator takes all the
+    weight, and no disagreement is left. Weights are equal before any sample, when all errors are 0, and if all
+    simulators fail.
 
     Source: paper, section 2, *Informative*; the floor is gaplab's.
 
@@ -76,5 +76,5 @@ def simulator_weights(squared_errors: FloatArray, floor: float) -> FloatArray:
 
 
 def _weighty(fitnesses: Fitnesses, weights: FloatArray) -> Fitnesses:
-    """The same where the simulator has a weight, and 0 elsewhere, for nothing takes a nan out of a sum."""
+    """Return the fitnesses with 0 for simulators of weight 0, whose nan would remain in a sum."""
     return fitnesses if np.all(weights > 0) else np.where(weights > 0, fitnesses, 0.0)

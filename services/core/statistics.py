@@ -1,8 +1,8 @@
-"""The paper's t-tests between experiments, and what a careful reader would ask for beside them.
+"""The paper's t-tests between experiments, with Welch's and Mann-Whitney's tests and Holm's correction.
 
 The paper pools the recorded fitnesses of several counts of real-world evaluations into one sample ("combining the data
 for more than two real-world evaluations"). Values of one repetition at several counts are not independent, so a pooled
-p is smaller than it should be: it is given because the paper gives it, and is safe only at one count.
+p is too small. It is reported because the paper reports it, and is reliable only at a single count.
 """
 
 from collections.abc import Sequence
@@ -19,14 +19,14 @@ from gaplab.services.core.curves import equal, known
 
 @np.errstate(over="ignore", invalid="ignore")
 def compare(first: FloatArray, second: FloatArray) -> tuple[Test, Test, Test]:
-    """Student's t (the paper's), Welch's t and Mann-Whitney between two groups, two-sided.
+    """Return Student's t (the paper's), Welch's t and Mann-Whitney between two groups, two-sided.
 
-    A test is undefined, and its numbers None, where a group has fewer than two values or neither varies, or where the
-    values are too large to be squared.
+    A test is undefined, with None as its numbers, if a group has fewer than two values, if neither group varies, or if
+    squares of values overflow.
 
     Args:
-        first: `(n,)`, nan counts for nothing.
-        second: `(m,)`, likewise.
+        first: `(n,)`; nan is ignored.
+        second: `(m,)`; nan is ignored.
     """
     first, second = finite(first), finite(second)
     if min(len(first), len(second)) < 2 or equal(np.concatenate([first, second])):
@@ -42,17 +42,17 @@ def compare(first: FloatArray, second: FloatArray) -> tuple[Test, Test, Test]:
 
 @np.errstate(over="ignore", invalid="ignore")
 def effect_size(first: FloatArray, second: FloatArray) -> float | None:
-    """Cohen's d: the difference of the means over the pooled standard deviation; None where that is 0 or unknown."""
+    """Return Cohen's d: difference of the means over the pooled standard deviation; None if that is 0 or unknown."""
     first, second = finite(first), finite(second)
     freedom = len(first) + len(second) - 2
     if min(len(first), len(second)) < 2 or (equal(first) and equal(second)):
-        return None  # the variance of equal numbers need not come out as 0
+        return None  # the computed variance of equal numbers may differ from 0
     spread = ((len(first) - 1) * first.var(ddof=1) + (len(second) - 1) * second.var(ddof=1)) / freedom
     return known((first.mean() - second.mean()) / spread**0.5) if 0 < spread < inf else None
 
 
 def holm(p_values: Sequence[float | None]) -> tuple[float | None, ...]:
-    """Holm's step-down correction over a family of tests; an undefined test is not of the family.
+    """Return p-values with Holm's step-down correction over a family of tests, without undefined tests.
 
     Source: Holm 1979, A simple sequentially rejective multiple test procedure.
     """
@@ -68,13 +68,13 @@ def holm(p_values: Sequence[float | None]) -> tuple[float | None, ...]:
 def compare_all(
     recorded: dict[str, FloatArray], direct: frozenset[str], from_evaluations: int, to_evaluations: int
 ) -> tuple[Comparison, ...]:
-    """Every pair of experiments, pooled over a range of counts; Holm's correction is over all pairs, test by test.
+    """Compare every pair of experiments, pooled over a range of counts; Holm's correction is over all pairs, by test.
 
     Args:
-        recorded: `(r, k)` recorded fitness by experiment, in the order of the answer.
-        direct: the experiments whose only column, at 0, counts at any number of real-world evaluations.
-        from_evaluations: the first count that is pooled.
-        to_evaluations: the last.
+        recorded: recorded fitness `(r, k)` by experiment, in the order of the result.
+        direct: experiments whose only column, at 0, counts at every number of real-world evaluations.
+        from_evaluations: first pooled count.
+        to_evaluations: last pooled count.
     """
     pooled = {
         name: finite(values[:, :1] if name in direct else values[:, from_evaluations : to_evaluations + 1])
@@ -101,13 +101,13 @@ def compare_all(
 
 
 def corrected(family: Sequence[Test]) -> tuple[Test, ...]:
-    """The tests of a family with Holm's corrected p beside each."""
+    """Return the tests of a family with Holm's corrected p."""
     p_values = holm([test.p for test in family])
     return tuple(test.model_copy(update={"p_holm": p}) for test, p in zip(family, p_values, strict=True))
 
 
 def finite(values: FloatArray) -> FloatArray:
-    """The finite values in a row, as one vector."""
+    """Return the finite values as one vector."""
     return values[np.isfinite(values)]
 
 

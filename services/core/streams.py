@@ -1,4 +1,4 @@
-"""Random numbers by address: what a stream draws depends on where it is used, never on what was drawn before."""
+"""Random numbers by address: a stream depends on where it is used, not on earlier draws."""
 
 from hashlib import sha256
 
@@ -6,14 +6,14 @@ from numpy.random import PCG64, Generator, SeedSequence
 
 
 def stream(seed: int, *path: str | int) -> Generator:
-    """The random generator at an address such as `(strategy, repetition, iteration, phase)`.
+    """Return the random generator at an address such as `(strategy, repetition, iteration, phase)`.
 
     Equal addresses give equal streams, in any order and on any machine; different addresses give independent ones.
-    That makes a resumed repetition bit-equal to one that never stopped.
+    Therefore a resumed repetition is bit-equal to an uninterrupted one.
 
     Args:
         seed: the experiment's seed, below 2**64.
-        path: names and non-negative numbers; a name counts by its SHA-256, so that it may be anything.
+        path: names and non-negative numbers; any name is allowed, because its SHA-256 is used.
     """
     return Generator(PCG64(SeedSequence(seed, spawn_key=tuple(_word(part) for part in path))))
 

@@ -13,12 +13,12 @@ from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Parameters,
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """A box of real vectors, some of whose coordinates may wrap around.
+    """A box of real vectors; coordinates may be periodic.
 
     Attributes:
-        lower: `(g,)`, the least value of each coordinate.
-        upper: `(g,)`, the greatest; above `lower` in each.
-        periodic: `(g,)` of bool: the coordinate wraps (a phase); else it clips (a width).
+        lower: `(g,)`: smallest value of each coordinate.
+        upper: `(g,)`: largest value of each coordinate, above `lower`.
+        periodic: `(g,)` of bool: true if the coordinate wraps (a phase), false if it clips (a width).
     """
 
     lower: FloatArray
@@ -36,27 +36,27 @@ class Space:
 
     @classmethod
     def box(cls, lower: Sequence[float], upper: Sequence[float], periodic: Sequence[bool] | None = None) -> "Space":
-        """A space from plain sequences; nothing is periodic unless said so."""
+        """Create a space from sequences; by default no coordinate is periodic."""
         wraps = np.array(periodic if periodic is not None else [False] * len(lower), dtype=bool)
         wraps.flags.writeable = False
         return cls(frozen(lower), frozen(upper), wraps)
 
     @property
     def size(self) -> int:
-        """The number of coordinates, g."""
+        """Return the number of coordinates, g."""
         return len(self.lower)
 
     @property
     def extent(self) -> FloatArray:
-        """`(g,)`: upper minus lower."""
+        """Return `(g,)`: upper minus lower."""
         return self.upper - self.lower
 
     def draw(self, count: int, rng: Generator) -> Genomes:
-        """`(count, g)` vectors, uniform over the box."""
+        """Return vectors `(count, g)`, drawn uniformly from the box."""
         return self.lower + self.extent * rng.random((count, self.size))
 
     def contain(self, vectors: FloatArray) -> FloatArray:
-        """The vectors brought back into the box: periodic coordinates wrap, the others clip."""
+        """Return the vectors moved into the box: periodic coordinates wrap, the others clip."""
         wrapped = self.lower + np.mod(vectors - self.lower, self.extent)
         clipped = np.minimum(np.maximum(vectors, self.lower), self.upper)
         return np.where(self.periodic, wrapped, clipped)
@@ -64,7 +64,7 @@ class Space:
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """A controller with its fitness in reality; nan if the measurement failed (it counts, and teaches nothing)."""
+    """A genome with its fitness in reality; nan if the measurement failed, which counts but is not learned from."""
 
     genome: Genome
     fitness: float
@@ -85,13 +85,13 @@ class Simulator:
 
 @dataclass(frozen=True, eq=False)
 class Belief:
-    """All that a strategy may know: the samples so far, and simulators tuned on them, best first.
+    """Everything that a strategy may know: the samples so far, and simulators tuned on them, best first.
 
     Attributes:
-        space: of genomes.
-        known: `(g,)`, the robot's hand-designed genome.
-        samples: in the order in which they were measured.
-        simulators: one, or a diverse ensemble; random ones before the first sample.
+        space: space of genomes.
+        known: `(g,)`: the robot's hand-designed genome.
+        samples: samples in the order of measurement.
+        simulators: one simulator or a diverse ensemble; random before the first sample.
     """
 
     space: Space
@@ -101,17 +101,17 @@ class Belief:
 
     @property
     def parameters(self) -> Parameters:
-        """`(m, p)` of all simulators."""
+        """Return the parameters `(m, p)` of all simulators."""
         return np.array([each.parameters for each in self.simulators])
 
     @property
     def squared_errors(self) -> FloatArray:
-        """`(m,)` of all simulators."""
+        """Return the squared errors `(m,)` of all simulators."""
         return np.array([each.squared_error for each in self.simulators])
 
     @property
     def learnable(self) -> tuple[Sample, ...]:
-        """The samples whose measurement succeeded."""
+        """Return the samples whose measurement succeeded."""
         return tuple(each for each in self.samples if np.isfinite(each.fitness))
 
 
@@ -120,8 +120,8 @@ class Budget:
     """Fitness evaluations of each search; the paper's numbers are the defaults. Source: sections 2 and 3.
 
     Attributes:
-        reuse_transfer: a strategy that would search for what the transfer has just found tries that one in reality;
-            so it selects from a search of `controller_evaluations`, others from one of `selection_evaluations`.
+        reuse_transfer: true if a strategy whose search has the transfer's goal tries the transferred controller. It
+            then selects from a search of `controller_evaluations`, other strategies from `selection_evaluations`.
     """
 
     controller_evaluations: int = 10_000
@@ -132,12 +132,12 @@ class Budget:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a step took.
+    """Cost of a step.
 
     Attributes:
-        rollouts: that were simulated.
-        failures: how many of them failed (nan).
-        saved: that the budget had for it and that could not have changed its outcome.
+        rollouts: number of simulated rollouts.
+        failures: number of those that failed (nan).
+        saved: budgeted rollouts that could not change the result, and were not simulated.
     """
 
     rollouts: int = 0
@@ -173,10 +173,10 @@ class Tuned:
 
 @dataclass(frozen=True, eq=False)
 class Transferred:
-    """A controller evolved in the best simulator, to be looked at in reality.
+    """A controller was evolved in the best simulator, for a probe in reality.
 
     Attributes:
-        fitness: of the genome in that simulator; nan if the physics failed for every controller tried.
+        fitness: fitness in that simulator; nan if the physics failed for every controller tried.
     """
 
     iteration: int
@@ -187,11 +187,11 @@ class Transferred:
 
 @dataclass(frozen=True)
 class Probed:
-    """The transferred controller's fitness in reality: looked at, never learned from, never counted.
+    """The fitness of the transferred controller in reality was recorded; it is never learned from or counted.
 
     Attributes:
-        fitness: nan if the measurement failed.
-        recorded: the larger of it and the best sample's, which is what the curve shows. Source: section 3.
+        fitness: fitness in reality; nan if the measurement failed.
+        recorded: the larger of this and the best sample's fitness, which the curve shows. Source: section 3.
     """
 
     iteration: int

@@ -1,4 +1,4 @@
-"""What is simulated, in no engine's terms: immutable, edited by `dataclasses.replace`.
+"""Engine-neutral description of what is simulated: immutable, edited by `dataclasses.replace`.
 
 SI units throughout; z points up; the ground is the plane z = 0. Lengths of boxes are full edges, not halves.
 """
@@ -13,10 +13,10 @@ Vector: TypeAlias = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Material:
-    """The surface of the robot *and* of the ground: the paper gives both the same. Source: section 2.
+    """The material of the robot *and* of the ground, as in the paper. Source: section 2.
 
-    The coefficients are those of the contact between the two, so an engine that combines two surfaces must see to it
-    that their combination is this. A static friction below the dynamic one acts as if it were equal to it.
+    The coefficients are those of the contact. An engine that combines two surfaces must ensure that the result has
+    these coefficients. A static friction below the dynamic one acts as if equal to it.
     """
 
     static_friction: float = 1.0
@@ -46,9 +46,9 @@ class Body:
     """A rigid body.
 
     Attributes:
-        shape: gives the inertia, and the collision geometry if it collides.
-        center_m: of the shape, in the frame of the body (the joint that carries it, or the base).
-        collides: with the ground; bodies of one robot never collide with each other.
+        shape: shape for inertia, and for collisions if it collides.
+        center_m: centre of the shape, in the frame of the body (that of its joint, or of the base).
+        collides: true if the body collides with the ground; bodies of a robot never collide with each other.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Motor:
-    """A position servo: a velocity constraint that closes `position_gain` of the error each step, within a torque."""
+    """A position servo: a velocity constraint that closes the share `position_gain` of the error in each step."""
 
     position_gain: float
     max_torque_nm: float
@@ -72,8 +72,8 @@ class Joint:
     """A hinge that carries `child`.
 
     Attributes:
-        parent: name of a body; the joint's frame is at `origin_m` in the parent's frame.
-        axis: unit vector in that frame.
+        parent: name of the parent body, in whose frame `origin_m` is.
+        axis: unit vector in the parent's frame.
         motor: None leaves the hinge passive.
     """
 
@@ -87,14 +87,14 @@ class Joint:
 
 @dataclass(frozen=True)
 class World:
-    """Everything an engine needs to know but the motion.
+    """Everything that an engine needs except the motion.
 
-    A world without bodies has only a material: the analytic engine's closed form is all its physics.
+    A world without bodies has only a material, for the formula of the analytic engine.
 
     Attributes:
-        bodies: the first one is the base; each other one is the child of exactly one joint.
-        joints: those with a motor are the actuators, in this order.
-        start_height_m: of the base's frame at time 0, at rest, all joints at their zero.
+        bodies: bodies; the first is the base, each other one is the child of exactly one joint.
+        joints: joints; those with a motor are the actuators, in this order.
+        start_height_m: height of the base's frame at time 0, at rest with all joints at zero.
     """
 
     bodies: tuple[Body, ...] = ()
@@ -107,7 +107,7 @@ class World:
 
     @property
     def actuators(self) -> tuple[Joint, ...]:
-        """The joints that a motion drives."""
+        """Return the joints that a motion drives."""
         return tuple(joint for joint in self.joints if joint.motor is not None)
 
 
@@ -116,9 +116,9 @@ class Motion:
     """Actuator targets over time, constant between changes.
 
     Attributes:
-        times_s: `(k,)`, ascending from 0: when the targets change.
-        targets: `(k, a)`, rad for a hinge: the targets from that time on.
-        observe_s: `(t,)`, ascending: when the trajectory is looked at; the last one ends the rollout.
+        times_s: `(k,)`, ascending from 0: times at which targets change.
+        targets: `(k, a)`, rad for a hinge: targets from each time on.
+        observe_s: `(t,)`, ascending: times of observation; the last one ends the rollout.
     """
 
     times_s: FloatArray
@@ -128,13 +128,13 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Where the base was.
+    """The observed motion of the base.
 
     Attributes:
-        times_s: `(t,)`, the motion's `observe_s`.
-        positions_m: `(..., t, 3)` of the base's frame; leading axes, if any, are motions × worlds. nan throughout where
-            the physics failed.
-        orientations: `(..., t, 4)` of the base, quaternions x, y, z, w.
+        times_s: `(t,)`: the motion's `observe_s`.
+        positions_m: `(..., t, 3)`: positions of the base's frame; leading axes are motions × worlds. All nan where the
+            physics failed.
+        orientations: `(..., t, 4)`: orientations of the base, as quaternions x, y, z, w.
     """
 
     times_s: FloatArray
@@ -144,13 +144,13 @@ class Trajectory:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A rollout looked at more often than its fitness needs, and in all its joints.
+    """A rollout with additional observations and joint angles.
 
     Attributes:
-        trajectory: to the bit what the rollout gives that is not recorded.
-        times_s: `(k,)`: when it was looked at.
-        poses: `(k, 7)`: position and quaternion x, y, z, w of the base's frame then; nan where the physics failed.
-        angles_rad: `(k, joints)`, in the world's order; None from an engine that does not tell them.
+        trajectory: trajectory, bit-equal to that of the plain rollout.
+        times_s: `(k,)`: times of observation.
+        poses: `(k, 7)`: positions and quaternions x, y, z, w of the base's frame; nan where the physics failed.
+        angles_rad: `(k, joints)`, in the world's order; None if the engine does not provide them.
     """
 
     trajectory: Trajectory

@@ -1,4 +1,4 @@
-"""Engines: one module in this folder is one engine."""
+"""Engines: each module or package in this folder is one engine."""
 
 from gaplab.services.core.registry import Registry
 from gaplab.services.engines.base import Engine

@@ -1,4 +1,4 @@
-"""A closed form in the place of physics: on it the whole of gaplab runs in seconds."""
+"""A closed formula in place of physics, with which all of gaplab runs in seconds."""
 
 from collections.abc import Sequence
 
@@ -10,10 +10,10 @@ from gaplab.services.engines.base import Engine
 
 
 class Analytic(Engine):
-    """Worlds without bodies: the base glides along x at a speed that is a function of one target and the material.
+    """A formula for worlds without bodies: the base glides along x, at a speed given by one target and the material.
 
-    The speed has a broad hill, a narrow peak and ripples, whose places and heights the three coefficients move: a
-    search in a wrong simulator climbs the wrong slope, and most controllers say little about where the peak is.
+    The speed has a broad hill, a narrow peak and ripples. The three coefficients move their places and heights, so a
+    search in a wrong simulator climbs the wrong slope. Most controllers reveal little about the place of the peak.
     """
 
     name = "analytic"
@@ -24,16 +24,16 @@ class Analytic(Engine):
 
     @classmethod
     def runs(cls, world: World) -> bool:
-        """Worlds without bodies."""
+        """Return whether the world has no bodies."""
         return not world.bodies
 
     def rollout(self, world: World, motion: Motion) -> Trajectory:
-        """The glide of one motion in one world."""
+        """Return the glide of one motion in one world."""
         glides = self.rollouts([world], [motion])
         return Trajectory(motion.observe_s, glides.positions_m[0, 0], glides.orientations[0, 0])
 
     def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion]) -> Trajectory:
-        """All glides at once."""
+        """Return all glides at once."""
         materials = [each.material for each in worlds]
         coefficients = np.array([(each.static_friction, each.dynamic_friction, each.restitution) for each in materials])
         targets = np.array([motion.targets[0, 0] for motion in motions])
@@ -47,7 +47,7 @@ class Analytic(Engine):
 def speed(
     target: FloatArray, static_friction: FloatArray, dynamic_friction: FloatArray, restitution: FloatArray
 ) -> FloatArray:
-    """The speed in m/s at a target in [0, 1] under the three coefficients; all broadcast against each other."""
+    """Return the speed in m/s at a target in [0, 1] with the three coefficients; all arguments broadcast."""
     hill = 0.5 * _bump((target - 0.9 + 0.5 * dynamic_friction) / 0.3)
     peak = (0.5 - 0.4 * restitution) * _bump((target - 0.2 - 0.4 * static_friction) / 0.1)
     ripple = 0.1 * np.sin(2 * np.pi * (4.0 * target + 1.5 * dynamic_friction - 2.0 * restitution))

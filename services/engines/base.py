@@ -1,4 +1,4 @@
-"""The contract of an engine: World and Motion in, Trajectory out, and nothing else matters."""
+"""The contract of an engine: World and Motion in, Trajectory out."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -29,21 +29,21 @@ ALL_FIELDS = frozenset(
         "solver_iterations",
     }
 )
-"""What there is to honour in a World, for an engine that honours it all."""
+"""All fields of a World that an engine can honour."""
 
 
 class Engine(Plugin):
     """A physics engine.
 
-    One instance lives in one process and keeps its world warm between rollouts. A rollout is bit-equal on repeat,
-    whatever ran before it. Physics that blows up is a trajectory of nan, never an exception.
+    One instance lives in one process, and keeps its worlds loaded between rollouts. A rollout is bit-equal on repeat,
+    whatever ran before. If the simulation diverges, the trajectory is nan; an engine does not raise.
 
     Attributes:
-        library: the Python module that it needs, or None; it is imported inside the class.
-        install: the line that installs it.
-        honours: the World fields that change what it computes, like `material.dynamic_friction`.
-        batch: rollouts that one call should ask for, if there is a choice; 1 where a call costs little beside one.
-        usual_rollout_s: seconds that a rollout usually takes, to estimate with before any was measured.
+        library: Python module that the engine needs, imported inside the class; None if there is none.
+        install: command that installs the library.
+        honours: World fields that affect the results, like `material.dynamic_friction`.
+        batch: preferred number of rollouts in a call; 1 if a call has little overhead.
+        usual_rollout_s: usual seconds of a rollout, for estimates before any measurement.
     """
 
     library: ClassVar[str | None] = None
@@ -55,16 +55,16 @@ class Engine(Plugin):
     @classmethod
     @abstractmethod
     def runs(cls, world: World) -> bool:
-        """Whether the engine can simulate such a world at all."""
+        """Return whether the engine can simulate the world."""
 
     @abstractmethod
     def rollout(self, world: World, motion: Motion) -> Trajectory:
-        """The base's trajectory, `(t, 3)`, under the motion from the world's start."""
+        """Return the trajectory of the base, `(t, 3)`, under the motion from the start of the world."""
 
     def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion]) -> Trajectory:
-        """Every motion in every world, `(n motions, m worlds, t, 3)`; all motions are observed at the same times.
+        """Return every motion in every world, `(n motions, m worlds, t, 3)`; observation times are equal.
 
-        An engine that is faster in batches replaces this loop.
+        An engine that is faster in batches overrides this loop.
         """
         grid = [[self.rollout(world, motion) for world in worlds] for motion in motions]
         return Trajectory(
@@ -74,13 +74,13 @@ class Engine(Plugin):
         )
 
     def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
-        """The very rollout of the motion in the world, looked at at these times besides.
+        """Return the same rollout, with poses at additional times.
 
-        An engine that can tell the angles of its joints replaces this, which tells of the base alone.
+        This default records the base alone. An engine that knows joint angles overrides it.
 
         Args:
-            world: as of `rollout`.
-            motion: as of `rollout`.
+            world: as in `rollout`.
+            motion: as in `rollout`.
             times_s: `(k,)`, ascending, from 0 to the last observation.
         """
         seen = self.rollout(world, replace(motion, observe_s=times_s))
@@ -89,16 +89,16 @@ class Engine(Plugin):
 
     @classmethod
     def available(cls) -> bool:
-        """Whether the engine's library is installed."""
+        """Return whether the engine's library is installed."""
         return cls.library is None or find_spec(cls.library) is not None
 
     @classmethod
     def describe(cls) -> PluginRead:
-        """The engine as the catalogue lists it, with its install line if its library is missing."""
+        """Return the catalogue's entry, with the install command if the library is missing."""
         note = None if cls.available() else f"not installed: {cls.install}"
         return super().describe().model_copy(update={"available": cls.available(), "note": note})
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """The World fields that the engine honours."""
+        """Return the World fields that the engine honours, for the catalogue."""
         return {"honours": sorted(cls.honours)}

@@ -1,4 +1,4 @@
-"""What engines share that go on step by step: a motion in whole time steps, and scenes that are kept warm."""
+"""Shared parts of engines that advance step by step: motions in whole time steps, and a cache of scenes."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -13,47 +13,47 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.world import Motion, Recording, Trajectory, World
 
 WARM_SCENES = 4
-"""Worlds that differ in more than their material are kept warm up to this number; the longest unused one goes."""
+"""Largest number of cached scenes. Worlds that differ only in material share a scene."""
 
 FARTHEST_M = 100.0
-"""A base that is farther than this from where it started was thrown there by numbers, not by physics: it failed."""
+"""Largest plausible distance of the base from its start; beyond it, the rollout failed numerically."""
 
 DEEPEST_M = 1.0
-"""So was one that is deeper than this in the ground."""
+"""Largest plausible depth of the base in the ground."""
 
 
 class Warm(Protocol):
-    """A world in an engine, kept for the next rollout."""
+    """A scene that is kept for the next rollout."""
 
     def close(self) -> None:
-        """Give up what the engine holds for it."""
+        """Release the engine's resources."""
 
 
 class Scene(Warm, Protocol):
-    """A world that goes on step by step."""
+    """A world that advances step by step."""
 
     @property
     def world(self) -> World:
-        """What it was built from."""
+        """Return the world that the scene was built from."""
 
     def command(self, actuator: int, target: float) -> None:
-        """A new target for an actuator, rad."""
+        """Set a new target for an actuator, rad."""
 
     def pose(self) -> FloatArray:
-        """`(7,)`: position and quaternion x, y, z, w of the base's frame."""
+        """Return `(7,)`: position and quaternion x, y, z, w of the base's frame."""
 
     def angles(self) -> FloatArray:
-        """`(joints,)`, rad, in the world's order."""
+        """Return the joint angles `(joints,)`, rad, in the world's order."""
 
 
 S = TypeVar("S", bound=Warm)
 
 
 class WarmScenes(Generic[S]):
-    """The scenes of the latest worlds.
+    """A cache of scenes by world.
 
     Args:
-        build: makes the scene of a world.
+        build: function that builds the scene of a world.
     """
 
     def __init__(self, build: Callable[[World], S]) -> None:
@@ -68,22 +68,22 @@ class WarmScenes(Generic[S]):
         return scene
 
     def drop(self, world: World) -> None:
-        """Give up a scene that was spoilt; the next one of its world is built anew."""
+        """Drop a broken scene; the next call rebuilds it."""
         self._scenes.pop(world).close()
 
     def close(self) -> None:
-        """Give all scenes up."""
+        """Close all scenes."""
         while self._scenes:
             self._scenes.popitem()[1].close()
 
 
 def watch(scene: Scene, advance: Callable[[int], None], motion: Motion) -> FloatArray:
-    """`(t, 7)`: position and quaternion of the base at each observation of a motion; times in whole time steps.
+    """Run a motion; return `(t, 7)`: position and quaternion of the base at each observation, in whole time steps.
 
     Args:
-        scene: at time 0.
-        advance: goes on by so many time steps.
-        motion: its targets are commanded when they change, and only those that do.
+        scene: scene at time 0.
+        advance: function that advances the scene by a number of time steps.
+        motion: motion to run; a target is commanded only when it changes.
     """
     return _watch(scene, advance, motion, scene.pose)
 
@@ -91,12 +91,12 @@ def watch(scene: Scene, advance: Callable[[int], None], motion: Motion) -> Float
 def record(
     scene: Scene, advance: Callable[[int], None], motion: Motion, times_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """What `watch` sees, `(t, 7)`, and base and joints at other times, `(k, 7 + joints)`.
+    """Run a motion; return the result of `watch`, `(t, 7)`, and base and joints at other times, `(k, 7 + joints)`.
 
     Args:
-        scene: as of `watch`.
-        advance: as of `watch`.
-        motion: as of `watch`.
+        scene: as in `watch`.
+        advance: as in `watch`.
+        motion: as in `watch`.
         times_s: `(k,)`, ascending, up to the last observation.
     """
     often = replace(motion, observe_s=np.union1d(motion.observe_s, times_s))
@@ -106,7 +106,7 @@ def record(
 
 
 def recording(motion: Motion, times_s: FloatArray, poses: FloatArray, seen: FloatArray) -> Recording:
-    """What `record` returned, put together; nan throughout if no physics can have led to the poses."""
+    """Return a Recording of the poses from `record`; all nan if they are implausible."""
     if not plausible(poses):
         poses, seen = np.full_like(poses, np.nan), np.full_like(seen, np.nan)
     trajectory = Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
@@ -128,13 +128,13 @@ def _watch(scene: Scene, advance: Callable[[int], None], motion: Motion, look: C
 
 
 def plausible(poses: FloatArray) -> NDArray[np.bool_]:
-    """`(...)`: whether physics can have led to all of the poses `(..., t, 7)`; nan is not plausible."""
+    """Return `(...)`: whether all poses `(..., t, 7)` are plausible; nan is not."""
     near = np.all(np.abs(poses[..., :3]) < FARTHEST_M, axis=(-2, -1))
     return np.asarray(near & np.all(poses[..., 2] > -DEEPEST_M, axis=-1))
 
 
 def _commands(motion: Motion, time_step_s: float) -> dict[int, list[tuple[int, float]]]:
-    """By time step: the actuators whose targets change then, with their new targets; at step 0, all of them."""
+    """Return the actuators whose targets change, with the new targets, by time step; at step 0, all."""
     changed = np.vstack([np.ones_like(motion.targets[:1], bool), motion.targets[1:] != motion.targets[:-1]])
     rows, actuators = np.nonzero(changed)
     steps, targets = _steps(motion.times_s[rows], time_step_s), motion.targets[rows, actuators].tolist()

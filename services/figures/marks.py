@@ -5,11 +5,11 @@ None stands for a missing value: it interrupts a line, and is left out among poi
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
 
+from gaplab.services.figures.checks import Number as Number
+from gaplab.services.figures.checks import check_numbers
 from gaplab.services.figures.style import INK, Style
 
-Number = float | None
 Numbers = tuple[Number, ...]
 
 PLAIN = Style(INK, "solid", "circle")
@@ -39,7 +39,7 @@ class Line:
     steps: bool = False
 
     def __post_init__(self) -> None:
-        _check(self.name, (self.x, self.y), (self.lower, self.upper, self.hover))
+        check_numbers(self.name, (self.x, self.y), (self.lower, self.upper, self.hover))
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Points:
     hollow: bool = False
 
     def __post_init__(self) -> None:
-        _check(self.name, (self.x, self.y), (self.shades, self.hover))
+        check_numbers(self.name, (self.x, self.y), (self.shades, self.hover))
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Level:
     upright: bool = False
 
     def __post_init__(self) -> None:
-        _check(self.name, ((self.value, self.lower, self.upper),))
+        check_numbers(self.name, ((self.value, self.lower, self.upper),))
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class Bars:
     thickness: float = 0.8
 
     def __post_init__(self) -> None:
-        _check(self.name, self.intervals)
+        check_numbers(self.name, self.intervals)
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class Arrow:
     style: Style = PLAIN
 
     def __post_init__(self) -> None:
-        _check("arrow", (self.start, self.end))
+        check_numbers("arrow", (self.start, self.end))
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class Label:
     beside: bool = False
 
     def __post_init__(self) -> None:
-        _check(self.text, ((self.x, self.y),))
+        check_numbers(self.text, ((self.x, self.y),))
 
 
 Mark = Line | Points | Level | Diagonal | Bars | Arrow | Label
@@ -161,7 +161,7 @@ class Axis:
     ticks: tuple[tuple[float, str], ...] = ()
 
     def __post_init__(self) -> None:
-        _check(self.label, (self.limits,))
+        check_numbers(self.label, (self.limits,))
         if not self.limits[0] < self.limits[1] or (self.log and self.limits[0] <= 0):
             raise ValueError(f"the limits of an axis must ascend, from above 0 if it is logarithmic, not {self.limits}")
 
@@ -248,17 +248,3 @@ def _has_data(mark: Mark) -> bool:
     if isinstance(mark, Line | Points):
         return any(each is not None for each in mark.y)
     return isinstance(mark, Level | Arrow) or (isinstance(mark, Bars) and bool(mark.intervals))
-
-
-def _check(name: str, parts: Sequence[Sequence[Number]], optional: Sequence[Sequence[object]] = ()) -> None:
-    """Refuse numbers that JSON does not have, and parts of different lengths; optional parts may be empty.
-
-    Raises:
-        ValueError: the message has the name and the value or the lengths.
-    """
-    lengths = {len(part) for part in (*parts, *filter(None, optional))}
-    if len(lengths) > 1:
-        raise ValueError(f"the parts of {name!r} have {sorted(lengths)} values; they must have equally many")
-    for value in (each for part in (*parts, *optional) for each in part if isinstance(each, int | float)):
-        if not isfinite(value):
-            raise ValueError(f"{name!r} has the value {value}; a missing value must be None")

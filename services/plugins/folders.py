@@ -1,10 +1,11 @@
-"""Plug-ins of one's own: files in folders that GAPLAB_PLUGINS names.
+"""External plug-ins: the files in the folders that GAPLAB_PLUGINS names.
 
-Every process that runs gaplab's code finds them when it imports it, those that Ray starts too, which have no main of
-ours to be told anything by. Only who starts a process can name a folder; no spec and no request can.
+Only the environment of a process can name a folder; no spec and no request can. Each process finds them for itself:
+services and supervisors when they start, the processes that Ray starts before their first task.
 """
 
 import os
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -13,55 +14,57 @@ from gaplab.services.core import external_plugins
 VARIABLE = "GAPLAB_PLUGINS"
 
 
-def look_where_the_environment_says() -> None:
-    """Let registries find what is in the folders of GAPLAB_PLUGINS, and in no others.
+@cache
+def find() -> None:
+    """Let registries find the plug-ins in the folders of GAPLAB_PLUGINS; later calls in this process do nothing.
 
-    The variable is made absolute, for processes that this one starts elsewhere.
+    The variable becomes absolute, for processes that this one starts in other folders.
     """
-    named = [each for each in os.environ.get(VARIABLE, "").split(os.pathsep) if each]
-    folders = tuple(Path(each).expanduser().absolute() for each in named)
+    named = [folder for folder in os.environ.get(VARIABLE, "").split(os.pathsep) if folder]
+    folders = tuple(Path(folder).expanduser().absolute() for folder in named)
     if folders:
         os.environ[VARIABLE] = os.pathsep.join(map(str, folders))
-    external_plugins.look_in(folders)
+    external_plugins.set_folders(folders)
 
 
 def load() -> None:
-    """Import every plug-in now, so that one that is broken is known when a process starts.
+    """Find and import every plug-in, so that a process with a broken one does not start.
 
     Raises:
-        PluginBroken: a file cannot be imported, or what it has is no plug-in.
+        PluginBroken: a file cannot be imported, or a class in it is not a valid plug-in.
     """
     from gaplab.services.plugins.catalogue import catalogue
 
+    find()
     catalogue()
 
 
 def digests() -> dict[str, str]:
-    """The modules of the folders and all that is in packages, each with twelve letters that change with its content.
+    """Return a short hash of the content of each module in the folders and of each file in their packages.
 
-    What else lies there, a database perhaps, is no part of a plug-in: data belongs into a package.
+    Other files, such as a database, are not part of a plug-in: its data belongs into a package.
     """
-    found: dict[str, str] = {}
+    hashes: dict[str, str] = {}
     for folder in external_plugins.folders():
         packages = sorted(path.parent for path in folder.glob("*/__init__.py"))
-        for path in sorted([*folder.glob("*.py"), *(each for package in packages for each in package.rglob("*"))]):
+        for path in sorted([*folder.glob("*.py"), *(file for package in packages for file in package.rglob("*"))]):
             parts = path.relative_to(folder).parts
-            if path.is_file() and not any(each.startswith(".") or each == "__pycache__" for each in parts):
-                found["/".join(parts)] = sha256(path.read_bytes()).hexdigest()[:12]
-    return found
+            if path.is_file() and not any(part.startswith(".") or part == "__pycache__" for part in parts):
+                hashes["/".join(parts)] = sha256(path.read_bytes()).hexdigest()[:12]
+    return hashes
 
 
 def digest_of(file: str) -> str:
-    """That of a plug-in's file; of a package, which has more than one, of all that is in its folder."""
-    found = digests()
+    """Return the digest of a plug-in's module; for a file in a package, that of the whole package."""
+    hashes = digests()
     package, slash, _ = file.partition("/")
     if not slash:
-        return found[file]
-    inside = sorted(each for each in found.items() if each[0].startswith(f"{package}/"))
+        return hashes[file]
+    inside = sorted(item for item in hashes.items() if item[0].startswith(f"{package}/"))
     return sha256(repr(inside).encode()).hexdigest()[:12]
 
 
 def digest() -> str:
-    """One for all of them; "none" if there are none."""
-    found = digests()
-    return sha256(repr(sorted(found.items())).encode()).hexdigest()[:12] if found else "none"
+    """Return one digest for all external plug-ins, or "none" if there are none."""
+    hashes = digests()
+    return sha256(repr(sorted(hashes.items())).encode()).hexdigest()[:12] if hashes else "none"

@@ -14,6 +14,7 @@ from typing import Any, TypeAlias, TypeVar
 from cachetools import LRUCache
 
 from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
+from gaplab.services.plugins import folders
 
 T = TypeVar("T")
 
@@ -156,6 +157,7 @@ def _serve(pipe: Connection) -> None:
     """Execute calls until the other end of the pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which closes the pipe
     os.nice(NICENESS)
+    folders.find()
     with suppress(EOFError, OSError):
         while True:
             function, arguments = pipe.recv()

@@ -1,26 +1,24 @@
 """From what a user wrote to what is run: every default filled in, every impossibility refused, all of them at once."""
 
-from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.resolved import ResolvedBudget, ResolvedReality, ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked, SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, SharedSettings, StudySpec
-from gaplab.services.core.errors import InvalidSpec, Violation, gather, unknown_name
+from gaplab.services.core.errors import InvalidSpec, Violation, gather
 from gaplab.services.core.optimizers import optimizers
-from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.registry import Registry
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.tunables import tunables
-from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.presets import PRESETS
+from gaplab.services.specs.violations import bounds_of, budget_violations, reality_violations, tunable_violations
 
 
 def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
@@ -42,9 +40,9 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     )
     budget = _budget(spec)
     violations = [
-        *_tunable_violations(spec, engine),
-        *_reality_violations(spec, reality_engine),
-        *_budget_violations(budget, strategy, optimizer),
+        *tunable_violations(spec, engine),
+        *reality_violations(spec, reality_engine),
+        *budget_violations(budget, strategy, optimizer),
     ]
     if violations:
         raise InvalidSpec(violations)
@@ -164,13 +162,8 @@ def _label(strategy: Strategy) -> str:
     return f"{strategy.name} ({', '.join(changed)})"[:200] if changed else strategy.name
 
 
-def _bounds(ref: TunableRef) -> tuple[float, float]:
-    tunable = tunables[ref.name]
-    return tunable.lower if ref.lower is None else ref.lower, tunable.upper if ref.upper is None else ref.upper
-
-
 def _with_bounds(ref: TunableRef) -> ResolvedTunable:
-    lower, upper = _bounds(ref)
+    lower, upper = bounds_of(ref)
     return ResolvedTunable(name=ref.name, lower=lower, upper=upper)
 
 
@@ -184,52 +177,6 @@ def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str
     return {**nominal, **spec.reality.parameters}
 
 
-def _tunable_violations(spec: ExperimentSpec, engine: type[Engine]) -> Iterator[Violation]:
-    counts = Counter(ref.name for ref in spec.tunables)
-    for index, ref in enumerate(spec.tunables):
-        pointer = f"/tunables/{index}"
-        if ref.name not in tunables:
-            yield unknown_name(pointer, "tunable", ref.name, list(tunables))
-            continue
-        yield from _honour_violations(ref.name, engine, pointer)
-        yield from _bound_violations(ref, pointer)
-        if counts[ref.name] > 1:
-            yield Violation(pointer, ref.name, f"{ref.name} is named {counts[ref.name]} times; once is permitted")
-
-
-def _bound_violations(ref: TunableRef, pointer: str) -> Iterator[Violation]:
-    (lower, upper), tunable = _bounds(ref), tunables[ref.name]
-    for side in ("lower", "upper"):
-        if (given := getattr(ref, side)) is not None:
-            yield from _range_violations(tunable, given, f"{pointer}/{side}")
-    if lower >= upper:
-        yield Violation(pointer, [lower, upper], f"lower must be below upper, not {lower:g} and {upper:g}")
-
-
-def _range_violations(tunable: type[Tunable], value: float, pointer: str) -> Iterator[Violation]:
-    if not tunable.least <= value <= tunable.greatest:
-        permitted = f"{tunable.least:g} to {tunable.greatest:g}"
-        yield Violation(pointer, value, f"{tunable.name} is {permitted}, not {value:g}", permitted)
-
-
-def _honour_violations(name: str, engine: type[Engine], pointer: str) -> Iterator[Violation]:
-    field = tunables[name].field
-    if field not in engine.honours:
-        able = [each.name for each in engines.values() if field in each.honours]
-        message = f"{engine.name} does not honour {name}; {' and '.join(able) or 'no engine'} does"
-        yield Violation(pointer, name, message, able)
-
-
-def _reality_violations(spec: ExperimentSpec, engine: type[Engine]) -> Iterator[Violation]:
-    for name, value in spec.reality.parameters.items():
-        pointer = f"/reality/parameters/{name}"
-        if name not in tunables:
-            yield unknown_name(pointer, "tunable", name, list(tunables))
-            continue
-        yield from _honour_violations(name, engine, pointer)
-        yield from _range_violations(tunables[name], value, pointer)
-
-
 def _budget(spec: ExperimentSpec) -> ResolvedBudget:
     """Return the budget with every number written out."""
     preset = PRESETS[spec.budget.preset]
@@ -240,17 +187,3 @@ def _budget(spec: ExperimentSpec) -> ResolvedBudget:
         simulator_evaluations=spec.budget.simulator_evaluations or preset.simulator_evaluations,
         reuse_transfer=spec.budget.reuse_transfer,
     )
-
-
-def _budget_violations(budget: ResolvedBudget, strategy: Strategy, optimizer: Optimizer) -> Iterator[Violation]:
-    least = optimizer.least_evaluations
-    tuning = optimizer.diverse(strategy.ensemble).least_evaluations if strategy.ensemble > 1 else least
-    needed = {"controller_evaluations": (budget.controller_evaluations, least)}
-    if strategy.searches and not strategy.in_reality:
-        needed["selection_evaluations"] = (budget.selection_evaluations, least)
-    if not strategy.in_reality:
-        needed["simulator_evaluations"] = (budget.simulator_evaluations, tuning)
-    for name, (given, minimum) in needed.items():
-        if given < minimum:
-            message = f"{given} evaluations do not fill the population of {minimum} that the search starts with"
-            yield Violation(f"/budget/{name}", given, message, f"at least {minimum}")

@@ -1,6 +1,7 @@
 """Recording a rollout changes nothing of it, in any engine, and what is recorded is where the bodies were."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,16 +18,16 @@ TIMES_S = np.arange(151) / 50
 
 
 @pytest.fixture(params=EMBODIED)
-def engine(request):
+def engine(request: pytest.FixtureRequest) -> Any:
     return engines[request.param]()
 
 
-def genomes(count=3):
+def genomes(count: Any = 3) -> Any:
     return Quadruped().space.draw(count, np.random.default_rng(5))
 
 
 @pytest.mark.parametrize("material", [{}, {"dynamic_friction": 0.3, "restitution": 0.4}])
-def test_fitness_is_bit_equal_with_and_without_recording(engine, material):
+def test_fitness_is_bit_equal_with_and_without_recording(engine: Any, material: Any) -> None:
     robot = Quadruped()
     world = replace(robot.world, material=replace(robot.world.material, **material))
     motions = [robot.motion(genome) for genome in genomes()]
@@ -39,7 +40,7 @@ def test_fitness_is_bit_equal_with_and_without_recording(engine, material):
     assert len(set(recorded)) == len(recorded)
 
 
-def test_a_recording_passes_through_what_the_rollout_observes(engine):
+def test_a_recording_passes_through_what_the_rollout_observes(engine: Any) -> None:
     robot = Quadruped()
     motion = robot.motion(robot.known)
 
@@ -52,7 +53,7 @@ def test_a_recording_passes_through_what_the_rollout_observes(engine):
     assert np.array_equal(seen.poses[at, 3:], seen.trajectory.orientations)
 
 
-def test_joints_follow_their_motors_and_feet_stay_out_of_the_ground(engine):
+def test_joints_follow_their_motors_and_feet_stay_out_of_the_ground(engine: Any) -> None:
     robot = Quadruped()
     motion = robot.motion(robot.known)
 
@@ -72,7 +73,7 @@ def test_joints_follow_their_motors_and_feet_stay_out_of_the_ground(engine):
     assert all(np.corrcoef(turning[:, each], wanted[:, each])[0, 1] > 0.5 for each in range(12))
 
 
-def test_a_recording_of_physics_that_blows_up_is_nan_and_harms_nothing_after_it(engine):
+def test_a_recording_of_physics_that_blows_up_is_nan_and_harms_nothing_after_it(engine: Any) -> None:
     robot = Quadruped()
     motion = robot.motion(robot.known)
     before = engine.rollout(robot.world, motion).positions_m
@@ -85,7 +86,7 @@ def test_a_recording_of_physics_that_blows_up_is_nan_and_harms_nothing_after_it(
     assert np.array_equal(engine.rollout(robot.world, motion).positions_m, before)
 
 
-def test_engines_agree_on_which_joint_is_which():
+def test_engines_agree_on_which_joint_is_which() -> None:
     robot = Quadruped()
     motion = robot.motion(genomes(1)[0])
     early = TIMES_S[:11]
@@ -98,7 +99,7 @@ def test_engines_agree_on_which_joint_is_which():
 
 
 @pytest.mark.parametrize("name", INSTALLED)
-def test_an_engine_that_tells_nothing_of_joints_still_shows_the_base(name):
+def test_an_engine_that_tells_nothing_of_joints_still_shows_the_base(name: Any) -> None:
     robot = Quadruped() if name in EMBODIED else robots["toy_function"]()
     motion = robot.motion(robot.known)
     times = motion.observe_s

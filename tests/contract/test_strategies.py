@@ -1,5 +1,7 @@
 """What every strategy promises, the day its file is there."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ PAPER = [
 ]
 
 
-def belief(strategy, samples=()):
+def belief(strategy: Any, samples: Any = ()) -> Any:
     rng = np.random.default_rng(5)
     simulators = tuple(Simulator(row, 0.1) for row in rng.random((strategy.ensemble, 2)))
     return Belief(SPACE, np.array([0.2, 0.9]), tuple(samples), simulators)
@@ -29,18 +31,18 @@ def belief(strategy, samples=()):
 class GridSearch:
     """A search that looks at every point of a grid."""
 
-    def __init__(self, believed):
+    def __init__(self, believed: Any) -> None:
         self.believed = believed
         self.calls = 0
 
-    def __call__(self, score):
+    def __call__(self, score: Any) -> Any:
         self.calls += 1
         axis = np.linspace(0, 1, 41)
         grid = np.array(np.meshgrid(axis, axis)).reshape(2, -1).T
         return grid[int(np.argmax(score(grid, paraboloid(grid, self.believed.parameters))))]
 
 
-def select(name, samples=(), seed=0, options=None):
+def select(name: Any, samples: Any = (), seed: Any = 0, options: Any = None) -> Any:
     strategy = strategies.create(PluginRef(name=name, options=options or {}))
     believed = belief(strategy, samples)
     return strategy.select(believed, GridSearch(believed), np.random.default_rng(seed))
@@ -48,21 +50,21 @@ def select(name, samples=(), seed=0, options=None):
 
 @pytest.mark.parametrize("name", sorted(strategies))
 class TestEveryStrategy:
-    def test_selects_a_genome_of_the_space(self, name):
+    def test_selects_a_genome_of_the_space(self, name: Any) -> None:
         genome = select(name)
 
         assert genome.shape == (2,)
         assert np.all((genome >= SPACE.lower) & (genome <= SPACE.upper))
 
-    def test_selects_the_same_from_the_same(self, name):
+    def test_selects_the_same_from_the_same(self, name: Any) -> None:
         np.testing.assert_array_equal(select(name), select(name))
 
-    def test_copes_with_samples_measured_and_failed(self, name):
+    def test_copes_with_samples_measured_and_failed(self, name: Any) -> None:
         samples = [Sample(np.array([0.5, 0.5]), 0.8), Sample(np.array([0.1, 0.5]), float("nan"))]
 
         assert np.isfinite(select(name, samples)).all()
 
-    def test_says_truly_whether_it_searches_and_does_so_once(self, name):
+    def test_says_truly_whether_it_searches_and_does_so_once(self, name: Any) -> None:
         strategy = strategies[name]()
         search = GridSearch(belief(strategy))
 
@@ -70,7 +72,7 @@ class TestEveryStrategy:
 
         assert search.calls == int(strategy.searches)
 
-    def test_describes_itself_for_the_catalogue(self, name):
+    def test_describes_itself_for_the_catalogue(self, name: Any) -> None:
         described = strategies[name].describe()
 
         assert described.name == name
@@ -78,18 +80,18 @@ class TestEveryStrategy:
         assert "Paper" in described.source
 
 
-def test_the_papers_six_strategies_and_the_baseline_are_there():
+def test_the_papers_six_strategies_and_the_baseline_are_there() -> None:
     assert {*PAPER, "direct"} <= set(strategies)
     assert [name for name in strategies if strategies[name].in_reality] == ["direct"]
 
 
-def test_simulated_fit_selects_the_summit_of_its_simulator():
+def test_simulated_fit_selects_the_summit_of_its_simulator() -> None:
     simulator = belief(strategies["simulated_fit"]()).parameters[0]
 
     np.testing.assert_allclose(select("simulated_fit"), simulator, atol=0.02)
 
 
-def test_uniqueness_moves_the_selection_away_from_a_sample_on_the_summit():
+def test_uniqueness_moves_the_selection_away_from_a_sample_on_the_summit() -> None:
     summit = select("simulated_fit")
     sample = Sample(summit, 1.0)
 
@@ -99,7 +101,7 @@ def test_uniqueness_moves_the_selection_away_from_a_sample_on_the_summit():
     assert uniqueness_penalty(moved[None], np.array([1.0]), [sample])[0] < 0.5
 
 
-def test_informative_selects_where_the_simulators_disagree_most():
+def test_informative_selects_where_the_simulators_disagree_most() -> None:
     genome = select("informative", options={"simulators": 3})
 
     parameters = belief(strategies.create(PluginRef(name="informative", options={"simulators": 3}))).parameters
@@ -107,7 +109,7 @@ def test_informative_selects_where_the_simulators_disagree_most():
     assert paraboloid(genome[None], parameters).std() >= everywhere.max()
 
 
-def test_the_weights_of_the_mixture_lead_from_fit_to_informative():
+def test_the_weights_of_the_mixture_lead_from_fit_to_informative() -> None:
     name = "simulated_fit_and_informative"
     only_fit = select(name, options={"simulators": 3, "informative_weight": 0.0})
     only_informative = select(name, options={"simulators": 3, "fit_weight": 0.0})
@@ -117,13 +119,13 @@ def test_the_weights_of_the_mixture_lead_from_fit_to_informative():
     np.testing.assert_allclose(only_fit, parameters.mean(axis=0), atol=0.02)
 
 
-def test_random_selections_are_uniform():
+def test_random_selections_are_uniform() -> None:
     drawn = np.array([select("random", seed=seed) for seed in range(400)])
 
     np.testing.assert_allclose(drawn.mean(axis=0), [0.5, 0.5], atol=0.05)
 
 
-def test_known_fit_adds_up_to_a_quarter_to_each_gene_wraps_phases_and_clips_widths():
+def test_known_fit_adds_up_to_a_quarter_to_each_gene_wraps_phases_and_clips_widths() -> None:
     drawn = np.array([select("known_fit", seed=seed) for seed in range(200)])
 
     added = np.mod(drawn[:, 0] - 0.2, 1.0)
@@ -133,7 +135,7 @@ def test_known_fit_adds_up_to_a_quarter_to_each_gene_wraps_phases_and_clips_widt
     assert drawn[:, 1].max() == 1.0
 
 
-def test_truth_is_not_among_what_a_strategy_is_given():
+def test_truth_is_not_among_what_a_strategy_is_given() -> None:
     believed = belief(strategies["informative"]())
 
     assert set(vars(believed)) == {"space", "known", "samples", "simulators"}

@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+from typing import Any
 
 import httpx2
 
@@ -19,7 +20,7 @@ class Api:
         http: a client of it.
     """
 
-    def __init__(self, database_url, log):
+    def __init__(self, database_url: str, log: Any) -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self._port = probe.getsockname()[1]
@@ -27,31 +28,31 @@ class Api:
         self.http = httpx2.Client(base_url=self.url, timeout=60)
         self._log = log
         self._environment = os.environ | {"GAPLAB_DATABASE_URL": database_url, "GAPLAB_PORT": str(self._port)}
-        self._process = None
+        self._process: Any = None
 
-    def start(self):
+    def start(self) -> Any:
         with self._log.open("ab") as log:
             command = [sys.executable, "-m", "gaplab.api"]
             self._process = subprocess.Popen(command, env=self._environment, stdout=log, stderr=log)
         wait_until(self._answers, 120, lambda: self._log.read_text())
         return self
 
-    def kill(self):
+    def kill(self) -> None:
         self._process.send_signal(signal.SIGKILL)
         self._process.wait()
 
-    def close(self):
+    def close(self) -> None:
         self.http.close()
         if self._process and self._process.poll() is None:
             self._process.send_signal(signal.SIGTERM)
             self._process.wait(40)
 
-    def get(self, path, **query):
+    def get(self, path: Any, **query: Any) -> Any:
         answer = self.http.get(path, params=query)
         assert answer.status_code == 200, answer.text
         return answer.json()
 
-    def _answers(self):
+    def _answers(self) -> bool:
         try:
             return self.http.get("/livez").status_code == 200
         except httpx2.TransportError:

@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 from pathlib import Path
+from typing import Any
 
 import axe_playwright_python
 from playwright.sync_api import sync_playwright
@@ -33,7 +34,7 @@ AXE = Path(axe_playwright_python.__file__).with_name("axe.min.js")
 SERIOUS = {"serious", "critical"}
 
 
-def chromium():
+def chromium() -> Any:
     """The path of the machine's Chromium; None: Playwright's own, which `make test` installs where there is none."""
     return os.environ.get(VARIABLE) or next(filter(None, map(shutil.which, NAMES)), None)
 
@@ -41,32 +42,32 @@ def chromium():
 class Chromium:
     """One browser; each `visit` has a context of its own, and what goes wrong in it is kept until `end`."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._playwright = sync_playwright().start()
         try:
             self._browser = self._playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
         except BaseException:
             self._playwright.stop()
             raise
-        self._contexts = []
-        self._troubles = []
-        self._forgiven = []
+        self._contexts: list[Any] = []
+        self._troubles: list[str] = []
+        self._forgiven: list[str] = []
 
-    def visit(self, url, *, beside=None, **how):
+    def visit(self, url: Any, *, beside: Any = None, **how: Any) -> Any:
         """A page at the address: in another tab of the window of the page `beside`, or in a window of its own."""
         page = (beside.context if beside else self._window(**how)).new_page()
-        page.on("console", lambda said: said.type == "error" and self._note(f"console: {said.text}"))
+        page.on("console", lambda said: said.type == "error" and self._note(f"console: {said.text}"))  # type: ignore[func-returns-value]
         page.on("pageerror", lambda error: self._note(f"error: {error}"))
         page.on("requestfailed", self._failed)
-        page.on("response", lambda answer: answer.status >= 400 and self._note(f"{answer.status} {answer.url}"))
+        page.on("response", lambda answer: answer.status >= 400 and self._note(f"{answer.status} {answer.url}"))  # type: ignore[func-returns-value]
         page.goto(url)
         return page
 
-    def forgive(self, *patterns):
+    def forgive(self, *patterns: Any) -> None:
         """What a test causes on purpose: troubles that match one of these do not fail it."""
         self._forgiven += patterns
 
-    def end(self):
+    def end(self) -> None:
         """Close what the test opened; fail it if anything went wrong there."""
         for context in self._contexts:
             context.close()
@@ -74,11 +75,11 @@ class Chromium:
         self._contexts, self._troubles, self._forgiven = [], [], []
         assert not troubles, "\n".join(troubles)
 
-    def close(self):
+    def close(self) -> None:
         self._browser.close()
         self._playwright.stop()
 
-    def _window(self, *, dark=False, width=1280, height=900):
+    def _window(self, *, dark: Any = False, width: Any = 1280, height: Any = 900) -> Any:
         """In light or dark, as wide as a screen or a phone."""
         context = self._browser.new_context(
             color_scheme="dark" if dark else "light",
@@ -90,15 +91,15 @@ class Chromium:
         self._contexts.append(context)
         return context
 
-    def _failed(self, request):
+    def _failed(self, request: Any) -> None:
         if request.failure != "net::ERR_ABORTED":  # a view that is left stops what it asked for
             self._note(f"{request.failure} {request.url}")
 
-    def _note(self, trouble):
+    def _note(self, trouble: Any) -> None:
         self._troubles.append(trouble)
 
 
-def axe(page):
+def axe(page: Any) -> None:
     """Assert that axe finds nothing serious or critical in what the page shows."""
     page.evaluate(AXE.read_text(encoding="utf-8"))
     found = page.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
@@ -111,14 +112,14 @@ def axe(page):
     assert not serious, "\n".join(serious)
 
 
-def screenshot(page, name):
+def screenshot(page: Any, name: Any) -> None:
     """Keep what the page looks like, if a folder for that is named."""
     if folder := os.environ.get(SCREENSHOTS):
         Path(folder).mkdir(parents=True, exist_ok=True)
         page.screenshot(path=Path(folder) / f"{name}.png", full_page=True)
 
 
-def fits(page):
+def fits(page: Any) -> None:
     """Assert that nothing is wider than the window, once figures have followed it: no phone scrolls sideways."""
     for _ in range(100):
         wide = page.evaluate("() => document.documentElement.scrollWidth - document.documentElement.clientWidth")

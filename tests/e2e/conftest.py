@@ -8,7 +8,9 @@ service with workers.
 """
 
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -26,7 +28,7 @@ STUDY = Path(__file__).parents[2] / "docs" / "studies" / "mujoco-in-mujoco.zip"
 
 
 @pytest.fixture(scope="module")
-def browser():
+def browser() -> Iterator[Any]:
     """Of a module, not of all tests: Playwright keeps an event loop running, which others could not run beside."""
     browser = Chromium()
     yield browser
@@ -34,25 +36,25 @@ def browser():
 
 
 @pytest.fixture
-def visit(browser):
+def visit(browser: Any) -> Iterator[Any]:
     """Opens the page at an address."""
 
-    def open_page(address, **how):
+    def open_page(address: Any, **how: Any) -> Any:
         return browser.visit(address, **how)
 
-    open_page.forgive = browser.forgive
+    open_page.forgive = browser.forgive  # type: ignore[attr-defined]
     yield open_page
     browser.end()
 
 
 @pytest.fixture(scope="session")
-def written_file(folder, sqlite_template):
+def written_file(folder: Path, sqlite_template: Path) -> Any:
     """The database of `api`."""
     return Path(shutil.copy(sqlite_template, folder / "written.db"))
 
 
 @pytest.fixture(scope="session")
-def api(written_file, folder):
+def api(written_file: Any, folder: Path) -> Iterator[Any]:
     """The API alone, on a database that tests fill as workers would."""
     api = Api(f"sqlite:///{written_file}", folder / "written.log").start()
     yield api
@@ -60,7 +62,7 @@ def api(written_file, folder):
 
 
 @pytest.fixture
-def written(written_file):
+def written(written_file: Any) -> Iterator[Any]:
     """The database of `api`, in which nothing is queued when a test begins."""
     store = Store(f"sqlite:///{written_file}")
     yield store
@@ -71,7 +73,7 @@ def written(written_file):
 
 
 @pytest.fixture(scope="session")
-def archive(folder, sqlite_template):
+def archive(folder: Path, sqlite_template: Path) -> Iterator[Any]:
     """The API on a database with seventy made-up experiments and the study that is published with this repository."""
     file = folder / "archive.db"
     shutil.copy(sqlite_template, file)
@@ -86,7 +88,7 @@ def archive(folder, sqlite_template):
 
 
 @pytest.fixture(scope="session")
-def shared_service(folder):
+def shared_service(folder: Path) -> Iterator[Any]:
     """The real service, with workers, for all tests of the page."""
     place = folder / "service"
     place.mkdir()

@@ -5,7 +5,10 @@ import shlex
 import signal
 import socket
 import subprocess
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import Any
 
 import psycopg
 
@@ -20,7 +23,7 @@ SERVERS = {"gaplab serve", "python -m workers serve", "python -m api"}
 """Lines that do not end by themselves."""
 
 
-def free_port():
+def free_port() -> Any:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
@@ -34,7 +37,7 @@ class Postgres:
         environment: by which Postgres' own commands are its administrator's, on its socket.
     """
 
-    def __init__(self, folder):
+    def __init__(self, folder: Path) -> None:
         installation = Installation(folder)
         data, port = folder / "readers", free_port()
         installation.initialise(data)
@@ -43,24 +46,24 @@ class Postgres:
         self.environment = {"PGHOST": str(data), "PGPORT": str(port), "PGUSER": "postgres"}
         self._server = Server(installation, data, listen_addresses="127.0.0.1", port=port, fsync="off")
 
-    def forget(self):
+    def forget(self) -> None:
         """Remove what readers have made."""
         with self._connected() as connection:
             connection.execute("DROP DATABASE IF EXISTS gaplab WITH (FORCE)")
             connection.execute("DROP ROLE IF EXISTS gaplab")
 
-    def stored(self):
+    def stored(self) -> Any:
         """How many experiments are in the database that readers have made."""
         with self._connected("gaplab") as connection:
             return connection.execute("SELECT count(*) FROM experiment").fetchone()[0]
 
-    def close(self):
+    def close(self) -> None:
         self._server.stop()
 
-    def _connected(self, database="postgres"):
+    def _connected(self, database: Any = "postgres") -> Any:
         names = {"host": "PGHOST", "port": "PGPORT", "user": "PGUSER"}
         given = {key: self.environment[name] for key, name in names.items()}
-        return psycopg.connect(dbname=database, autocommit=True, **given)
+        return psycopg.connect(dbname=database, autocommit=True, **given)  # type: ignore[arg-type]
 
 
 class Shell:
@@ -71,7 +74,7 @@ class Shell:
         log: what all that it started said.
     """
 
-    def __init__(self, folder, **environment):
+    def __init__(self, folder: Path, **environment: Any) -> None:
         self.home, self.log = folder / "home", folder / "log"
         self.home.mkdir(parents=True)
         inherited = {name: value for name, value in os.environ.items() if not name.startswith(("RAY_", "GAPLAB_"))}
@@ -82,7 +85,7 @@ class Shell:
         self._environment = inherited | own | environment
 
     @contextmanager
-    def following(self, lines):
+    def following(self, lines: Any) -> Iterator[Any]:
         """What a document has its reader do, in its order; a client while that serves, which is then told to end."""
         with ExitStack() as serving:
             for line in lines:
@@ -94,7 +97,7 @@ class Shell:
             wait_until(client.ready, 120, self.said)
             yield client
 
-    def run(self, line):
+    def run(self, line: Any) -> None:
         """To its end, which must be a good one; who is asked for a password types it, twice."""
         word, *values = shlex.split(line)
         if word == "export":
@@ -115,14 +118,14 @@ class Shell:
             )
         assert done.returncode == 0, f"{line}\n{self.said()}"
 
-    def said(self):
+    def said(self) -> Any:
         return self.log.read_text(errors="replace")[-6000:]
 
-    def processes(self):
+    def processes(self) -> Any:
         """All that it started and that lives."""
         return processes_with(self._mark)
 
-    def close(self):
+    def close(self) -> None:
         """End what is left outright, as nodes of a Ray that are asked wait for each other."""
         for pid in self.processes():
             with suppress(ProcessLookupError):
@@ -130,7 +133,7 @@ class Shell:
         wait_until(lambda: not self.processes(), 30, self.processes)
 
     @contextmanager
-    def _serving(self, line):
+    def _serving(self, line: Any) -> Iterator[None]:
         with self.log.open("ab") as log:
             call = ["bash", "-c", f"exec {line}"]
             process = subprocess.Popen(call, cwd=self.home, env=self._environment, stdout=log, stderr=log)

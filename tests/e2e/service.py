@@ -6,6 +6,8 @@ import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
+from typing import Any
 
 import httpx2
 
@@ -20,7 +22,7 @@ class Service:
         http: a client of it.
     """
 
-    def __init__(self, folder, database_url=None, plugins=""):
+    def __init__(self, folder: Path, database_url: str | None = None, plugins: Any = "") -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
@@ -34,21 +36,21 @@ class Service:
             "GAPLAB_LEASE_S": "5",
             "GAPLAB_PLUGINS": str(plugins),
         }
-        self._process = None
+        self._process: Any = None
 
-    def start(self):
+    def start(self) -> Any:
         with self._log.open("ab") as log:
             command = [sys.executable, "-m", "gaplab", "serve"]
             self._process = subprocess.Popen(command, env=self._environment, stdout=log, stderr=log)
         wait_until(self._answers, 60, self.log)
         return self
 
-    def stop(self, how=signal.SIGINT):
+    def stop(self, how: Any = signal.SIGINT) -> None:
         """In order, as Ctrl-C does."""
         self._process.send_signal(how)
         assert self._process.wait(40) == 0, self.log()
 
-    def kill(self):
+    def kill(self) -> None:
         """Everything at once, with no time to say goodbye: the API, the supervisor, Ray and its workers."""
         for pid in [*self.processes(), self._process.pid]:
             try:
@@ -57,49 +59,49 @@ class Service:
                 continue
         self._process.wait()
 
-    def kill_repetitions(self):
+    def kill_repetitions(self) -> None:
         """The processes of Ray that compute repetitions, and nothing else."""
         ours = set(self.processes())
         for pid, command in processes():
             if pid in ours and command.startswith(b"ray::run"):
                 os.kill(pid, signal.SIGKILL)
 
-    def processes(self):
+    def processes(self) -> Any:
         """Everything that runs with this service's port in its environment."""
         return processes_with(f"GAPLAB_PORT={self._environment['GAPLAB_PORT']}")
 
-    def log(self):
+    def log(self) -> Any:
         return self._log.read_text()
 
-    def close(self):
+    def close(self) -> None:
         self.http.close()
         if self._process and self._process.poll() is None:
             self.stop()
 
-    def get(self, path, **query):
+    def get(self, path: Any, **query: Any) -> Any:
         answer = self.http.get(path, params=query)
         assert answer.status_code == 200, answer.text
         return answer.json()
 
-    def post(self, path, body):
+    def post(self, path: Any, body: Any) -> Any:
         answer = self.http.post(path, json=body)
         assert answer.status_code == 202, answer.text
         assert self.get(answer.headers["location"])["id"] == answer.json()["id"]
         return answer.json()
 
-    def finish(self, path, within_s):
+    def finish(self, path: Any, within_s: Any) -> Any:
         """The resource at the path, once it has ended."""
         wait_until(lambda: self.get(path)["state"] not in {"QUEUED", "RUNNING"}, within_s, lambda: self.get(path))
         return self.get(path)
 
-    def _answers(self):
+    def _answers(self) -> bool:
         try:
             return self.http.get("/readyz").status_code == 200
         except httpx2.TransportError:
             return False
 
 
-def wait_until(condition, within_s, otherwise=lambda: "it took too long"):
+def wait_until(condition: Any, within_s: Any, otherwise: Any = lambda: "it took too long") -> None:
     deadline = time.monotonic() + within_s
     while not condition():
         assert time.monotonic() < deadline, otherwise()

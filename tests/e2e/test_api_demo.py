@@ -52,7 +52,7 @@ def left_running(folder: Path) -> list[str]:
     return found
 
 
-def test_a_demo_killed_outright_leaves_nothing_running_and_goes_on_when_run_again(tmp_path: Path, specs: Path):
+def test_a_demo_killed_outright_leaves_nothing_running_and_goes_on_when_run_again(tmp_path: Path, specs: Path) -> None:
     folder = tmp_path / "my [bold] demo :house:"
     first = demo(folder, specs)
     deadline = time.monotonic() + 60

@@ -1,5 +1,7 @@
 """The page on a real service: a study from the form to its end, called off, and in sight while the service dies."""
 
+from typing import Any
+
 from tests.e2e.browser import axe, screenshot
 from tests.e2e.service import wait_until
 
@@ -17,7 +19,7 @@ SLOW = {
 }
 
 
-def test_a_study_is_submitted_by_the_form_and_finishes_while_one_watches(visit, shared_service):
+def test_a_study_is_submitted_by_the_form_and_finishes_while_one_watches(visit: Any, shared_service: Any) -> None:
     page = visit(f"{shared_service.url}/#/new")
     page.get_by_role("button", name="Toy function, quickly").click()
     page.get_by_label("Name", exact=True).fill("by the form")
@@ -41,7 +43,7 @@ def test_a_study_is_submitted_by_the_form_and_finishes_while_one_watches(visit, 
     assert [each["spec"]["iterations"] for each in study["experiments"]] == [4] * 6 + [3]
 
 
-def test_a_running_study_is_cancelled_after_a_question(visit, shared_service):
+def test_a_running_study_is_cancelled_after_a_question(visit: Any, shared_service: Any) -> None:
     study = shared_service.post("/studies", SLOW | {"name": "to be cancelled"})["id"]
     page = visit(f"{shared_service.url}/#/studies/{study}")
     page.locator(".state-now .running").wait_for(timeout=LONG_MS)
@@ -59,7 +61,9 @@ def test_a_running_study_is_cancelled_after_a_question(visit, shared_service):
     page.get_by_text("None of its experiments can be paused now").wait_for()
 
 
-def test_killed_and_started_again_the_service_is_followed_by_pages_that_stayed_open(visit, shared_service):
+def test_killed_and_started_again_the_service_is_followed_by_pages_that_stayed_open(
+    visit: Any, shared_service: Any
+) -> None:
     visit.forgive(*AWAY)
     study = shared_service.post("/studies", SLOW | {"name": "outlives its service"})["id"]
     one, all_of_them = visit(f"{shared_service.url}/#/studies/{study}"), visit(shared_service.url)
@@ -82,7 +86,7 @@ def test_killed_and_started_again_the_service_is_followed_by_pages_that_stayed_o
     one.locator(".plot .scatterlayer .trace").first.wait_for(state="attached")
 
 
-def test_a_page_that_is_opened_before_its_service_answers_comes_by_itself(visit, shared_service):
+def test_a_page_that_is_opened_before_its_service_answers_comes_by_itself(visit: Any, shared_service: Any) -> None:
     visit.forgive(*AWAY)
     page = visit(shared_service.url)
     page.get_by_role("heading", name="Studies and experiments").wait_for()

@@ -2,12 +2,14 @@
 
 import re
 from itertools import islice
+from typing import Any
 
 import pytest
 from playwright.sync_api import expect
 
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import some_log, toy
 
@@ -17,31 +19,31 @@ STUDY = "MuJoCo in MuJoCo"
 
 
 @pytest.fixture
-def study(archive):
+def study(archive: Any) -> Any:
     """The published study, with seven experiments."""
     return archive.get("/studies", text=STUDY)["items"][0]
 
 
 @pytest.fixture
-def ids(study):
+def ids(study: Any) -> Any:
     return [each["id"] for each in study["experiments"]]
 
 
-def address(api, *experiments, **query):
+def address(api: Any, *experiments: Any, **query: Any) -> str:
     tail = "".join(f"&{name}={value}" for name, value in query.items())
     return f"{api.url}/#/compare?experiments={','.join(experiments)}{tail}"
 
 
-def fragment(page):
+def fragment(page: Any) -> Any:
     return page.evaluate("() => location.hash")
 
 
-def lines(page):
+def lines(page: Any) -> Any:
     """The curves that are drawn: those with points."""
     return page.locator(".large .scatterlayer .trace:has(.point)")
 
 
-def test_a_study_is_found_as_one_types_and_added_by_keyboard(archive, study, ids, visit):
+def test_a_study_is_found_as_one_types_and_added_by_keyboard(archive: Any, study: Any, ids: Any, visit: Any) -> None:
     page = visit(f"{archive.url}/#/compare")
     expect(page.get_by_text("Choose experiments above")).to_be_visible()
     field = page.get_by_role("combobox", name="Add experiments")
@@ -68,7 +70,7 @@ def test_a_study_is_found_as_one_types_and_added_by_keyboard(archive, study, ids
     axe(page)
 
 
-def test_the_address_holds_everything(archive, ids, visit):
+def test_the_address_holds_everything(archive: Any, ids: Any, visit: Any) -> None:
     page = visit(address(archive, *ids[:3]))
     expect(lines(page)).to_have_count(3)
     page.get_by_role("radio", name="Time").check()
@@ -97,7 +99,7 @@ def test_the_address_holds_everything(archive, ids, visit):
     assert fragment(other) == wanted
 
 
-def test_what_differs_is_what_the_service_found(archive, ids, visit):
+def test_what_differs_is_what_the_service_found(archive: Any, ids: Any, visit: Any) -> None:
     page = visit(address(archive, *ids, to="1"))
     matrix = page.locator("table.matrix")
     expect(page.get_by_text("The row against the column")).to_contain_text("after 1 real-world evaluation")
@@ -123,7 +125,7 @@ def test_what_differs_is_what_the_service_found(archive, ids, visit):
     expect(page.get_by_role("button", name="3–5", exact=True)).to_have_attribute("aria-pressed", "true")
 
 
-def test_what_should_not_be_compared_is_warned_of(archive, ids, visit):
+def test_what_should_not_be_compared_is_warned_of(archive: Any, ids: Any, visit: Any) -> None:
     toys = archive.get("/experiments", text="experiment", limit=10)["items"]
     other = next(each for each in toys if each["spec"]["robot"]["name"] == "toy_function")
     page = visit(address(archive, ids[0], other["id"]))
@@ -134,7 +136,7 @@ def test_what_should_not_be_compared_is_warned_of(archive, ids, visit):
     expect(warned).to_have_count(0)
 
 
-def test_a_reality_that_is_hidden_is_not_taken_for_the_same(api, written, visit):
+def test_a_reality_that_is_hidden_is_not_taken_for_the_same(api: Any, written: Store, visit: Any) -> None:
     first, second = (submission.submit_experiment(written, toy(name=name)).id for name in ("one", "two"))
     page = visit(address(api, first, second, "nowhere"))
     expect(page.locator(".remark.warned")).to_contain_text("hidden until their experiments have ended")
@@ -142,7 +144,7 @@ def test_a_reality_that_is_hidden_is_not_taken_for_the_same(api, written, visit)
     visit.forgive("404")
 
 
-def test_of_many_experiments_the_figure_is_drawn_and_no_pair_is_tested(archive, visit):
+def test_of_many_experiments_the_figure_is_drawn_and_no_pair_is_tested(archive: Any, visit: Any) -> None:
     many = [each["id"] for each in archive.get("/experiments", limit=60)["items"]]
     page = visit(address(archive, *many))
     expect(page.locator(".chosen li")).to_have_count(60)
@@ -153,7 +155,7 @@ def test_of_many_experiments_the_figure_is_drawn_and_no_pair_is_tested(archive, 
     expect(page.locator(".results")).to_be_hidden()
 
 
-def test_it_grows_as_an_experiment_goes_on(api, written, visit):
+def test_it_grows_as_an_experiment_goes_on(api: Any, written: Store, visit: Any) -> None:
     submitted = submission.submit_experiment(written, toy(name="growing", repetitions=2))
     claims = execution.claim(written, "tests", 2)
     logs = [some_log(2, recorded) for recorded in (1.0, 1.5)]
@@ -168,7 +170,7 @@ def test_it_grows_as_an_experiment_goes_on(api, written, visit):
     expect(page.locator(".chosen .pill.completed")).to_be_visible()
 
 
-def test_its_figure_is_saved_in_every_format(archive, ids, visit):
+def test_its_figure_is_saved_in_every_format(archive: Any, ids: Any, visit: Any) -> None:
     page = visit(address(archive, *ids, band="sd", x="rollouts"))
     for words, begins in (("SVG", b"<?xml"), ("PNG", b"\x89PNG"), ("PDF", b"%PDF"), ("CSV", b"experiment,")):
         with page.expect_download(timeout=SLOW_MS) as saved:
@@ -177,7 +179,7 @@ def test_its_figure_is_saved_in_every_format(archive, ids, visit):
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_it_is_accessible_and_fits_a_phone(archive, ids, visit, dark):
+def test_it_is_accessible_and_fits_a_phone(archive: Any, ids: Any, visit: Any, dark: Any) -> None:
     for width in (1280, 375):
         page = visit(address(archive, *ids), dark=dark, width=width)
         expect(lines(page)).to_have_count(6)

@@ -2,6 +2,7 @@
 
 import json
 from itertools import islice
+from typing import Any
 
 import httpx2
 import pytest
@@ -9,6 +10,7 @@ from playwright.sync_api import expect
 
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import some_log, toy
 
@@ -18,28 +20,28 @@ NAME = "simulated_fit"
 
 
 @pytest.fixture
-def ended(archive):
+def ended(archive: Any) -> Any:
     """The address of an experiment that has everything."""
     found = archive.get("/experiments", text=NAME, strategy=NAME, limit=500)["items"]
     return next(each for each in found if each["spec"]["robot"]["name"] == "quadruped")
 
 
-def address(api, experiment, **query):
+def address(api: Any, experiment: Any, **query: Any) -> str:
     tail = "&".join(f"{name}={value}" for name, value in query.items())
     return f"{api.url}/#/experiments/{experiment}{'?' if tail else ''}{tail}"
 
 
-def steps(store, claim, log):
+def steps(store: Store, claim: Any, log: Any) -> None:
     for step in log:
         assert execution.record(store, claim, step)
 
 
-def markers(page):
+def markers(page: Any) -> Any:
     """The points of the curve that are drawn."""
     return page.locator(".figure-curves .scatterlayer .point").count()
 
 
-def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api, written, visit):
+def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api: Any, written: Store, visit: Any) -> None:
     submitted = submission.submit_experiment(written, toy(name="growing", repetitions=2, iterations=3))
     claims = execution.claim(written, "tests", 2)
     logs = [some_log(3, recorded) for recorded in (1.0, 1.5)]
@@ -72,7 +74,9 @@ def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api, written, 
     assert page.evaluate("() => window.untouched")
 
 
-def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(api, written, visit):
+def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(
+    api: Any, written: Store, visit: Any
+) -> None:
     submitted = submission.submit_experiment(written, toy(repetitions=2))
     for claim in execution.claim(written, "tests", 2):
         steps(written, claim, some_log())
@@ -91,7 +95,7 @@ def test_repetitions_stand_behind_the_mean_and_reality_is_hidden_until_the_end(a
     expect(simulators).to_contain_text("Reality is shown once")
 
 
-def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api, written, visit):
+def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api: Any, written: Store, visit: Any) -> None:
     submitted = submission.submit_experiment(written, toy(repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)
     log = some_log()
@@ -110,7 +114,7 @@ def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api, written,
     expect(page.locator("#connection")).to_be_empty()
 
 
-def test_what_failed_is_said_with_its_reason_and_attempts(api, written, visit):
+def test_what_failed_is_said_with_its_reason_and_attempts(api: Any, written: Store, visit: Any) -> None:
     submitted = submission.submit_experiment(written, toy(repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)
     assert execution.fail(written, claim, "a foot fell off")
@@ -123,7 +127,7 @@ def test_what_failed_is_said_with_its_reason_and_attempts(api, written, visit):
     expect(attempts).to_contain_text("a foot fell off")
 
 
-def test_there_is_nothing_yet_or_no_such_experiment(api, written, visit):
+def test_there_is_nothing_yet_or_no_such_experiment(api: Any, written: Store, visit: Any) -> None:
     submitted = submission.submit_experiment(written, toy())
     page = visit(address(api, submitted.id, tab="samples"))
     expect(page.locator(".figure-curves")).to_contain_text("Nothing to draw yet.")
@@ -135,7 +139,7 @@ def test_there_is_nothing_yet_or_no_such_experiment(api, written, visit):
     expect(page.get_by_role("alert")).to_contain_text("nowhere")
 
 
-def test_details_are_reached_by_keyboard_and_are_in_the_address(archive, ended, visit):
+def test_details_are_reached_by_keyboard_and_are_in_the_address(archive: Any, ended: Any, visit: Any) -> None:
     page = visit(address(archive, ended["id"], tab="samples"))
     panel = page.get_by_role("tabpanel")
     expect(panel.locator("tbody tr")).to_have_count(25)
@@ -159,7 +163,7 @@ def test_details_are_reached_by_keyboard_and_are_in_the_address(archive, ended, 
     assert json.loads(page.evaluate("() => navigator.clipboard.readText()")) == ended["spec"]
 
 
-def test_its_files_are_saved(archive, ended, visit):
+def test_its_files_are_saved(archive: Any, ended: Any, visit: Any) -> None:
     page = visit(address(archive, ended["id"]))
     with page.expect_download() as archived:
         page.get_by_role("link", name="Archive of everything").click()
@@ -174,7 +178,7 @@ def test_its_files_are_saved(archive, ended, visit):
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_it_is_accessible_and_fits_a_phone(archive, ended, visit, dark):
+def test_it_is_accessible_and_fits_a_phone(archive: Any, ended: Any, visit: Any, dark: Any) -> None:
     shade = "dark" if dark else "light"
     for width in (1280, 375):
         page = visit(address(archive, ended["id"]), dark=dark, width=width)

@@ -1,12 +1,15 @@
 """The page without workers: lists, filters, a study, the form and its errors; for eyes, ears, keyboards and phones."""
 
 import json
+from pathlib import Path
+from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
 
 from gaplab.schemas.access import Role
 from gaplab.services.access import create_token
+from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import axe, fits, screenshot
 
@@ -16,12 +19,12 @@ REFUSED = ("422",)
 
 
 @pytest.fixture(scope="session")
-def published(archive):
+def published(archive: Any) -> Any:
     """The study that is published with this repository."""
     return archive.get("/studies", text=PUBLISHED)["items"][0]
 
 
-def address(archive, view, published):
+def address(archive: Any, view: Any, published: Any) -> str:
     return f"{archive.url}/{view.format(published['id'])}"
 
 
@@ -36,12 +39,14 @@ def address(archive, view, published):
         ("#/studies/no-such-study", ".failed h1"),
     ],
 )
-def test_every_view_can_be_used_in_light_in_dark_and_on_a_phone(visit, archive, published, view, ready):
+def test_every_view_can_be_used_in_light_in_dark_and_on_a_phone(
+    visit: Any, archive: Any, published: Any, view: Any, ready: Any
+) -> None:
     if "no-such" in view:
         visit.forgive("404")
     name = view.strip("#/").split("/")[0].split("?")[0] or "list"
     for mode, how in {"light": {}, "dark": {"dark": True}, "phone": {"width": 375, "height": 760}}.items():
-        page = visit(address(archive, view, published), **how)
+        page = visit(address(archive, view, published), **how)  # type: ignore[arg-type]
         page.locator(ready).first.wait_for()
 
         axe(page)
@@ -49,7 +54,7 @@ def test_every_view_can_be_used_in_light_in_dark_and_on_a_phone(visit, archive, 
         screenshot(page, f"{name}-{mode}")
 
 
-def test_studies_are_found_opened_ticked_and_compared(visit, archive, published):
+def test_studies_are_found_opened_ticked_and_compared(visit: Any, archive: Any, published: Any) -> None:
     page = visit(archive.url)
     page.locator("tr.study").nth(10).wait_for()
 
@@ -72,7 +77,7 @@ def test_studies_are_found_opened_ticked_and_compared(visit, archive, published)
     assert page.locator("tr.study").count() == 1
 
 
-def test_experiments_are_filtered_sorted_and_shown_page_by_page(visit, archive):
+def test_experiments_are_filtered_sorted_and_shown_page_by_page(visit: Any, archive: Any) -> None:
     page = visit(archive.url)
     page.get_by_role("button", name="Experiments", exact=True).click()
     page.locator("tr.experiment").nth(19).wait_for()
@@ -90,7 +95,7 @@ def test_experiments_are_filtered_sorted_and_shown_page_by_page(visit, archive):
     page.locator("tr.study").nth(5).wait_for()
 
 
-def test_what_is_submitted_and_cancelled_elsewhere_is_seen(visit, archive):
+def test_what_is_submitted_and_cancelled_elsewhere_is_seen(visit: Any, archive: Any) -> None:
     page = visit(archive.url)
     page.locator("tr.study").first.wait_for()
     page.wait_for_timeout(1_000)  # until it listens
@@ -103,7 +108,7 @@ def test_what_is_submitted_and_cancelled_elsewhere_is_seen(visit, archive):
     row.locator(".cancelled").wait_for()
 
 
-def test_a_study_is_renamed_and_nobody_is_written_over(visit, archive):
+def test_a_study_is_renamed_and_nobody_is_written_over(visit: Any, archive: Any) -> None:
     visit.forgive("412")
     made = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
     page = visit(f"{archive.url}/#/studies/{made}")
@@ -121,7 +126,7 @@ def test_a_study_is_renamed_and_nobody_is_written_over(visit, archive):
     archive.http.post(f"/studies/{made}/cancel")
 
 
-def test_errors_stand_beside_their_fields_until_they_are_right(visit, archive):
+def test_errors_stand_beside_their_fields_until_they_are_right(visit: Any, archive: Any) -> None:
     visit.forgive(*REFUSED)
     page = visit(f"{archive.url}/#/new")
     page.locator(".panel .big").wait_for()
@@ -145,7 +150,7 @@ def test_errors_stand_beside_their_fields_until_they_are_right(visit, archive):
     assert page.locator("[aria-invalid]").count() == 0
 
 
-def test_the_form_holds_every_start_and_what_one_copies_is_what_it_submits(visit, archive):
+def test_the_form_holds_every_start_and_what_one_copies_is_what_it_submits(visit: Any, archive: Any) -> None:
     page = visit(f"{archive.url}/#/new")
     page.locator(".starts button").first.wait_for()
     names = page.locator(".starts button").all_text_contents()
@@ -164,7 +169,7 @@ def test_the_form_holds_every_start_and_what_one_copies_is_what_it_submits(visit
     assert json.loads(page.evaluate("() => navigator.clipboard.readText()")) == spec
 
 
-def test_a_strategy_is_compared_with_itself_under_other_options(visit, archive):
+def test_a_strategy_is_compared_with_itself_under_other_options(visit: Any, archive: Any) -> None:
     visit.forgive(*REFUSED)
     page = visit(f"{archive.url}/#/new")
     page.get_by_role("button", name="None", exact=True).click()
@@ -185,7 +190,7 @@ def test_a_strategy_is_compared_with_itself_under_other_options(visit, archive):
     ]
 
 
-def test_the_keyboard_reaches_the_content_and_the_theme_is_remembered(visit, archive):
+def test_the_keyboard_reaches_the_content_and_the_theme_is_remembered(visit: Any, archive: Any) -> None:
     page = visit(archive.url)
     page.locator("tr.study").first.wait_for()
 
@@ -199,7 +204,7 @@ def test_the_keyboard_reaches_the_content_and_the_theme_is_remembered(visit, arc
     assert page.evaluate("() => document.documentElement.dataset.theme") == "dark"
 
 
-def test_an_empty_service_says_how_to_begin(visit, sqlite_url, tmp_path):
+def test_an_empty_service_says_how_to_begin(visit: Any, sqlite_url: str, tmp_path: Path) -> None:
     api = Api(sqlite_url, tmp_path / "api.log").start()
     try:
         page = visit(api.url)
@@ -215,8 +220,8 @@ def test_an_empty_service_says_how_to_begin(visit, sqlite_url, tmp_path):
 
 
 def test_a_service_with_tokens_asks_for_one_and_a_reader_may_look_and_estimate(
-    visit, sqlite_store, sqlite_url, tmp_path
-):
+    visit: Any, sqlite_store: Store, sqlite_url: str, tmp_path: Path
+) -> None:
     visit.forgive("401", "403")
     token = create_token(sqlite_store, Role.READER).secret
     api = Api(sqlite_url, tmp_path / "api.log").start()
@@ -237,7 +242,7 @@ def test_a_service_with_tokens_asks_for_one_and_a_reader_may_look_and_estimate(
         api.close()
 
 
-def test_the_line_for_curl_is_one_that_every_shell_takes(visit, archive, published):
+def test_the_line_for_curl_is_one_that_every_shell_takes(visit: Any, archive: Any, published: Any) -> None:
     page = visit(f"{archive.url}/#/studies/{published['id']}")
 
     call = page.locator(".calls code").first.text_content()

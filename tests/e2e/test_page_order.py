@@ -2,6 +2,7 @@
 
 import json
 import re
+from typing import Any
 
 import pytest
 
@@ -38,8 +39,8 @@ async () => {
 
 
 def test_after_a_break_everything_is_asked_for_anew_until_it_is_there_also_if_something_happens_meanwhile(
-    visit, archive
-):
+    visit: Any, archive: Any
+) -> None:
     page = visit(f"{archive.url}/{QUIET}")
     page.get_by_role("heading", level=1).wait_for()
 
@@ -56,13 +57,15 @@ def test_after_a_break_everything_is_asked_for_anew_until_it_is_there_also_if_so
         "toy?experiment=..%2Fcatalogue%3F",
     ],
 )
-def test_an_address_that_cannot_be_an_id_is_no_page(visit, archive, view):
+def test_an_address_that_cannot_be_an_id_is_no_page(visit: Any, archive: Any, view: Any) -> None:
     page = visit(f"{archive.url}/#/{view}")
 
     page.get_by_role("heading", name="There is no such page").wait_for()
 
 
-def test_what_was_typed_just_before_one_left_does_not_change_the_address_of_another_view(visit, archive):
+def test_what_was_typed_just_before_one_left_does_not_change_the_address_of_another_view(
+    visit: Any, archive: Any
+) -> None:
     page = visit(archive.url)
     page.locator("tr.study").first.wait_for()
 
@@ -74,7 +77,7 @@ def test_what_was_typed_just_before_one_left_does_not_change_the_address_of_anot
     assert page.url.endswith(QUIET)
 
 
-def test_more_of_a_list_that_another_has_replaced_is_not_added_to_it(visit, archive):
+def test_more_of_a_list_that_another_has_replaced_is_not_added_to_it(visit: Any, archive: Any) -> None:
     page = visit(f"{archive.url}/#/?show=experiments")
     page.locator("tr.experiment").nth(19).wait_for()
     late = []
@@ -91,7 +94,9 @@ def test_more_of_a_list_that_another_has_replaced_is_not_added_to_it(visit, arch
     assert page.locator("tr.experiment").count() == 0
 
 
-def test_earlier_events_and_the_next_page_of_samples_come_once_however_fast_one_presses(visit, archive):
+def test_earlier_events_and_the_next_page_of_samples_come_once_however_fast_one_presses(
+    visit: Any, archive: Any
+) -> None:
     found = archive.get("/experiments", text="simulated_fit", strategy="simulated_fit", limit=500)["items"]
     ended = next(each["id"] for each in found if each["spec"]["robot"]["name"] == "quadruped")
     page = visit(f"{archive.url}/#/experiments/{ended}?tab=samples")
@@ -109,7 +114,7 @@ def test_earlier_events_and_the_next_page_of_samples_come_once_however_fast_one_
     assert len(set(numbers)) == len(numbers)
 
 
-def test_a_number_is_submitted_as_it_was_typed_or_not_at_all(visit, archive):
+def test_a_number_is_submitted_as_it_was_typed_or_not_at_all(visit: Any, archive: Any) -> None:
     visit.forgive("422")
     page = visit(f"{archive.url}/#/new")
     page.locator(".panel .big").wait_for()
@@ -130,7 +135,9 @@ def test_a_number_is_submitted_as_it_was_typed_or_not_at_all(visit, archive):
     archive.http.post(f"/experiments/{made}/cancel")
 
 
-def test_a_figure_that_the_service_did_not_answer_with_is_asked_for_again_and_none_stands_for_another(visit, archive):
+def test_a_figure_that_the_service_did_not_answer_with_is_asked_for_again_and_none_stands_for_another(
+    visit: Any, archive: Any
+) -> None:
     visit.forgive("ERR_FAILED")
     made = archive.http.post("/experiments", json={"robot": "toy_function", "strategy": "random", "budget": "smoke"})
     page = visit(f"{archive.url}/#/toy?experiment={made.json()['id']}")
@@ -145,7 +152,7 @@ def test_a_figure_that_the_service_did_not_answer_with_is_asked_for_again_and_no
     archive.http.post(f"/experiments/{made.json()['id']}/cancel")
 
 
-def test_a_stream_that_is_refused_is_not_a_service_that_is_away(visit, archive):
+def test_a_stream_that_is_refused_is_not_a_service_that_is_away(visit: Any, archive: Any) -> None:
     visit.forgive("429")
     page = visit(f"{archive.url}/{QUIET}")
     refusal = {"status": 429, "title": "Too many", "detail": "20 streams are open."}
@@ -156,7 +163,7 @@ def test_a_stream_that_is_refused_is_not_a_service_that_is_away(visit, archive):
     page.get_by_text("Live updates are refused: 20 streams are open; trying again…").wait_for()
 
 
-def test_a_list_that_did_not_come_is_not_said_to_be_empty_and_comes_by_itself(visit, archive):
+def test_a_list_that_did_not_come_is_not_said_to_be_empty_and_comes_by_itself(visit: Any, archive: Any) -> None:
     visit.forgive("ERR_FAILED")
     page = visit(f"{archive.url}/#/?show=experiments")
     page.locator("tr.experiment").nth(19).wait_for()
@@ -172,7 +179,7 @@ def test_a_list_that_did_not_come_is_not_said_to_be_empty_and_comes_by_itself(vi
     page.get_by_role("heading", name="The service does not answer").wait_for(state="detached")
 
 
-def test_more_of_a_list_that_does_not_come_is_said_and_asked_for_again(visit, archive):
+def test_more_of_a_list_that_does_not_come_is_said_and_asked_for_again(visit: Any, archive: Any) -> None:
     visit.forgive("500")
     page = visit(f"{archive.url}/#/?show=experiments")
     page.locator("tr.experiment").nth(19).wait_for()
@@ -189,7 +196,7 @@ def test_more_of_a_list_that_does_not_come_is_said_and_asked_for_again(visit, ar
     page.get_by_role("heading", name="Busy").wait_for(state="detached")
 
 
-def test_a_part_that_could_not_be_had_for_a_while_is_not_left_as_it_was(visit, archive):
+def test_a_part_that_could_not_be_had_for_a_while_is_not_left_as_it_was(visit: Any, archive: Any) -> None:
     visit.forgive("500", "console: ")
     made = archive.http.post("/experiments", json={"robot": "toy_function", "strategy": "random", "budget": "smoke"})
     page = visit(f"{archive.url}/#/experiments/{made.json()['id']}?tab=repetitions")
@@ -205,7 +212,7 @@ def test_a_part_that_could_not_be_had_for_a_while_is_not_left_as_it_was(visit, a
     page.locator("tbody .pill.cancelled").first.wait_for()
 
 
-def test_what_was_saved_is_shown_though_nothing_can_be_looked_at_any_more(visit, archive):
+def test_what_was_saved_is_shown_though_nothing_can_be_looked_at_any_more(visit: Any, archive: Any) -> None:
     visit.forgive("ERR_FAILED")
     study = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
     page = visit(f"{archive.url}/#/studies/{study}")
@@ -221,7 +228,7 @@ def test_what_was_saved_is_shown_though_nothing_can_be_looked_at_any_more(visit,
     archive.http.post(f"/studies/{study}/cancel")
 
 
-def test_a_change_whose_answer_was_lost_is_not_taken_for_somebody_elses(visit, archive):
+def test_a_change_whose_answer_was_lost_is_not_taken_for_somebody_elses(visit: Any, archive: Any) -> None:
     visit.forgive("ERR_FAILED", "412")
     study = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
     page = visit(f"{archive.url}/#/studies/{study}")
@@ -239,7 +246,7 @@ def test_a_change_whose_answer_was_lost_is_not_taken_for_somebody_elses(visit, a
     archive.http.post(f"/studies/{study}/cancel")
 
 
-def test_an_estimate_that_comes_late_does_not_wipe_away_why_the_study_was_refused(visit, archive):
+def test_an_estimate_that_comes_late_does_not_wipe_away_why_the_study_was_refused(visit: Any, archive: Any) -> None:
     visit.forgive("429")
     page = visit(f"{archive.url}/#/new")
     page.locator(".panel .big").wait_for()

@@ -2,6 +2,7 @@
 
 from io import BytesIO
 from time import monotonic
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,35 +18,37 @@ Plotly.react = (...given) => late().then(() => react(...given)); }"
 
 
 @pytest.fixture(scope="module")
-def walker(archive):
+def walker(archive: Any) -> Any:
     """The id of an experiment with robots that walk."""
     return of_the_study(archive, "simulated_fit_and_unique")
 
 
 @pytest.fixture(scope="module")
-def function(archive):
+def function(archive: Any) -> Any:
     """The id of an experiment on the toy function."""
     found = archive.get("/experiments", strategy="simulated_fit", state="COMPLETED", limit=500)["items"]
     return next(each["id"] for each in found if each["spec"]["robot"]["name"] == "toy_function")
 
 
-def of_the_study(archive, strategy):
+def of_the_study(archive: Any, strategy: Any) -> Any:
     """The experiment of the walking robot, whatever other tests have stored beside it."""
     found = archive.get("/experiments", strategy=strategy, limit=500)["items"]
     return next(each["id"] for each in found if each["spec"]["robot"]["name"] == "quadruped")
 
 
-def replay(visit, archive, walker, query="repetition=0&iteration=1&kind=sample", **how):
+def replay(
+    visit: Any, archive: Any, walker: Any, query: Any = "repetition=0&iteration=1&kind=sample", **how: Any
+) -> Any:
     page = visit(f"{archive.url}/#/replay?experiment={walker}&{query}", **how)
     page.wait_for_selector(".stage-canvas[data-time]", timeout=120_000)
     return page
 
 
-def time_of(page):
+def time_of(page: Any) -> Any:
     return float(page.locator(".stage-canvas").first.get_attribute("data-time"))
 
 
-def eventually(page, holds):
+def eventually(page: Any, holds: Any) -> None:
     """Wait until it does; the page's policy forbids to wait for an expression of its own."""
     until = monotonic() + 60
     while not holds():
@@ -53,11 +56,11 @@ def eventually(page, holds):
         page.wait_for_timeout(50)
 
 
-def picture(canvas):
+def picture(canvas: Any) -> Any:
     return np.asarray(Image.open(BytesIO(canvas.screenshot())).convert("RGB"), dtype=int)
 
 
-def test_a_controller_walks_in_both_worlds_on_one_timeline(visit, archive, walker):
+def test_a_controller_walks_in_both_worlds_on_one_timeline(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
     canvases = page.locator(".stage-canvas")
     assert [each.get_attribute("data-drawn") for each in canvases.all()] == ["webgl", "webgl"]
@@ -81,7 +84,7 @@ def test_a_controller_walks_in_both_worlds_on_one_timeline(visit, archive, walke
         assert (np.abs(now - first).sum(axis=-1) > 60).mean() > 0.005
 
 
-def test_it_plays_at_the_speed_that_is_chosen_and_stands_when_told(visit, archive, walker):
+def test_it_plays_at_the_speed_that_is_chosen_and_stands_when_told(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
 
     page.get_by_label("Speed", exact=True).select_option("2")
@@ -100,7 +103,7 @@ def test_it_plays_at_the_speed_that_is_chosen_and_stands_when_told(visit, archiv
     eventually(page, lambda: time_of(page) > 0.1)
 
 
-def test_the_camera_goes_round_by_keys_and_by_dragging(visit, archive, walker):
+def test_the_camera_goes_round_by_keys_and_by_dragging(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
     canvas = page.locator(".stage-canvas").first
     first = picture(canvas)
@@ -120,7 +123,7 @@ def test_the_camera_goes_round_by_keys_and_by_dragging(visit, archive, walker):
     assert time_of(page) == 0  # the arrows are the camera's
 
 
-def test_the_cursor_of_the_gait_follows_the_time_and_a_click_moves_it(visit, archive, walker):
+def test_the_cursor_of_the_gait_follows_the_time_and_a_click_moves_it(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
     page.wait_for_selector(".gait .main-svg")
     page.get_by_label("Time", exact=True).fill("1")
@@ -137,7 +140,7 @@ def test_the_cursor_of_the_gait_follows_the_time_and_a_click_moves_it(visit, arc
     eventually(page, lambda: abs(time_of(page) - 1) < 0.03)
 
 
-def test_the_cursor_follows_a_gait_that_is_painted_late_at_another_width(visit, archive, walker):
+def test_the_cursor_follows_a_gait_that_is_painted_late_at_another_width(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
     page.wait_for_selector(".gait .main-svg")
     page.get_by_label("Time", exact=True).fill("1.5")
@@ -146,14 +149,14 @@ def test_the_cursor_follows_a_gait_that_is_painted_late_at_another_width(visit, 
 
     page.set_viewport_size({"width": 400, "height": 900})
 
-    def on_the_time():
+    def on_the_time() -> Any:
         cursor, plotted = page.locator(".gait .cursor").bounding_box(), page.locator(".gait .bglayer").bounding_box()
         return plotted["width"] < 400 and abs(cursor["x"] - plotted["x"] - plotted["width"] / 2) < 20
 
     eventually(page, on_the_time)
 
 
-def test_another_controller_or_simulator_is_chosen_and_is_in_the_address(visit, archive, walker):
+def test_another_controller_or_simulator_is_chosen_and_is_in_the_address(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
 
     page.get_by_label("Controller", exact=True).select_option("transfer")
@@ -170,7 +173,7 @@ def test_another_controller_or_simulator_is_chosen_and_is_in_the_address(visit, 
     assert page.get_by_label("Iteration", exact=True).input_value() == "3"
 
 
-def test_what_is_not_there_says_so_and_another_may_be_chosen(visit, archive, walker):
+def test_what_is_not_there_says_so_and_another_may_be_chosen(visit: Any, archive: Any, walker: Any) -> None:
     visit.forgive("404")
     page = visit(f"{archive.url}/#/replay?experiment={walker}&repetition=99&iteration=1")
 
@@ -181,7 +184,7 @@ def test_what_is_not_there_says_so_and_another_may_be_chosen(visit, archive, wal
     page.wait_for_selector(".stage-canvas[data-time]", timeout=120_000)
 
 
-def test_what_is_not_yet_there_may_be_looked_for_again(visit, archive):
+def test_what_is_not_yet_there_may_be_looked_for_again(visit: Any, archive: Any) -> None:
     visit.forgive("409")
     stopped = of_the_study(archive, "informative")
     done = {each["number"]: each["iterations_done"] for each in archive.get(f"/experiments/{stopped}/repetitions")}
@@ -195,7 +198,7 @@ def test_what_is_not_yet_there_may_be_looked_for_again(visit, archive):
     assert page.get_by_role("button", name="Try again").is_visible()
 
 
-def test_the_page_of_an_experiment_leads_to_its_replays(visit, archive, walker):
+def test_the_page_of_an_experiment_leads_to_its_replays(visit: Any, archive: Any, walker: Any) -> None:
     page = visit(f"{archive.url}/#/experiments/{walker}")
 
     page.get_by_role("link", name="Replay a controller").click()
@@ -204,7 +207,7 @@ def test_the_page_of_an_experiment_leads_to_its_replays(visit, archive, walker):
     assert page.get_by_label("Iteration", exact=True).input_value() == "5"  # the last
 
 
-def test_the_direct_baseline_is_seen_in_reality_alone(visit, archive):
+def test_the_direct_baseline_is_seen_in_reality_alone(visit: Any, archive: Any) -> None:
     direct = of_the_study(archive, "direct")
 
     page = replay(visit, archive, direct, query="")
@@ -213,7 +216,7 @@ def test_the_direct_baseline_is_seen_in_reality_alone(visit, archive):
     assert page.get_by_text("This controller evolved in reality itself.").is_visible()
 
 
-def test_without_webgl_it_is_seen_from_the_side(visit, archive, walker):
+def test_without_webgl_it_is_seen_from_the_side(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
     page.add_init_script(FLAT)
     page.reload()
@@ -222,7 +225,7 @@ def test_without_webgl_it_is_seen_from_the_side(visit, archive, walker):
     assert len(np.unique(picture(page.locator(".stage-canvas").first).reshape(-1, 3), axis=0)) > 5
 
 
-def test_the_toy_is_stepped_through(visit, archive, function):
+def test_the_toy_is_stepped_through(visit: Any, archive: Any, function: Any) -> None:
     page = visit(f"{archive.url}/#/toy?experiment={function}")
     page.wait_for_selector(".toy .main-svg")
     page.wait_for_selector("text=Iteration 0: after 0 samples")
@@ -241,7 +244,7 @@ def test_the_toy_is_stepped_through(visit, archive, function):
     eventually(page, lambda: "repetition=1" in page.url)
 
 
-def seen_by_all(page, name):
+def seen_by_all(page: Any, name: Any) -> None:
     """Light, dark and on a phone, one after the other."""
     axe(page)
     screenshot(page, f"{name}-light")
@@ -255,7 +258,7 @@ def seen_by_all(page, name):
     screenshot(page, f"{name}-phone")
 
 
-def test_a_replay_can_be_seen_by_all(visit, archive, walker):
+def test_a_replay_can_be_seen_by_all(visit: Any, archive: Any, walker: Any) -> None:
     page = replay(visit, archive, walker)
     page.get_by_label("Time", exact=True).fill("1.2")
     page.wait_for_selector(".gait .main-svg")
@@ -263,7 +266,7 @@ def test_a_replay_can_be_seen_by_all(visit, archive, walker):
     seen_by_all(page, "replay")
 
 
-def test_the_toy_can_be_seen_by_all(visit, archive, function):
+def test_the_toy_can_be_seen_by_all(visit: Any, archive: Any, function: Any) -> None:
     page = visit(f"{archive.url}/#/toy?experiment={function}&iteration=4")
     page.wait_for_selector(".toy .main-svg")
 

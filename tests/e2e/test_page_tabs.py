@@ -1,5 +1,7 @@
 """Many tabs of one window: a browser opens six connections to a service, and every tab would like one for itself."""
 
+from typing import Any
+
 QUEUED = {"robot": "toy_function", "strategies": ["random"], "budget": "smoke"}
 TABS = 8
 SEEN = """
@@ -10,11 +12,11 @@ SEEN = """
 """
 
 
-def is_stream(request):
+def is_stream(request: Any) -> Any:
     return request.url.split("?")[0].endswith("/events")
 
 
-def test_however_many_tabs_are_open_each_shows_its_list(visit, archive):
+def test_however_many_tabs_are_open_each_shows_its_list(visit: Any, archive: Any) -> None:
     page = visit(archive.url)
     for _ in range(1, TABS):
         page.locator("tr.study").first.wait_for()
@@ -25,7 +27,9 @@ def test_however_many_tabs_are_open_each_shows_its_list(visit, archive):
     assert len(page.context.pages) == TABS
 
 
-def test_a_tab_that_nobody_sees_lets_go_of_its_stream_and_catches_up_when_somebody_does(visit, archive):
+def test_a_tab_that_nobody_sees_lets_go_of_its_stream_and_catches_up_when_somebody_does(
+    visit: Any, archive: Any
+) -> None:
     page = visit(f"{archive.url}/#/toy")
     with page.expect_response(lambda answer: is_stream(answer.request)):
         page.get_by_role("link", name="Experiments").first.click()

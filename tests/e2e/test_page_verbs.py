@@ -1,5 +1,9 @@
 """What may be asked of an experiment on its page: the verbs, its turn, its name, and what a reader may not."""
 
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
 import pytest
 from playwright.sync_api import expect
 
@@ -7,6 +11,7 @@ from gaplab.schemas.access import Role
 from gaplab.services.access import create_token
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.experiments import run, toy
 
@@ -15,7 +20,7 @@ expect.set_options(timeout=SLOW_MS)
 
 
 @pytest.fixture
-def guarded(sqlite_url, sqlite_store, tmp_path):
+def guarded(sqlite_url: str, sqlite_store: Store, tmp_path: Path) -> Iterator[Any]:
     """A service with tokens, a reader's, and an experiment."""
     submitted = submission.submit_experiment(sqlite_store, toy(name="guarded"))
     token = create_token(sqlite_store, Role.READER).secret
@@ -24,11 +29,11 @@ def guarded(sqlite_url, sqlite_store, tmp_path):
     api.close()
 
 
-def address(api, experiment):
+def address(api: Any, experiment: Any) -> str:
     return f"{api.url}/#/experiments/{experiment}"
 
 
-def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api, written, visit):
+def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api: Any, written: Store, visit: Any) -> None:
     submitted = submission.submit_experiment(written, toy())
     page = visit(address(api, submitted.id))
     verbs = page.get_by_role("group", name="Actions on this experiment")
@@ -57,7 +62,7 @@ def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api, written, vis
     expect(verbs.get_by_role("button", name="Pause")).to_have_attribute("aria-disabled", "true")
 
 
-def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api, written, visit):
+def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api: Any, written: Store, visit: Any) -> None:
     submitted = submission.submit_experiment(written, toy(repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)
     run(written, claim)
@@ -72,7 +77,7 @@ def test_a_completed_experiment_is_extended_and_a_running_one_stopped(api, writt
     expect(page.locator(".state-now")).to_contain_text("completed")
 
 
-def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api, written, visit):
+def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api: Any, written: Store, visit: Any) -> None:
     submitted = submission.submit_experiment(written, toy(name="mine"))
     visit.forgive("412")
     page = visit(address(api, submitted.id))
@@ -88,7 +93,7 @@ def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api, writte
     expect(page.locator(".notes")).to_have_text("On the second robot")
 
 
-def test_with_a_token_files_are_saved_and_a_reader_is_told_that_he_may_only_look(guarded, visit):
+def test_with_a_token_files_are_saved_and_a_reader_is_told_that_he_may_only_look(guarded: Any, visit: Any) -> None:
     api, token, submitted = guarded
     visit.forgive("403")
     page = visit(f"{api.url}/assets/dashboard/icon.svg")

@@ -45,7 +45,7 @@ def outputs_of(path: Path, folder: Path) -> list[Any]:
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 def test_a_notebook_runs_from_its_first_cell_to_its_last(
     path: Path, service: LocalService, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+) -> None:
     monkeypatch.setenv("GAPLAB_URL", service.url)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
 
@@ -58,12 +58,12 @@ def test_a_notebook_runs_from_its_first_cell_to_its_last(
     assert not [output for output in shown if output["output_type"] == "stream" and output["name"] == "stderr"]
 
 
-def test_there_are_three():
+def test_there_are_three() -> None:
     assert [path.stem for path in NOTEBOOKS] == ["compare", "own_robot", "own_strategy"]
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_no_output_is_kept_in_git(path: Path):
+def test_no_output_is_kept_in_git(path: Path) -> None:
     notebook = nbformat.read(path, as_version=4)
 
     nbformat.validate(notebook)
@@ -82,7 +82,7 @@ HERE = [path for path in DOCUMENTS if any(each.mark is None for each in blocks(p
 
 
 @pytest.mark.parametrize("path", HERE, ids=lambda path: path.stem)
-def test_what_a_document_says_can_be_done(path: Path, service: LocalService, folder: Path):
+def test_what_a_document_says_can_be_done(path: Path, service: LocalService, folder: Path) -> None:
     environment = os.environ | {
         "GAPLAB_URL": service.url,
         "PATH": os.pathsep.join([str(commands(folder)), os.environ["PATH"]]),
@@ -97,7 +97,7 @@ def test_what_a_document_says_can_be_done(path: Path, service: LocalService, fol
     assert "Traceback" not in done.stderr
 
 
-def test_the_documents_have_code_and_what_is_not_run_says_why():
+def test_the_documents_have_code_and_what_is_not_run_says_why() -> None:
     every = {path.stem: blocks(path) for path in DOCUMENTS}
 
     assert sum(each.mark is None for found in every.values() for each in found) > 12

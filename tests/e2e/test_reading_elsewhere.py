@@ -4,9 +4,11 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import pytest
 
@@ -21,25 +23,25 @@ STRANGER = "import sys; from ray._raylet import GcsClient; GcsClient(address=sys
 
 
 @pytest.fixture(scope="module")
-def server(folder):
+def server(folder: Path) -> Iterator[Any]:
     found = Postgres(folder)
     yield found
     found.close()
 
 
 @pytest.fixture
-def postgres(server):
+def postgres(server: Any) -> Iterator[Any]:
     """A server on which nobody has made anything for gaplab."""
     yield server
     server.forget()
 
 
 @pytest.fixture
-def shell(postgres):
+def shell(postgres: Any) -> Iterator[Any]:
     """Opens shells in which one is the administrator of Postgres; short paths, for Ray has sockets there."""
     with TemporaryDirectory(prefix="gaplab-") as place, ExitStack() as opened:
 
-        def open_shell(name, **environment):
+        def open_shell(name: Any, **environment: Any) -> Any:
             given = {"PATH": str(postgres.commands), "RAY_TMPDIR": place, "RAY_USAGE_STATS_ENABLED": "0"}
             found = Shell(Path(place) / name, **given | postgres.environment | environment)
             opened.callback(found.close)
@@ -48,7 +50,7 @@ def shell(postgres):
         yield open_shell
 
 
-def paragraphs(path, **placeholders):
+def paragraphs(path: Any, **placeholders: Any) -> Iterator[Any]:
     """What a document has its readers run apart, with what they put in: lines for each place that they are typed at."""
     for block in blocks(path):
         for lines in block.paragraphs() if block.mark == "run apart" else ():
@@ -57,14 +59,14 @@ def paragraphs(path, **placeholders):
             yield lines
 
 
-def complete(gaplab):
+def complete(gaplab: Any) -> Any:
     """The id of a new experiment that was computed."""
-    id_ = gaplab.submit(TINY).id
-    gaplab.wait(id_, timeout_s=200)  # raises if it fails
+    id_ = gaplab.submit(TINY).id  # type: ignore[attr-defined]
+    gaplab.wait(id_, timeout_s=200)  # raises if it fails  # type: ignore[attr-defined]
     return id_
 
 
-def test_what_is_said_of_postgres_can_be_done(postgres, shell):
+def test_what_is_said_of_postgres_can_be_done(postgres: Any, shell: Any) -> None:
     whole, parts = paragraphs(POSTGRES, PASSWORD=PASSWORD, HOST=postgres.host)
     reader = shell("reader", GAPLAB_WORKERS="1")
 
@@ -79,7 +81,7 @@ def test_what_is_said_of_postgres_can_be_done(postgres, shell):
     wait_until(lambda: not reader.processes(), 30, reader.processes)
 
 
-def test_what_is_said_of_a_cluster_can_be_done(postgres, shell):
+def test_what_is_said_of_a_cluster_can_be_done(postgres: Any, shell: Any) -> None:
     port = str(free_port())
     put_in = {"PASSWORD": PASSWORD, "@HOST": f"@{postgres.host}", "HEAD": "127.0.0.1", "6379": port}
     at_head, at_node, beside = paragraphs(CLUSTER, **put_in)
@@ -103,12 +105,12 @@ def test_what_is_said_of_a_cluster_can_be_done(postgres, shell):
     assert "AuthenticationError" in asked_without_token(f"127.0.0.1:{port}")
 
 
-def sized(line, cores):
+def sized(line: Any, cores: Any) -> Any:
     """Nodes as small as they can be; all the cores are at the second, which so must have computed what was computed."""
     return f"{line} --num-cpus {cores} --object-store-memory 100000000" if "ray start" in line else line
 
 
-def asked_without_token(address):
+def asked_without_token(address: Any) -> Any:
     """What is said to a stranger."""
     without = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
     call = [sys.executable, "-c", STRANGER, address]
@@ -116,5 +118,5 @@ def asked_without_token(address):
     return subprocess.run(call, env=environment, capture_output=True, text=True, timeout=60, check=False).stderr
 
 
-def test_every_document_that_is_run_apart_is_run_here():
+def test_every_document_that_is_run_apart_is_run_here() -> None:
     assert {path for path in DOCUMENTS if any(each.mark == "run apart" for each in blocks(path))} == {POSTGRES, CLUSTER}

@@ -1,5 +1,9 @@
 """From POST to curve through the real service: HTTP, database, Ray, physics."""
 
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
 import pytest
 
 from gaplab.schemas.spec import StudySpec
@@ -46,11 +50,11 @@ QUADRUPED = {
 
 
 @pytest.fixture
-def service_in():
+def service_in() -> Iterator[Any]:
     """Makes services, which are closed at the end."""
     made = []
 
-    def make(folder, **how):
+    def make(folder: Path, **how: Any) -> Any:
         made.append(Service(folder, **how))
         return made[-1]
 
@@ -60,11 +64,11 @@ def service_in():
 
 
 @pytest.fixture
-def service(tmp_path, service_in):
+def service(tmp_path: Path, service_in: Any) -> Any:
     return service_in(tmp_path)
 
 
-def computed_here(spec):
+def computed_here(spec: Any) -> Any:
     """Samples and recorded fitness of every experiment, computed in this process without any service."""
     experiments = []
     for resolved in resolve_study(StudySpec.model_validate(spec)):
@@ -78,13 +82,13 @@ def computed_here(spec):
     return experiments
 
 
-def told_by(service, study):
+def told_by(service: Any, study: Any) -> Any:
     """The same, as the service tells it."""
     experiments = []
     for curve in service.get(f"/studies/{study}/curves"):
         values = [point["values"] for point in curve["points"]]
         samples = service.get(f"/experiments/{curve['experiment']}/samples", kind="sample", limit=1000)["items"]
-        by_repetition = [[] for _ in values[0]]
+        by_repetition = [[] for _ in values[0]]  # type: ignore[var-annotated]
         for each in sorted(samples, key=lambda sample: (sample["repetition"], sample["iteration"])):
             by_repetition[each["repetition"]].append(each["fitness"])
         recorded = [list(row) for row in zip(*values, strict=True)]
@@ -92,7 +96,7 @@ def told_by(service, study):
     return experiments
 
 
-def test_a_toy_study_goes_from_post_to_curve_with_the_numbers_of_one_process(service):
+def test_a_toy_study_goes_from_post_to_curve_with_the_numbers_of_one_process(service: Any) -> None:
     service.start()
 
     study = service.post("/studies", TOY)["id"]
@@ -107,7 +111,7 @@ def test_a_toy_study_goes_from_post_to_curve_with_the_numbers_of_one_process(ser
     assert "<svg" in service.http.get("/figures/curves", params={"study": study, "format": "svg"}).text
 
 
-def test_a_quadruped_study_on_pybullet_goes_from_post_to_curve(service):
+def test_a_quadruped_study_on_pybullet_goes_from_post_to_curve(service: Any) -> None:
     service.start()
 
     study = service.post("/studies", QUADRUPED)["id"]
@@ -118,7 +122,7 @@ def test_a_quadruped_study_on_pybullet_goes_from_post_to_curve(service):
     assert told_by(service, study) == computed_here(QUADRUPED)
 
 
-def test_killed_in_the_middle_it_goes_on_where_it_was_with_the_same_numbers(service):
+def test_killed_in_the_middle_it_goes_on_where_it_was_with_the_same_numbers(service: Any) -> None:
     service.start()
     study = service.post("/studies", SLOW_TOY)["id"]
     wait_until(lambda: service.get(f"/studies/{study}")["progress"]["iterations_done"] >= 5, 60)
@@ -135,7 +139,9 @@ def test_killed_in_the_middle_it_goes_on_where_it_was_with_the_same_numbers(serv
 
 
 @pytest.mark.parametrize("edited", [OWN.replace("fittest", "very fittest"), "class Own("])
-def test_no_half_of_an_experiment_is_computed_with_a_strategy_that_was_edited_meanwhile(tmp_path, service_in, edited):
+def test_no_half_of_an_experiment_is_computed_with_a_strategy_that_was_edited_meanwhile(
+    tmp_path: Path, service_in: Any, edited: Any
+) -> None:
     own = tmp_path / "own.py"
     own.write_text(OWN)
     service = service_in(tmp_path, plugins=tmp_path)
@@ -149,7 +155,7 @@ def test_no_half_of_an_experiment_is_computed_with_a_strategy_that_was_edited_me
     wait_until(lambda: service.log().count("another starts in") >= 1, 60, service.log)
     own.write_text(OWN.replace("fittest", "very fittest"))
 
-    def refused():
+    def refused() -> Any:
         return [each for each in service.get(path)["warnings"] if "strategy own (own.py" in each]
 
     wait_until(refused, 60, service.log)
@@ -163,7 +169,7 @@ def test_no_half_of_an_experiment_is_computed_with_a_strategy_that_was_edited_me
     assert first["provenance"]["outside"] != second["provenance"]["outside"]
 
 
-def test_stopped_in_order_it_leaves_no_process_behind(service):
+def test_stopped_in_order_it_leaves_no_process_behind(service: Any) -> None:
     service.start()
     service.post("/studies", SLOW_TOY)
     wait_until(lambda: service.get("/studies")["items"][0]["state"] == "RUNNING", 60)

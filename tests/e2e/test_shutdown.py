@@ -2,6 +2,9 @@
 
 import signal
 import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 from sqlalchemy import text
@@ -19,13 +22,13 @@ LONG_STEPS = {
 
 
 @pytest.fixture
-def service(tmp_path):
+def service(tmp_path: Path) -> Iterator[Any]:
     service = Service(tmp_path)
     yield service
     service.close()
 
 
-def test_told_to_stop_it_hands_back_what_is_under_way_and_nothing_of_it_stays(service, tmp_path):
+def test_told_to_stop_it_hands_back_what_is_under_way_and_nothing_of_it_stays(service: Any, tmp_path: Path) -> None:
     service.start()
     study = service.post("/studies", LONG_STEPS)["id"]
     experiment = service.get(f"/studies/{study}")["experiments"][0]["id"]
@@ -47,7 +50,7 @@ def test_told_to_stop_it_hands_back_what_is_under_way_and_nothing_of_it_stays(se
     assert parts > 0
 
 
-def steps_of(folder):
+def steps_of(folder: Path) -> Any:
     store = Store(f"sqlite:///{folder / 'gaplab.db'}")
     with store.reading() as session:
         found = session.execute(text("SELECT sum(steps) FROM repetition")).scalar_one()

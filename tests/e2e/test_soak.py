@@ -1,5 +1,8 @@
 """A small soak: random faults on the real service, on SQLite and on Postgres; `make soak` runs a thousand."""
 
+from pathlib import Path
+from typing import Any
+
 import pytest
 
 from tests.soak.databases import Postgres, Sqlite
@@ -7,8 +10,8 @@ from tests.soak.soak import soak
 
 
 @pytest.mark.parametrize(("kind", "number"), [(Sqlite, 12), (Postgres, 13)], ids=["sqlite", "postgres"])
-def test_under_random_faults_it_keeps_its_word(tmp_path, kind, number):
-    said = []
+def test_under_random_faults_it_keeps_its_word(tmp_path: Path, kind: Any, number: Any) -> None:
+    said: list[Any] = []
 
     outcome = soak(tmp_path, kind, number, seed=1, at_once=8, say=said.append)
 

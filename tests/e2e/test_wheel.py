@@ -80,7 +80,7 @@ class User:
 
     def run(self, command: str, *arguments: str) -> str:
         call, where = [self._commands / command, *arguments], {"cwd": self._home, "env": self._environment}
-        done = subprocess.run(call, **where, capture_output=True, text=True, timeout=240, check=False)
+        done = subprocess.run(call, **where, capture_output=True, text=True, timeout=240, check=False)  # type: ignore[call-overload]
         assert done.returncode == 0, done.stdout + done.stderr + self.log()
         return done.stdout
 
@@ -89,7 +89,7 @@ class User:
         """The service, with its workers."""
         call, where = [self._commands / "gaplab", "serve"], {"cwd": self._home, "env": self._environment}
         with (self._home / "service.log").open("wb") as log:
-            service = subprocess.Popen(call, **where, stdout=log, stderr=log)
+            service = subprocess.Popen(call, **where, stdout=log, stderr=log)  # type: ignore[call-overload]
         try:
             wait_until(lambda: service.poll() is not None or self._answers(), 120, self.log)
             yield

@@ -41,7 +41,7 @@ def bearer(store: Store, role: Role) -> dict[str, str]:
 
 def test_on_loopback_all_is_open_until_a_token_is_made_and_stays_closed_after_the_last_is_revoked(
     store: Store, api: TestClient
-):
+) -> None:
     before = api.post("/experiments", json=TOY).status_code
     made = create_token(store, Role.READER)
     refused = api.get("/experiments")
@@ -56,7 +56,7 @@ def test_on_loopback_all_is_open_until_a_token_is_made_and_stays_closed_after_th
     assert api.get("/experiments").status_code == 401
 
 
-def test_beyond_loopback_a_token_is_needed_even_where_none_was_ever_made(sqlite_store: Store):
+def test_beyond_loopback_a_token_is_needed_even_where_none_was_ever_made(sqlite_store: Store) -> None:
     api = TestClient(create_app(sqlite_store, Settings(host="0.0.0.0")))
 
     assert api.get("/experiments").status_code == 401
@@ -71,7 +71,9 @@ def test_beyond_loopback_a_token_is_needed_even_where_none_was_ever_made(sqlite_
         (Role.ADMIN, {"read", "estimate", "submit", "check", "edit", "cancel", "reveal"}),
     ],
 )
-def test_each_role_may_do_what_it_is_for_and_no_more(store: Store, api: TestClient, role: Role, permitted: set[str]):
+def test_each_role_may_do_what_it_is_for_and_no_more(
+    store: Store, api: TestClient, role: Role, permitted: set[str]
+) -> None:
     made = api.post("/experiments", json=TOY).json()["id"]
     headers = bearer(store, role)
     answers = {
@@ -93,7 +95,7 @@ def test_each_role_may_do_what_it_is_for_and_no_more(store: Store, api: TestClie
 
 def test_every_route_wants_a_token_but_those_for_health_and_the_files_of_the_page(
     sqlite_store: Store, lite: TestClient
-):
+) -> None:
     create_token(sqlite_store, Role.ADMIN)
     document = create_app(sqlite_store).openapi()
     routes = [(method, path) for path, operations in document["paths"].items() for method in operations]
@@ -124,11 +126,11 @@ def test_every_route_wants_a_token_but_those_for_health_and_the_files_of_the_pag
         "Bearer \u00e9".encode("latin-1"),
     ],
 )
-def test_what_is_no_token_lets_nobody_in_even_where_none_is_needed(lite: TestClient, header: str | bytes):
-    assert lite.get("/experiments", headers={"Authorization": header}).status_code == 401
+def test_what_is_no_token_lets_nobody_in_even_where_none_is_needed(lite: TestClient, header: str | bytes) -> None:
+    assert lite.get("/experiments", headers={"Authorization": header}).status_code == 401  # type: ignore[arg-type]
 
 
-def test_a_token_with_another_secret_lets_nobody_in(store: Store):
+def test_a_token_with_another_secret_lets_nobody_in(store: Store) -> None:
     made, other = (create_token(store, Role.ADMIN).secret for _ in range(2))
     forged = made.rpartition("_")[0] + "_" + other.rpartition("_")[2]
 
@@ -137,7 +139,7 @@ def test_a_token_with_another_secret_lets_nobody_in(store: Store):
     assert authenticate(store, made, required=True).role is Role.ADMIN
 
 
-def test_a_secret_is_stored_nowhere_and_a_use_is_noted(store: Store):
+def test_a_secret_is_stored_nowhere_and_a_use_is_noted(store: Store) -> None:
     made = create_token(store, Role.RUNNER, "ci")
     unused = access.list_tokens(store)[0]
 
@@ -154,21 +156,21 @@ def test_a_secret_is_stored_nowhere_and_a_use_is_noted(store: Store):
     assert made.secret.rpartition("_")[2] not in str(rows)
 
 
-def test_secrets_have_256_bits_and_differ(sqlite_store: Store):
+def test_secrets_have_256_bits_and_differ(sqlite_store: Store) -> None:
     secrets = {create_token(sqlite_store, Role.READER).secret.rpartition("_")[2] for _ in range(20)}
 
     assert len(secrets) == 20
     assert all(re.fullmatch("[0-9a-f]{64}", each) for each in secrets)
 
 
-def test_an_unknown_token_cannot_be_revoked(store: Store):
+def test_an_unknown_token_cannot_be_revoked(store: Store) -> None:
     with pytest.raises(NotFound):
         access.revoke_token(store, "none\0such")
 
 
 def test_no_token_is_in_logs_answers_or_problems_whatever_happens(
     sqlite_store: Store, lite: TestClient, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-):
+) -> None:
     caplog.set_level(logging.DEBUG)
     headers = bearer(sqlite_store, Role.READER)
     secret = headers["Authorization"].rpartition("_")[2]
@@ -192,7 +194,7 @@ def test_no_token_is_in_logs_answers_or_problems_whatever_happens(
         {"origin": "http://["},
     ],
 )
-def test_without_tokens_no_page_of_another_site_is_served(sqlite_store: Store, headers: dict[str, str]):
+def test_without_tokens_no_page_of_another_site_is_served(sqlite_store: Store, headers: dict[str, str]) -> None:
     api = TestClient(create_app(sqlite_store, Settings()), base_url="http://127.0.0.1:8000")
 
     assert api.get("/experiments", headers=headers).status_code == 403
@@ -202,7 +204,7 @@ def test_without_tokens_no_page_of_another_site_is_served(sqlite_store: Store, h
     assert api.get("/experiments", headers=headers | bearer(sqlite_store, Role.READER)).status_code == 200
 
 
-def test_other_origins_are_told_nothing_by_cors(lite: TestClient):
+def test_other_origins_are_told_nothing_by_cors(lite: TestClient) -> None:
     plain = lite.get("/experiments", headers={"origin": "http://evil.example"})
     asked = lite.options(
         "/experiments", headers={"origin": "http://evil.example", "access-control-request-method": "POST"}
@@ -226,7 +228,7 @@ def test_other_origins_are_told_nothing_by_cors(lite: TestClient):
         ("", False),
     ],
 )
-def test_loopback_is_what_only_this_machine_reaches(host: str, expected: bool):
+def test_loopback_is_what_only_this_machine_reaches(host: str, expected: bool) -> None:
     assert is_loopback(host) is expected
 
 
@@ -242,7 +244,7 @@ def command(
 
 def test_the_command_makes_lists_and_revokes_tokens_in_the_database_itself(
     sqlite_url: str, sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+) -> None:
     monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
     _, secret, about = command(monkeypatch, capsys, "token", "create", "--role", "runner", "--name", "night runs")
     caller = authenticate(sqlite_store, secret.strip(), required=True)
@@ -263,7 +265,7 @@ def test_the_command_makes_lists_and_revokes_tokens_in_the_database_itself(
 
 def test_a_first_token_can_be_made_before_the_database_was_ever_used(
     tmp_path: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+) -> None:
     monkeypatch.setenv("GAPLAB_DATABASE_URL", f"sqlite:///{tmp_path / 'new.db'}")
 
     code, secret, _ = command(monkeypatch, capsys, "token", "create", "--role", "admin")
@@ -273,7 +275,7 @@ def test_a_first_token_can_be_made_before_the_database_was_ever_used(
 
 
 @pytest.mark.parametrize("way", ["argument", "environment", "none"])
-def test_a_client_shows_its_token(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, way: str):
+def test_a_client_shows_its_token(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, way: str) -> None:
     secret = create_token(sqlite_store, Role.READER).secret
     monkeypatch.delenv("GAPLAB_TOKEN", raising=False)
     if way == "environment":
@@ -289,7 +291,7 @@ def test_a_client_shows_its_token(sqlite_store: Store, monkeypatch: pytest.Monke
             assert client.experiments().items == ()
 
 
-def test_only_an_admin_may_demand_what_an_admin_may():
+def test_only_an_admin_may_demand_what_an_admin_may() -> None:
     for role in (Role.READER, Role.RUNNER):
         with pytest.raises(Forbidden, match="an admin"):
             access.demand(access.Caller("x", role), Role.ADMIN, "this")

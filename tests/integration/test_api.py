@@ -51,7 +51,7 @@ def finish(store: Store) -> None:
             run(store, claim, some_log(iterations, recorded=1 + 0.1 * next(numbers)))
 
 
-def test_a_submitted_experiment_exists_at_its_location_with_every_default_filled_in(api: TestClient):
+def test_a_submitted_experiment_exists_at_its_location_with_every_default_filled_in(api: TestClient) -> None:
     answer = api.post("/experiments", json={"strategy": "simulated_fit", "iterations": 10, "repetitions": 40})
 
     assert answer.status_code == 202
@@ -62,7 +62,7 @@ def test_a_submitted_experiment_exists_at_its_location_with_every_default_filled
     assert found.json()["spec"]["robot"]["name"] == "quadruped"
 
 
-def test_an_empty_study_is_the_papers_six_strategies_and_the_direct_baseline(api: TestClient):
+def test_an_empty_study_is_the_papers_six_strategies_and_the_direct_baseline(api: TestClient) -> None:
     answer = api.post("/studies", json={})
 
     assert answer.status_code == 202
@@ -79,7 +79,7 @@ def test_an_empty_study_is_the_papers_six_strategies_and_the_direct_baseline(api
     assert study["progress"]["repetitions"] == 7 * 40
 
 
-def test_lists_are_read_page_by_page_each_item_once(api: TestClient):
+def test_lists_are_read_page_by_page_each_item_once(api: TestClient) -> None:
     submitted = [api.post("/experiments", json=TOY | {"seed": seed}).json()["id"] for seed in range(5)]
 
     listed, cursor = [], None
@@ -92,7 +92,7 @@ def test_lists_are_read_page_by_page_each_item_once(api: TestClient):
     assert listed == submitted[::-1]
 
 
-def test_experiments_are_filtered_by_study_state_and_strategy(api: TestClient):
+def test_experiments_are_filtered_by_study_state_and_strategy(api: TestClient) -> None:
     study = api.post("/studies", json=STUDY).json()
     alone = api.post("/experiments", json=TOY).json()
     api.post(f"/experiments/{alone['id']}/cancel")
@@ -106,7 +106,7 @@ def test_experiments_are_filtered_by_study_state_and_strategy(api: TestClient):
     assert [each["id"] for each in api.get("/studies").json()["items"]] == [study["id"]]
 
 
-def test_what_has_run_is_shown_by_repetition_sample_and_simulator(store: Store, api: TestClient):
+def test_what_has_run_is_shown_by_repetition_sample_and_simulator(store: Store, api: TestClient) -> None:
     made = api.post("/experiments", json=toy(repetitions=2).model_dump(mode="json")).json()
     finish(store)
 
@@ -120,7 +120,7 @@ def test_what_has_run_is_shown_by_repetition_sample_and_simulator(store: Store, 
     assert [(each["rank"], each["squared_error"]) for each in simulators] == [(0, 1e-300), (1, None)]
 
 
-def test_realitys_parameters_are_hidden_until_the_end(store: Store, api: TestClient):
+def test_realitys_parameters_are_hidden_until_the_end(store: Store, api: TestClient) -> None:
     hidden = {"reality": {"parameters": {"static_friction": 0.77}}, "repetitions": 1}
     made = api.post("/experiments", json=TOY | hidden)
     before = made.json()["spec"]["reality"]["parameters"]
@@ -132,7 +132,7 @@ def test_realitys_parameters_are_hidden_until_the_end(store: Store, api: TestCli
     assert after["static_friction"] == 0.77
 
 
-def test_a_curve_has_mean_sd_n_and_interval_at_every_count(store: Store, api: TestClient):
+def test_a_curve_has_mean_sd_n_and_interval_at_every_count(store: Store, api: TestClient) -> None:
     made = api.post("/experiments", json=TOY).json()
     finish(store)
 
@@ -145,7 +145,7 @@ def test_a_curve_has_mean_sd_n_and_interval_at_every_count(store: Store, api: Te
     assert curve["points"][0]["lower"] < 1.1 < curve["points"][0]["upper"]
 
 
-def test_curves_of_a_study_are_those_of_its_experiments(store: Store, api: TestClient):
+def test_curves_of_a_study_are_those_of_its_experiments(store: Store, api: TestClient) -> None:
     study = api.post("/studies", json=STUDY).json()
     finish(store)
 
@@ -157,7 +157,7 @@ def test_curves_of_a_study_are_those_of_its_experiments(store: Store, api: TestC
     assert api.get("/curves", params={"experiment": ids[::-1]}).json() == curves[::-1]
 
 
-def test_curves_are_also_comma_separated_values(store: Store, api: TestClient):
+def test_curves_are_also_comma_separated_values(store: Store, api: TestClient) -> None:
     study = api.post("/studies", json=STUDY).json()
     finish(store)
 
@@ -169,7 +169,7 @@ def test_curves_are_also_comma_separated_values(store: Store, api: TestClient):
     assert all(math.isfinite(float(row["fitness"])) for row in rows)
 
 
-def test_experiments_are_compared_pair_by_pair(store: Store, api: TestClient):
+def test_experiments_are_compared_pair_by_pair(store: Store, api: TestClient) -> None:
     study = api.post("/studies", json=STUDY).json()
     finish(store)
     ids = [each["id"] for each in study["experiments"]]
@@ -185,7 +185,7 @@ def test_experiments_are_compared_pair_by_pair(store: Store, api: TestClient):
     assert pairs[0]["n_first"] == 4
 
 
-def test_a_figure_is_a_page_without_links_to_elsewhere_or_a_file(store: Store, api: TestClient):
+def test_a_figure_is_a_page_without_links_to_elsewhere_or_a_file(store: Store, api: TestClient) -> None:
     study = api.post("/studies", json=STUDY).json()
     finish(store)
 
@@ -201,7 +201,9 @@ def test_a_figure_is_a_page_without_links_to_elsewhere_or_a_file(store: Store, a
     assert ET.fromstring(drawing.text).tag == "{http://www.w3.org/2000/svg}svg"
 
 
-def test_a_sensitivity_check_exists_at_its_location_and_its_warnings_on_the_experiment(store: Store, api: TestClient):
+def test_a_sensitivity_check_exists_at_its_location_and_its_warnings_on_the_experiment(
+    store: Store, api: TestClient
+) -> None:
     dull = {"robot": "toy_function", "tunables": [{"name": "restitution", "lower": 0.3, "upper": 0.3001}]}
     made = api.post("/sensitivity", json=dull)
     experiment = api.post("/experiments", json=TOY | dull).json()
@@ -219,7 +221,7 @@ def test_a_sensitivity_check_exists_at_its_location_and_its_warnings_on_the_expe
     assert api.post("/sensitivity", json=dull).json() == found
 
 
-def test_misfit_has_error_gap_and_spread_of_simulators_by_iteration(store: Store, api: TestClient):
+def test_misfit_has_error_gap_and_spread_of_simulators_by_iteration(store: Store, api: TestClient) -> None:
     made = api.post("/experiments", json=toy().model_dump(mode="json")).json()
     finish(store)
 
@@ -231,7 +233,7 @@ def test_misfit_has_error_gap_and_spread_of_simulators_by_iteration(store: Store
     assert len(found["remarks"]) == 1
 
 
-def test_cancelling_keeps_what_is_stored(store: Store, api: TestClient):
+def test_cancelling_keeps_what_is_stored(store: Store, api: TestClient) -> None:
     made = api.post("/experiments", json=TOY).json()
     run(store, execution.claim(store, "test", limit=1)[0])
 
@@ -241,7 +243,7 @@ def test_cancelling_keeps_what_is_stored(store: Store, api: TestClient):
     assert api.get(f"/experiments/{made['id']}/curve").json()["points"][0]["n"] == 1
 
 
-def test_the_verbs_of_an_experiment_and_of_a_study(api: TestClient):
+def test_the_verbs_of_an_experiment_and_of_a_study(api: TestClient) -> None:
     study = api.post("/studies", json={"robot": "toy_function", "budget": "smoke"}).json()
     first = study["experiments"][0]["id"]
 
@@ -258,7 +260,7 @@ def test_the_verbs_of_an_experiment_and_of_a_study(api: TestClient):
     )
 
 
-def test_an_experiment_is_extended_to_totals_and_given_another_turn(store: Store, api: TestClient):
+def test_an_experiment_is_extended_to_totals_and_given_another_turn(store: Store, api: TestClient) -> None:
     made = api.post("/experiments", json=TOY | {"max_parallel": 1}).json()
     too_early = api.post(f"/experiments/{made['id']}/extend", json={"repetitions": 50})
     while claims := execution.claim(store, "test", limit=1):
@@ -277,7 +279,7 @@ def test_an_experiment_is_extended_to_totals_and_given_another_turn(store: Store
     assert api.get(f"/experiments/{made['id']}/repetitions/99/attempts").status_code == 404
 
 
-def test_the_catalogue_lists_every_plug_in_with_the_schema_of_its_options(lite: TestClient):
+def test_the_catalogue_lists_every_plug_in_with_the_schema_of_its_options(lite: TestClient) -> None:
     found = lite.get("/catalogue").json()
 
     assert {each["name"] for each in found["strategies"]} >= {"simulated_fit", "random", "direct"}
@@ -288,6 +290,6 @@ def test_the_catalogue_lists_every_plug_in_with_the_schema_of_its_options(lite: 
         Draft202012Validator.check_schema(each["options"])
 
 
-def test_the_service_says_that_it_lives_and_is_ready(api: TestClient):
+def test_the_service_says_that_it_lives_and_is_ready(api: TestClient) -> None:
     assert api.get("/livez").json() == {"status": "ok"}
     assert api.get("/readyz").json() == {"status": "ok"}

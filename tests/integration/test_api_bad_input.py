@@ -73,7 +73,7 @@ def only_error(answer: Any) -> dict[str, Any]:
 )
 def test_a_misspelt_name_is_refused_with_its_place_and_the_nearest_name(
     api: TestClient, change: dict[str, Any], pointer: str, value: object, nearest: str
-):
+) -> None:
     error = only_error(api.post("/experiments", json=LEAST | change))
 
     assert (error["pointer"], error["value"], error["nearest"]) == (pointer, value, nearest)
@@ -105,7 +105,9 @@ def test_a_misspelt_name_is_refused_with_its_place_and_the_nearest_name(
         ({"name": "x" * 201}, "/name"),
     ],
 )
-def test_a_value_out_of_its_range_is_refused_with_its_place(api: TestClient, change: dict[str, Any], pointer: str):
+def test_a_value_out_of_its_range_is_refused_with_its_place(
+    api: TestClient, change: dict[str, Any], pointer: str
+) -> None:
     answer = api.post("/experiments", content=json.dumps(LEAST | change), headers=JSON)
 
     error = problem(answer, 422)["errors"][0]
@@ -129,18 +131,18 @@ def test_a_value_out_of_its_range_is_refused_with_its_place(api: TestClient, cha
 )
 def test_a_sensitivity_check_is_refused_where_an_experiment_would_be(
     api: TestClient, change: dict[str, Any], pointer: str
-):
+) -> None:
     answer = api.post("/sensitivity", json={"robot": "toy_function"} | change)
 
     assert only_error(answer)["pointer"] == pointer
 
 
-def test_an_unknown_check_and_the_misfit_of_an_unknown_experiment_are_not_found(api: TestClient):
+def test_an_unknown_check_and_the_misfit_of_an_unknown_experiment_are_not_found(api: TestClient) -> None:
     for address in ("/sensitivity/nope", "/sensitivity/%00", "/experiments/nope/misfit"):
         problem(api.get(address), 404)
 
 
-def test_numbers_that_json_does_not_have_come_back_as_text(api: TestClient):
+def test_numbers_that_json_does_not_have_come_back_as_text(api: TestClient) -> None:
     answer = api.post(
         "/experiments", content='{"strategy": "random", "seed": NaN, "iterations": -Infinity}', headers=JSON
     )
@@ -151,14 +153,14 @@ def test_numbers_that_json_does_not_have_come_back_as_text(api: TestClient):
 
 def test_a_tunable_that_the_engine_ignores_and_a_robot_that_it_cannot_run_are_refused_with_the_engines_that_can(
     api: TestClient,
-):
+) -> None:
     error = only_error(api.post("/experiments", json=LEAST | {"robot": "quadruped", "engine": "analytic"}))
 
     assert error["pointer"] == "/engine"
     assert "pybullet" in error["permitted"]
 
 
-def test_every_mistake_is_told_at_once(api: TestClient):
+def test_every_mistake_is_told_at_once(api: TestClient) -> None:
     wrong = {"strategies": ["random", "randm", {"name": "informative", "options": {"x": 1}}], "robot": "toy_functoin"}
     answer = api.post("/studies", json=wrong)
 
@@ -167,42 +169,42 @@ def test_every_mistake_is_told_at_once(api: TestClient):
     assert len(pointers) == 3
 
 
-def test_a_list_of_strategies_is_no_field_of_an_experiment_and_it_says_which_is(api: TestClient):
+def test_a_list_of_strategies_is_no_field_of_an_experiment_and_it_says_which_is(api: TestClient) -> None:
     errors = problem(api.post("/experiments", json={"strategies": ["random"]}), 422)["errors"]
 
     assert {(each["pointer"], each["nearest"]) for each in errors} == {("/strategies", "strategy"), ("/strategy", None)}
 
 
 @pytest.mark.parametrize("body", ["", "{", "[1, 2", '{"strategy": "random"} x', "nonsense", "\x00", '{"a": }'])
-def test_a_body_that_is_no_json_is_refused(api: TestClient, body: str):
+def test_a_body_that_is_no_json_is_refused(api: TestClient, body: str) -> None:
     found = problem(api.post("/experiments", content=body, headers=JSON), 422)
 
     assert found["type"] in {"urn:gaplab:problem:not-json", "urn:gaplab:problem:invalid-spec"}
 
 
 @pytest.mark.parametrize("body", [b"\xff\xfe\x00", b'{"seed": ' + b"9" * 5000 + b"}", b"[" * 100_000])
-def test_a_body_that_breaks_parsers_is_refused_as_no_json(api: TestClient, body: bytes):
+def test_a_body_that_breaks_parsers_is_refused_as_no_json(api: TestClient, body: bytes) -> None:
     assert problem(api.post("/studies", content=body, headers=JSON), 422)["type"] == "urn:gaplab:problem:not-json"
 
 
 @pytest.mark.parametrize("body", ["[]", "1", '"random"', "null", "true"])
-def test_json_that_is_no_object_is_refused(api: TestClient, body: str):
+def test_json_that_is_no_object_is_refused(api: TestClient, body: str) -> None:
     problem(api.post("/experiments", content=body, headers=JSON), 422)
 
 
-def test_a_body_without_its_content_type_is_refused_with_the_header_that_it_needs(api: TestClient):
+def test_a_body_without_its_content_type_is_refused_with_the_header_that_it_needs(api: TestClient) -> None:
     answer = api.post("/experiments", content=json.dumps(LEAST), headers={"content-type": "text/plain"})
 
     assert "Content-Type: application/json" in problem(answer, 415)["errors"][0]["message"]
 
 
-def test_text_that_is_no_unicode_is_answered_with_text_that_is(api: TestClient):
+def test_text_that_is_no_unicode_is_answered_with_text_that_is(api: TestClient) -> None:
     answer = api.post("/experiments", content=b'{"strategy": "\\ud800", "\\udfff": "\\ud800"}', headers=JSON)
 
     problem(answer, 422)
 
 
-def test_a_hostile_number_of_mistakes_gets_an_answer_of_modest_size(api: TestClient):
+def test_a_hostile_number_of_mistakes_gets_an_answer_of_modest_size(api: TestClient) -> None:
     answer = api.post("/experiments", json=LEAST | {"tunables": [7] * 100_000, "x" * 100_000: ["y" * 100_000] * 3})
 
     found = problem(answer, 422)
@@ -211,7 +213,7 @@ def test_a_hostile_number_of_mistakes_gets_an_answer_of_modest_size(api: TestCli
     assert len(answer.content) < 100_000
 
 
-def test_a_body_over_a_megabyte_is_too_large_whether_announced_streamed_or_lied_about(api: TestClient):
+def test_a_body_over_a_megabyte_is_too_large_whether_announced_streamed_or_lied_about(api: TestClient) -> None:
     huge = b'{"name": "' + b"x" * MOST_BYTES + b'"}'
 
     def stream() -> Iterator[bytes]:
@@ -223,7 +225,7 @@ def test_a_body_over_a_megabyte_is_too_large_whether_announced_streamed_or_lied_
     problem(api.post("/experiments", content=stream(), headers=JSON | {"content-length": "10"}), 413)
 
 
-def test_a_body_of_just_a_megabyte_is_read(api: TestClient):
+def test_a_body_of_just_a_megabyte_is_read(api: TestClient) -> None:
     spec = json.dumps(LEAST)
 
     assert api.post("/experiments", content=spec.ljust(MOST_BYTES), headers=JSON).status_code == 202
@@ -231,18 +233,18 @@ def test_a_body_of_just_a_megabyte_is_read(api: TestClient):
 
 @pytest.mark.parametrize("name", ["nope", "x" * 2000, "%00", "a'b", "ü", "-1", "%ff"])
 @pytest.mark.parametrize("path", ["/studies/{}", "/experiments/{}", "/experiments/{}/curve", "/studies/{}/curves"])
-def test_an_unknown_id_is_not_found(api: TestClient, path: str, name: str):
+def test_an_unknown_id_is_not_found(api: TestClient, path: str, name: str) -> None:
     problem(api.get(path.format(name)), 404)
 
 
 @pytest.mark.parametrize(
     "path", ["/curves?experiment=nope", "/figures/curves?study=nope", "/comparisons?experiment=a&experiment=b"]
 )
-def test_an_unknown_id_among_those_asked_for_is_not_found(api: TestClient, path: str):
+def test_an_unknown_id_among_those_asked_for_is_not_found(api: TestClient, path: str) -> None:
     problem(api.get(path), 404)
 
 
-def test_what_has_ended_cannot_be_cancelled(api: TestClient):
+def test_what_has_ended_cannot_be_cancelled(api: TestClient) -> None:
     made = api.post("/experiments", json=LEAST).json()["id"]
     api.post(f"/experiments/{made}/cancel")
 
@@ -250,7 +252,7 @@ def test_what_has_ended_cannot_be_cancelled(api: TestClient):
     problem(api.post("/experiments/nope/cancel"), 404)
 
 
-def test_an_unknown_address_and_a_wrong_method_are_problems_too(api: TestClient):
+def test_an_unknown_address_and_a_wrong_method_are_problems_too(api: TestClient) -> None:
     problem(api.get("/nothing/here{}"), 404)
     refused = api.delete("/experiments")
     problem(refused, 405)
@@ -283,7 +285,7 @@ def test_an_unknown_address_and_a_wrong_method_are_problems_too(api: TestClient)
         ("/events/page?after=1&after=2", "after"),
     ],
 )
-def test_a_wrong_query_is_refused_with_the_parameters_name(api: TestClient, path: str, name: str):
+def test_a_wrong_query_is_refused_with_the_parameters_name(api: TestClient, path: str, name: str) -> None:
     found = problem(api.get(path), 422)
 
     assert found["type"] == "urn:gaplab:problem:invalid-request"
@@ -291,14 +293,14 @@ def test_a_wrong_query_is_refused_with_the_parameters_name(api: TestClient, path
 
 
 @pytest.mark.parametrize(("query", "name"), [("from=5&to=2", "from"), ("", "experiment")])
-def test_a_comparison_over_no_range_or_with_itself_is_refused(api: TestClient, query: str, name: str):
+def test_a_comparison_over_no_range_or_with_itself_is_refused(api: TestClient, query: str, name: str) -> None:
     first, second = (api.post("/experiments", json=LEAST).json()["id"] for _ in range(2))
     other = second if query else first
 
     assert only_error(api.get(f"/comparisons?experiment={first}&experiment={other}&{query}"))["pointer"] == name
 
 
-def test_a_misspelt_choice_in_a_query_is_answered_with_the_nearest(api: TestClient):
+def test_a_misspelt_choice_in_a_query_is_answered_with_the_nearest(api: TestClient) -> None:
     error = only_error(api.get("/experiments?state=RUNING"))
 
     assert error["nearest"] == "RUNNING"
@@ -308,7 +310,7 @@ def test_a_misspelt_choice_in_a_query_is_answered_with_the_nearest(api: TestClie
 @pytest.mark.parametrize("path", ["/studies", "/experiments", "/experiments/x/curve", "/readyz"])
 def test_requests_without_a_database_are_problems_and_succeed_when_it_is_back(
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, path: str
-):
+) -> None:
     def away() -> None:
         raise StoreUnavailable("the database cannot be used now: connection refused")
 
@@ -324,7 +326,7 @@ def test_requests_without_a_database_are_problems_and_succeed_when_it_is_back(
     assert api.get(path).status_code in {200, 404}
 
 
-def test_a_database_that_was_never_migrated_is_not_ready(tmp_path: Any):
+def test_a_database_that_was_never_migrated_is_not_ready(tmp_path: Any) -> None:
     store = Store(f"sqlite:///{tmp_path / 'empty.db'}")
     api = TestClient(create_app(store))
 
@@ -335,7 +337,7 @@ def test_a_database_that_was_never_migrated_is_not_ready(tmp_path: Any):
 
 def test_an_accident_inside_leaks_nothing_but_a_number_to_find_it_by(
     api: TestClient, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-):
+) -> None:
     def fail(*_: object, **__: object) -> None:
         raise RuntimeError("the password is swordfish")
 

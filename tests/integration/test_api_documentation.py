@@ -143,7 +143,7 @@ def operations(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]
 
 
 def complaints(document: dict[str, Any], schema: dict[str, Any], value: object) -> list[str]:
-    whole = Resource(contents=document, specification=DRAFT202012)
+    whole = Resource(contents=document, specification=DRAFT202012)  # type: ignore[call-arg]
     registry = Registry().with_resource("urn:api", whole)
     pointed = _absolute(schema)
     return [each.message for each in Draft202012Validator(pointed, registry=registry).iter_errors(value)]
@@ -175,11 +175,11 @@ def example_of(document: dict[str, Any], schema: dict[str, Any], place: str) -> 
     return found
 
 
-def test_every_endpoint_is_documented_and_no_other(document: dict[str, Any]):
+def test_every_endpoint_is_documented_and_no_other(document: dict[str, Any]) -> None:
     assert {name for name, _ in operations(document)} == ENDPOINTS
 
 
-def test_operations_have_short_names_of_their_own_and_summaries(document: dict[str, Any]):
+def test_operations_have_short_names_of_their_own_and_summaries(document: dict[str, Any]) -> None:
     names = [operation["operationId"] for _, operation in operations(document)]
 
     assert len(set(names)) == len(names)
@@ -187,11 +187,11 @@ def test_operations_have_short_names_of_their_own_and_summaries(document: dict[s
     assert all(operation["summary"] and operation["description"] for _, operation in operations(document))
 
 
-def test_operations_keep_the_names_that_generated_clients_call_them_by(document: dict[str, Any]):
+def test_operations_keep_the_names_that_generated_clients_call_them_by(document: dict[str, Any]) -> None:
     assert {operation["operationId"] for _, operation in operations(document)} == OPERATIONS
 
 
-def test_every_operation_says_which_token_it_wants_and_links_lead_to_operations(document: dict[str, Any]):
+def test_every_operation_says_which_token_it_wants_and_links_lead_to_operations(document: dict[str, Any]) -> None:
     for name, operation in operations(document):
         open_ = name in {"GET /livez", "GET /readyz"}
         assert operation["security"] == ([] if open_ else [{"token": []}, {}]), name
@@ -201,7 +201,7 @@ def test_every_operation_says_which_token_it_wants_and_links_lead_to_operations(
     assert document["components"]["securitySchemes"]["token"]["scheme"] == "bearer"
 
 
-def test_every_answer_has_an_example_that_fits_its_schema(document: dict[str, Any]):
+def test_every_answer_has_an_example_that_fits_its_schema(document: dict[str, Any]) -> None:
     for name, operation in operations(document):
         success = next(answer for status, answer in operation["responses"].items() if status.startswith("2"))
         for media, content in success["content"].items():
@@ -211,7 +211,7 @@ def test_every_answer_has_an_example_that_fits_its_schema(document: dict[str, An
             assert complaints(document, content["schema"], example) == [], (name, media)
 
 
-def test_every_example_of_a_spec_is_accepted(document: dict[str, Any], sqlite_store: Store):
+def test_every_example_of_a_spec_is_accepted(document: dict[str, Any], sqlite_store: Store) -> None:
     api = TestClient(create_app(sqlite_store))
     for name, operation in operations(document):
         if name.startswith("POST") and "application/json" in operation.get("requestBody", {}).get("content", {}):
@@ -224,11 +224,11 @@ def test_every_example_of_a_spec_is_accepted(document: dict[str, Any], sqlite_st
 
 def _completed(store: Store) -> str:
     experiment = submission.submit_experiment(store, toy(repetitions=1, priority=10)).id
-    run(store, *execution.claim(store, "me", 1))
+    run(store, *execution.claim(store, "me", 1))  # type: ignore[arg-type]
     return experiment
 
 
-def test_every_error_is_documented_as_a_problem(document: dict[str, Any]):
+def test_every_error_is_documented_as_a_problem(document: dict[str, Any]) -> None:
     for name, operation in operations(document):
         for status, answer in operation["responses"].items():
             if status[0] in "45":
@@ -236,7 +236,7 @@ def test_every_error_is_documented_as_a_problem(document: dict[str, Any]):
     assert "HTTPValidationError" not in str(document)
 
 
-def test_what_takes_json_says_what_it_answers_to_anything_else(document: dict[str, Any]):
+def test_what_takes_json_says_what_it_answers_to_anything_else(document: dict[str, Any]) -> None:
     bodies = {
         operation["operationId"]: operation["responses"]
         for operations in document["paths"].values()
@@ -248,7 +248,7 @@ def test_what_takes_json_says_what_it_answers_to_anything_else(document: dict[st
     assert [name for name, answers in bodies.items() if "415" not in answers] == []
 
 
-def test_a_key_is_offered_where_it_is_heeded(document: dict[str, Any]):
+def test_a_key_is_offered_where_it_is_heeded(document: dict[str, Any]) -> None:
     keyed = {
         operation["operationId"]
         for operations in document["paths"].values()
@@ -259,7 +259,7 @@ def test_a_key_is_offered_where_it_is_heeded(document: dict[str, Any]):
     assert keyed == {"submit_experiment", "submit_study", "submit_sensitivity"}
 
 
-def test_real_answers_fit_their_documented_schema(document: dict[str, Any], sqlite_store: Store):
+def test_real_answers_fit_their_documented_schema(document: dict[str, Any], sqlite_store: Store) -> None:
     api = TestClient(create_app(sqlite_store))
     made = api.post("/studies", json={"robot": "toy_function", "budget": "smoke"}).json()
     experiment = made["experiments"][0]
@@ -272,7 +272,7 @@ def test_real_answers_fit_their_documented_schema(document: dict[str, Any], sqli
 
 
 @pytest.mark.parametrize("page", ["/docs", "/redoc"])
-def test_the_pages_load_everything_from_the_service_itself(api: TestClient, page: str):
+def test_the_pages_load_everything_from_the_service_itself(api: TestClient, page: str) -> None:
     answer = api.get(page)
 
     assert answer.status_code == 200
@@ -283,6 +283,6 @@ def test_the_pages_load_everything_from_the_service_itself(api: TestClient, page
         assert api.get(source).status_code == 200, source
 
 
-def test_the_page_of_the_service_leads_to_its_documentation(api: TestClient):
+def test_the_page_of_the_service_leads_to_its_documentation(api: TestClient) -> None:
     assert 'href="docs"' in api.get("/").text
     assert "swagger" in api.get("/docs").text

@@ -68,19 +68,19 @@ FUZZ = settings(max_examples=150, deadline=None, suppress_health_check=list(Heal
 
 @FUZZ
 @given(spec=mutated_specs())
-def test_no_mutation_of_a_spec_makes_the_service_fail(api: TestClient, spec: dict[str, Any]):
+def test_no_mutation_of_a_spec_makes_the_service_fail(api: TestClient, spec: dict[str, Any]) -> None:
     is_accepted_or_refused(api, "/experiments", json.dumps(spec))
 
 
 @FUZZ
 @given(spec=ANYTHING)
-def test_no_json_at_all_makes_the_service_fail(api: TestClient, spec: object):
+def test_no_json_at_all_makes_the_service_fail(api: TestClient, spec: object) -> None:
     is_accepted_or_refused(api, "/studies", json.dumps(spec))
 
 
 @FUZZ
 @given(spec=mutated_specs())
-def test_no_mutation_of_what_is_checked_makes_the_service_fail(api: TestClient, spec: dict[str, Any]):
+def test_no_mutation_of_what_is_checked_makes_the_service_fail(api: TestClient, spec: dict[str, Any]) -> None:
     spec.pop("strategy", None)
     spec.pop("name", None)
     is_accepted_or_refused(api, "/sensitivity", json.dumps(spec))
@@ -88,7 +88,7 @@ def test_no_mutation_of_what_is_checked_makes_the_service_fail(api: TestClient, 
 
 @FUZZ
 @given(body=st.binary(max_size=50))
-def test_no_bytes_make_the_service_fail(api: TestClient, body: bytes):
+def test_no_bytes_make_the_service_fail(api: TestClient, body: bytes) -> None:
     is_accepted_or_refused(api, "/experiments", body)
 
 
@@ -114,7 +114,7 @@ def test_no_bytes_make_the_service_fail(api: TestClient, body: bytes):
         max_size=3,
     ),
 )
-def test_no_query_makes_the_service_fail(api: TestClient, path: str, query: dict[str, str]):
+def test_no_query_makes_the_service_fail(api: TestClient, path: str, query: dict[str, str]) -> None:
     answer = api.get(path, params=query)
 
     assert answer.status_code in {200, 404, 422}, answer.text

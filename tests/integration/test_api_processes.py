@@ -61,14 +61,16 @@ def port() -> int:
 
 
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
-def test_a_service_migrates_its_database_answers_and_ends_in_order(tmp_path: Path, port: int, how: signal.Signals):
+def test_a_service_migrates_its_database_answers_and_ends_in_order(
+    tmp_path: Path, port: int, how: signal.Signals
+) -> None:
     environment = {"GAPLAB_DATABASE_URL": f"sqlite:///{tmp_path / 'new.db'}"}
     process = serve(environment, "--no-workers", "--port", str(port))
 
     with Client(f"http://127.0.0.1:{port}") as client:
-        assert within(20, client.ready)
+        assert within(60, client.ready)
     process.send_signal(how)
-    said, _ = process.communicate(timeout=20)
+    said, _ = process.communicate(timeout=60)
 
     assert process.returncode == 0, said
     assert json.loads(said)["message"].startswith(f"gaplab serves on http://127.0.0.1:{port}")
@@ -79,7 +81,7 @@ def test_a_service_migrates_its_database_answers_and_ends_in_order(tmp_path: Pat
 @pytest.mark.parametrize("module", ["gaplab", "gaplab.api"])
 def test_beyond_loopback_a_service_without_a_token_does_not_start_and_says_how_to_make_one(
     tmp_path: Path, port: int, module: str
-):
+) -> None:
     environment = {"GAPLAB_DATABASE_URL": f"sqlite:///{tmp_path / 'new.db'}", "GAPLAB_HOST": "0.0.0.0"}
     migrate(environment["GAPLAB_DATABASE_URL"])
     arguments = ["serve", "--no-workers"] if module == "gaplab" else []
@@ -99,7 +101,7 @@ def test_beyond_loopback_a_service_without_a_token_does_not_start_and_says_how_t
     assert refused.stderr.count("\n") == 1
 
 
-def test_a_host_is_refused_until_a_token_lets_someone_in(store_url: str):
+def test_a_host_is_refused_until_a_token_lets_someone_in(store_url: str) -> None:
     store, strangers = Store(store_url), Settings(database_url=store_url, host="0.0.0.0")
     with pytest.raises(Unauthenticated, match="token create"):
         require_token(strangers)
@@ -114,11 +116,11 @@ def test_a_host_is_refused_until_a_token_lets_someone_in(store_url: str):
     store.dispose()
 
 
-def test_a_port_that_is_taken_is_a_sentence(tmp_path: Path):
+def test_a_port_that_is_taken_is_a_sentence(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         process = serve({"GAPLAB_DATABASE_URL": f"sqlite:///{tmp_path / 'x.db'}"}, "--port", str(port))
-        said, _ = process.communicate(timeout=20)
+        said, _ = process.communicate(timeout=60)
 
     assert process.returncode == 1
     assert re.fullmatch(rf"gaplab: cannot serve on 127\.0\.0\.1:{port}: address already in use\n", said)
@@ -127,7 +129,7 @@ def test_a_port_that_is_taken_is_a_sentence(tmp_path: Path):
 @pytest.mark.parametrize(
     ("host", "port"), [("no-such-host.invalid", 9999), ("127.0.0.1", 99999), ("127.0.0.1", -1), ("::1::", 1)]
 )
-def test_an_address_that_is_none_is_a_sentence(host: str, port: int):
+def test_an_address_that_is_none_is_a_sentence(host: str, port: int) -> None:
     with pytest.raises(CommandError, match=f"^cannot serve on {host}:{port}: [^\n]+$"):
         listen(host, port)
 
@@ -135,7 +137,7 @@ def test_an_address_that_is_none_is_a_sentence(host: str, port: int):
 @pytest.mark.parametrize(
     "url", ["sqlite:////no/such/folder/x.db", "postgresql+psycopg://me:secret@127.0.0.1:9/x", "nonsense", "mysql://x/y"]
 )
-def test_a_database_that_cannot_be_migrated_is_a_sentence_without_its_password(url: str):
+def test_a_database_that_cannot_be_migrated_is_a_sentence_without_its_password(url: str) -> None:
     with pytest.raises(StoreUnavailable) as refused:
         migrate(url)
 
@@ -145,17 +147,17 @@ def test_a_database_that_cannot_be_migrated_is_a_sentence_without_its_password(u
 
 def test_a_supervisor_that_dies_is_started_again_and_it_is_said(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-):
+) -> None:
     monkeypatch.setattr(service, "LONGEST_PAUSE_S", 0.1)
     supervisor = SupervisorProcess({}, module="this")
 
     supervisor.start()
-    assert within(20, lambda: caplog.text.count("another starts") >= 2)
+    assert within(60, lambda: caplog.text.count("another starts") >= 2)
     supervisor.stop()
     assert "ended by itself (exit code 0)" in caplog.text
 
 
-def test_a_supervisor_that_is_stopped_ends_its_supervisor(tmp_path: Path):
+def test_a_supervisor_is_ended_when_its_process_is_stopped(tmp_path: Path) -> None:
     supervisor = SupervisorProcess({"PYTHONPATH": str(tmp_path)}, module="sleeper")
     note = tmp_path / "pid"
     (tmp_path / "sleeper.py").write_text(
@@ -163,20 +165,20 @@ def test_a_supervisor_that_is_stopped_ends_its_supervisor(tmp_path: Path):
     )
 
     supervisor.start()
-    assert within(20, lambda: note.exists() and note.read_text())
+    assert within(60, lambda: note.exists() and note.read_text())
     supervisor.stop()
 
     assert not alive(int(note.read_text()))
 
 
-def test_a_child_ends_when_its_parent_is_killed_outright(tmp_path: Path):
+def test_a_child_ends_when_its_parent_is_killed_outright(tmp_path: Path) -> None:
     note = tmp_path / "pid"
     script = (
         "import time; from gaplab.api.process.child_process import start; "
         f"open({str(note)!r}, 'w').write(str(start('http.server', '0', '--bind', '127.0.0.1').pid)); time.sleep(60)"
     )
     parent = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    assert within(20, lambda: note.exists() and note.read_text())
+    assert within(60, lambda: note.exists() and note.read_text())
     time.sleep(1.0)
 
     parent.kill()
@@ -185,21 +187,21 @@ def test_a_child_ends_when_its_parent_is_killed_outright(tmp_path: Path):
     assert within(10, lambda: not alive(int(note.read_text())))
 
 
-def test_a_child_that_does_not_end_when_asked_is_killed(tmp_path: Path):
+def test_a_child_that_does_not_end_when_asked_is_killed(tmp_path: Path) -> None:
     (tmp_path / "stubborn.py").write_text(
         "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('ready', flush=True); time.sleep(60)"
     )
     log = tmp_path / "log"
     with log.open("wb") as output:
         process = start("stubborn", environment={"PYTHONPATH": str(tmp_path)}, log=output)
-    assert within(20, lambda: b"ready" in log.read_bytes())
+    assert within(60, lambda: b"ready" in log.read_bytes())
 
     end(process, patience_s=0.2)
 
     assert process.returncode == -signal.SIGKILL
 
 
-def test_children_read_the_same_settings():
+def test_children_read_the_same_settings() -> None:
     settings = Settings(database_url="sqlite:///x.db", ray_address="auto", workers=3, host="0.0.0.0", port=99)
 
     assert environment_of(settings) == {
@@ -214,7 +216,7 @@ def test_children_read_the_same_settings():
 
 def test_the_token_of_another_service_is_not_shown_to_one_of_ones_own(
     sqlite_url: str, sqlite_store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+) -> None:
     monkeypatch.setenv("GAPLAB_TOKEN", f"gaplab_elsewhere_{'0' * 64}")
     with start_service(sqlite_url, tmp_path / "log", workers=False) as client:
         found = client.studies()

@@ -41,7 +41,7 @@ def document(store: Store) -> BaseSchema:
     return found
 
 
-def test_whatever_is_asked_and_whatever_follows_is_answered_as_the_document_says(document: BaseSchema):
+def test_whatever_is_asked_and_whatever_follows_is_answered_as_the_document_says(document: BaseSchema) -> None:
     asked: Counter[str] = Counter()
     followed: set[str] = set()
     troubles = []

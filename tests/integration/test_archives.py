@@ -3,10 +3,12 @@
 import json
 import time
 import tracemalloc
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from io import BytesIO
 from math import copysign, inf, nan
+from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
@@ -31,6 +33,7 @@ from gaplab.services.running import execution
 from gaplab.services.store.models import Base, ExperimentRow, RepetitionRow, SimulatorRow
 from gaplab.services.store.queries import archives as repository
 from gaplab.services.store.queries.attempts import attempts_of
+from gaplab.services.store.session import Store
 from tests.experiments import AWKWARD, cancel, run, some_log, toy
 
 EVERY = settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -46,12 +49,12 @@ NAME = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0")
 
 
 @st.composite
-def logs(draw):
+def logs(draw: Any) -> Any:
     """A whole log of a toy experiment with whatever numbers."""
     return list(_steps(draw))
 
 
-def _steps(draw):
+def _steps(draw: Any) -> Iterator[Any]:
     for iteration in range(3):
         if iteration:
             yield Selected(iteration, draw(GENOME), draw(COST))
@@ -62,19 +65,19 @@ def _steps(draw):
 
 
 @pytest.fixture
-def other(request, store):
+def other(request: pytest.FixtureRequest, store: Store) -> Any:
     """A database of the other kind."""
     with store.reading() as session:
         kind = session.get_bind().dialect.name
     return request.getfixturevalue("postgres_store" if kind == "sqlite" else "sqlite_store")
 
 
-def exported(archive):
+def exported(archive: Any) -> Any:
     with archive.file as file:
         return file.read()
 
 
-def finished(store, log=None, **changes):
+def finished(store: Store, log: Any = None, **changes: Any) -> Any:
     """The id of an experiment whose repetitions are all complete."""
     submitted = submission.submit_experiment(store, toy(**changes)).id
     while claims := execution.claim(store, "me", 9):
@@ -83,7 +86,7 @@ def finished(store, log=None, **changes):
     return submitted
 
 
-def shown(store, experiment):
+def shown(store: Store, experiment: Any) -> Any:
     """Everything that the service shows of it, but for its sensitivity check, which is its tunables'."""
     return (
         reading.read_experiment(store, experiment).model_dump(exclude={"sensitivity"}),
@@ -95,7 +98,7 @@ def shown(store, experiment):
     )
 
 
-def forget(store):
+def forget(store: Store) -> None:
     """Remove what there is, as an import must find its ids free again."""
     with store.transaction() as session:
         for table in reversed(Base.metadata.sorted_tables):
@@ -103,7 +106,7 @@ def forget(store):
                 session.execute(table.delete())
 
 
-def test_an_experiment_goes_to_the_other_kind_of_database_and_back(store, other):
+def test_an_experiment_goes_to_the_other_kind_of_database_and_back(store: Store, other: Any) -> None:
     submitted = finished(store, reality={"parameters": {"static_friction": 0.9}})
     before, archive = shown(store, submitted), exported(export_experiment(store, submitted))
 
@@ -119,10 +122,10 @@ def test_an_experiment_goes_to_the_other_kind_of_database_and_back(store, other)
 
 
 @pytest.fixture
-def unpacked_here(monkeypatch):
+def unpacked_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Parquet is read in this process, without its limits, which saves a second each time."""
 
-    def read(files):
+    def read(files: Any) -> None:
         assert all(unpacking.convert(str(each), str(opening._lines_of(each))) for each in files)
 
     monkeypatch.setattr(opening, "_read_parquet", read)
@@ -130,7 +133,7 @@ def unpacked_here(monkeypatch):
 
 @EVERY
 @given(st.data())
-def test_whatever_numbers_and_names_go_there_and_back(store, other, unpacked_here, data):
+def test_whatever_numbers_and_names_go_there_and_back(store: Store, other: Any, unpacked_here: Any, data: Any) -> None:
     forget(store)
     forget(other)
     submitted = finished(store, data.draw(logs()), repetitions=1, name=data.draw(NAME))
@@ -142,7 +145,7 @@ def test_whatever_numbers_and_names_go_there_and_back(store, other, unpacked_her
     assert repr(shown(other, submitted)) == repr(shown(store, submitted))
 
 
-def test_a_zero_has_no_sign_in_either_database(store, other, unpacked_here):
+def test_a_zero_has_no_sign_in_either_database(store: Store, other: Any, unpacked_here: Any) -> None:
     submitted = finished(store, list(some_log(recorded=-0.0)), repetitions=1)
     archive = exported(export_experiment(store, submitted))
 
@@ -153,10 +156,12 @@ def test_a_zero_has_no_sign_in_either_database(store, other, unpacked_here):
     assert copysign(1, values[0]) == 1
 
 
-def test_an_archive_may_arrive_twice_at_once(store, other, unpacked_here, monkeypatch):
+def test_an_archive_may_arrive_twice_at_once(
+    store: Store, other: Any, unpacked_here: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     archive, taken_ids = exported(export_experiment(store, finished(store))), repository.taken_ids
 
-    def slowly(*arguments):
+    def slowly(*arguments: Any) -> Any:
         found = taken_ids(*arguments)
         time.sleep(0.2)
         return found
@@ -168,14 +173,14 @@ def test_an_archive_may_arrive_twice_at_once(store, other, unpacked_here, monkey
     assert sorted(len(each.renamed) for each in both) == [0, 1]
 
 
-def test_the_best_of_repetitions_whose_sum_is_no_number_is_one(store):
+def test_the_best_of_repetitions_whose_sum_is_no_number_is_one(store: Store) -> None:
     greatest = 1.7e308
     id_ = finished(store, list(some_log(recorded=greatest)))
 
     assert reading.read_experiment(store, id_).best_fitness == pytest.approx(greatest)
 
 
-def test_a_study_goes_there_with_all_that_is_its_own(store, other):
+def test_a_study_goes_there_with_all_that_is_its_own(store: Store, other: Any) -> None:
     study = submission.submit_study(
         store,
         StudySpec.model_validate(TOY_STUDY | {"strategies": ["random", "direct"]}),
@@ -199,7 +204,7 @@ def test_a_study_goes_there_with_all_that_is_its_own(store, other):
     assert exported(export_study(other, study.id)) == archive
 
 
-def _fitting(step, tunables):
+def _fitting(step: Any, tunables: Any) -> Any:
     """The same step for so many tunables."""
     if not isinstance(step, Tuned):
         return step
@@ -207,7 +212,7 @@ def _fitting(step, tunables):
     return Tuned(step.iteration, simulators, step.cost)
 
 
-def test_an_experiment_of_a_study_goes_on_its_own(store, other):
+def test_an_experiment_of_a_study_goes_on_its_own(store: Store, other: Any) -> None:
     study = submission.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["random"]}))
     (experiment,) = (each.id for each in study.experiments)
 
@@ -218,7 +223,7 @@ def test_an_experiment_of_a_study_goes_on_its_own(store, other):
         reading.read_study(other, study.id)
 
 
-def test_ids_that_are_taken_become_new_ones_and_the_rest_is_the_same(store):
+def test_ids_that_are_taken_become_new_ones_and_the_rest_is_the_same(store: Store) -> None:
     submitted = finished(store)
     archive = exported(export_experiment(store, submitted))
 
@@ -231,7 +236,7 @@ def test_ids_that_are_taken_become_new_ones_and_the_rest_is_the_same(store):
         assert repr(first) == repr(second).replace(new, submitted)
 
 
-def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(store, other):
+def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(store: Store, other: Any) -> None:
     submitted = submission.submit_experiment(store, toy()).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)
@@ -252,7 +257,7 @@ def test_what_was_not_computed_yet_arrives_called_off_and_nothing_of_it_runs(sto
 
 
 @pytest.mark.parametrize("ended", [False, True])
-def test_reality_is_hidden_until_its_study_has_ended(store, other, ended):
+def test_reality_is_hidden_until_its_study_has_ended(store: Store, other: Any, ended: Any) -> None:
     spec = TOY_STUDY | {"strategies": ["direct", "random"], "repetitions": 1}
     truth = {"reality": {"parameters": {"static_friction": 0.98765}}, "tunables": ["static_friction", "restitution"]}
     study = submission.submit_study(store, StudySpec.model_validate(spec | truth))
@@ -275,7 +280,7 @@ def test_reality_is_hidden_until_its_study_has_ended(store, other, ended):
         assert misfit(other, first).points == ()
 
 
-def test_an_export_is_of_one_moment_while_a_supervisor_writes(store, other):
+def test_an_export_is_of_one_moment_while_a_supervisor_writes(store: Store, other: Any) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=6)).id
     for claim in execution.claim(store, "me", 6):
         run(store, claim)
@@ -286,7 +291,7 @@ def test_an_export_is_of_one_moment_while_a_supervisor_writes(store, other):
         archive.file.close()
 
 
-def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store):
+def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store: Store) -> None:
     submitted = finished(sqlite_store)
 
     with ZipFile(BytesIO(exported(export_experiment(sqlite_store, submitted)))) as opened:
@@ -306,7 +311,7 @@ def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store):
     assert {name.partition(".")[0] for name in manifest["members"]} == {*EXPORTED, "curves"}
 
 
-def test_attempts_go_with_it_and_none_goes_on(store, other):
+def test_attempts_go_with_it_and_none_goes_on(store: Store, other: Any) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=2)).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)
@@ -323,12 +328,12 @@ def test_attempts_go_with_it_and_none_goes_on(store, other):
     assert last.ended_at is not None
 
 
-def attempts(store, experiment, number):
+def attempts(store: Store, experiment: Any, number: Any) -> Any:
     with store.reading() as session:
         return attempts_of(session, experiment, number)
 
 
-def test_what_came_without_its_reality_cannot_be_extended(store, other):
+def test_what_came_without_its_reality_cannot_be_extended(store: Store, other: Any) -> None:
     study = submission.submit_study(store, StudySpec.model_validate(TOY_STUDY | {"strategies": ["direct", "random"]}))
     direct = study.experiments[0].id
     for claim in execution.claim(store, "me", 9):
@@ -342,7 +347,7 @@ def test_what_came_without_its_reality_cannot_be_extended(store, other):
         extension.extend_experiment(other, direct, ExtensionSpec(repetitions=3))
 
 
-def test_times_keep_their_microseconds(store, other):
+def test_times_keep_their_microseconds(store: Store, other: Any) -> None:
     submitted = finished(store)
     moment = datetime(2012, 11, 5, 9, 0, 0, 123457, tzinfo=UTC)
     with store.transaction() as session:
@@ -354,7 +359,7 @@ def test_times_keep_their_microseconds(store, other):
     assert reading.read_experiment(other, submitted).created_at == moment
 
 
-def test_memory_does_not_grow_with_what_is_exported(sqlite_store):
+def test_memory_does_not_grow_with_what_is_exported(sqlite_store: Store) -> None:
     """Rows are never all there at once."""
     submitted = finished(sqlite_store, repetitions=1)
     with sqlite_store.transaction() as session:

@@ -8,6 +8,7 @@ import zipfile
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import pyarrow as arrow
 import pyarrow.parquet
@@ -28,7 +29,7 @@ from tests.experiments import run, toy
 
 
 @pytest.fixture(scope="module")
-def good(sqlite_template, tmp_path_factory):
+def good(sqlite_template: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """The members of an archive with which nothing is wrong."""
     file = tmp_path_factory.mktemp("good") / "good.db"
     shutil.copy(sqlite_template, file)
@@ -43,10 +44,10 @@ def good(sqlite_template, tmp_path_factory):
 
 
 @pytest.fixture
-def unpacked_here(monkeypatch):
+def unpacked_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Parquet is read in this process, without its limits, which saves a second each time."""
 
-    def read(files):
+    def read(files: Any) -> None:
         for file in files:
             if not unpacking.convert(str(file), str(opening._lines_of(file))):
                 raise InvalidArchive(f"{file.name} is no Parquet")
@@ -54,7 +55,7 @@ def unpacked_here(monkeypatch):
     monkeypatch.setattr(opening, "_read_parquet", read)
 
 
-def packed(members, *, honest=True, compression=zipfile.ZIP_DEFLATED):
+def packed(members: Any, *, honest: Any = True, compression: Any = zipfile.ZIP_DEFLATED) -> Any:
     """A zip of the members, whose manifest tells the truth of them unless it is not to."""
     members = dict(members)
     if honest:
@@ -71,7 +72,7 @@ def packed(members, *, honest=True, compression=zipfile.ZIP_DEFLATED):
     return file.getvalue()
 
 
-def rows_of(name, content):
+def rows_of(name: Any, content: Any) -> Any:
     if name.endswith(".parquet"):
         try:
             return pyarrow.parquet.read_metadata(BytesIO(content)).num_rows
@@ -80,7 +81,7 @@ def rows_of(name, content):
     return content.count(b"\n")
 
 
-def refused(store, archive, *what):
+def refused(store: Store, archive: Any, *what: Any) -> None:
     with pytest.raises(InvalidArchive) as refusal:
         import_archive(store, BytesIO(archive))
     assert listing.list_experiments(store).items == ()
@@ -88,7 +89,7 @@ def refused(store, archive, *what):
     assert all(each in str(refusal.value) for each in what), refusal.value
 
 
-def with_row(good, **changes):
+def with_row(good: Any, **changes: Any) -> Any:
     """The experiment's row with other values; a callable makes one of the old."""
     row = json.loads(good["experiment.jsonl"])
     for name, value in changes.items():
@@ -96,7 +97,7 @@ def with_row(good, **changes):
     return good | {"experiment.jsonl": json.dumps(row).encode() + b"\n"}
 
 
-def with_table(good, table, change):
+def with_table(good: Any, table: Any, change: Any) -> Any:
     """A table with its rows changed."""
     rows = pyarrow.parquet.read_table(BytesIO(good[f"{table}.parquet"]))
     changed = arrow.Table.from_pylist(change(rows.to_pylist()), rows.schema)
@@ -105,39 +106,41 @@ def with_table(good, table, change):
     return good | {f"{table}.parquet": file.getvalue()}
 
 
-def set_in(rows, place, **values):
+def set_in(rows: Any, place: Any, **values: Any) -> Any:
     rows[place] |= values
     return rows
 
 
-def test_the_good_one_is_good(sqlite_store, good):
+def test_the_good_one_is_good(sqlite_store: Store, good: Any) -> None:
     stored = import_archive(sqlite_store, BytesIO(packed(good)))
 
     assert read_experiment(sqlite_store, stored.experiments[0]).progress.completed == 2
 
 
 @pytest.mark.parametrize("archive", [b"", b"no zip", b"PK\x03\x04" + bytes(100), b"PK\x05\x06" + b"\xff" * 18])
-def test_what_is_no_zip(sqlite_store, archive):
+def test_what_is_no_zip(sqlite_store: Store, archive: Any) -> None:
     refused(sqlite_store, archive, "zip")
 
 
 @pytest.mark.parametrize("name", ["../../../etc/passwd", "/etc/passwd", "C:\\x", "event.parquet", "a/experiment.jsonl"])
-def test_a_member_with_another_name(sqlite_store, good, name):
+def test_a_member_with_another_name(sqlite_store: Store, good: Any, name: Any) -> None:
     refused(sqlite_store, packed(good | {name: b"x"}), "a member is called", "permitted: ")
 
 
-def test_a_member_twice(sqlite_store, good):
+def test_a_member_twice(sqlite_store: Store, good: Any) -> None:
     file = BytesIO(packed(good))
     with pytest.warns(UserWarning, match="Duplicate"), zipfile.ZipFile(file, "a") as archive:
         archive.writestr("experiment.jsonl", b"{}")
     refused(sqlite_store, file.getvalue(), "experiment.jsonl is there twice")
 
 
-def test_another_compression(sqlite_store, good):
+def test_another_compression(sqlite_store: Store, good: Any) -> None:
     refused(sqlite_store, packed(good, compression=zipfile.ZIP_BZIP2), "compressed by another method")
 
 
-def test_more_than_is_permitted_when_it_is_unpacked(sqlite_store, good, monkeypatch):
+def test_more_than_is_permitted_when_it_is_unpacked(
+    sqlite_store: Store, good: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(opening, "MOST_BYTES", 1_000_000)
     bomb = packed(good | {"curves.json": bytes(2_000_000)})
     assert len(bomb) < 100_000
@@ -145,7 +148,7 @@ def test_more_than_is_permitted_when_it_is_unpacked(sqlite_store, good, monkeypa
     refused(sqlite_store, bomb, "unpacked it has 2,0", "1,000,000 are permitted")
 
 
-def test_more_than_its_directory_says(sqlite_store, good):
+def test_more_than_its_directory_says(sqlite_store: Store, good: Any) -> None:
     content = good | {"curves.json": bytes(2_000_000)}
     archive = packed(content).replace((2_000_000).to_bytes(4, "little"), (100).to_bytes(4, "little"))
 
@@ -153,12 +156,12 @@ def test_more_than_its_directory_says(sqlite_store, good):
 
 
 @pytest.mark.parametrize("name", ["experiment.jsonl", "measurement.parquet", "curves.json"])
-def test_a_member_that_was_changed(sqlite_store, good, name):
+def test_a_member_that_was_changed(sqlite_store: Store, good: Any, name: Any) -> None:
     refused(sqlite_store, packed(good | {name: good[name] + b" "}, honest=False), name, "damaged or changed")
 
 
 @pytest.mark.parametrize("name", ["manifest.json", "simulator.parquet", "experiment.jsonl"])
-def test_a_member_that_is_missing(sqlite_store, good, name):
+def test_a_member_that_is_missing(sqlite_store: Store, good: Any, name: Any) -> None:
     left = {each: content for each, content in good.items() if each != name}
 
     refused(sqlite_store, packed(left, honest=False), name)
@@ -177,18 +180,18 @@ def test_a_member_that_is_missing(sqlite_store, good, name):
         ({"surprise": 1}, "surprise"),
     ],
 )
-def test_a_manifest_that_is_none(sqlite_store, good, change, said, unpacked_here):
+def test_a_manifest_that_is_none(sqlite_store: Store, good: Any, change: Any, said: Any, unpacked_here: Any) -> None:
     manifest = json.dumps(json.loads(good["manifest.json"]) | change).encode()
 
     refused(sqlite_store, packed(good | {"manifest.json": manifest}, honest=False), said)
 
 
 @pytest.mark.parametrize("manifest", [b"", b"[]", b"{" * 50_000, b"[" * 90_000, b"\xff", b" " * 200_000])
-def test_a_manifest_that_is_no_json(sqlite_store, good, manifest):
+def test_a_manifest_that_is_no_json(sqlite_store: Store, good: Any, manifest: Any) -> None:
     refused(sqlite_store, packed(good | {"manifest.json": manifest}, honest=False), "manifest.json")
 
 
-def in_spec(**changes):
+def in_spec(**changes: Any) -> Any:
     return lambda spec: spec | changes
 
 
@@ -196,7 +199,7 @@ BOUNDED = {"name": "static_friction", "lower": 0.0, "upper": 1.0}
 PARTS = ("name", "iterations", "repetitions", "robot", "engine", "tunables", "optimizer", "budget", "seed")
 
 
-def without(part):
+def without(part: Any) -> Any:
     return lambda spec: {name: value for name, value in spec.items() if name != part}
 
 
@@ -250,12 +253,14 @@ def without(part):
         ({"spec_version": 99}, "version 99"),
     ],
 )
-def test_an_experiment_that_cannot_be(sqlite_store, good, changes, said, unpacked_here):
+def test_an_experiment_that_cannot_be(
+    sqlite_store: Store, good: Any, changes: Any, said: Any, unpacked_here: Any
+) -> None:
     refused(sqlite_store, packed(with_row(good, **changes)), said)
 
 
 @pytest.mark.parametrize("token", [b"NaN", b"Infinity", b"-Infinity", b"1e999", b"[" * 3000, b"9" * 5000, b"'x'"])
-def test_a_number_or_a_value_that_json_has_not(sqlite_store, good, token, unpacked_here):
+def test_a_number_or_a_value_that_json_has_not(sqlite_store: Store, good: Any, token: Any, unpacked_here: Any) -> None:
     bad = good["experiment.jsonl"].replace(b'"iterations": 3', b'"iterations": ' + token)
     assert bad != good["experiment.jsonl"]
 
@@ -272,11 +277,13 @@ def test_a_number_or_a_value_that_json_has_not(sqlite_store, good, token, unpack
         (b"", "its experiment is not"),
     ],
 )
-def test_rows_that_are_none(sqlite_store, good, content, said, unpacked_here):
+def test_rows_that_are_none(sqlite_store: Store, good: Any, content: Any, said: Any, unpacked_here: Any) -> None:
     refused(sqlite_store, packed(good | {"experiment.jsonl": content}), said)
 
 
-def test_a_row_without_an_end(sqlite_store, good, monkeypatch, unpacked_here):
+def test_a_row_without_an_end(
+    sqlite_store: Store, good: Any, monkeypatch: pytest.MonkeyPatch, unpacked_here: Any
+) -> None:
     monkeypatch.setattr(checking, "LONGEST_LINE", 1_000)
 
     refused(sqlite_store, packed(good | {"experiment.jsonl": b" " * 2_000}), "more than 1,000 characters")
@@ -307,12 +314,14 @@ def test_a_row_without_an_end(sqlite_store, good, monkeypatch, unpacked_here):
         ("repetition", lambda rows: [*rows, set_in(rows[:1], 0, number=0)[0]], "contradict"),
     ],
 )
-def test_results_that_cannot_be(store, good, table, change, said, unpacked_here):
+def test_results_that_cannot_be(
+    store: Store, good: Any, table: Any, change: Any, said: Any, unpacked_here: Any
+) -> None:
     refused(store, packed(with_table(good, table, change)), said)
 
 
 @pytest.mark.parametrize("left", [[], [0], [1]])
-def test_an_experiment_without_some_of_its_repetitions(store, good, left, unpacked_here):
+def test_an_experiment_without_some_of_its_repetitions(store: Store, good: Any, left: Any, unpacked_here: Any) -> None:
     members = with_table(good, "repetition", lambda rows: [rows[each] for each in left])
     for table in ("iteration", "measurement", "simulator", "attempt"):
         members = with_table(members, table, lambda rows: [each for each in rows if each["repetition"] in left])
@@ -321,11 +330,13 @@ def test_an_experiment_without_some_of_its_repetitions(store, good, left, unpack
 
 
 @pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1" * 100, bytes(1000)])
-def test_what_is_no_parquet(sqlite_store, good, content):
+def test_what_is_no_parquet(sqlite_store: Store, good: Any, content: Any) -> None:
     refused(sqlite_store, packed(good | {"simulator.parquet": content}), "simulator.parquet is not readable Parquet")
 
 
-def test_a_reader_of_parquet_that_is_killed(sqlite_store, good, monkeypatch, tmp_path):
+def test_a_reader_of_parquet_that_is_killed(
+    sqlite_store: Store, good: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     suicide = tmp_path / "suicide.py"
     suicide.write_text("import os; os.kill(os.getpid(), 9)")
     monkeypatch.setattr(opening, "_UNPACKING", suicide)
@@ -343,7 +354,7 @@ sys.exit(unpacking.main(sys.argv[3:]))
 
 
 @pytest.mark.parametrize(("room", "ended"), [(0, 1), (1, 2), (2, 3), (3, 0)])
-def test_what_is_written_of_all_tables_together_is_limited(good, tmp_path, room, ended):
+def test_what_is_written_of_all_tables_together_is_limited(good: Any, tmp_path: Path, room: Any, ended: Any) -> None:
     table, paths = tmp_path / "simulator.parquet", [str(tmp_path / name) for name in ("first", "second", "third")]
     table.write_bytes(good["simulator.parquet"])
     assert unpacking.convert(str(table), str(tmp_path / "alone"))
@@ -356,7 +367,7 @@ def test_what_is_written_of_all_tables_together_is_limited(good, tmp_path, room,
     assert subprocess.run(command, check=False).returncode == ended
 
 
-def test_a_small_file_of_parquet_that_becomes_a_large_row(sqlite_store, good):
+def test_a_small_file_of_parquet_that_becomes_a_large_row(sqlite_store: Store, good: Any) -> None:
     bomb = with_table(good, "measurement", lambda rows: set_in(rows, 0, genome=[0.5] * 2_500_000))
     assert len(bomb["measurement.parquet"]) < 100_000
 
@@ -365,7 +376,7 @@ def test_a_small_file_of_parquet_that_becomes_a_large_row(sqlite_store, good):
 
 @settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
-def test_whichever_bytes_are_damaged(sqlite_store, good, unpacked_here, data):
+def test_whichever_bytes_are_damaged(sqlite_store: Store, good: Any, unpacked_here: Any, data: Any) -> None:
     archive = bytearray(packed(good))
     for _ in range(data.draw(st.integers(1, 4))):
         place = data.draw(st.integers(0, len(archive) - 1) | st.integers(len(archive) - 900, len(archive) - 1))
@@ -378,7 +389,7 @@ def test_whichever_bytes_are_damaged(sqlite_store, good, unpacked_here, data):
     assert all(each.progress.completed == 2 for each in stored)  # what was damaged means nothing, like a date
 
 
-def test_too_many_at_once_are_asked_to_wait(sqlite_store, good):
+def test_too_many_at_once_are_asked_to_wait(sqlite_store: Store, good: Any) -> None:
     taken = [reading._SLOTS.acquire(blocking=False) for _ in range(reading.AT_ONCE)]
     try:
         with pytest.raises(Conflict, match="try again"):
@@ -391,7 +402,7 @@ def test_too_many_at_once_are_asked_to_wait(sqlite_store, good):
     assert import_archive(sqlite_store, BytesIO(packed(good))).experiments
 
 
-def test_over_http_it_is_a_problem(sqlite_store, good):
+def test_over_http_it_is_a_problem(sqlite_store: Store, good: Any) -> None:
     api = TestClient(create_app(sqlite_store))
 
     answer = api.post("/import", content=packed(good | {"../x": b""}))
@@ -402,7 +413,9 @@ def test_over_http_it_is_a_problem(sqlite_store, good):
     assert "../x" in answer.json()["detail"]
 
 
-def test_an_archive_may_be_larger_than_a_spec_but_not_as_large_as_it_likes(sqlite_store, monkeypatch):
+def test_an_archive_may_be_larger_than_a_spec_but_not_as_large_as_it_likes(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     api = TestClient(create_app(sqlite_store))
     monkeypatch.setitem(limits.MOST_BYTES_OF, "/import", 2_000_000)
 

@@ -1,6 +1,8 @@
 """Archives over HTTP and by the command."""
 
 from io import BytesIO
+from pathlib import Path
+from typing import Any
 from zipfile import ZipFile
 
 import pytest
@@ -29,7 +31,7 @@ def submitted(sqlite_store: Store) -> str:
     return found
 
 
-def test_an_export_says_what_it_is_and_how_large(api: TestClient, submitted: str):
+def test_an_export_says_what_it_is_and_how_large(api: TestClient, submitted: str) -> None:
     answer = api.get(f"/experiments/{submitted}/export")
 
     assert answer.status_code == 200
@@ -39,7 +41,7 @@ def test_an_export_says_what_it_is_and_how_large(api: TestClient, submitted: str
     assert ZipFile(BytesIO(answer.content)).testzip() is None
 
 
-def test_an_import_leads_to_what_it_stored(api: TestClient, submitted: str):
+def test_an_import_leads_to_what_it_stored(api: TestClient, submitted: str) -> None:
     archive = api.get(f"/experiments/{submitted}/export").content
 
     answer = api.post("/import", content=archive)
@@ -52,7 +54,7 @@ def test_an_import_leads_to_what_it_stored(api: TestClient, submitted: str):
     assert first == second
 
 
-def test_a_study_goes_the_same_way(api: TestClient):
+def test_a_study_goes_the_same_way(api: TestClient) -> None:
     study = api.post("/studies", json={"robot": "toy_function", "budget": "smoke", "strategies": ["random"]}).json()
 
     answer = api.post("/import", content=api.get(f"/studies/{study['id']}/export").content)
@@ -63,11 +65,11 @@ def test_a_study_goes_the_same_way(api: TestClient):
 
 
 @pytest.mark.parametrize("path", ["/experiments/none/export", "/studies/none/export"])
-def test_what_there_is_not_cannot_be_exported(api: TestClient, path: str):
+def test_what_there_is_not_cannot_be_exported(api: TestClient, path: str) -> None:
     assert api.get(path).status_code == 404
 
 
-def test_the_command_writes_an_archive_and_reads_it(gaplab: Gaplab, submitted: str, tmp_path):
+def test_the_command_writes_an_archive_and_reads_it(gaplab: Gaplab, submitted: str, tmp_path: Path) -> None:
     file = tmp_path / "archive.zip"
 
     written = gaplab("export", submitted, "--to", str(file))
@@ -79,7 +81,7 @@ def test_the_command_writes_an_archive_and_reads_it(gaplab: Gaplab, submitted: s
     assert gaplab("show", read.out.strip()).code == 0
 
 
-def test_the_command_overwrites_no_file_and_leaves_no_half(gaplab: Gaplab, submitted: str, tmp_path):
+def test_the_command_overwrites_no_file_and_leaves_no_half(gaplab: Gaplab, submitted: str, tmp_path: Path) -> None:
     (tmp_path / "precious.zip").write_text("precious")
 
     taken = gaplab("export", submitted, "--to", str(tmp_path / "precious.zip"))
@@ -91,12 +93,12 @@ def test_the_command_overwrites_no_file_and_leaves_no_half(gaplab: Gaplab, submi
 
 
 def test_an_archive_that_is_being_written_has_not_its_name_yet(
-    gaplab: Gaplab, submitted: str, tmp_path, monkeypatch: pytest.MonkeyPatch
-):
-    meanwhile, export = [], Client.export
+    gaplab: Gaplab, submitted: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    meanwhile, export = [], Client.export  # type: ignore[misc, var-annotated]
 
-    def watched(self, id_, file):
-        export(self, id_, file)
+    def watched(self, id_: Any, file: Any) -> None:  # type: ignore[no-untyped-def]
+        export(self, id_, file)  # type: ignore[call-arg]
         meanwhile.extend(each.name for each in tmp_path.iterdir())
 
     monkeypatch.setattr(Client, "export", watched)
@@ -108,14 +110,16 @@ def test_an_archive_that_is_being_written_has_not_its_name_yet(
     assert [each.name for each in tmp_path.iterdir()] == ["archive.zip"]
 
 
-def test_what_is_no_id_is_no_place_for_an_archive(gaplab: Gaplab, tmp_path, monkeypatch: pytest.MonkeyPatch):
+def test_what_is_no_id_is_no_place_for_an_archive(
+    gaplab: Gaplab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
 
     assert gaplab("export", "../x").code == 4
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_command_says_what_is_wrong_with_an_archive(gaplab: Gaplab, tmp_path):
+def test_the_command_says_what_is_wrong_with_an_archive(gaplab: Gaplab, tmp_path: Path) -> None:
     (tmp_path / "bad.zip").write_text("no zip")
 
     said = gaplab("import", str(tmp_path / "bad.zip"))

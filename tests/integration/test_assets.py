@@ -22,7 +22,7 @@ def api(sqlite_store: Store) -> TestClient:
     return TestClient(create_app(sqlite_store))
 
 
-def test_plotly_is_sent_compressed_under_an_address_that_is_kept_for_good(api: TestClient):
+def test_plotly_is_sent_compressed_under_an_address_that_is_kept_for_good(api: TestClient) -> None:
     (path,) = {
         f"/assets/plotly/plotly.min.js?v={each}" for each in api.get("/").text.split('data-plotly="')[1].split('"')[:1]
     }
@@ -39,7 +39,7 @@ def test_plotly_is_sent_compressed_under_an_address_that_is_kept_for_good(api: T
 
 
 @pytest.mark.parametrize("encoding", ["gzip", "identity"])
-def test_a_module_that_has_not_changed_is_not_sent_again(api: TestClient, encoding: str):
+def test_a_module_that_has_not_changed_is_not_sent_again(api: TestClient, encoding: str) -> None:
     first = api.get("/assets/dashboard/app.js", headers={"accept-encoding": encoding})
     headers = {"accept-encoding": encoding, "if-none-match": first.headers["etag"]}
 
@@ -50,7 +50,7 @@ def test_a_module_that_has_not_changed_is_not_sent_again(api: TestClient, encodi
     assert (again.status_code, again.content) == (304, b"")
 
 
-def test_a_module_is_script_also_where_it_is_compressed(api: TestClient):
+def test_a_module_is_script_also_where_it_is_compressed(api: TestClient) -> None:
     for path in ("app.js", "views/list.js"):
         answer = api.get(f"/assets/dashboard/{path}", headers={"accept-encoding": "gzip"})
 
@@ -60,7 +60,7 @@ def test_a_module_is_script_also_where_it_is_compressed(api: TestClient):
 
 @pytest.mark.parametrize("path", ["/assets/dashboard/app.js", "/assets/docs/favicon.png"])
 @pytest.mark.parametrize("part", ["bytes=0-3", "bytes=99999999-", "bytes=nonsense", "parsecs=1-2"])
-def test_a_file_is_sent_whole_whatever_part_of_it_is_asked_for(api: TestClient, path: str, part: str):
+def test_a_file_is_sent_whole_whatever_part_of_it_is_asked_for(api: TestClient, path: str, part: str) -> None:
     whole = api.get(path, headers={"accept-encoding": "identity"})
     answer = api.get(path, headers={"accept-encoding": "identity", "range": part})
 
@@ -68,12 +68,12 @@ def test_a_file_is_sent_whole_whatever_part_of_it_is_asked_for(api: TestClient, 
     assert answer.headers["accept-ranges"] == "none"
 
 
-def test_nothing_outside_the_folder_is_served(api: TestClient):
+def test_nothing_outside_the_folder_is_served(api: TestClient) -> None:
     for path in ("/assets/dashboard/../app.py", "/assets/dashboard/%2e%2e/app.py", "/assets/dashboard/no.js"):
         assert api.get(path).status_code == 404
 
 
-def test_long_lists_are_sent_compressed(api: TestClient):
+def test_long_lists_are_sent_compressed(api: TestClient) -> None:
     for _ in range(4):
         api.post("/studies", json={"robot": "toy_function", "budget": "smoke"})
 
@@ -84,12 +84,12 @@ def test_long_lists_are_sent_compressed(api: TestClient):
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_every_start_of_the_form_can_be_submitted(name: str):
+def test_every_start_of_the_form_can_be_submitted(name: str) -> None:
     assert resolve_study(StudySpec.model_validate(PRESETS[name]))
 
 
 @pytest.mark.parametrize("file", ["toy", "quadruped", "weights", "figure_4"])
-def test_the_starts_of_the_form_are_the_examples(file: str):
+def test_the_starts_of_the_form_are_the_examples(file: str) -> None:
     example = json.loads((EXAMPLES / f"{file}.json").read_text())
 
     same = [
@@ -101,7 +101,7 @@ def test_the_starts_of_the_form_are_the_examples(file: str):
     assert len(same) == 1
 
 
-def test_the_catalogue_has_the_named_budgets():
+def test_the_catalogue_has_the_named_budgets() -> None:
     found = {each.name: each for each in catalogue().budgets}
 
     assert list(found) == ["smoke", "desk", "paper"]
@@ -113,7 +113,7 @@ def test_the_catalogue_has_the_named_budgets():
 
 
 @pytest.mark.parametrize("path", sorted(FILES.rglob("*.*")), ids=lambda path: path.name)
-def test_files_of_the_page_are_short_and_say_what_they_are(path: Path):
+def test_files_of_the_page_are_short_and_say_what_they_are(path: Path) -> None:
     text = path.read_text()
 
     if path.suffix in {".js", ".css"}:
@@ -123,17 +123,17 @@ def test_files_of_the_page_are_short_and_say_what_they_are(path: Path):
     assert "https://" not in text
 
 
-def test_the_catalogue_has_what_a_study_leaves_out():
+def test_the_catalogue_has_what_a_study_leaves_out() -> None:
     assert StudySpec.model_validate(catalogue().defaults) == StudySpec()
 
 
-def test_the_catalogue_tells_functions_from_robots_with_bodies():
+def test_the_catalogue_tells_functions_from_robots_with_bodies() -> None:
     functions = {each.name: each.details["function"] for each in catalogue().robots}
 
     assert (functions["toy_function"], functions["quadruped"]) == (True, False)
 
 
-def test_the_direct_baseline_is_marked_as_such_and_no_other_experiment_is(api: TestClient):
+def test_the_direct_baseline_is_marked_as_such_and_no_other_experiment_is(api: TestClient) -> None:
     study = api.post("/studies", json={"robot": "toy_function", "budget": "smoke", "iterations": 1}).json()
 
     assert [each["strategy"] for each in study["experiments"] if each["direct"]] == ["direct"]

@@ -3,7 +3,9 @@
 import sqlite3
 import subprocess
 import sys
+from pathlib import Path
 from threading import Event, Thread
+from typing import Any
 
 import pytest
 
@@ -21,7 +23,7 @@ from gaplab.services.store.session import Store
 from tests.experiments import toy
 
 
-def work(store):
+def work(store: Store) -> None:
     """A supervisor of one: steps are recorded as they are computed, until nothing is queued."""
     while claims := execution.claim(store, "me", 1):
         for claim in claims:
@@ -30,12 +32,12 @@ def work(store):
             assert execution.complete(store, claim)
 
 
-def test_copies_made_while_a_supervisor_writes_go_on_to_the_same_end(sqlite_url, tmp_path):
+def test_copies_made_while_a_supervisor_writes_go_on_to_the_same_end(sqlite_url: str, tmp_path: Path) -> None:
     store = Store(sqlite_url)
     submitted = submission.submit_experiment(store, toy(repetitions=2)).id
     worker = Thread(target=work, args=(store,))
     worker.start()
-    copies = []
+    copies: list[Any] = []
     while worker.is_alive() or not copies:
         copies.append(tmp_path / f"copy_{len(copies)}.db")
         backup(sqlite_url, copies[-1])
@@ -56,11 +58,11 @@ def test_copies_made_while_a_supervisor_writes_go_on_to_the_same_end(sqlite_url,
         copy.dispose()
 
 
-def test_a_copy_waits_for_whoever_writes_and_has_all_of_it_or_nothing(sqlite_url, tmp_path):
+def test_a_copy_waits_for_whoever_writes_and_has_all_of_it_or_nothing(sqlite_url: str, tmp_path: Path) -> None:
     store = Store(sqlite_url)
     half_way, made = Event(), []
 
-    def copy():
+    def copy() -> None:
         half_way.wait()
         made.append(backup(sqlite_url, tmp_path / "copy.db"))
 
@@ -80,14 +82,14 @@ def test_a_copy_waits_for_whoever_writes_and_has_all_of_it_or_nothing(sqlite_url
     assert made == [(tmp_path / "copy.db").stat().st_size]
 
 
-def test_only_the_owner_may_read_a_copy_and_nothing_else_is_left(sqlite_url, tmp_path):
+def test_only_the_owner_may_read_a_copy_and_nothing_else_is_left(sqlite_url: str, tmp_path: Path) -> None:
     backup(sqlite_url, tmp_path / "copy.db")
 
     assert (tmp_path / "copy.db").stat().st_mode & 0o777 == 0o600
     assert [each.name for each in tmp_path.iterdir()] == ["copy.db"]
 
 
-def test_a_file_that_is_there_stays_as_it_is(sqlite_url, tmp_path):
+def test_a_file_that_is_there_stays_as_it_is(sqlite_url: str, tmp_path: Path) -> None:
     file = tmp_path / "precious.db"
     file.write_text("precious")
 
@@ -97,14 +99,14 @@ def test_a_file_that_is_there_stays_as_it_is(sqlite_url, tmp_path):
     assert file.read_text() == "precious"
 
 
-def test_without_a_database_none_is_made(tmp_path):
+def test_without_a_database_none_is_made(tmp_path: Path) -> None:
     with pytest.raises(StoreUnavailable, match="no database"):
         backup(f"sqlite:///{tmp_path / 'none.db'}", tmp_path / "copy.db")
 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_no_database_is_not_copied(tmp_path):
+def test_what_is_no_database_is_not_copied(tmp_path: Path) -> None:
     (tmp_path / "text.db").write_text("this is no database" * 100)
 
     with pytest.raises(StoreUnavailable, match="not a database"):
@@ -113,7 +115,7 @@ def test_what_is_no_database_is_not_copied(tmp_path):
     assert [each.name for each in tmp_path.iterdir()] == ["text.db"]
 
 
-def test_of_postgres_it_says_what_copies_one(tmp_path):
+def test_of_postgres_it_says_what_copies_one(tmp_path: Path) -> None:
     with pytest.raises(Unsupported, match="pg_dump --format=custom") as refusal:
         backup("postgresql://me:secret@127.0.0.1/gaplab", tmp_path / "copy")
 
@@ -121,7 +123,9 @@ def test_of_postgres_it_says_what_copies_one(tmp_path):
 
 
 @pytest.mark.parametrize("scheme", ["postgresql", "postgresql+psycopg"])
-def test_the_line_that_copies_a_postgres_has_a_url_that_its_tool_knows(tmp_path, monkeypatch, scheme):
+def test_the_line_that_copies_a_postgres_has_a_url_that_its_tool_knows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme: Any
+) -> None:
     monkeypatch.setenv("GAPLAB_DATABASE_URL", f"{scheme}://me:a:b@127.0.0.1/gaplab")
     with pytest.raises(Unsupported) as refusal:
         backup("postgresql+psycopg://me:secret@127.0.0.1/gaplab", tmp_path / "my copy")
@@ -133,7 +137,14 @@ def test_the_line_that_copies_a_postgres_has_a_url_that_its_tool_knows(tmp_path,
 
 
 @pytest.mark.parametrize(("existing", "code"), [(False, 0), (True, 7)])
-def test_the_command_copies_the_database_of_the_environment(sqlite_url, tmp_path, monkeypatch, capsys, existing, code):
+def test_the_command_copies_the_database_of_the_environment(
+    sqlite_url: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    existing: Any,
+    code: Any,
+) -> None:
     file = tmp_path / "copy.db"
     if existing:
         file.touch()
@@ -148,10 +159,12 @@ def test_the_command_copies_the_database_of_the_environment(sqlite_url, tmp_path
     assert str(file) in (said.out if code == 0 else said.err)
 
 
-def test_a_file_that_appears_meanwhile_is_not_written_over(sqlite_url, tmp_path, monkeypatch):
+def test_a_file_that_appears_meanwhile_is_not_written_over(
+    sqlite_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     copied = backing_up._copy
 
-    def slowly(source, part):
+    def slowly(source: Any, part: Any) -> None:
         copied(source, part)
         (tmp_path / "copy.db").write_text("mine")
 
@@ -163,11 +176,13 @@ def test_a_file_that_appears_meanwhile_is_not_written_over(sqlite_url, tmp_path,
     assert [each.read_text() for each in tmp_path.iterdir()] == ["mine"]
 
 
-def test_what_a_copy_left_that_was_killed_is_in_no_ones_way(sqlite_url, tmp_path, monkeypatch):
+def test_what_a_copy_left_that_was_killed_is_in_no_ones_way(
+    sqlite_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     class Killed(BaseException):
         """Stands for a death after which nothing is tidied up."""
 
-    def die(*_):
+    def die(*_: Any) -> None:
         raise Killed
 
     with monkeypatch.context() as patch:

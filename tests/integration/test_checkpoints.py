@@ -2,6 +2,7 @@
 
 import time
 from threading import enumerate as threads
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,16 +16,17 @@ from gaplab.services.running import execution
 from gaplab.services.running.execution import Checkpoint
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.store.models import CheckpointRow
+from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import StepRecorder, recorded
 from tests.experiments import cancel, same, some_log, toy
 from tests.fakes import Recorder, flat, paraboloid, small_setting
 
 
-def steps_of(told):
+def steps_of(told: Any) -> Any:
     return [each for each in told if not isinstance(each, Checkpoint)]
 
 
-def test_a_repetition_told_at_any_moment_goes_on_from_there():
+def test_a_repetition_told_at_any_moment_goes_on_from_there() -> None:
     whole = [flat(step) for step in repetition(small_setting())]
     told = list(recorded(small_setting(), (), (), 0.0))
 
@@ -37,28 +39,28 @@ def test_a_repetition_told_at_any_moment_goes_on_from_there():
         assert not rest or rest[0].seconds > sum(each.seconds for each in checkpoints)
 
 
-def test_what_a_checkpoint_has_is_not_simulated_again():
+def test_what_a_checkpoint_has_is_not_simulated_again() -> None:
     first, second = Recorder(), Recorder()
     told = list(recorded(small_setting(simulate=first), (), (), 0.0))
     checkpoints = [each for each in told if isinstance(each, Checkpoint) and each.step == 1]
 
-    list(recorded(small_setting(simulate=second, iterations=0), [told[0].step], checkpoints, 3600.0))
+    list(recorded(small_setting(simulate=second, iterations=0), [told[0].step], checkpoints, 3600.0))  # type: ignore[list-item]
 
     answered = sum(len(row) for each in checkpoints for _, row in unpack(each.answers))
     assert answered == 40
     assert second.rollouts == 0
 
 
-def test_short_steps_have_no_checkpoints():
+def test_short_steps_have_no_checkpoints() -> None:
     assert not any(isinstance(each, Checkpoint) for each in recorded(small_setting(), (), (), 3600.0))
 
 
-def test_a_call_that_would_take_long_is_made_in_several():
-    def slow(genomes, parameters):
+def test_a_call_that_would_take_long_is_made_in_several() -> None:
+    def slow(genomes: Any, parameters: Any) -> Any:
         time.sleep(0.002 * len(genomes))
         return paraboloid(genomes, parameters)
 
-    calls, told = Recorder(slow), []
+    calls, told = Recorder(slow), []  # type: ignore[var-annotated]
     answers = StepRecorder(told.append, 0.02, 5).answers(small_setting(simulate=calls))
     genomes = np.random.default_rng(0).random((30, 2))
 
@@ -70,8 +72,8 @@ def test_a_call_that_would_take_long_is_made_in_several():
     assert told
 
 
-def test_what_a_repetition_raises_is_raised_where_its_steps_are_taken():
-    def broken(genomes, parameters):
+def test_what_a_repetition_raises_is_raised_where_its_steps_are_taken() -> None:
+    def broken(genomes: Any, parameters: Any) -> None:
         msg = "broken"
         raise ZeroDivisionError(msg)
 
@@ -82,11 +84,11 @@ def test_what_a_repetition_raises_is_raised_where_its_steps_are_taken():
         next(steps)
 
 
-def test_a_repetition_that_nobody_wants_ends():
+def test_a_repetition_that_nobody_wants_ends() -> None:
     steps = recorded(small_setting(iterations=100_000), (), ())
     next(steps)
 
-    steps.close()
+    steps.close()  # type: ignore[attr-defined]
 
     deadline = time.monotonic() + 180
     while any(each.name == "repetition" for each in threads()):
@@ -94,16 +96,16 @@ def test_a_repetition_that_nobody_wants_ends():
         time.sleep(0.01)
 
 
-def part(step, number, answers=b"answers", seconds=2.0):
+def part(step: Any, number: Any, answers: Any = b"answers", seconds: Any = 2.0) -> Any:
     return execution.Checkpoint(step, number, answers, seconds)
 
 
-def checkpoints_left(store):
+def checkpoints_left(store: Store) -> Any:
     with store.reading() as session:
         return session.query(CheckpointRow).count()
 
 
-def test_checkpoints_of_the_step_under_way_are_handed_out_with_the_claim(store):
+def test_checkpoints_of_the_step_under_way_are_handed_out_with_the_claim(store: Store) -> None:
     submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     first = next(some_log())
@@ -117,7 +119,7 @@ def test_checkpoints_of_the_step_under_way_are_handed_out_with_the_claim(store):
     assert claim.checkpoints == (part(1, 0, b"a\0b"), part(1, 1), part(1, 2, b""))
 
 
-def test_a_checkpoint_that_is_delivered_twice_is_stored_once(store):
+def test_a_checkpoint_that_is_delivered_twice_is_stored_once(store: Store) -> None:
     submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
 
@@ -127,7 +129,7 @@ def test_a_checkpoint_that_is_delivered_twice_is_stored_once(store):
     assert checkpoints_left(store) == 2
 
 
-def test_checkpoints_are_gone_once_their_step_is_recorded(store):
+def test_checkpoints_are_gone_once_their_step_is_recorded(store: Store) -> None:
     submission.submit_experiment(store, toy())
     claims = execution.claim(store, "me", 2)
     execution.record_all(store, [(claim, [part(0, 0), part(0, 1)]) for claim in claims])
@@ -142,7 +144,7 @@ def test_checkpoints_are_gone_once_their_step_is_recorded(store):
 
 
 @pytest.mark.parametrize("wrong", [part(0, 1), part(1, 0)])
-def test_a_checkpoint_that_would_leave_a_hole_is_refused(store, wrong):
+def test_a_checkpoint_that_would_leave_a_hole_is_refused(store: Store, wrong: Any) -> None:
     submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
 
@@ -152,7 +154,7 @@ def test_a_checkpoint_that_would_leave_a_hole_is_refused(store, wrong):
     assert checkpoints_left(store) == 0
 
 
-def test_a_late_checkpoint_of_a_holder_who_lost_the_lease_is_not_stored(store):
+def test_a_late_checkpoint_of_a_holder_who_lost_the_lease_is_not_stored(store: Store) -> None:
     submission.submit_experiment(store, toy())
     (late,) = execution.claim(store, "me", 1)
     execution.release(store, late, "killed")
@@ -163,7 +165,7 @@ def test_a_late_checkpoint_of_a_holder_who_lost_the_lease_is_not_stored(store):
     assert checkpoints_left(store) == 0
 
 
-def test_one_that_gets_on_within_a_step_may_be_lost_any_number_of_times(store):
+def test_one_that_gets_on_within_a_step_may_be_lost_any_number_of_times(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=1))
 
     for number in range(2 * MAX_LOSSES):
@@ -174,7 +176,7 @@ def test_one_that_gets_on_within_a_step_may_be_lost_any_number_of_times(store):
     assert reading.read_experiment(store, submitted.id).state is State.RUNNING
 
 
-def test_cancelling_forgets_checkpoints(store):
+def test_cancelling_forgets_checkpoints(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     execution.record_all(store, [(claim, [part(0, 0)])])
@@ -185,7 +187,7 @@ def test_cancelling_forgets_checkpoints(store):
 
 
 @pytest.mark.parametrize("hopeless", [True, False])
-def test_a_repetition_that_fails_leaves_no_checkpoints(store, hopeless):
+def test_a_repetition_that_fails_leaves_no_checkpoints(store: Store, hopeless: Any) -> None:
     submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     execution.record_all(store, [(claim, [part(0, 0)])])
@@ -199,7 +201,7 @@ def test_a_repetition_that_fails_leaves_no_checkpoints(store, hopeless):
     assert checkpoints_left(store) == 0
 
 
-def test_a_claim_that_timed_out_is_handed_back_and_those_that_are_known_stay(store):
+def test_a_claim_that_timed_out_is_handed_back_and_those_that_are_known_stay(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy())
     (known,) = execution.claim(store, "me", 1)
     execution.claim(store, "me", 1)

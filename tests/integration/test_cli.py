@@ -11,12 +11,13 @@ from typing import Any
 
 import pytest
 
+from gaplab.api.clients import records
 from gaplab.api.clients.client import Client
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
-from gaplab.api.commands import records
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
+from gaplab.services.experiments import listing
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import subject
 from gaplab.services.store.session import Store
@@ -35,11 +36,18 @@ def finish(store: Store) -> None:
             run(store, claim, some_log(iterations, recorded=1 + number / 10))
 
 
+def wait_for_submission(store: Store) -> None:
+    """Wait until an experiment is queued, and its watcher has printed a line."""
+    while not listing.list_experiments(store).items:
+        time.sleep(0.05)
+    time.sleep(0.5)
+
+
 def submitted(gaplab: Gaplab, spec: str = SMOKE) -> str:
     return gaplab("submit", spec).out.strip()
 
 
-def test_submit_prints_the_id_that_show_and_list_know(gaplab: Gaplab):
+def test_submit_prints_the_id_that_show_and_list_know(gaplab: Gaplab) -> None:
     id = submitted(gaplab)
 
     shown, listed = gaplab("show", id), gaplab("list")
@@ -51,17 +59,17 @@ def test_submit_prints_the_id_that_show_and_list_know(gaplab: Gaplab):
     assert id in listed.out
 
 
-def test_an_edit_that_is_none_is_a_sentence(gaplab: Gaplab):
+def test_an_edit_that_is_none_is_a_sentence(gaplab: Gaplab) -> None:
     id = submitted(gaplab)
 
     nothing, nameless = gaplab("edit", id), gaplab("edit", id, "--name", "")
 
     assert (nothing.code, nameless.code) == (Exit.INVALID, Exit.INVALID)
-    assert nothing.err == "gaplab: give a name, notes, or both\n"
+    assert nothing.err == "gaplab: nothing to change: give a name, notes, or both\n"
     assert nameless.err == "gaplab: --name: String should have at least 1 character\n"
 
 
-def test_a_spec_with_several_strategies_or_none_is_a_study(gaplab: Gaplab):
+def test_a_spec_with_several_strategies_or_none_is_a_study(gaplab: Gaplab) -> None:
     submitted(gaplab, str(EXAMPLES / "toy.json"))
     submitted(gaplab, str(EXAMPLES / "weights.json"))
 
@@ -73,7 +81,7 @@ def test_a_spec_with_several_strategies_or_none_is_a_study(gaplab: Gaplab):
 
 def test_an_experiment_of_no_study_is_listed_whatever_many_of_studies_are_newer(
     gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch
-):
+) -> None:
     monkeypatch.setattr(records, "PAGE", 4)
     older, alone = submitted(gaplab), submitted(gaplab)
     studies = [submitted(gaplab, str(EXAMPLES / "toy.json")) for _ in range(2)]
@@ -87,16 +95,16 @@ def test_an_experiment_of_no_study_is_listed_whatever_many_of_studies_are_newer(
     assert [each["id"] for each in all_] == [*reversed(studies), alone, older]
 
 
-def test_a_spec_comes_from_standard_input_too(gaplab: Gaplab):
+def test_a_spec_comes_from_standard_input_too(gaplab: Gaplab) -> None:
     said = gaplab("submit", "-", stdin='{"strategy": "random", "budget": "smoke"}')
 
     assert said.code == 0
     assert "random" in gaplab("list").out
 
 
-def test_watching_shows_progress_line_by_line_where_there_is_no_terminal(gaplab: Gaplab, sqlite_store: Store):
+def test_watching_shows_progress_line_by_line_where_there_is_no_terminal(gaplab: Gaplab, sqlite_store: Store) -> None:
     def work() -> None:
-        time.sleep(0.5)
+        wait_for_submission(sqlite_store)
         finish(sqlite_store)
 
     worker = threading.Thread(target=work)
@@ -110,9 +118,9 @@ def test_watching_shows_progress_line_by_line_where_there_is_no_terminal(gaplab:
     assert "\x1b" not in said.out
 
 
-def test_watching_what_fails_says_why_and_ends_with_1(gaplab: Gaplab, sqlite_store: Store):
+def test_watching_what_fails_says_why_and_ends_with_1(gaplab: Gaplab, sqlite_store: Store) -> None:
     def work() -> None:
-        time.sleep(0.5)
+        wait_for_submission(sqlite_store)
         for claim in execution.claim(sqlite_store, "test", limit=10):
             execution.fail(sqlite_store, claim, "ValueError: the robot fell apart")
 
@@ -126,7 +134,7 @@ def test_watching_what_fails_says_why_and_ends_with_1(gaplab: Gaplab, sqlite_sto
     assert "the robot fell apart" in said.err
 
 
-def test_curves_are_a_table_values_or_drawings(gaplab: Gaplab, sqlite_store: Store, tmp_path: Path):
+def test_curves_are_a_table_values_or_drawings(gaplab: Gaplab, sqlite_store: Store, tmp_path: Path) -> None:
     small = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "smoke", "repetitions": 3}
     id = gaplab("submit", "-", stdin=json.dumps(small)).out.strip()
     finish(sqlite_store)
@@ -145,7 +153,7 @@ def test_curves_are_a_table_values_or_drawings(gaplab: Gaplab, sqlite_store: Sto
     assert html.read_text().startswith("<!doctype html>")
 
 
-def test_a_cancelled_study_has_no_experiment_left_to_run(gaplab: Gaplab):
+def test_a_cancelled_study_has_no_experiment_left_to_run(gaplab: Gaplab) -> None:
     id = submitted(gaplab, str(EXAMPLES / "toy.json"))
 
     first, second = gaplab("cancel", id), gaplab("cancel", id)
@@ -155,7 +163,7 @@ def test_a_cancelled_study_has_no_experiment_left_to_run(gaplab: Gaplab):
     assert second.code == Exit.CONFLICT
 
 
-def test_the_verbs_say_what_it_is_now_and_forbidden_ones_are_a_sentence(gaplab: Gaplab, sqlite_store: Store):
+def test_the_verbs_say_what_it_is_now_and_forbidden_ones_are_a_sentence(gaplab: Gaplab, sqlite_store: Store) -> None:
     id = submitted(gaplab)
 
     said = [gaplab(verb, id) for verb in ("pause", "resume", "resume")]
@@ -168,7 +176,7 @@ def test_the_verbs_say_what_it_is_now_and_forbidden_ones_are_a_sentence(gaplab: 
     assert gaplab("stop", id).out.endswith("is COMPLETED.\n")
 
 
-def test_the_catalogue_lists_every_kind_of_plug_in(gaplab: Gaplab):
+def test_the_catalogue_lists_every_kind_of_plug_in(gaplab: Gaplab) -> None:
     said = gaplab("catalogue").out
 
     assert all(
@@ -192,7 +200,7 @@ DULL = {
 }
 
 
-def test_sensitivity_waits_for_a_table_and_warns(gaplab: Gaplab, sqlite_store: Store):
+def test_sensitivity_waits_for_a_table_and_warns(gaplab: Gaplab, sqlite_store: Store) -> None:
     worker = threading.Thread(target=checked, args=(sqlite_store,))
     worker.start()
     said = gaplab("sensitivity", "-", stdin=json.dumps(DULL))
@@ -204,7 +212,7 @@ def test_sensitivity_waits_for_a_table_and_warns(gaplab: Gaplab, sqlite_store: S
     assert "restitution over 0.3 to 0.3001 does nothing" in said.out
 
 
-def test_a_sensitivity_check_that_failed_is_a_sentence(gaplab: Gaplab, sqlite_store: Store):
+def test_a_sensitivity_check_that_failed_is_a_sentence(gaplab: Gaplab, sqlite_store: Store) -> None:
     def fail() -> None:
         while (claim := sensitivity.claim(sqlite_store, "test")) is None:
             time.sleep(0.05)
@@ -219,14 +227,14 @@ def test_a_sensitivity_check_that_failed_is_a_sentence(gaplab: Gaplab, sqlite_st
     assert re.fullmatch(r"gaplab: the check \w+ ended as FAILED: ValueError: no legs\n", said.err)
 
 
-def test_mistakes_in_what_is_to_be_checked_are_sentences(gaplab: Gaplab):
+def test_mistakes_in_what_is_to_be_checked_are_sentences(gaplab: Gaplab) -> None:
     said = gaplab("sensitivity", "-", stdin='{"robot": "quadruppet", "points": 1}')
 
     assert said.code == Exit.INVALID
     assert said.err.startswith("gaplab: /points: ")
 
 
-def test_show_tells_warnings_and_misfit(gaplab: Gaplab, sqlite_store: Store):
+def test_show_tells_warnings_and_misfit(gaplab: Gaplab, sqlite_store: Store) -> None:
     small = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 3}
     tunables = ["static_friction", {"name": "restitution", "lower": 0.3, "upper": 0.3001}]
     id = gaplab("submit", "-", stdin=json.dumps(small | {"tunables": tunables})).out.strip()
@@ -242,7 +250,7 @@ def test_show_tells_warnings_and_misfit(gaplab: Gaplab, sqlite_store: Store):
     assert re.search(r"^ *static_friction +0.1±0 ", after.out, re.MULTILINE)
 
 
-def test_no_service_is_a_sentence_that_says_how_to_start_one(gaplab: Gaplab):
+def test_no_service_is_a_sentence_that_says_how_to_start_one(gaplab: Gaplab) -> None:
     said = gaplab("list", "--url", "http://127.0.0.1:9")
 
     assert said.code == Exit.UNREACHABLE
@@ -251,7 +259,7 @@ def test_no_service_is_a_sentence_that_says_how_to_start_one(gaplab: Gaplab):
 
 
 @pytest.mark.parametrize("address", ["nonsense", "http://[", "ftp://127.0.0.1", "http://no-such-host.invalid", ""])
-def test_an_address_that_is_none_is_a_sentence(gaplab: Gaplab, address: str, monkeypatch: pytest.MonkeyPatch):
+def test_an_address_that_is_none_is_a_sentence(gaplab: Gaplab, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GAPLAB_URL", address)
     said = gaplab("list")
 
@@ -261,14 +269,14 @@ def test_an_address_that_is_none_is_a_sentence(gaplab: Gaplab, address: str, mon
 
 @pytest.mark.parametrize("command", ["show", "curve", "cancel"])
 @pytest.mark.parametrize("name", ["nope", "..", "", "a/b", "x?y", "%", "ü"])
-def test_an_unknown_id_is_a_sentence(gaplab: Gaplab, command: str, name: str):
+def test_an_unknown_id_is_a_sentence(gaplab: Gaplab, command: str, name: str) -> None:
     said = gaplab(command, name)
 
     assert said.code == Exit.NOT_FOUND
     assert re.fullmatch(r"gaplab: there is no.*\n", said.err)
 
 
-def test_every_mistake_in_a_spec_has_a_line_of_its_own(gaplab: Gaplab):
+def test_every_mistake_in_a_spec_has_a_line_of_its_own(gaplab: Gaplab) -> None:
     said = gaplab("submit", "-", stdin='{"strategy": "simulated_fti", "robot": "quadruppet"}')
 
     assert said.code == Exit.INVALID
@@ -277,7 +285,7 @@ def test_every_mistake_in_a_spec_has_a_line_of_its_own(gaplab: Gaplab):
 
 
 @pytest.mark.parametrize("text", ["", "{", "[1]", '{"seed": NaN}', "[" * 100_000, '"text"'])
-def test_a_file_that_is_no_spec_is_a_sentence(gaplab: Gaplab, tmp_path: Path, text: str):
+def test_a_file_that_is_no_spec_is_a_sentence(gaplab: Gaplab, tmp_path: Path, text: str) -> None:
     file = tmp_path / "spec.json"
     file.write_text(text)
 
@@ -289,7 +297,7 @@ def test_a_file_that_is_no_spec_is_a_sentence(gaplab: Gaplab, tmp_path: Path, te
 
 
 @pytest.mark.parametrize("file", ["missing.json", ".", "\udcff.json"])
-def test_a_file_that_cannot_be_read_is_a_sentence(gaplab: Gaplab, file: str):
+def test_a_file_that_cannot_be_read_is_a_sentence(gaplab: Gaplab, file: str) -> None:
     said = gaplab("submit", file)
 
     assert said.code == Exit.FILE
@@ -298,7 +306,7 @@ def test_a_file_that_cannot_be_read_is_a_sentence(gaplab: Gaplab, file: str):
 
 def test_a_file_that_is_there_already_is_a_sentence(
     gaplab: Gaplab, sqlite_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+) -> None:
     monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
     file = tmp_path / "there.db"
     file.touch()
@@ -309,30 +317,36 @@ def test_a_file_that_is_there_already_is_a_sentence(
 
 
 @pytest.mark.parametrize("id_", ["", " ", "..", "a/b", "é", "\udcff"])
-def test_an_id_that_can_be_none_is_not_found(gaplab: Gaplab, id_: str):
+def test_an_id_that_can_be_none_is_not_found(gaplab: Gaplab, id_: str) -> None:
     assert gaplab("show", id_).code == Exit.NOT_FOUND
 
 
 @pytest.mark.parametrize("token", ["a\nb", "é", "\udcff"])
-def test_a_token_that_cannot_be_one_is_said_at_once(gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch, token: str):
+def test_a_token_that_cannot_be_one_is_said_at_once(
+    gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch, token: str
+) -> None:
     monkeypatch.setenv("GAPLAB_TOKEN", token)
 
     assert "the token has characters" in gaplab("list").err
 
 
-def test_a_token_that_is_none_is_an_id_that_is_none(gaplab: Gaplab, sqlite_url: str, monkeypatch: pytest.MonkeyPatch):
+def test_a_token_that_is_none_is_an_id_that_is_none(
+    gaplab: Gaplab, sqlite_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
 
     assert gaplab("token", "revoke", "nobody").code == Exit.NOT_FOUND
 
 
-def test_wrong_use_of_the_command_ends_with_2_and_help_tells_the_codes(gaplab: Gaplab):
+def test_wrong_use_of_the_command_ends_with_2_and_help_tells_the_codes(gaplab: Gaplab) -> None:
     assert gaplab("submit").code == Exit.USAGE
     assert gaplab("list", "--limit", "0").code == Exit.USAGE
     assert "Exit codes" in gaplab("--help").out
 
 
-def test_a_port_that_is_no_number_in_the_environment_is_a_sentence(gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch):
+def test_a_port_that_is_no_number_in_the_environment_is_a_sentence(
+    gaplab: Gaplab, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("GAPLAB_PORT", "eighty")
 
     said = gaplab("list")
@@ -342,14 +356,14 @@ def test_a_port_that_is_no_number_in_the_environment_is_a_sentence(gaplab: Gapla
 
 
 @pytest.mark.parametrize("example", sorted(EXAMPLES.glob("*.json")), ids=lambda path: path.name)
-def test_every_example_is_accepted_and_says_its_name(gaplab: Gaplab, example: Path):
+def test_every_example_is_accepted_and_says_its_name(gaplab: Gaplab, example: Path) -> None:
     said = gaplab("submit", str(example))
 
     assert said.code == 0, said.err
     assert json.loads(example.read_text())["name"]
 
 
-def test_the_client_raises_the_services_problem(url: str):
+def test_the_client_raises_the_services_problem(url: str) -> None:
     with Client(url) as client, pytest.raises(ServiceError) as refused:
         client.submit({"strategy": "simulated_fti"})
 
@@ -357,7 +371,7 @@ def test_the_client_raises_the_services_problem(url: str):
     assert refused.value.problem.errors[0].nearest == "simulated_fit"
 
 
-def test_the_client_knows_when_what_answers_is_no_gaplab():
+def test_the_client_knows_when_what_answers_is_no_gaplab() -> None:
     async def other(scope: dict[str, Any], receive: object, send: Callable[..., Any]) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": []})
         await send({"type": "http.response.body", "body": b"<html>hello</html>"})

@@ -5,7 +5,7 @@ import sys
 import threading
 import time
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from datetime import UTC, datetime
 from types import SimpleNamespace
 from typing import Any
@@ -19,6 +19,7 @@ from gaplab import Client, ExperimentFailed, ExtraMissing, ServiceError, Service
 from gaplab.api.app import create_app
 from gaplab.api.clients import events as stream
 from gaplab.api.clients import results, tables
+from gaplab.api.clients.records import experiments_of
 from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind, EventRead
 from gaplab.services import access
@@ -35,10 +36,13 @@ class InProcess(httpx2.BaseTransport):
     def __init__(self, store: Store) -> None:
         app = create_app(store)
         self._client = TestClient(app, raise_server_exceptions=False)
-        self.close = app.state.rollout_process.close
+        self._process = app.state.rollout_process
         self.asked: list[str] = []
         self.lost = 0
         self.busy = 0
+
+    def close(self) -> None:
+        self._process.close()
 
     def handle_request(self, request: httpx2.Request) -> httpx2.Response:
         self.asked.append(f"{request.method} {request.url.path}")
@@ -66,14 +70,14 @@ def client(network: InProcess) -> Iterator[Client]:
         yield found
 
 
-def test_a_curve_is_a_frame_of_its_points_or_of_its_repetitions(client: Client, finish: Callable[[], None]):
+def test_a_curve_is_a_frame_of_its_points_or_of_its_repetitions(client: Client, finish: Callable[[], None]) -> None:
     study = client.submit(BOTH)
     finish()
 
     points, values = client.curve(study.id), client.curve(study.id, each=True)
 
     (curve, direct) = client.curves([study.id])
-    assert list(points["experiment"].unique()) == [each.id for each in study.experiments]
+    assert list(points["experiment"].unique()) == [each.id for each in experiments_of(study)]
     assert len(points) == len(curve.points) + len(direct.points)
     assert points["mean"].iloc[0] == curve.points[0].mean
     assert points["evaluations"].dtype.kind == "i"
@@ -83,7 +87,7 @@ def test_a_curve_is_a_frame_of_its_points_or_of_its_repetitions(client: Client, 
 
 def test_samples_come_whole_however_many_pages_they_are(
     client: Client, finish: Callable[[], None], network: InProcess, monkeypatch: pytest.MonkeyPatch
-):
+) -> None:
     experiment = client.submit(SMALL)
     finish()
     whole = client.samples(experiment.id)
@@ -103,7 +107,7 @@ def test_samples_come_whole_however_many_pages_they_are(
     assert only["fitness"].isna().any()  # a measurement that failed
 
 
-def test_simulators_are_a_frame_with_a_column_for_each_tunable(client: Client, finish: Callable[[], None]):
+def test_simulators_are_a_frame_with_a_column_for_each_tunable(client: Client, finish: Callable[[], None]) -> None:
     experiment = client.submit(SMALL | {"tunables": ["static_friction", "restitution"]})
     finish()
 
@@ -116,11 +120,11 @@ def test_simulators_are_a_frame_with_a_column_for_each_tunable(client: Client, f
 
 def test_curves_are_asked_for_in_parts_that_the_service_takes_and_come_in_order(
     client: Client, finish: Callable[[], None], network: InProcess, monkeypatch: pytest.MonkeyPatch
-):
+) -> None:
     study = client.submit(BOTH)
     finish()
     whole = client.curves_csv([study.id])
-    first, second = (each.id for each in study.experiments)
+    first, second = (each.id for each in experiments_of(study))
     many = [first] * 70 + [second] * 70
     network.asked.clear()
 
@@ -141,7 +145,7 @@ def predictions(pending: int) -> httpx2.Response:
     return httpx2.Response(200, json={"experiment": "e", "unit": "m/s", "items": items, "pending": pending})
 
 
-def test_predictions_are_waited_for_until_none_is_pending():
+def test_predictions_are_waited_for_until_none_is_pending() -> None:
     answers = [predictions(2), predictions(1), predictions(0)]
     network = httpx2.MockTransport(lambda _: answers.pop(0))
 
@@ -154,7 +158,7 @@ def test_predictions_are_waited_for_until_none_is_pending():
     assert found["simulated_before"].isna().all()
 
 
-def test_predictions_that_take_too_long_say_how_many_are_left():
+def test_predictions_that_take_too_long_say_how_many_are_left() -> None:
     network = httpx2.MockTransport(lambda _: predictions(1))
 
     with (
@@ -165,14 +169,16 @@ def test_predictions_that_take_too_long_say_how_many_are_left():
 
 
 @pytest.mark.parametrize("method", ["samples", "simulators"])
-def test_nothing_yet_is_an_empty_frame_with_the_same_columns(client: Client, method: str):
+def test_nothing_yet_is_an_empty_frame_with_the_same_columns(client: Client, method: str) -> None:
     found = getattr(client, method)(client.submit(SMALL).id)
 
     assert found.empty
     assert {"repetition", "iteration"} <= set(found)
 
 
-def test_without_pandas_the_message_is_the_line_that_installs_it(client: Client, monkeypatch: pytest.MonkeyPatch):
+def test_without_pandas_the_message_is_the_line_that_installs_it(
+    client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
     id = client.submit(SMALL).id
     monkeypatch.setitem(sys.modules, "pandas", None)
 
@@ -181,14 +187,14 @@ def test_without_pandas_the_message_is_the_line_that_installs_it(client: Client,
     assert client.curves([id])
 
 
-def test_programs_import_what_the_client_raises_from_where_it_is():
+def test_programs_import_what_the_client_raises_from_where_it_is() -> None:
     raised = {"CommandError", "ExperimentFailed", "ExtraMissing", "ServiceError", "ServiceUnreachable"}
 
     assert raised < set(gaplab.__all__)
     assert [getattr(gaplab, name).__name__ for name in gaplab.__all__] == gaplab.__all__
 
 
-def test_waiting_gives_what_it_ended_as(client: Client, finish: Callable[[], None]):
+def test_waiting_gives_what_it_ended_as(client: Client, finish: Callable[[], None]) -> None:
     experiment = client.submit(SMALL)
     worker = threading.Timer(0.3, finish)
     worker.start()
@@ -202,7 +208,7 @@ def test_waiting_gives_what_it_ended_as(client: Client, finish: Callable[[], Non
 
 def test_waiting_shows_progress_on_standard_error_if_asked(
     client: Client, finish: Callable[[], None], capsys: pytest.CaptureFixture[str]
-):
+) -> None:
     experiment = client.submit(SMALL)
     finish()
 
@@ -214,7 +220,7 @@ def test_waiting_shows_progress_on_standard_error_if_asked(
     assert said.err.count("COMPLETED") == 1
 
 
-def test_waiting_for_what_fails_raises_with_its_reason(client: Client, sqlite_store: Store):
+def test_waiting_for_what_fails_raises_with_its_reason(client: Client, sqlite_store: Store) -> None:
     experiment = client.submit(SMALL)
     for claim in execution.claim(sqlite_store, "test", limit=10):
         execution.fail(sqlite_store, claim, "ValueError: the robot fell apart")
@@ -225,7 +231,7 @@ def test_waiting_for_what_fails_raises_with_its_reason(client: Client, sqlite_st
     assert failed.value.ended.id == experiment.id
 
 
-def test_waiting_for_what_is_cancelled_raises_too(client: Client):
+def test_waiting_for_what_is_cancelled_raises_too(client: Client) -> None:
     study = client.submit(BOTH)
     client.cancel(study.id)
 
@@ -233,7 +239,7 @@ def test_waiting_for_what_is_cancelled_raises_too(client: Client):
         client.wait(study.id)
 
 
-def test_waiting_has_an_end_if_asked(client: Client):
+def test_waiting_has_an_end_if_asked(client: Client) -> None:
     id = client.submit(SMALL).id
 
     with pytest.raises(TimeoutError, match=r"is QUEUED after 0\.1 s; it continues"):
@@ -242,7 +248,7 @@ def test_waiting_has_an_end_if_asked(client: Client):
 
 def test_a_notebook_gets_one_display_that_is_replaced(
     client: Client, finish: Callable[[], None], monkeypatch: pytest.MonkeyPatch
-):
+) -> None:
     shown: list[str] = []
     handle = SimpleNamespace(update=lambda html: shown.append(html.data))
 
@@ -267,7 +273,7 @@ def test_a_notebook_gets_one_display_that_is_replaced(
 
 def test_a_figure_shows_itself_and_saves_itself_by_its_suffix(
     client: Client, finish: Callable[[], None], tmp_path: Any, network: InProcess
-):
+) -> None:
     study = client.submit(BOTH)
     finish()
 
@@ -283,7 +289,7 @@ def test_a_figure_shows_itself_and_saves_itself_by_its_suffix(
     assert repr(figure) == f"<figure curves of {study.id}>" == shown["text/plain"]
 
 
-def test_a_figure_can_be_gone_on_with_in_plotly(client: Client, finish: Callable[[], None]):
+def test_a_figure_can_be_gone_on_with_in_plotly(client: Client, finish: Callable[[], None]) -> None:
     study = client.submit(BOTH)
     finish()
 
@@ -293,11 +299,11 @@ def test_a_figure_can_be_gone_on_with_in_plotly(client: Client, finish: Callable
     assert "evaluations" in found.layout.xaxis.title.text
 
 
-def test_the_client_knows_which_kinds_of_figures_there_are(client: Client):
+def test_the_client_knows_which_kinds_of_figures_there_are(client: Client) -> None:
     assert "curves" in client.figure_kinds()
 
 
-def test_a_figure_of_an_unknown_format_or_kind_or_id_is_a_sentence(client: Client, tmp_path: Any):
+def test_a_figure_of_an_unknown_format_or_kind_or_id_is_a_sentence(client: Client, tmp_path: Any) -> None:
     id = client.submit(SMALL).id
 
     with pytest.raises(ValueError, match="unknown figure format 'docx'; available: svg, png"):
@@ -311,7 +317,9 @@ def test_a_figure_of_an_unknown_format_or_kind_or_id_is_a_sentence(client: Clien
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_read_is_asked_for_again_if_the_answer_is_lost_or_the_service_busy(client: Client, network: InProcess):
+def test_what_is_read_is_asked_for_again_if_the_answer_is_lost_or_the_service_busy(
+    client: Client, network: InProcess
+) -> None:
     id = client.submit(SMALL).id
     network.asked.clear()
     network.lost, network.busy = 1, 1
@@ -324,7 +332,7 @@ def test_what_is_read_is_asked_for_again_if_the_answer_is_lost_or_the_service_bu
         client.experiment(id)
 
 
-def test_what_is_submitted_while_answers_are_lost_exists_once(client: Client, network: InProcess):
+def test_what_is_submitted_while_answers_are_lost_exists_once(client: Client, network: InProcess) -> None:
     network.lost, network.busy = 2, 1
 
     submitted = client.submit(SMALL)
@@ -332,7 +340,7 @@ def test_what_is_submitted_while_answers_are_lost_exists_once(client: Client, ne
     assert [each.id for each in client.experiments().items] == [submitted.id]
 
 
-def test_a_verb_whose_answer_is_lost_is_not_asked_for_again(client: Client, network: InProcess):
+def test_a_verb_whose_answer_is_lost_is_not_asked_for_again(client: Client, network: InProcess) -> None:
     id = client.submit(SMALL).id
     client.find(id)
     network.asked.clear()
@@ -349,7 +357,7 @@ def test_a_verb_whose_answer_is_lost_is_not_asked_for_again(client: Client, netw
     assert [each for each in network.asked if each.startswith("POST")] == [f"POST /experiments/{id}/cancel"]
 
 
-def test_a_spec_with_several_mistakes_raises_with_a_line_for_each(client: Client):
+def test_a_spec_with_several_mistakes_raises_with_a_line_for_each(client: Client) -> None:
     with pytest.raises(ServiceError) as refused:
         client.submit({"strategy": "simulated_fti", "robot": "quadruppet"})
 
@@ -361,7 +369,7 @@ def test_a_spec_with_several_mistakes_raises_with_a_line_for_each(client: Client
 
 def test_with_a_token_it_is_the_same_and_without_one_it_says_so(
     sqlite_store: Store, network: InProcess, monkeypatch: pytest.MonkeyPatch
-):
+) -> None:
     secret = access.create_token(sqlite_store, Role.RUNNER, "me").secret
     monkeypatch.delenv("GAPLAB_TOKEN", raising=False)
 
@@ -378,7 +386,7 @@ def test_with_a_token_it_is_the_same_and_without_one_it_says_so(
         assert from_the_environment.find(id).id == id
 
 
-def test_the_service_of_the_environment_is_the_one_that_is_meant(monkeypatch: pytest.MonkeyPatch):
+def test_the_service_of_the_environment_is_the_one_that_is_meant(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GAPLAB_URL", "http://127.0.0.1:7")
 
     with Client() as client:
@@ -387,17 +395,17 @@ def test_the_service_of_the_environment_is_the_one_that_is_meant(monkeypatch: py
             client.studies()
 
 
-def test_events_and_lists_are_values_that_json_can_hold(client: Client):
+def test_events_and_lists_are_values_that_json_can_hold(client: Client) -> None:
     study = client.submit(BOTH)
 
-    kinds = [each.kind for each in client.events(follow=False, study=study.id, after=None)]
+    kinds = [each.kind.value for each in client.events(follow=False, study=study.id, after=None)]
 
     assert kinds.count("submitted") == 2
     assert [each.number for each in client.events(follow=False, after=1)] == [2]
     assert json.dumps([each.model_dump(mode="json") for each in client.studies().items])
 
 
-def test_what_cannot_be_unpacked_is_no_answer():
+def test_what_cannot_be_unpacked_is_no_answer() -> None:
     network = httpx2.MockTransport(lambda _: httpx2.Response(200, headers={"Content-Encoding": "gzip"}, content=b"no"))
 
     with Client("http://gaplab.example", transport=network, pauses_s=()) as client:
@@ -407,7 +415,7 @@ def test_what_cannot_be_unpacked_is_no_answer():
             next(client.events(patience_s=-1))
 
 
-def test_events_of_what_is_no_gaplab_are_not_waited_for():
+def test_events_of_what_is_no_gaplab_are_not_waited_for() -> None:
     network = httpx2.MockTransport(lambda _: httpx2.Response(200, html="<p>hello</p>"))
 
     with (
@@ -418,7 +426,7 @@ def test_events_of_what_is_no_gaplab_are_not_waited_for():
 
 
 @pytest.mark.parametrize("answer", ["{}", "[]", "null", '{"paths": null}', "<p>hello</p>"])
-def test_kinds_of_figures_of_what_is_no_gaplab_are_a_sentence(answer: str):
+def test_kinds_of_figures_of_what_is_no_gaplab_are_a_sentence(answer: str) -> None:
     network = httpx2.MockTransport(lambda _: httpx2.Response(200, text=answer))
 
     with (
@@ -428,7 +436,7 @@ def test_kinds_of_figures_of_what_is_no_gaplab_are_a_sentence(answer: str):
         client.figure_kinds()
 
 
-def test_a_stream_that_had_nothing_to_tell_for_long_is_resumed_when_it_breaks(monkeypatch: pytest.MonkeyPatch):
+def test_a_stream_that_had_nothing_to_tell_for_long_is_resumed_when_it_breaks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stream, "RETRY_S", 0.01)
     event = EventRead(number=7, kind=EventKind.STARTED, experiment="e", body={}, at=datetime.now(UTC))
 
@@ -439,7 +447,7 @@ def test_a_stream_that_had_nothing_to_tell_for_long_is_resumed_when_it_breaks(mo
         msg = "it broke"
         raise httpx2.ReadError(msg)
 
-    bodies = [quiet(), f"data: {event.model_dump_json()}\n\n".encode()]
+    bodies: list[Iterable[bytes]] = [quiet(), f"data: {event.model_dump_json()}\n\n".encode().splitlines(keepends=True)]
     network = httpx2.MockTransport(
         lambda _: httpx2.Response(200, headers={"Content-Type": "text/event-stream"}, content=bodies.pop(0))
     )

@@ -58,7 +58,7 @@ def study(gaplab: Gaplab) -> str:
     return gaplab("submit", "-", stdin=json.dumps(STUDY)).out.strip()
 
 
-def test_every_command_that_prints_something_has_the_option():
+def test_every_command_that_prints_something_has_the_option() -> None:
     lacking = {name for name, command in commands() if "--json" not in {o for p in command.params for o in p.opts}}
 
     assert lacking == UNTIL_STOPPED
@@ -91,7 +91,7 @@ def test_every_command_prints_one_document_and_nothing_else(
     finish: Callable[[], None],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-):
+) -> None:
     monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
 
     live_and_die(ask, finish)
@@ -141,7 +141,7 @@ def keep(ask: Callable[..., Any], id: str, folder: Path) -> None:
     assert ask("backup", copy)["bytes"] > 0
 
 
-def test_versions_are_accepted_in_a_document(gaplab: Gaplab, study: str, sqlite_store: Store):
+def test_versions_are_accepted_in_a_document(gaplab: Gaplab, study: str, sqlite_store: Store) -> None:
     (claim, *_) = execution.claim(sqlite_store, "test", limit=1)
 
     said = gaplab("accept-versions", claim.experiment_id, "--json")
@@ -149,7 +149,7 @@ def test_versions_are_accepted_in_a_document(gaplab: Gaplab, study: str, sqlite_
     assert json.loads(said.out)["id"] == claim.experiment_id
 
 
-def test_a_failure_is_on_standard_error_and_the_document_is_not_half_there(gaplab: Gaplab):
+def test_a_failure_is_on_standard_error_and_the_document_is_not_half_there(gaplab: Gaplab) -> None:
     said = gaplab("show", "nope", "--json")
 
     assert said.code == Exit.NOT_FOUND
@@ -158,7 +158,7 @@ def test_a_failure_is_on_standard_error_and_the_document_is_not_half_there(gapla
 
 def test_a_failed_experiment_is_a_document_and_still_a_failure_for_the_shell(
     gaplab: Gaplab, study: str, sqlite_store: Store
-):
+) -> None:
     for claim in execution.claim(sqlite_store, "test", limit=10):
         execution.fail(sqlite_store, claim, "ValueError: the robot fell apart")
 
@@ -169,7 +169,7 @@ def test_a_failed_experiment_is_a_document_and_still_a_failure_for_the_shell(
     assert "the robot fell apart" in said.err
 
 
-def test_help_explains_every_exit_code(gaplab: Gaplab):
+def test_help_explains_every_exit_code(gaplab: Gaplab) -> None:
     said = gaplab("help", "exit-codes").out
 
     assert [int(line.split()[0]) for line in said.splitlines()] == [each.value for each in Exit]
@@ -177,7 +177,7 @@ def test_help_explains_every_exit_code(gaplab: Gaplab):
     assert gaplab("help", "nonsense").code == Exit.USAGE
 
 
-def test_whatever_is_wrong_with_a_request_ends_as_that_and_not_as_a_failure_of_the_service():
+def test_whatever_is_wrong_with_a_request_ends_as_that_and_not_as_a_failure_of_the_service() -> None:
     statuses = {status for status, *_ in [*problems.KINDS.values(), *problems.FRAMEWORK.values()] if status < 500}
 
     assert statuses - {405} <= set(BY_STATUS)  # the command knows which methods there are
@@ -186,7 +186,7 @@ def test_whatever_is_wrong_with_a_request_ends_as_that_and_not_as_a_failure_of_t
 
 def test_a_figure_is_drawn_into_as_many_files_as_one_names(
     gaplab: Gaplab, study: str, finish: Callable[[], None], tmp_path: Path
-):
+) -> None:
     finish()
     files = [tmp_path / "new" / f"a.{suffix}" for suffix in ("svg", "png", "pdf", "html", "json")]
 
@@ -221,7 +221,7 @@ def test_a_figure_that_cannot_be_drawn_is_a_sentence_and_no_file(  # noqa: PLR09
     arguments: list[str],
     code: int,
     says: str,
-):
+) -> None:
     monkeypatch.chdir(tmp_path)
 
     said = gaplab("figure", *(study if each == "STUDY" else each for each in arguments))
@@ -231,7 +231,7 @@ def test_a_figure_that_cannot_be_drawn_is_a_sentence_and_no_file(  # noqa: PLR09
     assert list(tmp_path.iterdir()) == []
 
 
-def test_all_about_one_plug_in(gaplab: Gaplab):
+def test_all_about_one_plug_in(gaplab: Gaplab) -> None:
     said = gaplab("catalogue", "simulated_fit_and_informative")
 
     assert "informative_weight" in said.out
@@ -239,7 +239,7 @@ def test_all_about_one_plug_in(gaplab: Gaplab):
     assert "did you mean 'random'" in gaplab("catalogue", "randon").err
 
 
-def test_ids_and_plug_ins_are_completed(url: str, study: str, monkeypatch: pytest.MonkeyPatch):
+def test_ids_and_plug_ins_are_completed(url: str, study: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GAPLAB_URL", url)
     monkeypatch.setattr(completion, "PATIENCE_S", 60.0)
 
@@ -254,7 +254,7 @@ def test_ids_and_plug_ins_are_completed(url: str, study: str, monkeypatch: pytes
     assert "curves" in completion.figures("cu")
 
 
-def test_where_no_service_answers_nothing_is_offered(monkeypatch: pytest.MonkeyPatch):
+def test_where_no_service_answers_nothing_is_offered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GAPLAB_URL", "http://127.0.0.1:9")
 
     assert completion.ids("") == []
@@ -262,7 +262,7 @@ def test_where_no_service_answers_nothing_is_offered(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_the_shell_gets_a_script_and_the_script_gets_commands_and_ids(url: str, study: str, shell: str):
+def test_the_shell_gets_a_script_and_the_script_gets_commands_and_ids(url: str, study: str, shell: str) -> None:
     def ask(**environment: str) -> str:
         command = [sys.executable, "-m", "gaplab"]
         shown = os.environ | {"GAPLAB_URL": url} | environment
@@ -280,8 +280,8 @@ def test_the_shell_gets_a_script_and_the_script_gets_commands_and_ids(url: str, 
     assert any(study in offer for offer in offers)
 
 
-def test_completion_installs_itself_for_the_shell_that_it_is_asked_from(tmp_path: Path):
-    ask = f"'{sys.executable}' -m api.cli --install-completion; true"  # bash would become the last command itself
+def test_completion_installs_itself_for_the_shell_that_it_is_asked_from(tmp_path: Path) -> None:
+    ask = f"'{sys.executable}' -m gaplab --install-completion; true"  # bash would become the last command itself
     environment = os.environ | {"HOME": str(tmp_path)}
 
     done = subprocess.run(["bash", "-c", ask], env=environment, capture_output=True, text=True, check=False)
@@ -293,7 +293,7 @@ def test_completion_installs_itself_for_the_shell_that_it_is_asked_from(tmp_path
     assert str(script) in (tmp_path / ".bashrc").read_text()
 
 
-def test_in_a_log_watching_is_lines(gaplab: Gaplab, study: str, finish: Callable[[], None]):
+def test_in_a_log_watching_is_lines(gaplab: Gaplab, study: str, finish: Callable[[], None]) -> None:
     worker = threading.Timer(0.3, finish)
     worker.start()
 
@@ -305,8 +305,9 @@ def test_in_a_log_watching_is_lines(gaplab: Gaplab, study: str, finish: Callable
     assert "\x1b" not in said.out
 
 
-def test_in_a_terminal_it_is_a_view_of_curves_and_repetitions(url: str, study: str, finish: Callable[[], None]):
-    screen = Console(force_terminal=True, width=140, file=io.StringIO(), highlight=False)
+def test_in_a_terminal_it_is_a_view_of_curves_and_repetitions(url: str, study: str, finish: Callable[[], None]) -> None:
+    shown_on = io.StringIO()
+    screen = Console(force_terminal=True, width=140, file=shown_on, highlight=False)
 
     def finishing(snapshots: Iterator[Snapshot]) -> Iterator[Snapshot]:
         yield next(snapshots)
@@ -317,7 +318,7 @@ def test_in_a_terminal_it_is_a_view_of_curves_and_repetitions(url: str, study: s
         snapshots = Snapshots(client.records, client.results).of(study, every_s=0.1, patience_s=60)
         ended = terminal.show(finishing(snapshots), screen, keep=True)
 
-    shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", screen.file.getvalue())
+    shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown_on.getvalue())
     assert ended.state == "COMPLETED"
     assert "QUEUED" in shown
     assert "fitness in reality, m/s" in shown
@@ -344,23 +345,24 @@ class Shaky(httpx2.HTTPTransport):
         return super().handle_request(request)
 
 
-def test_the_view_survives_a_service_that_is_away_and_says_so(url: str, study: str, finish: Callable[[], None]):
-    screen = Console(force_terminal=True, width=140, file=io.StringIO(), highlight=False)
+def test_the_view_survives_a_service_that_is_away_and_says_so(url: str, study: str, finish: Callable[[], None]) -> None:
+    shown_on = io.StringIO()
+    screen = Console(force_terminal=True, width=140, file=shown_on, highlight=False)
 
     with Client(url, transport=Shaky(2, finish)) as client:
         ended = client.watcher.show(study, screen, curves=True, every_s=0.1, patience_s=60)
 
     assert ended.state == "COMPLETED"
-    assert "the service has not answered for" in screen.file.getvalue()
+    assert "the service has not answered for" in shown_on.getvalue()
 
 
-def test_it_is_waited_for_only_so_long_and_a_refusal_not_at_all(url: str, study: str):
+def test_it_is_waited_for_only_so_long_and_a_refusal_not_at_all(url: str, study: str) -> None:
     with Client(url, transport=Shaky(99)) as client, pytest.raises(ServiceUnreachable):
         list(client.watch(study, every_s=0.05, patience_s=0.1))
     with Client(url) as client, pytest.raises(ServiceError):
         next(client.watch("nope", every_s=0.1, patience_s=60))
 
 
-def test_numbers_become_blocks():
+def test_numbers_become_blocks() -> None:
     assert terminal.spark([0, 1, 2], 0, 2) == "▁▅█"
     assert terminal.spark([3, 3], 3, 3) == "▁▁"

@@ -31,7 +31,7 @@ STUDY = {
 }
 
 
-def test_the_rollouts_are_those_that_the_submitted_study_has(store: Store):
+def test_the_rollouts_are_those_that_the_submitted_study_has(store: Store) -> None:
     spec = StudySpec.model_validate(STUDY)
 
     found = estimate(store, spec)
@@ -44,7 +44,7 @@ def test_the_rollouts_are_those_that_the_submitted_study_has(store: Store):
     assert [each.iterations for each in found.experiments] == [3, 3, 0]
 
 
-def test_the_time_is_that_of_rollouts_measured_here_with_the_same_robot_and_engine(store: Store):
+def test_the_time_is_that_of_rollouts_measured_here_with_the_same_robot_and_engine(store: Store) -> None:
     spec = StudySpec.model_validate(STUDY)
     before = estimate(store, spec, cores=2)
     made = submission.submit_experiment(store, toy(repetitions=1))
@@ -65,7 +65,7 @@ def test_the_time_is_that_of_rollouts_measured_here_with_the_same_robot_and_engi
     assert after.seconds == pytest.approx(after.core_seconds / 2)
 
 
-def test_the_direct_baseline_is_computed_by_the_engine_of_reality(sqlite_store: Store):
+def test_the_direct_baseline_is_computed_by_the_engine_of_reality(sqlite_store: Store) -> None:
     spec = {
         "strategies": ["random", "direct"],
         "engine": "pybullet",
@@ -79,7 +79,7 @@ def test_the_direct_baseline_is_computed_by_the_engine_of_reality(sqlite_store: 
     assert {each.engine for each in found.engines} == {"pybullet", "mujoco"}
 
 
-def test_what_the_direct_baseline_took_is_a_measurement_of_the_engine_of_reality(sqlite_store: Store):
+def test_what_the_direct_baseline_took_is_a_measurement_of_the_engine_of_reality(sqlite_store: Store) -> None:
     spec = StudySpec.model_validate(
         {"strategies": ["direct"], "engine": "mujoco", "reality": {"engine": "pybullet"}, "budget": "smoke"}
     )
@@ -97,13 +97,13 @@ def test_what_the_direct_baseline_took_is_a_measurement_of_the_engine_of_reality
     assert [(each.engine, each.measured) for each in other.engines] == [("mujoco", False)]
 
 
-def test_few_at_once_take_as_long_as_few_cores(sqlite_store: Store):
+def test_few_at_once_take_as_long_as_few_cores(sqlite_store: Store) -> None:
     spec = StudySpec.model_validate(STUDY | {"max_parallel": 1})
 
     assert estimate(sqlite_store, spec, cores=16).cores == 3
 
 
-def test_only_supervisors_that_were_heard_of_lately_work(store: Store):
+def test_only_supervisors_that_were_heard_of_lately_work(store: Store) -> None:
     long_ago = datetime.now(UTC) - timedelta(hours=1)
     with store.transaction() as session:
         session.add(SupervisorRow(owner="works"))
@@ -112,7 +112,7 @@ def test_only_supervisors_that_were_heard_of_lately_work(store: Store):
     assert estimate(store, StudySpec.model_validate(STUDY)).supervisors == 1
 
 
-def test_what_is_wrong_is_told_with_its_places_as_on_submission(sqlite_store: Store):
+def test_what_is_wrong_is_told_with_its_places_as_on_submission(sqlite_store: Store) -> None:
     api = TestClient(create_app(sqlite_store, limits=Limits(repetitions=10)))
     bad = STUDY | {
         "tunables": [{"name": "static_friction", "lower": 2.0, "upper": 1.0}],
@@ -128,13 +128,13 @@ def test_what_is_wrong_is_told_with_its_places_as_on_submission(sqlite_store: St
     assert "/strategies/0" in pointers
 
 
-def test_cores_are_the_workers_that_the_service_was_given(sqlite_store: Store):
+def test_cores_are_the_workers_that_the_service_was_given(sqlite_store: Store) -> None:
     api = TestClient(create_app(sqlite_store, Settings(workers=3)), base_url="http://127.0.0.1:8000")
 
     assert api.post("/studies/estimate", json=STUDY).json()["cores"] == 3
 
 
-def test_the_best_fitness_of_an_experiment_is_the_mean_of_its_repetitions_best(store: Store):
+def test_the_best_fitness_of_an_experiment_is_the_mean_of_its_repetitions_best(store: Store) -> None:
     made = submission.submit_experiment(store, toy(repetitions=2))
     assert reading.read_experiment(store, made.id).best_fitness is None
 
@@ -147,7 +147,7 @@ def test_the_best_fitness_of_an_experiment_is_the_mean_of_its_repetitions_best(s
     assert listed.best_fitness == pytest.approx((3.0 + 4.0) / 2)
 
 
-def test_a_best_fitness_of_nothing_has_no_sign_whichever_zero_a_database_takes_for_the_greater(store: Store):
+def test_a_best_fitness_of_nothing_has_no_sign_whichever_zero_a_database_takes_for_the_greater(store: Store) -> None:
     made = submission.submit_experiment(store, toy(repetitions=1))
     (one,) = claim(store, "me", 1)
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from itertools import count
+from typing import Any
 
 import httpx2
 import pytest
@@ -49,7 +50,7 @@ def kinds(store: Store, which: WantedEvents | None = None) -> list[str]:
     return [each.kind.value for each in told(store, which)]
 
 
-def within(condition) -> bool:
+def within(condition: Any) -> bool:
     deadline = time.monotonic() + DEADLINE_S
     while not condition():
         if time.monotonic() > deadline:
@@ -58,7 +59,7 @@ def within(condition) -> bool:
     return True
 
 
-def test_the_life_of_an_experiment_is_told_step_by_step(store):
+def test_the_life_of_an_experiment_is_told_step_by_step(store: Store) -> None:
     id_ = submission.submit_experiment(store, toy(repetitions=1, iterations=1)).id
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim, some_log(1))
@@ -117,13 +118,13 @@ def all_verbs(store: Store) -> None:
         if verb is Verb.PAUSE:
             lifecycle.ask_experiment(store, asked, Verb.RESUME)
     whole = submission.submit_experiment(store, toy(repetitions=1)).id
-    run(store, *execution.claim(store, "me", 1))
+    run(store, *execution.claim(store, "me", 1))  # type: ignore[arg-type]
     extension.extend_experiment(store, whole, ExtensionSpec(repetitions=2))
     with archives.export_experiment(store, asked).file as file:
         archives.import_archive(store, file)
 
 
-def test_every_kind_of_event_is_told_and_none_shows_where_reality_is(store):
+def test_every_kind_of_event_is_told_and_none_shows_where_reality_is(store: Store) -> None:
     with store.transaction() as session:
         note(session, EventKind.SUBMITTED, "the first")  # so that numbers and ids differ
 
@@ -138,7 +139,7 @@ def test_every_kind_of_event_is_told_and_none_shows_where_reality_is(store):
     assert lost.body["reason"].startswith("lost 5 times")
 
 
-def test_an_experiment_submitted_after_its_check_is_told_of_it_at_once(store):
+def test_an_experiment_submitted_after_its_check_is_told_of_it_at_once(store: Store) -> None:
     before = submission.submit_experiment(store, toy()).id
     check = sensitivity.claim(store, "me")
     sensitivity.complete(store, check, [])
@@ -149,7 +150,7 @@ def test_an_experiment_submitted_after_its_check_is_told_of_it_at_once(store):
         assert kinds(store, WantedEvents(experiment=each)) == ["submitted", "sensitivity_ended"]
 
 
-def test_an_experiment_submitted_while_its_check_ends_is_told_of_it(store):
+def test_an_experiment_submitted_while_its_check_ends_is_told_of_it(store: Store) -> None:
     submission.submit_experiment(store, toy())
     check, spec = sensitivity.claim(store, "me"), resolve_experiment(toy())
 
@@ -164,7 +165,7 @@ def test_an_experiment_submitted_while_its_check_ends_is_told_of_it(store):
     assert kinds(store, WantedEvents(experiment=row.id)) == ["submitted", "sensitivity_ended"]
 
 
-def test_a_step_that_is_delivered_twice_is_told_once(store):
+def test_a_step_that_is_delivered_twice_is_told_once(store: Store) -> None:
     submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
 
@@ -175,10 +176,10 @@ def test_a_step_that_is_delivered_twice_is_told_once(store):
     assert kinds(store, WantedEvents(kinds=frozenset({EventKind.PROBED}))) == ["probed"] * 3
 
 
-def test_what_is_rolled_back_was_never_told_and_leaves_no_hole(store):
+def test_what_is_rolled_back_was_never_told_and_leaves_no_hole(store: Store) -> None:
     submission.submit_experiment(store, toy())
 
-    def fail(session) -> None:
+    def fail(session: Any) -> None:
         note(session, EventKind.CANCELLED, "nobody")
         write(session)
         raise ZeroDivisionError
@@ -190,7 +191,7 @@ def test_what_is_rolled_back_was_never_told_and_leaves_no_hole(store):
     assert [(each.number, each.kind.value) for each in told(store)] == [(1, "submitted"), (2, "submitted")]
 
 
-def test_a_number_is_seen_only_with_all_smaller_ones(postgres_store):
+def test_a_number_is_seen_only_with_all_smaller_ones(postgres_store: Store) -> None:
     """The first transaction has its numbers and is slow to commit: the second, which begins later, waits for it."""
     first_counted, let_go = threading.Event(), threading.Event()
 
@@ -223,7 +224,7 @@ def write_many(store: Store, name: int) -> None:
     """Transactions of one, two or three events, a fifth of which are rolled back."""
     chance = random.Random(name)
 
-    def dawdle(session) -> None:
+    def dawdle(session: Any) -> None:
         for part in range(chance.randint(1, 3)):
             note(session, EventKind.PROBED, "some experiment", part=part)
         time.sleep(chance.random() * 0.01)
@@ -236,7 +237,7 @@ def write_many(store: Store, name: int) -> None:
             store.write(dawdle)
 
 
-def test_a_reader_that_resumes_among_many_writers_misses_nothing(store):
+def test_a_reader_that_resumes_among_many_writers_misses_nothing(store: Store) -> None:
     """Writers commit, roll back and dawdle; whoever reads meanwhile, a page after the other, sees every number once."""
     over = threading.Event()
 
@@ -261,7 +262,9 @@ def test_a_reader_that_resumes_among_many_writers_misses_nothing(store):
     assert seen == [stored, stored]
 
 
-def test_supervisors_that_record_claim_and_end_at_once_do_not_wait_for_each_other_in_a_circle(postgres_store):
+def test_supervisors_that_record_claim_and_end_at_once_do_not_wait_for_each_other_in_a_circle(
+    postgres_store: Store,
+) -> None:
     store = postgres_store
     for _ in range(3):
         submission.submit_experiment(store, toy(repetitions=8))
@@ -301,7 +304,7 @@ def take(stream: Iterator[EventRead], many: int) -> list[EventRead]:
     return [next(stream) for _ in range(many)]
 
 
-def test_a_stream_has_what_was_and_what_comes(store):
+def test_a_stream_has_what_was_and_what_comes(store: Store) -> None:
     submission.submit_experiment(store, toy(repetitions=1))
     with served(store) as (url, feed), Client(url) as client:
         stream = client.events()
@@ -310,7 +313,7 @@ def test_a_stream_has_what_was_and_what_comes(store):
         run(store, claim)
         rest = take(stream, 17)
         assert feed.open == 1
-        stream.close()
+        stream.close()  # type: ignore[attr-defined]
         assert within(lambda: feed.open == 0)
 
     assert [each.number for each in (*first, *rest)] == list(range(1, 19))
@@ -318,7 +321,7 @@ def test_a_stream_has_what_was_and_what_comes(store):
     assert (*first, *rest) == told(store)
 
 
-def test_streams_are_filtered(sqlite_store):
+def test_streams_are_filtered(sqlite_store: Store) -> None:
     wanted, other = (submission.submit_experiment(sqlite_store, toy(repetitions=1)).id for _ in range(2))
     for claim in execution.claim(sqlite_store, "me", 2):
         run(sqlite_store, claim)
@@ -333,7 +336,7 @@ def test_streams_are_filtered(sqlite_store):
     assert {each.experiment for each in of_one} == {wanted} != {other}
 
 
-def test_a_stream_resumes_after_the_last_event_that_the_header_names(sqlite_store):
+def test_a_stream_resumes_after_the_last_event_that_the_header_names(sqlite_store: Store) -> None:
     for _ in range(5):
         submission.submit_experiment(sqlite_store, toy())
     with served(sqlite_store) as (url, _), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
@@ -349,7 +352,9 @@ def test_a_stream_resumes_after_the_last_event_that_the_header_names(sqlite_stor
     assert refused.status_code == 422
 
 
-def test_a_stream_that_fell_behind_catches_up_from_the_database(sqlite_store, monkeypatch):
+def test_a_stream_that_fell_behind_catches_up_from_the_database(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(feeding, "PAGE", 3)
     with served(sqlite_store) as (url, feed), Client(url) as client:
         feed._recent = type(feed._recent)(maxlen=2)
@@ -363,11 +368,13 @@ def test_a_stream_that_fell_behind_catches_up_from_the_database(sqlite_store, mo
     assert [each.number for each in found] == list(range(1, 19))
 
 
-def test_all_streams_together_ask_the_database_once_a_look(sqlite_store, monkeypatch):
+def test_all_streams_together_ask_the_database_once_a_look(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     asked = count()
     page = events.page
 
-    def counted(*given, **named):
+    def counted(*given: Any, **named: Any) -> Any:
         next(asked)
         return page(*given, **named)
 
@@ -388,7 +395,9 @@ def test_all_streams_together_ask_the_database_once_a_look(sqlite_store, monkeyp
     assert second == [2] * 8
 
 
-def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(sqlite_store, monkeypatch):
+def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     submission.submit_experiment(sqlite_store, toy())
     page, failing = events.page, [False]
 
@@ -396,7 +405,7 @@ def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(sqlite_store, mo
         if failing.pop():
             msg = "a mistake of ours"
             raise ValueError(msg)
-        return page(*asked, **named)
+        return page(*asked, **named)  # type: ignore[arg-type]
 
     async def follow() -> list[int]:
         feed = EventFeed(sqlite_store, every_s=0.01)
@@ -409,14 +418,16 @@ def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(sqlite_store, mo
         await asyncio.sleep(0.05)
         monkeypatch.setattr(feeding.events, "page", page)
         second = await asyncio.wait_for(anext(resumed), DEADLINE_S)
-        await stalled.aclose()
-        await resumed.aclose()
+        await stalled.aclose()  # type: ignore[attr-defined]
+        await resumed.aclose()  # type: ignore[attr-defined]
         return [first.number, second.number]
 
     assert asyncio.run(follow()) == [1, 1]
 
 
-def test_a_stream_whose_reader_failed_is_resumed_by_the_client(sqlite_store, monkeypatch):
+def test_a_stream_whose_reader_failed_is_resumed_by_the_client(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("gaplab.api.clients.events.RETRY_S", 0.05)
     submission.submit_experiment(sqlite_store, toy())
     latest, failing = events.latest, iter([True])
@@ -435,18 +446,20 @@ def test_a_stream_whose_reader_failed_is_resumed_by_the_client(sqlite_store, mon
     assert next(failing, None) is None
 
 
-def test_an_idle_stream_says_that_it_lives_and_holds_no_transaction(store, monkeypatch):
+def test_an_idle_stream_says_that_it_lives_and_holds_no_transaction(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("fastapi.routing._PING_INTERVAL", 0.2)
     with served(store) as (url, _), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
         answer = http.send(http.build_request("GET", "/events"), stream=True)
-        said, held = next(answer.iter_lines()), store._engine.pool.checkedout()
+        said, held = next(answer.iter_lines()), store._engine.pool.checkedout()  # type: ignore[attr-defined]
         answer.close()
 
     assert said == ": ping"
     assert held <= 1  # the look of the moment
 
 
-def test_a_service_that_stops_ends_its_streams(sqlite_store):
+def test_a_service_that_stops_ends_its_streams(sqlite_store: Store) -> None:
     ended = threading.Event()
 
     def follow(url: str) -> None:
@@ -463,7 +476,9 @@ def test_a_service_that_stops_ends_its_streams(sqlite_store):
     listening.join()
 
 
-def test_a_client_goes_on_where_it_was_when_the_service_comes_back(sqlite_store, monkeypatch):
+def test_a_client_goes_on_where_it_was_when_the_service_comes_back(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("gaplab.api.clients.events.RETRY_S", 0.05)
     submission.submit_experiment(sqlite_store, toy())
     with served(sqlite_store) as (url, _):
@@ -482,7 +497,7 @@ def test_a_client_goes_on_where_it_was_when_the_service_comes_back(sqlite_store,
     assert [each.number for each in found] == [1, 2]
 
 
-def test_events_can_be_polled_page_by_page(store):
+def test_events_can_be_polled_page_by_page(store: Store) -> None:
     everything_that_can_happen(store)
     with TestClient(create_app(store)) as api:
         pages, after = [], 0
@@ -494,12 +509,12 @@ def test_events_can_be_polled_page_by_page(store):
     assert page["last"] == page["latest"] == len(pages)
 
 
-def test_a_poll_may_wait_for_what_comes(sqlite_store):
+def test_a_poll_may_wait_for_what_comes(sqlite_store: Store) -> None:
     id_ = submission.submit_experiment(sqlite_store, toy()).id
     with served(sqlite_store) as (url, feed), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
         asked = {"after": 1, "kind": "cancelled", "wait_s": 60}
         with ThreadPoolExecutor(1) as pool:
-            answer = pool.submit(http.get, "/events/page", params=asked)
+            answer = pool.submit(http.get, "/events/page", params=asked)  # type: ignore[arg-type]
             assert within(lambda: feed.open == 1)
             cancel(sqlite_store, id_)
             found = answer.result(DEADLINE_S).json()
@@ -510,7 +525,7 @@ def test_a_poll_may_wait_for_what_comes(sqlite_store):
     assert nothing["last"] == 2
 
 
-def test_events_of_a_study_are_those_of_its_experiments(sqlite_store):
+def test_events_of_a_study_are_those_of_its_experiments(sqlite_store: Store) -> None:
     from gaplab.schemas.spec import StudySpec
 
     study = submission.submit_study(

@@ -1,6 +1,7 @@
 """Leases and the log: what supervisors rely on, on both databases."""
 
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import pytest
 
@@ -12,10 +13,11 @@ from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.running import execution
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import setting
+from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, same, some_log, toy
 
 
-def test_a_claim_has_the_resolved_spec_and_no_log_at_first(store):
+def test_a_claim_has_the_resolved_spec_and_no_log_at_first(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(reality={"parameters": {"static_friction": 0.9}}))
 
     (claim,) = execution.claim(store, "me", 1)
@@ -25,7 +27,7 @@ def test_a_claim_has_the_resolved_spec_and_no_log_at_first(store):
     assert claim.spec.reality.parameters == {"static_friction": 0.9, "dynamic_friction": 0.8}
 
 
-def test_the_first_claim_starts_the_experiment(store):
+def test_the_first_claim_starts_the_experiment(store: Store) -> None:
     started = submission.submit_experiment(store, toy())
     waiting = submission.submit_experiment(store, toy())
 
@@ -36,11 +38,11 @@ def test_the_first_claim_starts_the_experiment(store):
     assert reading.read_experiment(store, waiting.id).state is State.QUEUED
 
 
-def test_claims_of_many_owners_never_overlap(store):
+def test_claims_of_many_owners_never_overlap(store: Store) -> None:
     for _ in range(3):
         submission.submit_experiment(store, toy(repetitions=20))
 
-    def claim_all(owner):
+    def claim_all(owner: Any) -> Any:
         claimed = []
         while claims := execution.claim(store, owner, 3):
             claimed += [each.id for each in claims]
@@ -52,7 +54,7 @@ def test_claims_of_many_owners_never_overlap(store):
     assert len(claimed) == len(set(claimed)) == 60
 
 
-def test_the_log_that_is_read_is_the_log_that_was_written(store):
+def test_the_log_that_is_read_is_the_log_that_was_written(store: Store) -> None:
     submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     for count, step in enumerate(some_log()):
@@ -64,7 +66,7 @@ def test_the_log_that_is_read_is_the_log_that_was_written(store):
         assert same(claim.log, tuple(some_log())[: count + 1])
 
 
-def test_a_step_that_is_delivered_twice_is_stored_once(store):
+def test_a_step_that_is_delivered_twice_is_stored_once(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
 
@@ -79,7 +81,7 @@ def test_a_step_that_is_delivered_twice_is_stored_once(store):
     assert reading.read_experiment(store, submitted.id).progress.rollouts_done == 3 * 60 + 2 * 90
 
 
-def test_a_step_that_would_leave_a_hole_is_refused(store):
+def test_a_step_that_would_leave_a_hole_is_refused(store: Store) -> None:
     submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     first, _, third, *_ = some_log()
@@ -92,15 +94,15 @@ def test_a_step_that_would_leave_a_hole_is_refused(store):
     assert len(execution.claim(store, "me", 1)[0].log) == 1
 
 
-def timed(steps):
+def timed(steps: Any) -> Any:
     return [execution.TimedStep(each, 0.5) for each in steps]
 
 
-def by_experiment(claims, *ids):
+def by_experiment(claims: Any, *ids: Any) -> Any:
     return tuple(sorted(claims, key=lambda each: (ids.index(each.experiment_id), each.number)))
 
 
-def test_many_repetitions_at_once_are_recorded_as_one_step_after_another_would_be(store):
+def test_many_repetitions_at_once_are_recorded_as_one_step_after_another_would_be(store: Store) -> None:
     one_by_one, together = (submission.submit_experiment(store, toy()).id for _ in range(2))
     claims = by_experiment(execution.claim(store, "me", 6), one_by_one, together)
     ends = (13, 7, 2)
@@ -123,7 +125,7 @@ def test_many_repetitions_at_once_are_recorded_as_one_step_after_another_would_b
     assert first.progress == second.progress
 
 
-def test_of_many_deliveries_only_those_whose_claim_holds_are_written(store):
+def test_of_many_deliveries_only_those_whose_claim_holds_are_written(store: Store) -> None:
     submission.submit_experiment(store, toy())
     lost, *held = execution.claim(store, "me", 3)
     execution.release(store, lost, "killed")
@@ -135,7 +137,7 @@ def test_of_many_deliveries_only_those_whose_claim_holds_are_written(store):
     assert (again.number, again.log) == (lost.number, ())
 
 
-def test_a_hole_in_one_of_many_deliveries_refuses_them_all(store):
+def test_a_hole_in_one_of_many_deliveries_refuses_them_all(store: Store) -> None:
     submission.submit_experiment(store, toy())
     whole, holed, _ = execution.claim(store, "me", 3)
     first, _, third = tuple(some_log())[:3]
@@ -147,7 +149,7 @@ def test_a_hole_in_one_of_many_deliveries_refuses_them_all(store):
     assert execution.claim(store, "me", 1)[0].log == ()
 
 
-def test_a_holder_who_wakes_up_late_cannot_write(store):
+def test_a_holder_who_wakes_up_late_cannot_write(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=1))
     (late,) = execution.claim(store, "late", 1)
     assert execution.requeue_lost(store, stale_after_s=-1) == 1
@@ -169,7 +171,7 @@ def test_a_holder_who_wakes_up_late_cannot_write(store):
     assert execution.record(store, present, second)
 
 
-def test_a_heartbeat_keeps_a_claim(store):
+def test_a_heartbeat_keeps_a_claim(store: Store) -> None:
     submission.submit_experiment(store, toy(repetitions=2))
     claims = execution.claim(store, "me", 2)
 
@@ -180,7 +182,7 @@ def test_a_heartbeat_keeps_a_claim(store):
     assert execution.requeue_lost(store, stale_after_s=30) == 0
 
 
-def test_a_repetition_that_was_lost_is_queued_again_and_goes_on_from_its_log(store):
+def test_a_repetition_that_was_lost_is_queued_again_and_goes_on_from_its_log(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "killed", 1)
     first, *_ = some_log()
@@ -196,7 +198,7 @@ def test_a_repetition_that_was_lost_is_queued_again_and_goes_on_from_its_log(sto
     assert reading.read_experiment(store, submitted.id).state is State.RUNNING
 
 
-def test_a_repetition_that_kills_its_workers_is_failed_in_the_end(store):
+def test_a_repetition_that_kills_its_workers_is_failed_in_the_end(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=1))
 
     for _ in range(MAX_LOSSES):
@@ -212,7 +214,7 @@ def test_a_repetition_that_kills_its_workers_is_failed_in_the_end(store):
     )
 
 
-def test_a_repetition_that_gets_on_may_be_lost_any_number_of_times(store):
+def test_a_repetition_that_gets_on_may_be_lost_any_number_of_times(store: Store) -> None:
     submission.submit_experiment(store, toy(repetitions=1))
 
     for step in some_log():
@@ -224,7 +226,7 @@ def test_a_repetition_that_gets_on_may_be_lost_any_number_of_times(store):
     assert execution.complete(store, claim)
 
 
-def test_a_repetition_may_be_handed_back_any_number_of_times(store):
+def test_a_repetition_may_be_handed_back_any_number_of_times(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy(repetitions=1)).id
 
     for _ in range(MAX_LOSSES + 1):
@@ -236,7 +238,7 @@ def test_a_repetition_may_be_handed_back_any_number_of_times(store):
     assert not execution.hand_back(store, claim)
 
 
-def test_the_experiment_is_completed_with_its_last_repetition(store):
+def test_the_experiment_is_completed_with_its_last_repetition(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=3))
     claims = execution.claim(store, "me", 3)
     states = []
@@ -253,7 +255,7 @@ def test_the_experiment_is_completed_with_its_last_repetition(store):
     assert found.ended_at >= found.started_at >= found.created_at
 
 
-def test_an_experiment_fails_when_all_of_its_repetitions_do_and_says_each_reason_once(store):
+def test_an_experiment_fails_when_all_of_its_repetitions_do_and_says_each_reason_once(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=3))
 
     for claim, reason in zip(execution.claim(store, "me", 3), ("zero division", "a key", "zero division"), strict=True):
@@ -264,7 +266,7 @@ def test_an_experiment_fails_when_all_of_its_repetitions_do_and_says_each_reason
     assert found.reasons == ("zero division", "a key")
 
 
-def test_repetitions_that_end_at_once_end_their_experiment(store):
+def test_repetitions_that_end_at_once_end_their_experiment(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=8))
     claims = execution.claim(store, "me", 8)
     for claim in claims:
@@ -278,7 +280,7 @@ def test_repetitions_that_end_at_once_end_their_experiment(store):
     assert reading.read_experiment(store, submitted.id).state is State.COMPLETED
 
 
-def test_a_repetition_with_iterations_missing_is_not_completed(store):
+def test_a_repetition_with_iterations_missing_is_not_completed(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     for step in some_log(iterations=1):
@@ -290,7 +292,7 @@ def test_a_repetition_with_iterations_missing_is_not_completed(store):
     assert reading.read_experiment(store, submitted.id).state is State.RUNNING
 
 
-def test_a_cancelled_experiment_refuses_its_running_repetitions_and_keeps_what_is_stored(store):
+def test_a_cancelled_experiment_refuses_its_running_repetitions_and_keeps_what_is_stored(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy())
     (claim,) = execution.claim(store, "me", 1)
     first, second, *_ = some_log()
@@ -307,11 +309,11 @@ def test_a_cancelled_experiment_refuses_its_running_repetitions_and_keeps_what_i
     assert len(reading.list_simulators(store, submitted.id).items) == 2
 
 
-def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(store):
+def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(store: Store) -> None:
     ids = [submission.submit_experiment(store, toy(repetitions=1)).id for _ in range(10)]
     claims = execution.claim(store, "me", 10)
 
-    def try_to_cancel(experiment):
+    def called_off(experiment: str) -> str:
         try:
             cancel(store, experiment)
         except Conflict:
@@ -320,13 +322,13 @@ def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(st
 
     with ThreadPoolExecutor(4) as pool:
         failed = [pool.submit(execution.fail, store, each, "x") for each in claims]
-        cancelled = [pool.submit(try_to_cancel, each) for each in ids]
+        cancelled = [pool.submit(called_off, each) for each in ids]
 
     assert [each.result() for each in failed] == [each.result() == "ended before" for each in cancelled]
     assert all(reading.read_experiment(store, each).state.ended for each in ids)
 
 
-def test_progress_counts_what_the_steps_took(store):
+def test_progress_counts_what_the_steps_took(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy())
     waiting = submitted.progress
     first, second, _ = execution.claim(store, "me", 3)
@@ -346,7 +348,7 @@ def test_progress_counts_what_the_steps_took(store):
     assert progress.seconds_left == pytest.approx((2 * expected - 90) * pace)  # the third may still wait for a core
 
 
-def test_nothing_is_left_to_do_at_the_end(store):
+def test_nothing_is_left_to_do_at_the_end(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
 
@@ -356,7 +358,7 @@ def test_nothing_is_left_to_do_at_the_end(store):
 
 
 @pytest.mark.parametrize("strategy", ["simulated_fit_and_informative", "known_fit", "direct"])
-def test_a_repetition_killed_after_every_step_ends_as_one_that_never_stopped(store, strategy):
+def test_a_repetition_killed_after_every_step_ends_as_one_that_never_stopped(store: Store, strategy: Any) -> None:
     submission.submit_experiment(store, toy(strategy=strategy, repetitions=1))
     claim, steps = execution.claim(store, "me", 1)[0], []
 
@@ -371,7 +373,7 @@ def test_a_repetition_killed_after_every_step_ends_as_one_that_never_stopped(sto
     assert same(tuple(steps), claim.log)
 
 
-def test_the_budgeted_rollouts_are_those_that_a_repetition_takes_or_saves(store):
+def test_the_budgeted_rollouts_are_those_that_a_repetition_takes_or_saves(store: Store) -> None:
     for strategy in ("simulated_fit_and_informative", "known_fit", "direct"):
         submission.submit_experiment(store, toy(strategy=strategy, repetitions=1))
     for claim in execution.claim(store, "me", 3):

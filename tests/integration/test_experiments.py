@@ -1,6 +1,7 @@
 """Submitting, looking at and cancelling experiments and studies, on both databases."""
 
 from datetime import UTC
+from typing import Any
 
 import pytest
 from sqlalchemy import event
@@ -13,30 +14,31 @@ from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.running import execution
 from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
+from gaplab.services.store.session import Store
 from tests.experiments import AWKWARD, cancel, run, some_log, toy
 
 SECRET = 0.987654321
 
 
-def small_study(**changes):
+def small_study(**changes: Any) -> Any:
     common = toy().model_dump(exclude={"strategy", "name"})
     return StudySpec.model_validate(common | {"repetitions": 1, "reality": {"parameters": {}}} | changes)
 
 
-def finish_all(store):
+def finish_all(store: Store) -> None:
     for claim in execution.claim(store, "me", 99):
         run(store, claim, some_log(iterations=0 if claim.spec.strategy.name == "direct" else 2))
 
 
-def every_page(list_page, **filters):
-    items, cursor, pages = [], None, 0
+def every_page(list_page: Any, **filters: Any) -> Any:
+    items, cursor, pages = [], None, 0  # type: ignore[var-annotated]
     while cursor is not None or not pages:
         page = list_page(cursor=cursor, **filters)
         items, cursor, pages = [*items, *page.items], page.next, pages + 1
     return items, pages
 
 
-def test_a_submitted_experiment_is_stored_resolved_and_queued(store):
+def test_a_submitted_experiment_is_stored_resolved_and_queued(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy(name="mine"))
 
     found = reading.read_experiment(store, submitted.id)
@@ -50,13 +52,13 @@ def test_a_submitted_experiment_is_stored_resolved_and_queued(store):
     assert found.progress.rollouts == 3 * expected_rollouts(resolved)
 
 
-def test_an_experiment_without_a_name_has_that_of_its_strategy(store):
+def test_an_experiment_without_a_name_has_that_of_its_strategy(store: Store) -> None:
     submitted = submission.submit_experiment(store, toy())
 
     assert submitted.name == "simulated_fit"
 
 
-def test_a_name_may_have_any_character(store):
+def test_a_name_may_have_any_character(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy(name="nul\0 ü 漢 🤖"))
     study = submission.submit_study(store, small_study(name="'\0'"))
 
@@ -64,7 +66,7 @@ def test_a_name_may_have_any_character(store):
     assert reading.read_study(store, study.id).name == "'\ufffd'"
 
 
-def test_an_invalid_spec_stores_nothing(store):
+def test_an_invalid_spec_stores_nothing(store: Store) -> None:
     with pytest.raises(InvalidSpec):
         submission.submit_study(store, small_study(strategies=["random", "no_such"]))
 
@@ -72,7 +74,7 @@ def test_an_invalid_spec_stores_nothing(store):
     assert listing.list_experiments(store).items == ()
 
 
-def test_a_study_has_an_experiment_for_each_strategy_in_its_order(store):
+def test_a_study_has_an_experiment_for_each_strategy_in_its_order(store: Store) -> None:
     submitted = submission.submit_study(store, small_study(name="all", direct_repetitions=4))
 
     found = reading.read_study(store, submitted.id)
@@ -86,7 +88,7 @@ def test_a_study_has_an_experiment_for_each_strategy_in_its_order(store):
     assert found.progress.rollouts == sum(each.progress.rollouts for each in found.experiments)
 
 
-def test_the_state_of_a_study_is_that_of_its_experiments_together(store):
+def test_the_state_of_a_study_is_that_of_its_experiments_together(store: Store) -> None:
     study = submission.submit_study(store, small_study(strategies=["simulated_fit", "direct"])).id
     states = []
 
@@ -102,7 +104,7 @@ def test_the_state_of_a_study_is_that_of_its_experiments_together(store):
 
 @pytest.mark.parametrize("look", [reading.read_experiment, cancel, reading.read_study])
 @pytest.mark.parametrize("name", ["no-such", "", "nul\0", "ü" * 1000, "'; DROP TABLE study; --"])
-def test_an_unknown_id_is_not_found_and_the_message_names_it(store, look, name):
+def test_an_unknown_id_is_not_found_and_the_message_names_it(store: Store, look: Any, name: Any) -> None:
     with pytest.raises(NotFound) as caught:
         look(store, name)
 
@@ -110,12 +112,12 @@ def test_an_unknown_id_is_not_found_and_the_message_names_it(store, look, name):
 
 
 @pytest.mark.parametrize("look", [reading.list_repetitions, reading.list_samples, reading.list_simulators])
-def test_the_results_of_an_unknown_experiment_are_not_found(store, look):
+def test_the_results_of_an_unknown_experiment_are_not_found(store: Store, look: Any) -> None:
     with pytest.raises(NotFound, match="no-such"):
         look(store, "no-such")
 
 
-def test_pages_have_every_experiment_once_newest_first_whatever_is_submitted_meanwhile(store):
+def test_pages_have_every_experiment_once_newest_first_whatever_is_submitted_meanwhile(store: Store) -> None:
     study = submission.submit_study(store, small_study())
     alone = submission.submit_experiment(store, toy())
 
@@ -129,7 +131,7 @@ def test_pages_have_every_experiment_once_newest_first_whatever_is_submitted_mea
     assert third.next is None
 
 
-def test_pages_of_studies_have_every_study_once_newest_first(store):
+def test_pages_of_studies_have_every_study_once_newest_first(store: Store) -> None:
     submitted = [submission.submit_study(store, small_study(name=str(number))) for number in range(5)]
 
     found, pages = every_page(lambda **page: listing.list_studies(store, limit=2, **page))
@@ -138,12 +140,12 @@ def test_pages_of_studies_have_every_study_once_newest_first(store):
     assert pages == 3
 
 
-def test_a_list_is_filtered_by_study_state_and_strategy(store):
+def test_a_list_is_filtered_by_study_state_and_strategy(store: Store) -> None:
     study = submission.submit_study(store, small_study())
     alone = submission.submit_experiment(store, toy())
     cancel(store, alone.id)
 
-    def found(**filters):
+    def found(**filters: Any) -> Any:
         return {each.id for each in listing.list_experiments(store, ListFilter(**filters)).items}
 
     assert found(study=study.id) == {each.id for each in study.experiments}
@@ -157,7 +159,7 @@ def test_a_list_is_filtered_by_study_state_and_strategy(store):
     "cursor", ["", "x", "ü", "W10", "WzEsMiwzXQ", "WyIyMDI2LTAxLTAxIiwgMSwgMV0", "W" * 100_000, "W1tb" * 497]
 )
 @pytest.mark.parametrize("listed", ["experiments", "studies", "samples", "simulators"])
-def test_a_cursor_that_no_page_gave_is_refused(store, listed, cursor):
+def test_a_cursor_that_no_page_gave_is_refused(store: Store, listed: Any, cursor: Any) -> None:
     experiment = submission.submit_experiment(store, toy()).id
     pages = {
         "experiments": lambda: listing.list_experiments(store, cursor=cursor),
@@ -172,11 +174,11 @@ def test_a_cursor_that_no_page_gave_is_refused(store, listed, cursor):
     assert [each.pointer for each in caught.value.violations] == ["cursor"]
 
 
-def test_a_list_takes_as_many_queries_for_many_as_for_one(store):
+def test_a_list_takes_as_many_queries_for_many_as_for_one(store: Store) -> None:
     counted = []
     event.listen(store._engine, "before_cursor_execute", lambda *details: counted.append(details[2]))
 
-    def queries():
+    def queries() -> Any:
         counted.clear()
         listing.list_studies(store)
         listing.list_experiments(store)
@@ -190,7 +192,7 @@ def test_a_list_takes_as_many_queries_for_many_as_for_one(store):
     assert queries() == one
 
 
-def test_samples_and_probes_are_rows_in_the_order_of_the_log(store):
+def test_samples_and_probes_are_rows_in_the_order_of_the_log(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy()).id
     for claim in execution.claim(store, "me", 2):
         run(store, claim)
@@ -209,7 +211,7 @@ def test_samples_and_probes_are_rows_in_the_order_of_the_log(store):
     assert page.next is None
 
 
-def test_samples_and_simulators_are_filtered_and_paged(store):
+def test_samples_and_simulators_are_filtered_and_paged(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy()).id
     for claim in execution.claim(store, "me", 3):
         run(store, claim)
@@ -232,7 +234,7 @@ def test_samples_and_simulators_are_filtered_and_paged(store):
     assert of_iteration[0].parameters == {"static_friction": 0.1, "dynamic_friction": 1 / 3}
 
 
-def test_realitys_parameters_are_shown_only_after_the_end(store):
+def test_realitys_parameters_are_shown_only_after_the_end(store: Store) -> None:
     spec = toy(repetitions=1, reality={"parameters": {"static_friction": SECRET}})
     experiment = submission.submit_experiment(store, spec).id
     before = reading.read_experiment(store, experiment)
@@ -248,7 +250,7 @@ def test_realitys_parameters_are_shown_only_after_the_end(store):
     assert after.spec["reality"]["parameters"] == {"static_friction": SECRET, "dynamic_friction": 0.8}
 
 
-def test_realitys_parameters_are_hidden_while_any_experiment_of_the_study_can_learn_them(store):
+def test_realitys_parameters_are_hidden_while_any_experiment_of_the_study_can_learn_them(store: Store) -> None:
     spec = small_study(strategies=["random", "simulated_fit"], reality={"parameters": {"static_friction": SECRET}})
     study = submission.submit_study(store, spec)
     first, second = study.experiments
@@ -262,7 +264,7 @@ def test_realitys_parameters_are_hidden_while_any_experiment_of_the_study_can_le
     assert reading.read_experiment(store, first.id).spec["reality"]["parameters"]["static_friction"] == SECRET
 
 
-def test_a_queued_experiment_can_be_cancelled_once(store):
+def test_a_queued_experiment_can_be_cancelled_once(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy()).id
 
     cancelled = cancel(store, experiment)
@@ -275,7 +277,7 @@ def test_a_queued_experiment_can_be_cancelled_once(store):
         cancel(store, experiment)
 
 
-def test_what_has_ended_cannot_be_cancelled(store):
+def test_what_has_ended_cannot_be_cancelled(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy()).id
     finish_all(store)
 
@@ -283,7 +285,7 @@ def test_what_has_ended_cannot_be_cancelled(store):
         cancel(store, experiment)
 
 
-def test_repetitions_tell_how_far_they_are(store):
+def test_repetitions_tell_how_far_they_are(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy()).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)

@@ -1,6 +1,8 @@
 """What is in the figures of one experiment: simulators, predictions, squared error, and curves against their cost."""
 
 import json
+from collections.abc import Iterator
+from typing import Any
 from warnings import catch_warnings
 
 import pytest
@@ -26,10 +28,10 @@ from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, curve, point, 
 
 
 def marks(figure: FigureDefinition, panel: int = 0) -> dict[str, Mark]:
-    return {mark.name: mark for mark in figure.panels[panel].marks}
+    return {mark.name: mark for mark in figure.panels[panel].marks}  # type: ignore[union-attr]
 
 
-def test_three_tunables_are_drawn_pair_by_pair_and_iterations_from_light_to_dark():
+def test_three_tunables_are_drawn_pair_by_pair_and_iterations_from_light_to_dark() -> None:
     figure = simulators_figure(tuned(3), DIMENSIONS[:3], truth=None)
 
     labels = [(each.x.label, each.y.label) for each in figure.panels]
@@ -40,24 +42,24 @@ def test_three_tunables_are_drawn_pair_by_pair_and_iterations_from_light_to_dark
         ("Dynamic friction", "Body mass (kg)"),
     ]
     assert all(each.square for each in figure.panels)
-    assert points.shades == (0, 0, 0, 1, 1, 1, 2, 2, 2)
-    assert points.x[:3] == pytest.approx((0.1, 0.2, 0.3))
-    assert points.y[:3] == pytest.approx((0.3, 0.4, 0.5))
-    assert points.hover[4] == "repetition 1, iteration 1"
+    assert points.shades == (0, 0, 0, 1, 1, 1, 2, 2, 2)  # type: ignore[union-attr]
+    assert points.x[:3] == pytest.approx((0.1, 0.2, 0.3))  # type: ignore[index, union-attr]
+    assert points.y[:3] == pytest.approx((0.3, 0.4, 0.5))  # type: ignore[index, union-attr]
+    assert points.hover[4] == "repetition 1, iteration 1"  # type: ignore[union-attr]
     assert "3\N{NO-BREAK SPACE}repetitions" in figure.caption
     assert "once its experiments have ended" in figure.caption
 
 
 @pytest.mark.parametrize("tunables", [1, 4])
-def test_one_tunable_or_very_many_are_drawn_against_iterations(tunables: int):
+def test_one_tunable_or_very_many_are_drawn_against_iterations(tunables: int) -> None:
     figure = simulators_figure(tuned(tunables), DIMENSIONS[:tunables], truth=TRUTH)
 
     assert [each.x.label for each in figure.panels] == ["Iteration"] * tunables
-    assert marks(figure)["Best simulator of a repetition"].x == (0, 0, 0, 1, 1, 1, 2, 2, 2)
-    assert marks(figure)[REALITY].value == 1.0
+    assert marks(figure)["Best simulator of a repetition"].x == (0, 0, 0, 1, 1, 1, 2, 2, 2)  # type: ignore[union-attr]
+    assert marks(figure)[REALITY].value == 1.0  # type: ignore[union-attr]
 
 
-def test_reality_is_a_point_where_both_are_known_a_level_where_one_is_and_within_the_frame():
+def test_reality_is_a_point_where_both_are_known_a_level_where_one_is_and_within_the_frame() -> None:
     far = {"static_friction": 9.0, "dynamic_friction": 0.8}
     figure = simulators_figure(tuned(3), DIMENSIONS[:3], truth=far)
 
@@ -71,27 +73,27 @@ def test_reality_is_a_point_where_both_are_known_a_level_where_one_is_and_within
     assert "ended" not in figure.caption
 
 
-def test_of_very_many_simulators_the_first_repetitions_are_drawn():
+def test_of_very_many_simulators_the_first_repetitions_are_drawn() -> None:
     figure = simulators_figure(tuned(2, repetitions=4000, iterations=1), DIMENSIONS[:2], truth=None)
 
-    assert len(marks(figure)["Best simulator of a repetition"].x) == MOST
+    assert len(marks(figure)["Best simulator of a repetition"].x) == MOST  # type: ignore[arg-type, union-attr]
     assert "2500\N{NO-BREAK SPACE}repetitions of 4000" in figure.caption
 
 
-def test_simulators_of_nothing_do_not_tell_where_reality_is():
+def test_simulators_of_nothing_do_not_tell_where_reality_is() -> None:
     figure = simulators_figure([], DIMENSIONS[:2], truth=TRUTH)
 
     assert figure.empty
     assert figure.panels[0].marks == ()
 
 
-def test_predictions_are_drawn_before_and_after_with_the_line_of_agreement():
+def test_predictions_are_drawn_before_and_after_with_the_line_of_agreement() -> None:
     figure = predictions_figure(PREDICTIONS, unit="m/s", pending=2, left_out=3)
 
     found = marks(figure)
     (panel,) = figure.panels
-    assert (found[BEFORE].x, found[BEFORE].y) == ((1.0, 1.0), (0.5, 1.5))
-    assert (found[AFTER].x, found[AFTER].y) == ((1.0, 1.0), (0.9, 1.1))
+    assert (found[BEFORE].x, found[BEFORE].y) == ((1.0, 1.0), (0.5, 1.5))  # type: ignore[union-attr]
+    assert (found[AFTER].x, found[AFTER].y) == ((1.0, 1.0), (0.9, 1.1))  # type: ignore[union-attr]
     assert any(isinstance(each, Diagonal) for each in panel.marks)
     assert panel.x.limits == panel.y.limits
     assert (panel.x.label, panel.y.label) == ("Fitness in reality (m/s)", "Fitness in simulation (m/s)")
@@ -104,18 +106,18 @@ def test_predictions_are_drawn_before_and_after_with_the_line_of_agreement():
     assert "2 samples still being computed." in told
 
 
-def test_predictions_that_are_on_their_way_say_so():
+def test_predictions_that_are_on_their_way_say_so() -> None:
     assert predictions_figure([], pending=3).nothing == "being computed"
     assert predictions_figure([]).nothing == "no results yet"
     assert predictions_figure([]).empty
 
 
-def test_squared_errors_have_their_median_and_quartiles_and_failures_are_counted():
+def test_squared_errors_have_their_median_and_quartiles_and_failures_are_counted() -> None:
     figure = squared_error_figure({1: {0: 1.0, 1: 2.0, 2: 9.0}, 2: {0: 4.0, 1: None}}, unit="m/s")
 
     line = marks(figure)["Best simulator"]
-    assert (line.x, line.y) == ((1, 2), (2.0, 4.0))
-    assert (line.lower, line.upper) == ((1.5, None), (5.5, None))
+    assert (line.x, line.y) == ((1, 2), (2.0, 4.0))  # type: ignore[union-attr]
+    assert (line.lower, line.upper) == ((1.5, None), (5.5, None))  # type: ignore[union-attr]
     assert figure.panels[0].y.label == "Squared error ((m/s)²)"
     assert not figure.panels[0].y.log
     told = figure.caption.replace("\N{NO-BREAK SPACE}", " ")
@@ -123,7 +125,7 @@ def test_squared_errors_have_their_median_and_quartiles_and_failures_are_counted
     assert "1 value left out, since the physics failed." in told
 
 
-def test_squared_errors_of_many_magnitudes_are_on_a_logarithmic_axis_without_zeros():
+def test_squared_errors_of_many_magnitudes_are_on_a_logarithmic_axis_without_zeros() -> None:
     figure = squared_error_figure(ERRORS, each=True)
 
     (panel,) = figure.panels
@@ -136,22 +138,22 @@ def test_squared_errors_of_many_magnitudes_are_on_a_logarithmic_axis_without_zer
     assert panel.y.limits[0] > 0
 
 
-def test_squared_errors_that_are_all_zero_or_failed_are_drawn_as_they_are():
+def test_squared_errors_that_are_all_zero_or_failed_are_drawn_as_they_are() -> None:
     perfect, failed = squared_error_figure({1: {0: 0.0}}), squared_error_figure({1: {0: None}})
 
-    assert marks(perfect)["Best simulator"].y == (0.0,)
+    assert marks(perfect)["Best simulator"].y == (0.0,)  # type: ignore[union-attr]
     assert not perfect.panels[0].y.log
     assert failed.empty
 
 
-def test_the_band_of_squared_errors_is_told_of_only_where_there_is_one():
+def test_the_band_of_squared_errors_is_told_of_only_where_there_is_one() -> None:
     alone, several = squared_error_figure({1: {0: 1.0}}), squared_error_figure({1: {0: 1.0, 1: 2.0}, 2: {0: 1.0}})
 
     assert alone.caption.endswith("Median over 1\N{NO-BREAK SPACE}repetition.")
     assert "band: from the first to the third quartile." in several.caption
 
 
-def test_a_sample_that_misses_one_of_its_points_is_left_out_of_both_so_that_they_are_of_the_same_samples():
+def test_a_sample_that_misses_one_of_its_points_is_left_out_of_both_so_that_they_are_of_the_same_samples() -> None:
     halves = [prediction(None, 0.3, 0.3), prediction(0.3, None, 0.3, 1)]
     figure = predictions_figure([prediction(0.5, 0.4, 0.3), prediction(0.1, 0.2, 0.3, 1), *halves])
 
@@ -161,7 +163,7 @@ def test_a_sample_that_misses_one_of_its_points_is_left_out_of_both_so_that_they
     assert predictions_figure(halves).empty
 
 
-def test_what_exploding_physics_says_is_drawn_too():
+def test_what_exploding_physics_says_is_drawn_too() -> None:
     predicted = predictions_figure([prediction(1e200, 1.0, 1.0)])
     tuning = squared_error_figure({1: {0: 1e-300}, 2: {0: 1e300}})
 
@@ -172,20 +174,20 @@ def test_what_exploding_physics_says_is_drawn_too():
         assert render_file(tuning, "svg")
 
 
-def test_what_is_too_large_to_be_reckoned_with_is_left_out_as_what_failed():
+def test_what_is_too_large_to_be_reckoned_with_is_left_out_as_what_failed() -> None:
     huge = 1.7e308
     predicted = predictions_figure([prediction(huge, -huge, 1.0), prediction(0.5, 1.0, 1.0, 1)])
     tuning = squared_error_figure({1: {0: huge, 1: huge, 2: 1.0}, 2: {0: huge, 1: huge}}, each=True)
 
-    assert marks(predicted)[BEFORE].y == (0.5,)
+    assert marks(predicted)[BEFORE].y == (0.5,)  # type: ignore[union-attr]
     assert "1\N{NO-BREAK SPACE}sample left out" in predicted.caption
-    assert marks(tuning)["Best simulator"].x[0] == 1
+    assert marks(tuning)["Best simulator"].x[0] == 1  # type: ignore[index, union-attr]
     assert "4\N{NO-BREAK SPACE}values left out" in tuning.caption
     assert squared_error_figure({1: {0: huge}}).empty
 
 
 @pytest.mark.parametrize("large", [1e300, 1.7e308])
-def test_every_figure_is_drawn_however_large_its_numbers_are(large: float):
+def test_every_figure_is_drawn_however_large_its_numbers_are(large: float) -> None:
     ends = [point(at, value, sd=large) for at, value in enumerate((large, -large, 1.0))]
     figures = [
         curves_figure([curve("a", *ends)], band="sd", each=True),
@@ -202,7 +204,7 @@ def test_every_figure_is_drawn_however_large_its_numbers_are(large: float):
             assert render_file(figure, "svg")
 
 
-def log(first: int, *, iterations: int, fitness: float | None = 1.0):
+def log(first: int, *, iterations: int, fitness: float | None = 1.0) -> Iterator[Any]:
     """Every phase of iteration k takes 10 rollouts times what it begins with; the last may have no fitness."""
     for iteration in range(iterations + 1):
         genome = frozen([0.5] * 8)
@@ -223,7 +225,7 @@ def experiment(store: Store) -> str:
     return made
 
 
-def test_rollouts_are_counted_from_the_start_over_those_that_got_there(store: Store, experiment: str):
+def test_rollouts_are_counted_from_the_start_over_those_that_got_there(store: Store, experiment: str) -> None:
     found_curves = curves.curves(store, [experiment])
 
     found = cost_axis(store, found_curves, "rollouts")
@@ -232,7 +234,7 @@ def test_rollouts_are_counted_from_the_start_over_those_that_got_there(store: St
     assert [found.at[experiment, at] for at in range(3)] == [30, 75, 120]
 
 
-def test_the_baseline_which_is_drawn_across_has_no_say_in_the_units_of_the_axis(store: Store, experiment: str):
+def test_the_baseline_which_is_drawn_across_has_no_say_in_the_units_of_the_axis(store: Store, experiment: str) -> None:
     direct = submission.submit_experiment(store, toy(strategy="direct", repetitions=1)).id
     (claim,) = (each for each in execution.claim(store, "test", limit=2) if each.experiment_id == direct)
     genome = frozen([0.5])
@@ -244,7 +246,7 @@ def test_the_baseline_which_is_drawn_across_has_no_say_in_the_units_of_the_axis(
     assert found.label == "Rollouts in simulation"
 
 
-def test_time_is_that_of_evaluations_and_of_simulation_as_measured(store: Store, experiment: str):
+def test_time_is_that_of_evaluations_and_of_simulation_as_measured(store: Store, experiment: str) -> None:
     found_curves = curves.curves(store, [experiment])
 
     simulated, both = (cost_axis(store, found_curves, "time", cost_s=each) for each in (0, 3600))
@@ -257,7 +259,7 @@ def test_time_is_that_of_evaluations_and_of_simulation_as_measured(store: Store,
     assert "at 3600\N{NO-BREAK SPACE}s each and simulation as measured" in both.note
 
 
-def test_reality_is_among_the_simulators_only_once_all_of_its_study_have_ended(store: Store, experiment: str):
+def test_reality_is_among_the_simulators_only_once_all_of_its_study_have_ended(store: Store, experiment: str) -> None:
     running = tuned_simulators(store, experiment)
     cancel(store, experiment)
     ended = tuned_simulators(store, experiment)

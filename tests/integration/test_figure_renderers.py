@@ -32,11 +32,11 @@ def render_svg(figure: FigureDefinition) -> str:
 
 
 def pixels(figure: FigureDefinition, **how: object) -> np.ndarray:
-    return matplotlib.image.imread(BytesIO(render_file(figure, "png", **how)))
+    return matplotlib.image.imread(BytesIO(render_file(figure, "png", **how)))  # type: ignore[arg-type]
 
 
 @EVERY
-def test_plotly_takes_the_chart_and_json_has_all_its_numbers(figure: FigureDefinition):
+def test_plotly_takes_the_chart_and_json_has_all_its_numbers(figure: FigureDefinition) -> None:
     drawn = json.loads(json.dumps(chart(figure), allow_nan=False))
 
     assert len(Chart(drawn).data) == len(drawn["data"])
@@ -45,7 +45,7 @@ def test_plotly_takes_the_chart_and_json_has_all_its_numbers(figure: FigureDefin
 
 
 @EVERY
-def test_every_mark_leaves_ink_on_paper(figure: FigureDefinition):
+def test_every_mark_leaves_ink_on_paper(figure: FigureDefinition) -> None:
     picture = pixels(figure)
 
     assert picture.shape[1] == pytest.approx(COLUMN_IN * DPI, abs=1)
@@ -55,7 +55,7 @@ def test_every_mark_leaves_ink_on_paper(figure: FigureDefinition):
 
 
 @EVERY
-def test_drawings_are_whole_documents_with_letters_that_publishers_take(figure: FigureDefinition):
+def test_drawings_are_whole_documents_with_letters_that_publishers_take(figure: FigureDefinition) -> None:
     drawing, document = render_svg(figure), render_file(figure, "pdf")
 
     assert ET.fromstring(drawing).tag == f"{SVG}svg"
@@ -68,12 +68,12 @@ def test_drawings_are_whole_documents_with_letters_that_publishers_take(figure: 
 
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
 @pytest.mark.parametrize("figure", [FIGURES[0], EVERYTHING, FIGURES[8]], ids=lambda each: each.name)
-def test_the_same_figure_is_the_same_bytes(figure: FigureDefinition, kind: FileFormat):
+def test_the_same_figure_is_the_same_bytes(figure: FigureDefinition, kind: FileFormat) -> None:
     assert render_file(figure, kind) == render_file(figure, kind)
 
 
 @EVERY
-def test_the_page_is_the_same_each_time_and_says_everything_in_words(figure: FigureDefinition):
+def test_the_page_is_the_same_each_time_and_says_everything_in_words(figure: FigureDefinition) -> None:
     page = render_html(figure)
 
     assert page == render_html(figure)
@@ -81,7 +81,7 @@ def test_the_page_is_the_same_each_time_and_says_everything_in_words(figure: Fig
     assert 'role="img" aria-label="' in page
 
 
-def test_marks_in_the_colour_of_text_say_so_and_the_page_decides_on_the_rest():
+def test_marks_in_the_colour_of_text_say_so_and_the_page_decides_on_the_rest() -> None:
     drawn = chart(EVERYTHING)
 
     for trace in drawn["data"]:
@@ -93,7 +93,7 @@ def test_marks_in_the_colour_of_text_say_so_and_the_page_decides_on_the_rest():
         assert foreign not in json.dumps(drawn["layout"])
 
 
-def test_a_name_stands_in_the_legend_once_and_in_the_order_of_the_marks():
+def test_a_name_stands_in_the_legend_once_and_in_the_order_of_the_marks() -> None:
     drawn = [each for each in chart(EVERYTHING)["data"] if each["showlegend"]]
     first = sorted((each for each in drawn if each["xaxis"] == "x2"), key=lambda each: each["legendrank"])
 
@@ -101,7 +101,7 @@ def test_a_name_stands_in_the_legend_once_and_in_the_order_of_the_marks():
     assert [each["name"] for each in first] == ["simulator", "steps", "mean", "equal", "tuned", "truth"]
 
 
-def test_panels_one_above_another_share_their_horizontal_axis():
+def test_panels_one_above_another_share_their_horizontal_axis() -> None:
     layout = chart(EVERYTHING)["layout"]
 
     assert layout["xaxis3"]["matches"] == layout["xaxis2"]["matches"] == "x"
@@ -112,13 +112,13 @@ def test_panels_one_above_another_share_their_horizontal_axis():
     assert layout["yaxis3"]["range"] == [-7, 2]
 
 
-def test_the_chart_of_a_study_is_a_few_kilobytes():
+def test_the_chart_of_a_study_is_a_few_kilobytes() -> None:
     curves = [curve(f"strategy {each}", *(point(at, 0.1 + at / 7) for at in range(11))) for each in range(7)]
 
     assert len(json.dumps(chart(curves_figure(curves)))) < 15_000
 
 
-def test_a_file_is_as_wide_as_asked_for_and_without_its_caption_lower():
+def test_a_file_is_as_wide_as_asked_for_and_without_its_caption_lower() -> None:
     figure = curves_figure([RISING, DIRECT], title="wide")
 
     assert pixels(figure, width_in=7.2).shape[1] == 2160
@@ -126,7 +126,7 @@ def test_a_file_is_as_wide_as_asked_for_and_without_its_caption_lower():
 
 
 @pytest.mark.parametrize("words", ["a title of many words " * 9, "x" * 200])
-def test_long_titles_are_broken_and_long_names_shortened_in_their_middle(words: str):
+def test_long_titles_are_broken_and_long_names_shortened_in_their_middle(words: str) -> None:
     first, second = (curve(words, point(0, 1.0)).model_copy(update={"experiment": each}) for each in "ab")
     figure = replace(curves_figure([first, second], title=words), caption=words)
 
@@ -143,11 +143,11 @@ def test_long_titles_are_broken_and_long_names_shortened_in_their_middle(words: 
     assert (short[:3], short[-3:]) == ("abc", "hij")
 
 
-def test_the_page_fetches_nothing_from_elsewhere():
+def test_the_page_fetches_nothing_from_elsewhere() -> None:
     found: list[str] = []
 
     class Sources(HTMLParser):
-        def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]):
+        def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
             found.extend(f"{tag} {value}" for name, value in attrs if name in {"src", "href"})
 
     page = render_html(curves_figure([RISING, DIRECT]))
@@ -157,7 +157,7 @@ def test_the_page_fetches_nothing_from_elsewhere():
     assert re.search(r'"modeBarButtonsToRemove": *\["sendChartToCloud"', page)
 
 
-def test_the_page_has_its_numbers_in_a_table_for_those_who_cannot_see_the_lines():
+def test_the_page_has_its_numbers_in_a_table_for_those_who_cannot_see_the_lines() -> None:
     page = render_html(curves_figure([RISING, DIRECT], title="The title"))
 
     assert "<h1>The title</h1>" in page
@@ -167,7 +167,7 @@ def test_the_page_has_its_numbers_in_a_table_for_those_who_cannot_see_the_lines(
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_hostile_names_are_only_text(name: str):
+def test_hostile_names_are_only_text(name: str) -> None:
     figure = curves_figure([curve(name, point(0, 1.0), point(1, 2.0))], title=name)
 
     page, drawing, trace = render_html(figure), render_svg(figure), chart(figure)["data"][-1]

@@ -52,7 +52,7 @@ def experiment(sqlite_store: Store) -> str:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_is_served_in_every_format(api: TestClient, experiment: str, kind: str):
+def test_every_kind_is_served_in_every_format(api: TestClient, experiment: str, kind: str) -> None:
     answers = {
         name: api.get(f"/figures/{kind}", params={"experiment": experiment, "format": name}) for name in MEDIA_TYPES
     }
@@ -76,11 +76,11 @@ def test_every_kind_is_served_in_every_format(api: TestClient, experiment: str, 
     assert found["caption"].split(".")[0] in answers["html"].text
 
 
-def test_curves_are_drawn_against_rollouts_and_time_and_with_each_repetition(api: TestClient, experiment: str):
+def test_curves_are_drawn_against_rollouts_and_time_and_with_each_repetition(api: TestClient, experiment: str) -> None:
     asked = {"experiment": experiment, "format": "json"}
 
     plain, rollouts, time, each = (
-        api.get("/figures/curves", params=asked | how).json()
+        api.get("/figures/curves", params=asked | how).json()  # type: ignore[arg-type, operator]
         for how in ({}, {"x": "rollouts"}, {"x": "time", "cost_s": 30}, {"each": True})
     )
 
@@ -91,13 +91,13 @@ def test_curves_are_drawn_against_rollouts_and_time_and_with_each_repetition(api
     assert len(each["figure"]["data"]) == len(plain["figure"]["data"]) + 1
 
 
-def test_an_experiment_that_is_asked_for_twice_is_drawn_once(api: TestClient, experiment: str):
+def test_an_experiment_that_is_asked_for_twice_is_drawn_once(api: TestClient, experiment: str) -> None:
     drawn = api.get("/figures/curves", params={"experiment": [experiment, experiment], "format": "json"}).json()
 
     assert len(drawn["table"]["rows"]) == 1
 
 
-def test_a_study_gives_the_title_unless_it_is_given_and_a_file_its_width(api: TestClient, experiment: str):
+def test_a_study_gives_the_title_unless_it_is_given_and_a_file_its_width(api: TestClient, experiment: str) -> None:
     study = api.get(f"/experiments/{experiment}").json()["study"]
 
     own = api.get("/figures/curves", params={"study": study, "format": "json"}).json()
@@ -109,7 +109,9 @@ def test_a_study_gives_the_title_unless_it_is_given_and_a_file_its_width(api: Te
     assert matplotlib.image.imread(BytesIO(wide.content)).shape[1] == 2160
 
 
-def test_reality_is_in_the_figure_of_simulators_once_all_of_the_study_have_ended(api: TestClient, experiment: str):
+def test_reality_is_in_the_figure_of_simulators_once_all_of_the_study_have_ended(
+    api: TestClient, experiment: str
+) -> None:
     study = api.get(f"/experiments/{experiment}").json()["study"]
     asked = {"experiment": experiment, "format": "json"}
 
@@ -124,7 +126,7 @@ def test_reality_is_in_the_figure_of_simulators_once_all_of_the_study_have_ended
     assert "once its experiments have ended" in running.json()["caption"]
 
 
-def test_predictions_are_drawn_as_they_are_computed(sqlite_store: Store, api: TestClient):
+def test_predictions_are_drawn_as_they_are_computed(sqlite_store: Store, api: TestClient) -> None:
     spec = STUDY | {"strategy": "simulated_fit", "repetitions": 1}
     spec = {name: value for name, value in spec.items() if name != "strategies"}
     made = api.post("/experiments", json=spec).json()["id"]
@@ -139,7 +141,7 @@ def test_predictions_are_drawn_as_they_are_computed(sqlite_store: Store, api: Te
     assert found["title"] == "Two <b>ways</b>"
 
 
-def test_an_experiment_that_has_not_begun_is_an_empty_figure(api: TestClient):
+def test_an_experiment_that_has_not_begun_is_an_empty_figure(api: TestClient) -> None:
     made = api.post("/experiments", json={"strategy": "random", "robot": "toy_function", "budget": "smoke"}).json()[
         "id"
     ]
@@ -150,7 +152,7 @@ def test_an_experiment_that_has_not_begun_is_an_empty_figure(api: TestClient):
         assert "no results yet" in found["alt"]
 
 
-def test_the_direct_baseline_says_that_it_tunes_nothing(api: TestClient, experiment: str):
+def test_the_direct_baseline_says_that_it_tunes_nothing(api: TestClient, experiment: str) -> None:
     study = api.get(f"/experiments/{experiment}").json()["study"]
     direct = api.get(f"/studies/{study}").json()["experiments"][-1]["id"]
 
@@ -160,7 +162,7 @@ def test_the_direct_baseline_says_that_it_tunes_nothing(api: TestClient, experim
         assert found["alt"] == "Nothing: the direct baseline tunes no simulators."
 
 
-def test_files_are_drawn_alike_by_many_threads_at_once(api: TestClient, experiment: str):
+def test_files_are_drawn_alike_by_many_threads_at_once(api: TestClient, experiment: str) -> None:
     def draw(kind: str) -> bytes:
         return api.get(f"/figures/{kind}", params={"experiment": experiment, "format": "svg"}).content
 
@@ -170,7 +172,7 @@ def test_files_are_drawn_alike_by_many_threads_at_once(api: TestClient, experime
     assert together == [draw(kind) for kind in KINDS] * 2
 
 
-def test_a_figure_that_is_none_is_not_found_and_the_answer_says_which_there_are(api: TestClient):
+def test_a_figure_that_is_none_is_not_found_and_the_answer_says_which_there_are(api: TestClient) -> None:
     found = api.get("/figures/curvs?experiment=x")
 
     assert found.status_code == 404
@@ -181,7 +183,7 @@ def test_a_figure_that_is_none_is_not_found_and_the_answer_says_which_there_are(
 
 
 @pytest.mark.parametrize("kind", [*KINDS, "predictions"])
-def test_an_unknown_experiment_is_not_found(api: TestClient, kind: str):
+def test_an_unknown_experiment_is_not_found(api: TestClient, kind: str) -> None:
     assert api.get(f"/figures/{kind}?experiment=nope").status_code == 404
 
 
@@ -198,7 +200,9 @@ def test_an_unknown_experiment_is_not_found(api: TestClient, kind: str):
         ("/figures/squared-error?experiment=a&colour=red", "colour", ""),
     ],
 )
-def test_what_cannot_be_drawn_is_refused_with_what_is_permitted(api: TestClient, path: str, name: str, permitted: str):
+def test_what_cannot_be_drawn_is_refused_with_what_is_permitted(
+    api: TestClient, path: str, name: str, permitted: str
+) -> None:
     answer = api.get(path)
 
     assert answer.status_code == 422

@@ -18,7 +18,7 @@ def levels(figure: FigureDefinition) -> list[Level]:
     return [mark for mark in figure.panels[0].marks if isinstance(mark, Level)]
 
 
-def test_a_curve_becomes_a_line_with_its_interval_and_the_baseline_a_level_with_its_sd():
+def test_a_curve_becomes_a_line_with_its_interval_and_the_baseline_a_level_with_its_sd() -> None:
     figure = curves_figure([RISING, DIRECT])
 
     (line,), (level,), (panel,) = lines(figure), levels(figure), figure.panels
@@ -33,14 +33,14 @@ def test_a_curve_becomes_a_line_with_its_interval_and_the_baseline_a_level_with_
     assert panel.x.limits == pytest.approx((-0.04, 2.04))
 
 
-def test_fewer_than_five_repetitions_are_drawn_with_their_sd():
+def test_fewer_than_five_repetitions_are_drawn_with_their_sd() -> None:
     few = curves_figure([curve("a", point(0, 1.0, n=4)), DIRECT])
 
     assert "standard deviation" in few.caption
     assert lines(few)[0].upper[0] == pytest.approx(1.1)
 
 
-def test_the_caption_says_n_and_what_the_bands_are():
+def test_the_caption_says_n_and_what_the_bands_are() -> None:
     interval = curves_figure([RISING, DIRECT]).caption.replace("\N{NO-BREAK SPACE}", " ")
     deviation = curves_figure([curve("a", point(0, 1, n=2), point(1, 1, n=5))], band="sd").caption
 
@@ -50,7 +50,7 @@ def test_the_caption_says_n_and_what_the_bands_are():
     assert "standard deviation" in deviation
 
 
-def test_a_sentence_tells_what_cannot_be_seen():
+def test_a_sentence_tells_what_cannot_be_seen() -> None:
     told = curves_figure([RISING, DIRECT]).alt
 
     assert told == (
@@ -60,7 +60,7 @@ def test_a_sentence_tells_what_cannot_be_seen():
     assert "no results yet" in curves_figure([]).alt
 
 
-def test_points_that_no_repetition_has_reached_are_left_out_and_one_repetition_has_no_band():
+def test_points_that_no_repetition_has_reached_are_left_out_and_one_repetition_has_no_band() -> None:
     figure = curves_figure([curve("a", point(0, 1.0, n=1, sd=None), point(1, None, n=0, sd=None))])
 
     (line,) = lines(figure)
@@ -68,7 +68,7 @@ def test_points_that_no_repetition_has_reached_are_left_out_and_one_repetition_h
     assert figure.caption == "Mean over 1\N{NO-BREAK SPACE}repetition."
 
 
-def test_each_repetition_has_a_thin_line_behind_the_mean_if_asked_for():
+def test_each_repetition_has_a_thin_line_behind_the_mean_if_asked_for() -> None:
     values = ((0.8, 1.0), (1.1, None))
     points = [point(at, 0.9).model_copy(update={"values": each}) for at, each in enumerate(values)]
     figure = curves_figure([curve("a", *points), curve("b")], each=True)
@@ -79,7 +79,7 @@ def test_each_repetition_has_a_thin_line_behind_the_mean_if_asked_for():
     assert "Thin lines: single repetitions." in figure.caption
 
 
-def test_curves_are_drawn_against_what_they_cost_where_that_is_known():
+def test_curves_are_drawn_against_what_they_cost_where_that_is_known() -> None:
     cost = CostAxis("Time (h)", "Time: of everything.", {(RISING.experiment, 0): 2.5, (RISING.experiment, 2): 7.0})
     figure = curves_figure([RISING, DIRECT], against=cost)
 
@@ -91,7 +91,7 @@ def test_curves_are_drawn_against_what_they_cost_where_that_is_known():
     assert levels(figure)
 
 
-def test_the_frame_shows_the_means_however_wide_a_band_is():
+def test_the_frame_shows_the_means_however_wide_a_band_is() -> None:
     wild = CurvePoint(evaluations=1, n=2, mean=1.2, sd=0.1, lower=-50, upper=50, values=(1.1, 1.3))
     least, most = curves_figure([curve("a", point(0, 1.0), wild)], band="interval").panels[0].y.limits
     tame = curves_figure([RISING]).panels[0].y.limits
@@ -102,7 +102,7 @@ def test_the_frame_shows_the_means_however_wide_a_band_is():
     assert tame[1] > 1.5
 
 
-def test_experiments_of_one_name_are_told_apart_by_their_ids():
+def test_experiments_of_one_name_are_told_apart_by_their_ids() -> None:
     first, second = RISING, RISING.model_copy(update={"experiment": "another-id"})
 
     names = [each.name for each in lines(curves_figure([first, second]))]
@@ -110,12 +110,12 @@ def test_experiments_of_one_name_are_told_apart_by_their_ids():
     assert names == ["Simulated fit (id-of-si)", "Simulated fit (another-)"]
 
 
-def test_units_are_shown_only_where_all_curves_share_one():
+def test_units_are_shown_only_where_all_curves_share_one() -> None:
     assert curves_figure([RISING, curve("b", unit="m")]).panels[0].y.label == "Fitness in reality"
     assert curves_figure([curve("b", unit="1")]).panels[0].y.label == "Fitness in reality"
 
 
-def test_thirty_six_lines_differ_in_more_than_colour():
+def test_thirty_six_lines_differ_in_more_than_colour() -> None:
     styles = [style_of(position) for position in range(36)]
 
     assert len(set(styles)) == 36
@@ -123,7 +123,7 @@ def test_thirty_six_lines_differ_in_more_than_colour():
 
 
 @pytest.mark.parametrize("wrong", [float("nan"), float("inf")])
-def test_no_mark_takes_a_number_that_json_does_not_have(wrong: float):
+def test_no_mark_takes_a_number_that_json_does_not_have(wrong: float) -> None:
     for make in (
         lambda: Line("a", (0,), (wrong,)),
         lambda: Line("a", (0,), (0,), lower=(wrong,), upper=(0,)),
@@ -138,7 +138,7 @@ def test_no_mark_takes_a_number_that_json_does_not_have(wrong: float):
             make()
 
 
-def test_parts_of_a_mark_are_equally_long_and_limits_go_up():
+def test_parts_of_a_mark_are_equally_long_and_limits_go_up() -> None:
     with pytest.raises(ValueError, match=r"\[1, 2\]"):
         Points("a", (0, 1), (0,))
     with pytest.raises(ValueError, match="must ascend"):
@@ -147,7 +147,7 @@ def test_parts_of_a_mark_are_equally_long_and_limits_go_up():
         Axis("a", (0, 1), log=True)
 
 
-def test_limits_have_room_for_one_value_and_for_none():
+def test_limits_have_room_for_one_value_and_for_none() -> None:
     assert limits([None]) == (0.0, 1.0)
     assert limits([0.0, 1.0, None]) == pytest.approx((-0.05, 1.05))
     for value in (0.0, 5.0, -3.0):
@@ -156,5 +156,5 @@ def test_limits_have_room_for_one_value_and_for_none():
 
 
 @pytest.mark.parametrize(("value", "written"), [(1e-6, "10⁻⁶"), (0.01, "0.01"), (3e5, "3·10⁵"), (10.0, "10")])
-def test_values_of_a_logarithmic_axis_are_written_as_in_papers(value: float, written: str):
+def test_values_of_a_logarithmic_axis_are_written_as_in_papers(value: float, written: str) -> None:
     assert power(value) == written

@@ -108,7 +108,7 @@ def text_of(answer: Response) -> str:
 
 def test_nothing_that_a_reader_can_see_tells_reality_while_the_experiment_runs(
     store: Store, running: dict[str, str], log: pytest.LogCaptureFixture
-):
+) -> None:
     secret = create_token(store, Role.READER).secret
     api = TestClient(create_app(store), headers={"Authorization": f"Bearer {secret}"})
     document = api.get("/openapi.json").json()
@@ -125,7 +125,7 @@ def test_nothing_that_a_reader_can_see_tells_reality_while_the_experiment_runs(
 
 def test_only_an_admin_may_have_it_revealed_and_no_one_where_there_are_no_tokens(
     store: Store, running: dict[str, str], log: pytest.LogCaptureFixture
-):
+) -> None:
     api = TestClient(create_app(store))
     places = [f"/experiments/{running['experiments']}", f"/studies/{running['studies']}"]
 
@@ -145,7 +145,7 @@ def test_only_an_admin_may_have_it_revealed_and_no_one_where_there_are_no_tokens
 
 def test_neither_submission_nor_its_repetition_nor_an_edit_or_its_end_tells(
     store: Store, log: pytest.LogCaptureFixture
-):
+) -> None:
     api = TestClient(create_app(store))
     first = api.post("/studies", json=STUDY, headers={"Idempotency-Key": "k"})
     again = api.post("/studies", json=STUDY, headers={"Idempotency-Key": "k"})
@@ -167,7 +167,7 @@ def test_neither_submission_nor_its_repetition_nor_an_edit_or_its_end_tells(
 
 def test_an_accident_of_the_database_logs_no_spec(
     sqlite_store: Store, log: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-):
+) -> None:
     from gaplab.services.store.queries import experiments as repository
 
     api = TestClient(create_app(sqlite_store), raise_server_exceptions=False)
@@ -182,13 +182,13 @@ def test_an_accident_of_the_database_logs_no_spec(
     assert not tells(failed.text + log.text)
 
 
-def test_the_digits_would_be_found_in_whatever_form():
+def test_the_digits_would_be_found_in_whatever_form() -> None:
     assert tells(json.dumps(HIDDEN))
     assert tells(f"{HIDDEN['static_friction']:.7g}")
     assert tells(re.sub(r"\s", "", str([round(each, 8) for each in HIDDEN.values()])))
 
 
-def test_limits_are_told_without_what_they_refused(sqlite_store: Store):
+def test_limits_are_told_without_what_they_refused(sqlite_store: Store) -> None:
     api = TestClient(create_app(sqlite_store, limits=Limits(iterations=1, experiments=1)))
 
     refused = api.post("/studies", json=STUDY)

@@ -2,6 +2,8 @@
 
 import re
 import sys
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -10,17 +12,19 @@ from gaplab.api.commands.exit_codes import Exit
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.running.versions import provenance
+from gaplab.services.store.session import Store
+from tests.commands import Gaplab
 from tests.experiments import run, some_log, toy
 from tests.integration.test_events import served
 
 
 @pytest.fixture
-def gaplab(sqlite_store, monkeypatch, capsys):
+def gaplab(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Any]:
     """Runs the command against a service of the store; its code, and what it printed."""
     with served(sqlite_store) as (url, _):
         monkeypatch.setenv("GAPLAB_URL", url)
 
-        def command(*arguments):
+        def command(*arguments: Any) -> Any:
             monkeypatch.setattr(sys, "argv", ["gaplab", *arguments])
             with pytest.raises(SystemExit) as left:
                 main()
@@ -30,7 +34,7 @@ def gaplab(sqlite_store, monkeypatch, capsys):
         yield command
 
 
-def test_events_are_printed_a_line_each(sqlite_store, gaplab):
+def test_events_are_printed_a_line_each(sqlite_store: Store, gaplab: Gaplab) -> None:
     id_ = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
     submission.submit_experiment(sqlite_store, toy())
     run(sqlite_store, execution.claim(sqlite_store, "me", 1)[0])
@@ -49,7 +53,7 @@ def test_events_are_printed_a_line_each(sqlite_store, gaplab):
     assert len(everything.splitlines()) == 19
 
 
-def test_a_refusal_is_shown_and_can_be_lifted(sqlite_store, gaplab):
+def test_a_refusal_is_shown_and_can_be_lifted(sqlite_store: Store, gaplab: Gaplab) -> None:
     id_ = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     execution.record(sqlite_store, claim, next(some_log()))

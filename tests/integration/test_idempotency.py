@@ -48,7 +48,7 @@ def count(store: Store, table: type) -> int:
 )
 def test_the_same_request_with_the_same_key_is_done_once_and_answered_twice(
     api: TestClient, path: str, body: dict[str, object]
-):
+) -> None:
     first = api.post(path, json=body, headers={"Idempotency-Key": "k"})
     again = api.post(path, json=dict(reversed(body.items())), headers={"Idempotency-Key": "k"})
     new = api.post(path, json=body, headers={"Idempotency-Key": "other"})
@@ -61,7 +61,7 @@ def test_the_same_request_with_the_same_key_is_done_once_and_answered_twice(
     assert (new.json()["id"] == first.json()["id"]) == (path == "/sensitivity")
 
 
-def test_a_key_with_another_body_or_at_another_endpoint_is_refused(api: TestClient):
+def test_a_key_with_another_body_or_at_another_endpoint_is_refused(api: TestClient) -> None:
     api.post("/experiments", json=TOY, headers={"Idempotency-Key": "k"})
 
     other = [
@@ -73,7 +73,7 @@ def test_a_key_with_another_body_or_at_another_endpoint_is_refused(api: TestClie
     assert {each.json()["type"] for each in other} == {"urn:gaplab:problem:key-reused"}
 
 
-def test_keys_of_one_token_are_not_those_of_another(store: Store, api: TestClient):
+def test_keys_of_one_token_are_not_those_of_another(store: Store, api: TestClient) -> None:
     made = set()
     for _ in range(2):
         headers = {"Authorization": f"Bearer {create_token(store, Role.RUNNER).secret}", "Idempotency-Key": "k"}
@@ -83,21 +83,21 @@ def test_keys_of_one_token_are_not_those_of_another(store: Store, api: TestClien
 
 
 @pytest.mark.parametrize("key", ["", "x" * 256, "with space", "t\tab"])
-def test_a_key_that_is_none_is_refused_by_the_headers_name(lite: TestClient, key: str):
+def test_a_key_that_is_none_is_refused_by_the_headers_name(lite: TestClient, key: str) -> None:
     answer = lite.post("/experiments", json=TOY, headers={"Idempotency-Key": key})
 
     assert answer.status_code == 422
     assert answer.json()["errors"][0]["pointer"].lower() == "idempotency-key"
 
 
-def test_what_was_refused_leaves_its_key_free(api: TestClient):
+def test_what_was_refused_leaves_its_key_free(api: TestClient) -> None:
     refused = api.post("/experiments", json=TOY | {"strategy": "nope"}, headers={"Idempotency-Key": "k"})
     accepted = api.post("/experiments", json=TOY, headers={"Idempotency-Key": "k"})
 
     assert (refused.status_code, accepted.status_code) == (422, 202)
 
 
-def test_duplicates_at_the_same_moment_create_one(store: Store):
+def test_duplicates_at_the_same_moment_create_one(store: Store) -> None:
     spec, threads = ExperimentSpec.model_validate(TOY), 6
     barrier = Barrier(threads)
 
@@ -114,7 +114,7 @@ def test_duplicates_at_the_same_moment_create_one(store: Store):
     assert (count(store, ExperimentRow), count(store, RepetitionRow)) == (1, 2)
 
 
-def test_key_and_work_are_committed_together_or_not_at_all(store: Store, monkeypatch: pytest.MonkeyPatch):
+def test_key_and_work_are_committed_together_or_not_at_all(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:
         raise InvalidSpec([])
 
@@ -128,7 +128,7 @@ def test_key_and_work_are_committed_together_or_not_at_all(store: Store, monkeyp
     assert not submission.admit_experiment(store, spec, Admission(key="k")).replayed
 
 
-def test_a_key_is_forgotten_after_a_week(store: Store, api: TestClient):
+def test_a_key_is_forgotten_after_a_week(store: Store, api: TestClient) -> None:
     first = api.post("/experiments", json=TOY, headers={"Idempotency-Key": "k"}).json()["id"]
     with store.transaction() as session:
         moment = session.scalar(select(IdempotencyRow.created_at))
@@ -141,7 +141,7 @@ def test_a_key_is_forgotten_after_a_week(store: Store, api: TestClient):
     assert count(store, IdempotencyRow) == 1
 
 
-def test_a_client_whose_answer_is_lost_asks_again_and_creates_one(sqlite_store: Store):
+def test_a_client_whose_answer_is_lost_asks_again_and_creates_one(sqlite_store: Store) -> None:
     inner = TestClient(create_app(sqlite_store))._transport  # what carries requests into the app itself
 
     class Losing(httpx2.BaseTransport):

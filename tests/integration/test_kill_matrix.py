@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -10,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize("database", ["SQLite", "Postgres"])
-def test_no_kill_leaves_a_trace_in_the_results(database, postgres, folder):
+def test_no_kill_leaves_a_trace_in_the_results(database: Any, postgres: Any, folder: Path) -> None:
     place = folder / f"kill-{database}"  # in memory, and apart from other tests' files
     place.mkdir()
     command = [sys.executable, "-W", "error", "-m", "tests.kill_matrix", "--kills", "1", "--only", database]

@@ -1,5 +1,7 @@
 """Pause, resume, stop, cancel and extend, on both databases: what each does to states, leases and numbers."""
 
+from typing import Any
+
 import pytest
 
 from gaplab.schemas.lifecycle import PERMITTED, Ending, State, Verb
@@ -14,43 +16,44 @@ from gaplab.services.running.execution import TimedStep
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.session import Store
 from tests.experiments import run, same, some_log, toy
 
 
-def submitted(store, **changes):
+def submitted(store: Store, **changes: Any) -> Any:
     return submission.submit_experiment(store, toy(**changes)).id
 
 
-def state(store, experiment):
+def state(store: Store, experiment: Any) -> Any:
     return reading.read_experiment(store, experiment).state
 
 
-def states(store, experiment):
+def states(store: Store, experiment: Any) -> Any:
     return [each.state for each in reading.list_repetitions(store, experiment)]
 
 
-def ask(store, experiment, verb):
+def ask(store: Store, experiment: Any, verb: Any) -> Any:
     return lifecycle.ask_experiment(store, experiment, verb).state
 
 
-def deliver(store, claim, count, log=some_log):
+def deliver(store: Store, claim: Any, count: Any, log: Any = some_log) -> Any:
     """The next `count` steps of a log whose first are stored; whether the claim holds on."""
     done = len(stored(store, claim.experiment_id)[claim.number])
     return [execution.record(store, claim, step) for step in tuple(log())[done : done + count]]
 
 
-def stored(store, experiment):
+def stored(store: Store, experiment: Any) -> Any:
     with store.reading() as session:
         rows = session.query(RepetitionRow).filter_by(experiment_id=experiment).order_by(RepetitionRow.number).all()
         found = logs(session, [row.id for row in rows])
         return [found[row.id] for row in rows]
 
 
-def endings(store, experiment, number=0):
+def endings(store: Store, experiment: Any, number: Any = 0) -> Any:
     return [each.ending for each in reading.list_attempts(store, experiment, number)]
 
 
-def compute(store, experiment=None):
+def compute(store: Store, experiment: Any = None) -> Any:
     """Run whatever is queued, by the real loop."""
     while claims := execution.claim(store, "me", 9):
         for each in claims:
@@ -60,7 +63,7 @@ def compute(store, experiment=None):
     return stored(store, experiment) if experiment else None
 
 
-def test_a_paused_repetition_finishes_its_step_and_keeps_its_place(store):
+def test_a_paused_repetition_finishes_its_step_and_keeps_its_place(store: Store) -> None:
     experiment = submitted(store)
     (claim,) = execution.claim(store, "me", 1)
     deliver(store, claim, 3)
@@ -77,7 +80,7 @@ def test_a_paused_repetition_finishes_its_step_and_keeps_its_place(store):
     assert endings(store, experiment) == [Ending.PAUSED]
 
 
-def test_a_resumed_experiment_goes_on_from_where_it_was(store):
+def test_a_resumed_experiment_goes_on_from_where_it_was(store: Store) -> None:
     experiment = submitted(store, repetitions=1)
     (claim,) = execution.claim(store, "me", 1)
     deliver(store, claim, 3)
@@ -96,7 +99,7 @@ def test_a_resumed_experiment_goes_on_from_where_it_was(store):
     assert reading.list_repetitions(store, experiment)[0].attempts == 2
 
 
-def test_resuming_before_the_step_is_over_interrupts_nothing(store):
+def test_resuming_before_the_step_is_over_interrupts_nothing(store: Store) -> None:
     experiment = submitted(store, repetitions=1)
     (claim,) = execution.claim(store, "me", 1)
 
@@ -107,7 +110,7 @@ def test_resuming_before_the_step_is_over_interrupts_nothing(store):
     assert endings(store, experiment) == [Ending.COMPLETED]
 
 
-def test_a_step_that_is_delivered_again_is_not_the_one_under_way(store):
+def test_a_step_that_is_delivered_again_is_not_the_one_under_way(store: Store) -> None:
     experiment = submitted(store, repetitions=1)
     (claim,) = execution.claim(store, "me", 1)
     first, second, *_ = some_log()
@@ -120,7 +123,7 @@ def test_a_step_that_is_delivered_again_is_not_the_one_under_way(store):
     assert len(stored(store, experiment)[0]) == 2
 
 
-def test_the_step_under_way_may_be_the_last_of_all(store):
+def test_the_step_under_way_may_be_the_last_of_all(store: Store) -> None:
     experiment = submitted(store, repetitions=1)
     (claim,) = execution.claim(store, "me", 1)
     deliver(store, claim, 12)
@@ -132,7 +135,7 @@ def test_the_step_under_way_may_be_the_last_of_all(store):
     assert endings(store, experiment) == [Ending.COMPLETED]
 
 
-def test_what_waits_at_a_core_gives_way_to_a_pause(store):
+def test_what_waits_at_a_core_gives_way_to_a_pause(store: Store) -> None:
     experiment = submitted(store)
     running, *waiting = execution.claim(store, "me", 3)
     ask(store, experiment, Verb.PAUSE)
@@ -146,7 +149,7 @@ def test_what_waits_at_a_core_gives_way_to_a_pause(store):
 
 
 @pytest.mark.parametrize("lose", ["release", "requeue_lost", "hand_back"])
-def test_a_worker_lost_while_pausing_leaves_it_paused(store, lose):
+def test_a_worker_lost_while_pausing_leaves_it_paused(store: Store, lose: Any) -> None:
     experiment = submitted(store, repetitions=1)
     (claim,) = execution.claim(store, "me", 1)
     ask(store, experiment, Verb.PAUSE)
@@ -162,7 +165,7 @@ def test_a_worker_lost_while_pausing_leaves_it_paused(store, lose):
     assert ask(store, experiment, Verb.RESUME) is State.QUEUED
 
 
-def test_stopping_keeps_what_is_there(store):
+def test_stopping_keeps_what_is_there(store: Store) -> None:
     experiment = submitted(store, repetitions=4)
     whole, half, begun = execution.claim(store, "me", 3)
     run(store, whole)
@@ -183,7 +186,7 @@ def test_stopping_keeps_what_is_there(store):
 
 
 @pytest.mark.parametrize("steps", [None, 0, 2])
-def test_an_experiment_stopped_before_its_first_point_is_not_completed_with_nothing(store, steps):
+def test_an_experiment_stopped_before_its_first_point_is_not_completed_with_nothing(store: Store, steps: Any) -> None:
     experiment = submitted(store)
     if steps is not None:
         (claim,) = execution.claim(store, "me", 1)
@@ -198,7 +201,7 @@ def test_an_experiment_stopped_before_its_first_point_is_not_completed_with_noth
     assert reading.read_experiment(store, experiment).ended_at is not None
 
 
-def test_cancelling_ends_the_attempts(store):
+def test_cancelling_ends_the_attempts(store: Store) -> None:
     experiment = submitted(store)
     (claim,) = execution.claim(store, "me", 1)
 
@@ -208,7 +211,7 @@ def test_cancelling_ends_the_attempts(store):
     assert not execution.record(store, claim, next(some_log()))
 
 
-def in_state(store, wanted):
+def in_state(store: Store, wanted: Any) -> Any:
     """An experiment that has got there by permitted moves."""
     experiment = submitted(store)
     (claim,) = execution.claim(store, "me", 1) if wanted not in (State.QUEUED, State.PAUSED) else (None,)
@@ -227,19 +230,19 @@ def in_state(store, wanted):
     return experiment
 
 
-def compute_with(store, log):
+def compute_with(store: Store, log: Any) -> None:
     for each in execution.claim(store, "me", 9):
         run(store, each, log())
 
 
-def obey(store, experiment, verb):
+def obey(store: Store, experiment: Any, verb: Any) -> Any:
     if verb is Verb.EXTEND:
         return extension.extend_experiment(store, experiment, ExtensionSpec(iterations=9)).state
     return ask(store, experiment, verb)
 
 
 @pytest.mark.parametrize("here", list(State))
-def test_a_forbidden_verb_is_refused_and_changes_nothing(store, here):
+def test_a_forbidden_verb_is_refused_and_changes_nothing(store: Store, here: Any) -> None:
     experiment = in_state(store, here)
     before = reading.read_experiment(store, experiment)
     able = ", ".join(each for each in Verb if here in PERMITTED[each]) or "nothing"
@@ -252,7 +255,7 @@ def test_a_forbidden_verb_is_refused_and_changes_nothing(store, here):
     assert after.model_copy(update={"progress": before.progress}) == before
 
 
-def test_a_verb_of_a_study_goes_to_all_of_its_experiments_that_permit_it(store):
+def test_a_verb_of_a_study_goes_to_all_of_its_experiments_that_permit_it(store: Store) -> None:
     small = {"robot": "toy_function", "budget": "smoke", "strategies": ["random", "simulated_fit", "direct"]}
     study = submission.submit_study(store, StudySpec.model_validate(small))
     first, second, third = (each.id for each in study.experiments)
@@ -273,7 +276,9 @@ def test_a_verb_of_a_study_goes_to_all_of_its_experiments_that_permit_it(store):
 
 
 @pytest.mark.parametrize("strategy", ["simulated_fit_and_informative", "simulated_fit"])
-def test_an_extended_experiment_equals_one_that_was_submitted_with_the_larger_totals(store, strategy):
+def test_an_extended_experiment_equals_one_that_was_submitted_with_the_larger_totals(
+    store: Store, strategy: Any
+) -> None:
     small = submitted(store, strategy=strategy, iterations=1, repetitions=1)
     before = compute(store, small)
     large = submitted(store, strategy=strategy, iterations=3, repetitions=2)
@@ -293,7 +298,7 @@ def test_an_extended_experiment_equals_one_that_was_submitted_with_the_larger_to
     assert curves.curve(store, small).points == curves.curve(store, large).points
 
 
-def test_extending_a_stopped_experiment_to_what_it_had_brings_it_to_its_end(store):
+def test_extending_a_stopped_experiment_to_what_it_had_brings_it_to_its_end(store: Store) -> None:
     whole = submitted(store, repetitions=3)
     expected = compute(store, whole)
     experiment = submitted(store, repetitions=3)
@@ -311,7 +316,7 @@ def test_extending_a_stopped_experiment_to_what_it_had_brings_it_to_its_end(stor
         extension.extend_experiment(store, experiment, ExtensionSpec(repetitions=3))
 
 
-def test_repetitions_of_the_direct_baseline_can_be_extended_but_it_has_no_iterations(store):
+def test_repetitions_of_the_direct_baseline_can_be_extended_but_it_has_no_iterations(store: Store) -> None:
     experiment = submitted(store, strategy="direct", repetitions=1)
     before = compute(store, experiment)
 
@@ -325,16 +330,16 @@ def test_repetitions_of_the_direct_baseline_can_be_extended_but_it_has_no_iterat
 
 
 @pytest.mark.parametrize("totals", [{"iterations": 1}, {"repetitions": 2}, {"iterations": 9, "repetitions": 1}, {}])
-def test_totals_below_what_is_there_are_refused(store, totals):
+def test_totals_below_what_is_there_are_refused(store: Store, totals: Any) -> None:
     experiment = in_state(store, State.COMPLETED)
 
-    with pytest.raises(InvalidSpec, match=r"a total, not what is added|name the total"):
+    with pytest.raises(InvalidSpec, match=r"is a total, which must not be smaller|name the total"):
         extension.extend_experiment(store, experiment, ExtensionSpec(**totals))
 
     assert state(store, experiment) is State.COMPLETED
 
 
-def test_a_failed_repetition_is_not_tried_again_by_extending(store):
+def test_a_failed_repetition_is_not_tried_again_by_extending(store: Store) -> None:
     experiment = submitted(store, repetitions=2)
     first, second = execution.claim(store, "me", 2)
     run(store, first)
@@ -345,7 +350,7 @@ def test_a_failed_repetition_is_not_tried_again_by_extending(store):
     assert states(store, experiment) == [State.QUEUED, State.FAILED]
 
 
-def test_reality_is_hidden_again_while_an_extended_experiment_runs(store):
+def test_reality_is_hidden_again_while_an_extended_experiment_runs(store: Store) -> None:
     experiment = in_state(store, State.COMPLETED)
     shown = reading.read_experiment(store, experiment).spec["reality"]["parameters"]
 
@@ -355,7 +360,7 @@ def test_reality_is_hidden_again_while_an_extended_experiment_runs(store):
     assert None not in shown.values()
 
 
-def test_attempts_say_who_had_a_repetition_and_how_it_ended(store):
+def test_attempts_say_who_had_a_repetition_and_how_it_ended(store: Store) -> None:
     experiment = submitted(store, repetitions=1)
     for owner, end in (
         ("first", lambda claim: execution.release(store, claim, "its process was killed")),
@@ -379,7 +384,7 @@ def test_attempts_say_who_had_a_repetition_and_how_it_ended(store):
         reading.list_attempts(store, experiment, 1)
 
 
-def test_an_attempt_that_goes_on_has_no_end(store):
+def test_an_attempt_that_goes_on_has_no_end(store: Store) -> None:
     experiment = submitted(store)
     execution.claim(store, "me", 1)
 

@@ -28,7 +28,7 @@ STUDY = {
 
 
 def served(store: Store, **limits: int) -> TestClient:
-    return TestClient(create_app(store, limits=Limits(**limits)))
+    return TestClient(create_app(store, limits=Limits(**limits)))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,7 @@ def served(store: Store, **limits: int) -> TestClient:
 )
 def test_a_submission_that_asks_for_too_much_is_refused_for_good(
     sqlite_store: Store, limits: dict[str, int], path: str, body: dict[str, object], name: str
-):
+) -> None:
     answer = served(sqlite_store, **limits).post(path, json=body)
 
     assert answer.status_code == 422
@@ -51,7 +51,7 @@ def test_a_submission_that_asks_for_too_much_is_refused_for_good(
 
 
 @pytest.mark.parametrize("name", ["experiments", "experiments_per_token", "rollouts", "rollouts_per_token"])
-def test_what_is_full_is_full_until_something_ends(store: Store, name: str):
+def test_what_is_full_is_full_until_something_ends(store: Store, name: str) -> None:
     api = served(store, **{name: 1 if name.startswith("experiments") else 4_000})
     answers = [api.post("/experiments", json=TOY) for _ in range(30)]
     taken = [each.json()["id"] for each in answers if each.status_code == 202]
@@ -69,7 +69,7 @@ def test_what_is_full_is_full_until_something_ends(store: Store, name: str):
     assert api.post("/experiments", json=TOY).status_code == 429
 
 
-def test_what_is_extended_stays_within_the_limits_too(sqlite_store: Store):
+def test_what_is_extended_stays_within_the_limits_too(sqlite_store: Store) -> None:
     made = served(sqlite_store).post("/experiments", json=TOY).json()["id"]
     for claim in execution.claim(sqlite_store, "me", 9):
         run(sqlite_store, claim)
@@ -84,7 +84,7 @@ def test_what_is_extended_stays_within_the_limits_too(sqlite_store: Store):
     assert extended.status_code == 202
 
 
-def test_what_is_extended_counts_with_the_rollouts_that_it_has_left(sqlite_store: Store):
+def test_what_is_extended_counts_with_the_rollouts_that_it_has_left(sqlite_store: Store) -> None:
     made = served(sqlite_store).post("/experiments", json=TOY | {"repetitions": 3}).json()
     for claim in execution.claim(sqlite_store, "me", 9):
         run(sqlite_store, claim)
@@ -100,7 +100,7 @@ def test_what_is_extended_counts_with_the_rollouts_that_it_has_left(sqlite_store
     assert (extended(left - 1), extended(left)) == (429, 202)
 
 
-def test_one_token_cannot_take_the_room_of_another(store: Store):
+def test_one_token_cannot_take_the_room_of_another(store: Store) -> None:
     api = served(store, experiments_per_token=1, experiments=2)
     first, second, third = ({"Authorization": f"Bearer {create_token(store, Role.RUNNER).secret}"} for _ in range(3))
 
@@ -109,14 +109,14 @@ def test_one_token_cannot_take_the_room_of_another(store: Store):
     assert found == [202, 429, 202, 429]
 
 
-def test_a_study_is_let_in_whole_or_not_at_all(store: Store):
+def test_a_study_is_let_in_whole_or_not_at_all(store: Store) -> None:
     api = served(store, experiments=2)
 
     assert api.post("/studies", json=STUDY).status_code == 429
     assert api.get("/studies").json()["items"] == api.get("/experiments").json()["items"] == []
 
 
-def test_submissions_at_the_same_moment_do_not_pass_a_limit_together(store: Store):
+def test_submissions_at_the_same_moment_do_not_pass_a_limit_together(store: Store) -> None:
     api = served(store, experiments=3)
 
     with ThreadPoolExecutor(8) as pool:
@@ -125,7 +125,7 @@ def test_submissions_at_the_same_moment_do_not_pass_a_limit_together(store: Stor
     assert sorted(found) == [202] * 3 + [429] * 5
 
 
-def test_a_body_has_the_limit_that_is_set(sqlite_store: Store):
+def test_a_body_has_the_limit_that_is_set(sqlite_store: Store) -> None:
     api = served(sqlite_store, body_bytes=100)
 
     refused = api.post("/experiments", json=TOY | {"name": "x" * 100})
@@ -134,7 +134,7 @@ def test_a_body_has_the_limit_that_is_set(sqlite_store: Store):
     assert "GAPLAB_MAX_BODY_BYTES" in refused.json()["detail"]
 
 
-def test_streams_are_limited_for_a_token_and_in_all_and_a_closed_one_makes_room():
+def test_streams_are_limited_for_a_token_and_in_all_and_a_closed_one_makes_room() -> None:
     streams = Streams(Limits(streams_per_token=2, streams=3))
     with streams.open("a"), streams.open("a"):
         with pytest.raises(LimitReached, match="GAPLAB_MAX_STREAMS_PER_TOKEN"), streams.open("a"):
@@ -152,7 +152,7 @@ def test_streams_are_limited_for_a_token_and_in_all_and_a_closed_one_makes_room(
         pass
 
 
-def test_who_waits_for_events_has_a_stream_open_and_who_does_not_wait_has_none(sqlite_store: Store):
+def test_who_waits_for_events_has_a_stream_open_and_who_does_not_wait_has_none(sqlite_store: Store) -> None:
     app = create_app(sqlite_store, limits=Limits(streams_per_token=1))
     api = TestClient(app)
     wait = {"wait_s": 0.05}
@@ -168,7 +168,7 @@ def test_who_waits_for_events_has_a_stream_open_and_who_does_not_wait_has_none(s
     assert [at_once.status_code, *(each.status_code for each in room)] == [200, 200, 200]
 
 
-def test_limits_come_from_the_environment(monkeypatch: pytest.MonkeyPatch):
+def test_limits_come_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     assert Limits.from_environment() == Limits()
     monkeypatch.setenv("GAPLAB_MAX_ROLLOUTS_PER_TOKEN", "7")
     assert Limits.from_environment() == Limits(rollouts_per_token=7)
@@ -177,7 +177,7 @@ def test_limits_come_from_the_environment(monkeypatch: pytest.MonkeyPatch):
         Limits.from_environment()
 
 
-def test_what_is_set_to_nothing_is_not_set(monkeypatch: pytest.MonkeyPatch):
+def test_what_is_set_to_nothing_is_not_set(monkeypatch: pytest.MonkeyPatch) -> None:
     for each in ("DATABASE_URL", "RAY_ADDRESS", "WORKERS", "LEASE_S", "HOST", "PORT", "URL", "TOKEN"):
         monkeypatch.setenv(f"GAPLAB_{each}", "")
 
@@ -187,7 +187,7 @@ def test_what_is_set_to_nothing_is_not_set(monkeypatch: pytest.MonkeyPatch):
 @pytest.mark.parametrize(
     ("host", "url"), [("::1", "http://[::1]:9000"), ("127.0.0.2", "http://127.0.0.2:9000"), ("x", "http://x:9000")]
 )
-def test_the_service_is_looked_for_where_it_binds(monkeypatch: pytest.MonkeyPatch, host: str, url: str):
+def test_the_service_is_looked_for_where_it_binds(monkeypatch: pytest.MonkeyPatch, host: str, url: str) -> None:
     monkeypatch.delenv("GAPLAB_URL", raising=False)
     monkeypatch.setenv("GAPLAB_HOST", host)
     monkeypatch.setenv("GAPLAB_PORT", "9000")
@@ -195,21 +195,21 @@ def test_the_service_is_looked_for_where_it_binds(monkeypatch: pytest.MonkeyPatc
     assert Settings.from_environment().url == url
 
 
-def test_a_number_that_is_none_is_said_with_its_variable(monkeypatch: pytest.MonkeyPatch):
+def test_a_number_that_is_none_is_said_with_its_variable(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GAPLAB_PORT", "8²")
 
     with pytest.raises(ValueError, match="GAPLAB_PORT is '8²'"):
         Settings.from_environment()
 
 
-def test_every_limit_is_documented_with_its_default():
+def test_every_limit_is_documented_with_its_default() -> None:
     text = (Path(__file__).parents[2] / "docs" / "security.md").read_text()
 
     for name, field in Limits.model_fields.items():
         assert f"| `{variable_of(name)}` | {field.default:,} |" in text
 
 
-def test_the_papers_whole_figure_is_let_in(sqlite_store: Store):
+def test_the_papers_whole_figure_is_let_in(sqlite_store: Store) -> None:
     answer = served(sqlite_store).post("/studies", json={"direct_repetitions": 100})
 
     assert answer.status_code == 202

@@ -1,6 +1,9 @@
 """Lists and curves cost what they show, not what is stored."""
 
+from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
 import pytest
 from sqlalchemy import event
@@ -12,6 +15,7 @@ from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.store.models import Base
+from gaplab.services.store.session import Store
 from tests.experiments import toy
 from tests.filling import IN_A_STUDY, experiment_id, fill, study_id
 
@@ -28,13 +32,13 @@ READS = {
 
 
 @contextmanager
-def statements(store):
+def statements(store: Store) -> Iterator[Any]:
     """Those that the store executes meanwhile, each with its parameters."""
     found = []
     with store.reading() as session:
         engine = session.get_bind().engine
 
-    def note(connection, cursor, statement, parameters, context, many):
+    def note(connection: Any, cursor: Any, statement: Any, parameters: Any, context: Any, many: Any) -> None:
         found.append((statement, parameters))
 
     event.listen(engine, "before_cursor_execute", note)
@@ -42,7 +46,7 @@ def statements(store):
     event.remove(engine, "before_cursor_execute", note)
 
 
-def asked(store):
+def asked(store: Store) -> Any:
     counts = {}
     for name, read in READS.items():
         with statements(store) as found:
@@ -51,7 +55,7 @@ def asked(store):
     return counts
 
 
-def test_what_benchmarks_fill_a_database_with_is_what_the_service_stores(store, tmp_path):
+def test_what_benchmarks_fill_a_database_with_is_what_the_service_stores(store: Store, tmp_path: Path) -> None:
     fill(store, 2 * IN_A_STUDY)
 
     with export_study(store, study_id(1)).file as archive:
@@ -64,7 +68,7 @@ def test_what_benchmarks_fill_a_database_with_is_what_the_service_stores(store, 
     assert {each.experiment_id for each in execution.claim(store, "me", 9)} == {submitted.id}
 
 
-def test_no_list_asks_more_often_when_it_shows_more(store):
+def test_no_list_asks_more_often_when_it_shows_more(store: Store) -> None:
     fill(store, 1)
     few = asked(store)
     with store.transaction() as session:
@@ -76,7 +80,7 @@ def test_no_list_asks_more_often_when_it_shows_more(store):
     assert asked(store) == few
 
 
-def test_every_read_finds_its_rows_by_an_index(sqlite_store):
+def test_every_read_finds_its_rows_by_an_index(sqlite_store: Store) -> None:
     fill(sqlite_store, 12 * IN_A_STUDY)
     with statements(sqlite_store) as found:
         for read in READS.values():
@@ -91,7 +95,7 @@ def test_every_read_finds_its_rows_by_an_index(sqlite_store):
 
 
 @pytest.mark.parametrize("filters", [{}, {"state": State.RUNNING}, {"strategy": "informative"}])
-def test_a_page_of_experiments_is_read_in_its_order_and_not_sorted(sqlite_store, filters):
+def test_a_page_of_experiments_is_read_in_its_order_and_not_sorted(sqlite_store: Store, filters: Any) -> None:
     fill(sqlite_store, IN_A_STUDY)
     with statements(sqlite_store) as found:
         listing.list_experiments(sqlite_store, ListFilter(**filters))

@@ -40,7 +40,7 @@ def walk(api: TestClient, path: str, **query: Any) -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize("path", ["/experiments", "/studies"])
 @pytest.mark.parametrize("sort", ["name", "-name", "created_at", "-created_at"])
-def test_a_sorted_list_has_each_once_and_its_opposite_is_its_reverse(api: TestClient, path: str, sort: str):
+def test_a_sorted_list_has_each_once_and_its_opposite_is_its_reverse(api: TestClient, path: str, sort: str) -> None:
     base = TOY if path == "/experiments" else {"strategies": ["random"], "robot": "toy_function", "budget": "smoke"}
     made = [api.post(path, json=base | {"name": name}).json()["id"] for name in NAMES]
 
@@ -53,7 +53,7 @@ def test_a_sorted_list_has_each_once_and_its_opposite_is_its_reverse(api: TestCl
         assert found == made
 
 
-def test_experiments_are_sorted_by_state_and_strategy(api: TestClient):
+def test_experiments_are_sorted_by_state_and_strategy(api: TestClient) -> None:
     for strategy in ("simulated_fit", "informative", "random"):
         last = api.post("/experiments", json=TOY | {"strategy": strategy}).json()["id"]
     api.post(f"/experiments/{last}/cancel")
@@ -66,7 +66,7 @@ def test_experiments_are_sorted_by_state_and_strategy(api: TestClient):
     assert [each["state"] for each in walk(api, "/experiments", sort="state")] == ["CANCELLED", "QUEUED", "QUEUED"]
 
 
-def test_text_is_looked_for_in_names_and_ids_as_it_stands(api: TestClient):
+def test_text_is_looked_for_in_names_and_ids_as_it_stands(api: TestClient) -> None:
     ids = {name: api.post("/experiments", json=TOY | {"name": name}).json()["id"] for name in NAMES}
 
     def found(text: str) -> set[str]:
@@ -81,7 +81,7 @@ def test_text_is_looked_for_in_names_and_ids_as_it_stands(api: TestClient):
     assert found("\0'") == set()
 
 
-def test_studies_are_filtered_by_state_strategy_and_text(store: Store, api: TestClient):
+def test_studies_are_filtered_by_state_strategy_and_text(store: Store, api: TestClient) -> None:
     def study(name: str, *strategies: str) -> dict[str, Any]:
         spec = {"name": name, "strategies": strategies, "robot": "toy_function", "budget": "smoke"}
         return api.post("/studies", json=spec).json()
@@ -108,7 +108,7 @@ def test_studies_are_filtered_by_state_strategy_and_text(store: Store, api: Test
 
 
 @pytest.mark.parametrize("path", ["/experiments", "/studies"])
-def test_a_cursor_is_good_only_for_the_list_that_gave_it(api: TestClient, path: str):
+def test_a_cursor_is_good_only_for_the_list_that_gave_it(api: TestClient, path: str) -> None:
     base = TOY if path == "/experiments" else {"strategies": ["random"], "robot": "toy_function", "budget": "smoke"}
     for _ in range(2):
         api.post(path, json=base)
@@ -130,7 +130,7 @@ def submitted(api: TestClient, noun: str) -> tuple[str, str]:
 @pytest.mark.parametrize("noun", ["experiments", "studies"])
 def test_a_change_that_starts_from_what_is_there_is_made_and_another_that_does_too_is_refused(
     api: TestClient, noun: str
-):
+) -> None:
     address, tag = submitted(api, noun)
 
     first = api.patch(address, json={"name": "first", "notes": "new\0 notes"}, headers={"If-Match": tag})
@@ -158,7 +158,9 @@ def test_a_change_that_starts_from_what_is_there_is_made_and_another_that_does_t
         ({"If-Match": "*"}, {"notes": "x" * 10_001}, 422),
     ],
 )
-def test_a_change_that_cannot_be_made_says_why(lite: TestClient, headers: dict[str, str], body: Any, status: int):
+def test_a_change_that_cannot_be_made_says_why(
+    lite: TestClient, headers: dict[str, str], body: Any, status: int
+) -> None:
     address, _ = submitted(lite, "experiments")
 
     answer = lite.patch(address, json=body, headers=headers)
@@ -168,7 +170,7 @@ def test_a_change_that_cannot_be_made_says_why(lite: TestClient, headers: dict[s
     assert lite.get(address).json()["edits"] == 0
 
 
-def test_progress_outdates_what_was_seen_but_refuses_no_edit(store: Store, api: TestClient):
+def test_progress_outdates_what_was_seen_but_refuses_no_edit(store: Store, api: TestClient) -> None:
     address, tag = submitted(api, "experiments")
     same = api.get(address, headers={"If-None-Match": f'"0.0", W/{tag}'})
     execution.claim(store, "me", 1)
@@ -182,7 +184,7 @@ def test_progress_outdates_what_was_seen_but_refuses_no_edit(store: Store, api: 
     assert edited.status_code == 200
 
 
-def test_whatever_there_is_is_not_sent_and_what_is_changed_is_shown(lite: TestClient):
+def test_whatever_there_is_is_not_sent_and_what_is_changed_is_shown(lite: TestClient) -> None:
     address, tag = submitted(lite, "experiments")
     whatever = {"If-None-Match": "*"}
 
@@ -193,7 +195,7 @@ def test_whatever_there_is_is_not_sent_and_what_is_changed_is_shown(lite: TestCl
     assert (edited.status_code, edited.json()["name"]) == (200, "x")
 
 
-def test_the_catalogue_is_sent_once(lite: TestClient):
+def test_the_catalogue_is_sent_once(lite: TestClient) -> None:
     tag = lite.get("/catalogue").headers["etag"]
 
     assert lite.get("/catalogue", headers={"If-None-Match": tag}).status_code == 304

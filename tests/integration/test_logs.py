@@ -7,6 +7,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import httpx2
 import pytest
@@ -33,19 +35,19 @@ def restored() -> Iterator[None]:
 
 def logged(stream: io.StringIO, *given: object, **named: object) -> str:
     logs.configure(stream)
-    logging.getLogger("gaplab.test").info(*given, **named)
+    logging.getLogger("gaplab.test").info(*given, **named)  # type: ignore[arg-type]
     return stream.getvalue()
 
 
 @pytest.mark.usefixtures("restored")
-def test_a_terminal_gets_a_line_that_people_read():
+def test_a_terminal_gets_a_line_that_people_read() -> None:
     line = logged(Terminal(), "on from step %d", 3, extra={"experiment": "abc", "repetition": 0})
 
     assert line.endswith(" INFO    gaplab.test abc/0: on from step 3\n")
 
 
 @pytest.mark.usefixtures("restored")
-def test_anything_else_gets_json():
+def test_anything_else_gets_json() -> None:
     line = logged(io.StringIO(), "on from\nstep %d", 3, extra={"experiment": "abc", "repetition": 0})
 
     found = json.loads(line)
@@ -79,12 +81,12 @@ def test_anything_else_gets_json():
         f"GAPLAB_TOKEN: '{SECRET}'",
     ],
 )
-def test_what_looks_like_a_secret_is_left_out(message, kind):
+def test_what_looks_like_a_secret_is_left_out(message: Any, kind: Any) -> None:
     assert SECRET not in logged(kind(), "%s", message)
 
 
 @pytest.mark.usefixtures("restored")
-def test_a_traceback_has_no_secrets_either():
+def test_a_traceback_has_no_secrets_either() -> None:
     stream = io.StringIO()
     try:
         msg = f"cannot reach postgresql://me:{SECRET}@db/gaplab"
@@ -97,14 +99,14 @@ def test_a_traceback_has_no_secrets_either():
 
 
 @pytest.mark.usefixtures("restored")
-def test_what_is_no_secret_is_left_as_it_is():
+def test_what_is_no_secret_is_left_as_it_is() -> None:
     message = "3 tokens of 12; path /experiments/abc?after=3, see http://127.0.0.1:8000/docs, me@example.org"
 
     assert json.loads(logged(io.StringIO(), "%s", message))["message"] == message
 
 
 @pytest.mark.parametrize("word", ["a", "token", "password-"])
-def test_a_very_long_word_is_looked_through_in_no_time(word: str):
+def test_a_very_long_word_is_looked_through_in_no_time(word: str) -> None:
     said = f"GET /{word * (60_000 // len(word))} 404, GAPLAB_TOKEN={SECRET}"
     began = time.perf_counter()
 
@@ -114,7 +116,7 @@ def test_a_very_long_word_is_looked_through_in_no_time(word: str):
     assert SECRET not in found
 
 
-def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_carry_to_itself(tmp_path):
+def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_carry_to_itself(tmp_path: Path) -> None:
     """The real process: every line of it is JSON, probes are left out, and no secret that it was given is in any."""
     log = tmp_path / "log"
     script = (

@@ -1,5 +1,7 @@
 """/metrics: what is counted, and that it is cheap to ask for."""
 
+from typing import Any
+
 import pytest
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
@@ -22,7 +24,7 @@ def read(api: TestClient) -> dict[tuple[str, ...], float]:
     return {(each.name, *each.labels.values()): each.value for family in families for each in family.samples}
 
 
-def test_it_counts_what_the_database_holds(store):
+def test_it_counts_what_the_database_holds(store: Store) -> None:
     submission.submit_experiment(store, toy())
     cancel(store, submission.submit_experiment(store, toy()).id)
     first, _ = execution.claim(store, "me", 2)
@@ -47,7 +49,7 @@ def test_it_counts_what_the_database_holds(store):
     assert found["gaplab_event_streams",] == 0
 
 
-def test_requests_are_counted_by_route_and_not_by_what_was_asked(sqlite_store):
+def test_requests_are_counted_by_route_and_not_by_what_was_asked(sqlite_store: Store) -> None:
     api = TestClient(create_app(sqlite_store))
     id_ = submission.submit_experiment(sqlite_store, toy()).id
     for path in (f"/experiments/{id_}", f"/experiments/{id_}", "/experiments/nobody", "/no/such/1", "/no/such/2"):
@@ -68,25 +70,27 @@ _TOKEN = "FROM token"
 """Who asks is looked up for every request."""
 
 
-def test_the_database_is_asked_once_however_often_the_metrics_are_read(sqlite_store, monkeypatch):
+def test_the_database_is_asked_once_however_often_the_metrics_are_read(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(metrics, "CACHED_S", 3600.0)
     api = TestClient(create_app(sqlite_store))
     asked: list[str] = []
 
     @event.listens_for(sqlite_store._engine, "before_cursor_execute")
-    def _(*given):
+    def _(*given: Any) -> None:
         if "SELECT" in given[2] and _TOKEN not in given[2]:
             asked.append(given[2])
 
     read(api)
     first = len(asked)
-    for _ in range(5):
+    for _ in range(5):  # type: ignore[assignment]
         read(api)
 
     assert 0 < first == len(asked)
 
 
-def test_without_a_database_it_says_so_and_counts_the_errors():
+def test_without_a_database_it_says_so_and_counts_the_errors() -> None:
     store = Store("postgresql://nobody@127.0.0.1:1/none")
     with pytest.raises(StoreUnavailable):
         store.check()

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 from alembic import command
@@ -24,7 +25,7 @@ def tables(connection: Connection) -> set[str]:
     return set(inspect(connection).get_table_names()) - {"alembic_version"}
 
 
-def test_the_store_needs_the_head_of_the_migrations():
+def test_the_store_needs_the_head_of_the_migrations() -> None:
     script = ScriptDirectory.from_config(migrations.configuration())
 
     heads = script.get_heads()
@@ -32,7 +33,7 @@ def test_the_store_needs_the_head_of_the_migrations():
     assert heads == [REVISION]
 
 
-def test_the_schema_goes_up_and_down_and_up(database_url):
+def test_the_schema_goes_up_and_down_and_up(database_url: str) -> None:
     engine = open_engine(database_url, enforce_foreign_keys=False).execution_options(**{WRITES: True})
     found = []
 
@@ -45,7 +46,7 @@ def test_the_schema_goes_up_and_down_and_up(database_url):
     assert found == [set(Base.metadata.tables), set(), set(Base.metadata.tables)]
 
 
-def test_the_migrations_make_what_the_models_say(store_url):
+def test_the_migrations_make_what_the_models_say(store_url: str) -> None:
     engine = open_engine(store_url)
 
     with engine.connect() as connection:
@@ -56,7 +57,7 @@ def test_the_migrations_make_what_the_models_say(store_url):
     assert differences == []
 
 
-def test_every_constraint_has_the_name_that_the_models_give_it(store_url):
+def test_every_constraint_has_the_name_that_the_models_give_it(store_url: str) -> None:
     engine = open_engine(store_url)
 
     with engine.connect() as connection:
@@ -77,7 +78,7 @@ def test_every_constraint_has_the_name_that_the_models_give_it(store_url):
     }
 
 
-def test_upgrading_at_head_changes_nothing(store_url):
+def test_upgrading_at_head_changes_nothing(store_url: str) -> None:
     migrations.upgrade(store_url)
 
     store = Store(store_url)
@@ -85,7 +86,7 @@ def test_upgrading_at_head_changes_nothing(store_url):
     store.dispose()
 
 
-def test_two_processes_that_upgrade_at_once_wait_for_each_other(database_url):
+def test_two_processes_that_upgrade_at_once_wait_for_each_other(database_url: str) -> None:
     with ThreadPoolExecutor(2) as pool:
         list(pool.map(migrations.upgrade, [database_url] * 2))
 
@@ -94,7 +95,7 @@ def test_two_processes_that_upgrade_at_once_wait_for_each_other(database_url):
     store.dispose()
 
 
-def test_a_database_of_a_later_version_is_left_as_it_is(store_url):
+def test_a_database_of_a_later_version_is_left_as_it_is(store_url: str) -> None:
     engine = open_engine(store_url).execution_options(**{WRITES: True})
     with engine.begin() as connection:
         connection.exec_driver_sql("UPDATE alembic_version SET version_num = 'future'")
@@ -108,7 +109,7 @@ def test_a_database_of_a_later_version_is_left_as_it_is(store_url):
 
 
 @pytest.mark.parametrize("place", ["sqlite:////no/such/folder/gaplab.db", "postgresql://me:secret@127.0.0.1:1/none"])
-def test_migrating_an_unreachable_database_is_refused_in_one_sentence(place):
+def test_migrating_an_unreachable_database_is_refused_in_one_sentence(place: Any) -> None:
     run = subprocess.run(
         [sys.executable, "-m", "gaplab.migrations"],
         env=os.environ | {"GAPLAB_DATABASE_URL": place},
@@ -124,7 +125,7 @@ def test_migrating_an_unreachable_database_is_refused_in_one_sentence(place):
     assert "secret" not in run.stderr
 
 
-def test_a_store_whose_schema_is_missing_is_unavailable_and_says_what_to_do(database_url):
+def test_a_store_whose_schema_is_missing_is_unavailable_and_says_what_to_do(database_url: str) -> None:
     store = Store(database_url)
 
     with pytest.raises(StoreUnavailable, match="python -m migrations"):
@@ -133,7 +134,7 @@ def test_a_store_whose_schema_is_missing_is_unavailable_and_says_what_to_do(data
     store.dispose()
 
 
-def test_a_store_at_another_revision_is_unavailable(store_url):
+def test_a_store_at_another_revision_is_unavailable(store_url: str) -> None:
     engine = open_engine(store_url).execution_options(**{WRITES: True})
     with engine.begin() as connection:
         connection.exec_driver_sql("UPDATE alembic_version SET version_num = 'future'")
@@ -146,7 +147,7 @@ def test_a_store_at_another_revision_is_unavailable(store_url):
     store.dispose()
 
 
-def test_what_ran_and_waited_before_there_were_turns_has_its_turn(database_url):
+def test_what_ran_and_waited_before_there_were_turns_has_its_turn(database_url: str) -> None:
     engine = open_engine(database_url, enforce_foreign_keys=False).execution_options(**{WRITES: True})
     experiment = "INSERT INTO experiment VALUES ('{}', NULL, 0, 'x', 'random', '{}', '{{}}', 1, 3, 9, '{}', NULL, NULL)"
     repetition = (

@@ -7,12 +7,13 @@ from gaplab.services.core.types import Measured, Sample, Selected, Simulator, Tr
 from gaplab.services.experiments import submission
 from gaplab.services.results.misfit import misfit
 from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 from tests.experiments import run, some_log, toy
 
 SECRET = 0.987654321
 
 
-def test_the_misfit_is_that_of_the_best_simulator_of_each_repetition(store):
+def test_the_misfit_is_that_of_the_best_simulator_of_each_repetition(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy(repetitions=2)).id
     for claim in execution.claim(store, "me", 2):
         run(store, claim)
@@ -29,7 +30,7 @@ def test_the_misfit_is_that_of_the_best_simulator_of_each_repetition(store):
     assert found.remarks[0].startswith("at 2 real-world evaluations the best simulators err by 1e-150 m/s a sample")
 
 
-def test_repetitions_that_are_under_way_count_as_far_as_they_are(store):
+def test_repetitions_that_are_under_way_count_as_far_as_they_are(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy(repetitions=2)).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)
@@ -41,16 +42,16 @@ def test_repetitions_that_are_under_way_count_as_far_as_they_are(store):
     assert [each.tunables[0].n for each in found.points] == [2, 2, 1]
 
 
-def test_a_coefficient_at_its_bound_is_remarked_on(store):
+def test_a_coefficient_at_its_bound_is_remarked_on(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy(repetitions=1, iterations=1)).id
     (claim,) = execution.claim(store, "me", 1)
-    simulators = (Simulator([1.5, 0.7], 0.04),)
+    simulators = (Simulator([1.5, 0.7], 0.04),)  # type: ignore[arg-type]
     log = [
         *some_log(0),
-        Selected(1, [0.5]),
-        Measured(1, Sample([0.5], 0.3)),
+        Selected(1, [0.5]),  # type: ignore[arg-type]
+        Measured(1, Sample([0.5], 0.3)),  # type: ignore[arg-type]
         Tuned(1, simulators),
-        Transferred(1, [0.1], 0.5),
+        Transferred(1, [0.1], 0.5),  # type: ignore[arg-type]
     ]
     for step in log:
         execution.record(store, claim, step)
@@ -63,7 +64,7 @@ def test_a_coefficient_at_its_bound_is_remarked_on(store):
     )
 
 
-def test_an_experiment_without_results_has_no_misfit_yet_and_the_direct_baseline_never(store):
+def test_an_experiment_without_results_has_no_misfit_yet_and_the_direct_baseline_never(store: Store) -> None:
     waiting = submission.submit_experiment(store, toy()).id
     execution.claim(store, "me", 9)
     direct = submission.submit_experiment(store, toy(strategy="direct", repetitions=1)).id
@@ -74,7 +75,7 @@ def test_an_experiment_without_results_has_no_misfit_yet_and_the_direct_baseline
         assert (misfit(store, each).points, misfit(store, each).remarks) == ((), ())
 
 
-def test_nothing_of_reality_is_shown(store):
+def test_nothing_of_reality_is_shown(store: Store) -> None:
     spec = toy(repetitions=1, reality={"parameters": {"static_friction": SECRET}})
     experiment = submission.submit_experiment(store, spec).id
     run(store, execution.claim(store, "me", 1)[0])
@@ -82,6 +83,6 @@ def test_nothing_of_reality_is_shown(store):
     assert str(SECRET) not in misfit(store, experiment).model_dump_json()
 
 
-def test_the_misfit_of_an_unknown_experiment_is_not_found(store):
+def test_the_misfit_of_an_unknown_experiment_is_not_found(store: Store) -> None:
     with pytest.raises(NotFound, match="no-such"):
         misfit(store, "no-such")

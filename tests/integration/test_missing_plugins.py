@@ -31,7 +31,7 @@ def experiment_without(store: Store, kind: str) -> str:
 
 @pytest.mark.parametrize("kind", ["robot", "engine", "tunables", "optimizer"])
 @pytest.mark.parametrize("path", ["", "/curve", "/misfit", "/simulators"])
-def test_what_is_stored_is_shown(sqlite_store: Store, kind: str, path: str):
+def test_what_is_stored_is_shown(sqlite_store: Store, kind: str, path: str) -> None:
     id_ = experiment_without(sqlite_store, kind)
 
     assert TestClient(create_app(sqlite_store)).get(f"/experiments/{id_}{path}").status_code == 200
@@ -41,7 +41,7 @@ def test_what_is_stored_is_shown(sqlite_store: Store, kind: str, path: str):
 @pytest.mark.parametrize(
     "path", ["/experiments/{}/predictions", "/figures/predictions?experiment={}", "/figures/toy?experiment={}"]
 )
-def test_what_cannot_be_computed_any_more_says_why(sqlite_store: Store, kind: str, path: str):
+def test_what_cannot_be_computed_any_more_says_why(sqlite_store: Store, kind: str, path: str) -> None:
     id_ = experiment_without(sqlite_store, kind)
 
     answer = TestClient(create_app(sqlite_store)).get(path.format(id_))
@@ -51,7 +51,7 @@ def test_what_cannot_be_computed_any_more_says_why(sqlite_store: Store, kind: st
 
 
 @pytest.mark.parametrize("kind", ["robot", "engine", "tunables", "optimizer", "strategy"])
-def test_a_repetition_of_it_fails_with_a_sentence(sqlite_store: Store, kind: str):
+def test_a_repetition_of_it_fails_with_a_sentence(sqlite_store: Store, kind: str) -> None:
     id_ = experiment_without(sqlite_store, kind)
     with sqlite_store.reading() as session:
         spec = spec_of(session.get_one(ExperimentRow, id_).spec)

@@ -122,7 +122,7 @@ def test_its_fields_are_where_mujocos_description_of_itself_says() -> None:
     contact, size = layout(structs, "mjContact")
 
     def number(address: int, kind: type) -> int | float:
-        return kind.from_address(address).value
+        return kind.from_address(address).value  # type: ignore[attr-defined]
 
     names = ("qpos", "qvel", "qacc", "qfrc_applied", "userdata", "efc_vel", "efc_force", "efc_J", "efc_b", "efc_AR")
     for name in names:
@@ -130,9 +130,9 @@ def test_its_fields_are_where_mujocos_description_of_itself_says() -> None:
     assert number(data._address + offsets["ncon"], c_int32) == len(data.contact) > 1
     first = number(data._address + offsets["contact"], c_int64)
     for index, point in enumerate(data.contact):
-        assert number(first + index * size + contact["dist"], c_double) == point.dist
-        assert number(first + index * size + contact["friction"], c_double) == point.friction[0]
-        assert number(first + index * size + contact["efc_address"], c_int32) == point.efc_address
+        assert number(first + index * size + contact["dist"], c_double) == point.dist  # type: ignore[arg-type]
+        assert number(first + index * size + contact["friction"], c_double) == point.friction[0]  # type: ignore[arg-type]
+        assert number(first + index * size + contact["efc_address"], c_int32) == point.efc_address  # type: ignore[arg-type]
 
 
 def test_importing_the_engine_does_not_load_its_libraries() -> None:

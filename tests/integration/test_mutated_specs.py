@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
 from gaplab.services.store.session import Store
-from tests.mutated_specs import OUTSIDE, WHOLE, measure, mutated
+from tests.mutated_specs import FORBIDDEN_NAMES, VALID_SPECS, measure, mutated
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def api(store: Store) -> Iterator[TestClient]:
         yield client
 
 
-def test_every_mutated_spec_is_taken_or_refused(api: TestClient):
+def test_every_mutated_spec_is_taken_or_refused(api: TestClient) -> None:
     found = measure(150, seed=1, api=api)
 
     assert found.wrong == []
@@ -29,8 +29,8 @@ def test_every_mutated_spec_is_taken_or_refused(api: TestClient):
     assert found.statuses[422] > 50
 
 
-def test_mutations_follow_from_their_seed():
-    one, same, other = (mutated(WHOLE["/studies"], random.Random(seed)) for seed in (3, 3, 4))
+def test_mutations_follow_from_their_seed() -> None:
+    one, same, other = (mutated(VALID_SPECS["/studies"], random.Random(seed)) for seed in (3, 3, 4))
 
     assert json.dumps(one) == json.dumps(same) != json.dumps(other)
 
@@ -50,15 +50,15 @@ NAMES = [
 @pytest.mark.parametrize(("place", "pointer"), NAMES)
 def test_a_file_a_class_an_address_or_code_is_no_plugin(
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, place: str, pointer: str
-):
+) -> None:
     api = TestClient(create_app(sqlite_store), raise_server_exceptions=False)
     api.get("/catalogue")  # every plug-in is imported by now
     opened: list[object] = []
     monkeypatch.setattr("builtins.open", lambda *given, **_: opened.append(given))
     monkeypatch.setattr("importlib.import_module", lambda *given, **_: opened.append(given))
 
-    for name in OUTSIDE:
-        spec: Any = copy.deepcopy(WHOLE["/experiments"])
+    for name in FORBIDDEN_NAMES:
+        spec: Any = copy.deepcopy(VALID_SPECS["/experiments"])
         *parents, last = place.split("/")[1:]
         target = spec
         for part in parents:
@@ -71,10 +71,10 @@ def test_a_file_a_class_an_address_or_code_is_no_plugin(
 
 
 @pytest.mark.parametrize("place", ["options", "path", "url", "class", "module"])
-def test_a_plugin_takes_no_path_address_or_class_beside_its_name(sqlite_store: Store, place: str):
+def test_a_plugin_takes_no_path_address_or_class_beside_its_name(sqlite_store: Store, place: str) -> None:
     api = TestClient(create_app(sqlite_store))
     for kind in ("strategy", "robot", "engine", "optimizer"):
-        extra = {"path": OUTSIDE[0]} if place == "options" else OUTSIDE[0]
-        spec = WHOLE["/experiments"] | {kind: {"name": WHOLE["/experiments"][kind]["name"], place: extra}}
+        extra = {"path": FORBIDDEN_NAMES[0]} if place == "options" else FORBIDDEN_NAMES[0]
+        spec = VALID_SPECS["/experiments"] | {kind: {"name": VALID_SPECS["/experiments"][kind]["name"], place: extra}}
 
         assert api.post("/experiments", json=spec).status_code == 422

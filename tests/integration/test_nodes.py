@@ -3,8 +3,10 @@
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 import pytest
 import ray
@@ -14,6 +16,7 @@ from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import ClusterUnusable
 from gaplab.services.experiments import reading, submission
 from gaplab.services.settings import Settings
+from gaplab.services.store.session import Store
 from gaplab.workers import nodes
 from gaplab.workers import repetitions as task
 from gaplab.workers.cluster import cluster
@@ -27,7 +30,7 @@ SPEC = toy(repetitions=4, iterations=1, budget={"controller_evaluations": 3_000,
 
 
 @pytest.fixture(scope="module")
-def head():
+def head() -> Iterator[Any]:
     """A cluster whose head computes nothing; it grows as the tests ask for nodes."""
     found = Cluster(initialize_head=True, head_node_args=NODE | {"num_cpus": 0, "include_dashboard": False})
     yield found
@@ -35,7 +38,7 @@ def head():
 
 
 @pytest.fixture
-def joined(head, request):
+def joined(head: Any, request: pytest.FixtureRequest) -> Iterator[Any]:
     """A connection to the cluster with as many nodes of one core as the test asks for."""
     for _ in range(request.param - len(head.worker_nodes)):
         head.add_node(**NODE, wait=False)
@@ -45,17 +48,17 @@ def joined(head, request):
 
 
 @pytest.fixture(scope="module")
-def in_one_process():
+def in_one_process() -> Any:
     return expected(SPEC)
 
 
 @pytest.fixture
-def ran_on(tmp_path, monkeypatch):
+def ran_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """The ids of the nodes on which a repetition was begun; the latest is the last."""
-    alone = task.run._function
+    alone = task.run._function  # type: ignore[attr-defined]
 
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-    def noted(*given):
+    def noted(*given: Any) -> Iterator[Any]:
         (tmp_path / ray.get_runtime_context().get_node_id()).touch()
         yield from alone(*given)
 
@@ -64,7 +67,9 @@ def ran_on(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("joined", [2, 4], indirect=True)
-def test_the_numbers_do_not_depend_on_how_many_nodes_there_are(joined, sqlite_store, ran_on, in_one_process, request):
+def test_the_numbers_do_not_depend_on_how_many_nodes_there_are(
+    joined: Any, sqlite_store: Store, ran_on: Any, in_one_process: Any, request: pytest.FixtureRequest
+) -> None:
     count = request.node.callspec.params["joined"]
     experiment = submission.submit_experiment(sqlite_store, SPEC).id
 
@@ -76,7 +81,9 @@ def test_the_numbers_do_not_depend_on_how_many_nodes_there_are(joined, sqlite_st
 
 
 @pytest.mark.parametrize("joined", [4], indirect=True)
-def test_a_node_lost_in_the_middle_costs_no_result(joined, head, sqlite_store, ran_on, in_one_process):
+def test_a_node_lost_in_the_middle_costs_no_result(
+    joined: Any, head: Any, sqlite_store: Store, ran_on: Any, in_one_process: Any
+) -> None:
     experiment = submission.submit_experiment(sqlite_store, SPEC).id
     supervisor = Supervisor(sqlite_store, joined.capacity, joined.versions)
     run(supervisor, sqlite_store, experiment, until=lambda: len(ran_on()) == 4)
@@ -92,7 +99,7 @@ def test_a_node_lost_in_the_middle_costs_no_result(joined, head, sqlite_store, r
 
 
 @pytest.mark.parametrize("joined", [2], indirect=True)
-def test_a_cluster_whose_nodes_have_other_versions_is_refused(joined, monkeypatch):
+def test_a_cluster_whose_nodes_have_other_versions_is_refused(joined: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     ours = nodes.versions()
     monkeypatch.setattr(nodes, "versions", lambda: ours | {"numpy": "1.26.4"})
 
@@ -101,7 +108,9 @@ def test_a_cluster_whose_nodes_have_other_versions_is_refused(joined, monkeypatc
 
 
 @pytest.mark.parametrize("joined", [2], indirect=True)
-def test_a_node_that_joins_with_other_versions_ends_the_work_before_a_step_of_it_is_stored(joined, sqlite_store):
+def test_a_node_that_joins_with_other_versions_ends_the_work_before_a_step_of_it_is_stored(
+    joined: Any, sqlite_store: Store
+) -> None:
     experiment = submission.submit_experiment(sqlite_store, toy()).id
     supervisor = Supervisor(sqlite_store, joined.capacity, joined.versions | {"gaplab": "0.0.1"})
 
@@ -137,7 +146,7 @@ print(state, supervisor.returncode)
 
 
 @pytest.fixture
-def environment(tmp_path, sqlite_url):
+def environment(tmp_path: Path, sqlite_url: str) -> Any:
     """Of a process that has nothing of this one's Ray, and a token of its own."""
     (tmp_path / "token").write_text("0123456789abcdef" * 4)
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
@@ -145,7 +154,7 @@ def environment(tmp_path, sqlite_url):
     return inherited | token | {"GAPLAB_DATABASE_URL": sqlite_url, "PYTHONPATH": str(ROOT)}
 
 
-def test_a_cluster_that_asks_for_a_token_is_given_it(environment):
+def test_a_cluster_that_asks_for_a_token_is_given_it(environment: Any) -> None:
     call = [sys.executable, "-c", WITH_A_TOKEN, toy().model_dump_json()]
 
     done = subprocess.run(call, env=environment, cwd=ROOT, capture_output=True, text=True, timeout=100, check=False)
@@ -153,7 +162,7 @@ def test_a_cluster_that_asks_for_a_token_is_given_it(environment):
     assert done.stdout.splitlines()[-1] == "COMPLETED 0", done.stderr
 
 
-def test_without_the_token_the_supervisor_says_so_and_ends(environment, tmp_path):
+def test_without_the_token_the_supervisor_says_so_and_ends(environment: Any, tmp_path: Path) -> None:
     (tmp_path / "token").unlink()
     call = [sys.executable, "-m", "gaplab.workers", "serve"]
     environment["GAPLAB_RAY_ADDRESS"] = "127.0.0.1:6379"

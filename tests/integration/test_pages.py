@@ -14,7 +14,7 @@ TOY = {"strategy": "random", "robot": "toy_function", "budget": "smoke"}
 
 
 def policy_of(answer: object) -> dict[str, set[str]]:
-    parts = (part.split() for part in answer.headers["content-security-policy"].split(";"))
+    parts = (part.split() for part in answer.headers["content-security-policy"].split(";"))  # type: ignore[attr-defined]
     return {name: set(sources) for name, *sources in parts}
 
 
@@ -30,7 +30,7 @@ def policy_of(answer: object) -> dict[str, set[str]]:
         "/livez",
     ],
 )
-def test_every_answer_says_what_a_browser_may_do_with_it(sqlite_store: Store, path: str):
+def test_every_answer_says_what_a_browser_may_do_with_it(sqlite_store: Store, path: str) -> None:
     api = TestClient(create_app(sqlite_store))
     study = api.post("/studies", json={"robot": "toy_function", "budget": "smoke"}).json()["id"]
 
@@ -50,7 +50,7 @@ def test_every_answer_says_what_a_browser_may_do_with_it(sqlite_store: Store, pa
         assert "script-src" not in found
 
 
-def test_a_script_that_someone_slipped_in_as_a_name_is_no_script_of_the_page(sqlite_store: Store):
+def test_a_script_that_someone_slipped_in_as_a_name_is_no_script_of_the_page(sqlite_store: Store) -> None:
     api = TestClient(create_app(sqlite_store))
     bad = "<script>alert(1)</script>"
     made = api.post("/experiments", json=TOY | {"name": bad}).json()["id"]

@@ -3,6 +3,8 @@
 import os
 import signal
 import time
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,23 +27,23 @@ SPEC = resolve_experiment(ExperimentSpec.model_validate({"strategy": "informativ
 
 
 @pytest.fixture(scope="module")
-def alone():
+def alone() -> Any:
     return setting(SPEC, 0)
 
 
 @pytest.fixture(scope="module", autouse=True)
-def two_cores():
+def two_cores() -> Iterator[None]:
     with cluster(Settings(workers=2)):
         yield
 
 
-def asked(alone, genomes, simulators):
+def asked(alone: Any, genomes: Any, simulators: Any) -> Any:
     rng = np.random.default_rng(0)
     return alone.genomes.draw(genomes, rng), alone.parameters.draw(simulators, rng)
 
 
 @pytest.fixture
-def pool(alone):
+def pool(alone: Any) -> Any:
     """A pool that knows how long a rollout takes, and has a helper."""
     warm = Pool(SPEC, alone.simulate, 1)
     deadline = time.monotonic() + 60
@@ -52,22 +54,24 @@ def pool(alone):
 
 
 @pytest.fixture
-def spreads(monkeypatch):
+def spreads(monkeypatch: pytest.MonkeyPatch) -> Any:
     """What was spread over cores."""
     spread = []
     run = Spread.run
-    monkeypatch.setattr(Spread, "run", lambda self: spread.append(self) or run(self))
+    monkeypatch.setattr(Spread, "run", lambda self: spread.append(self) or run(self))  # type: ignore[func-returns-value]
     return spread
 
 
 @pytest.mark.parametrize(("genomes", "simulators"), [(1, 1), (1, 8), (7, 1), (3, 5), (5, 3)])
-def test_what_is_spread_over_cores_is_what_one_core_computes(alone, pool, genomes, simulators):
+def test_what_is_spread_over_cores_is_what_one_core_computes(
+    alone: Any, pool: Any, genomes: Any, simulators: Any
+) -> None:
     question = asked(alone, genomes, simulators)
 
     np.testing.assert_array_equal(pool(*question), alone.simulate(*question))
 
 
-def test_rollouts_are_spread_if_there_are_several(alone, pool, spreads):
+def test_rollouts_are_spread_if_there_are_several(alone: Any, pool: Any, spreads: Any) -> None:
     pool(*asked(alone, 1, 1))
     assert not spreads
 
@@ -75,7 +79,7 @@ def test_rollouts_are_spread_if_there_are_several(alone, pool, spreads):
     assert spreads
 
 
-def until(pool, alone, batch):
+def until(pool: Any, alone: Any, batch: Any) -> None:
     """Wait until so many rollouts are what keeps the cores busy; one call has said that there is work for them."""
     deadline = time.monotonic() + 60
     pool(*asked(alone, batch, 1))
@@ -84,12 +88,12 @@ def until(pool, alone, batch):
         time.sleep(0.05)
 
 
-def test_it_asks_for_as_many_rollouts_at_a_time_as_keep_the_cores_busy(alone, pool):
+def test_it_asks_for_as_many_rollouts_at_a_time_as_keep_the_cores_busy(alone: Any, pool: Any) -> None:
     until(pool, alone, 3)  # this process, and two idle cores
 
 
-def test_a_long_call_gets_help_that_came_after_it_began(alone, spreads):
-    def slow(genomes, parameters):
+def test_a_long_call_gets_help_that_came_after_it_began(alone: Any, spreads: Any) -> None:
+    def slow(genomes: Any, parameters: Any) -> Any:
         time.sleep(0.1 * len(genomes) * len(parameters))
         return alone.simulate(genomes, parameters)
 
@@ -99,7 +103,9 @@ def test_a_long_call_gets_help_that_came_after_it_began(alone, spreads):
 
 
 @pytest.mark.parametrize("signum", [signal.SIGKILL, signal.SIGSTOP])
-def test_a_helper_that_dies_or_dawdles_costs_time_and_no_result(alone, pool, spreads, signum):
+def test_a_helper_that_dies_or_dawdles_costs_time_and_no_result(
+    alone: Any, pool: Any, spreads: Any, signum: Any
+) -> None:
     question = asked(alone, 1, 12)
     expected = alone.simulate(*question)
 
@@ -112,7 +118,7 @@ def test_a_helper_that_dies_or_dawdles_costs_time_and_no_result(alone, pool, spr
     assert pool.batch_size() == 1  # it is not asked again
 
 
-def test_one_of_several_helpers_that_dies_is_asked_no_more(alone, pool):
+def test_one_of_several_helpers_that_dies_is_asked_no_more(alone: Any, pool: Any) -> None:
     question = asked(alone, 1, 2)
     until(pool, alone, 3)
     live, dead = pool._helpers.ready(*question)
@@ -137,19 +143,21 @@ def test_one_of_several_helpers_that_dies_is_asked_no_more(alone, pool):
         (5, 2, 9, [5]),
     ],
 )
-def test_a_call_is_dealt_in_large_parts_first_and_small_ones_in_the_end(rows, cores, least, parts):
+def test_a_call_is_dealt_in_large_parts_first_and_small_ones_in_the_end(
+    rows: Any, cores: Any, least: Any, parts: Any
+) -> None:
     assert sizes(rows, cores, least) == parts
 
 
-def test_a_task_computes_every_step_of_a_repetition():
+def test_a_task_computes_every_step_of_a_repetition() -> None:
     spec = resolve_experiment(
         ExperimentSpec.model_validate(
             {"strategy": "random", "robot": "toy_function", "iterations": 2, "repetitions": 1, "budget": "smoke"}
         )
     )
-    claim = Claim(repetition_id=0, epoch=0, experiment_id="none", number=0, spec=spec)
+    claim = Claim(id=0, epoch=0, experiment_id="none", number=0, spec=spec)
 
     stream = task.run.remote(claim, {}, CHECKPOINT_S)
 
-    steps = [each for batch in stream for each in ray.get(batch) if isinstance(each, TimedStep)]
+    steps = [each for batch in stream for each in ray.get(batch) if isinstance(each, TimedStep)]  # type: ignore[attr-defined]
     assert len(steps) == sum(1 for _ in repetition(setting(spec, 0)))

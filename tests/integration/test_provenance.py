@@ -3,7 +3,9 @@
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
+from pathlib import Path
 from time import sleep
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -18,6 +20,7 @@ from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution, provenance, versions
 from gaplab.services.store.models import SPEC_VERSION
+from gaplab.services.store.session import Store
 from tests.experiments import run, same, some_log, toy
 
 HERE = versions.provenance()
@@ -36,7 +39,7 @@ ALIKE = HERE.model_copy(
 )
 
 
-def begun(store, under=HERE):
+def begun(store: Store, under: Any = HERE) -> Any:
     """An experiment with a step, queued again."""
     submission.submit_experiment(store, toy(repetitions=2))
     (claim,) = execution.claim(store, "me", 1, under)
@@ -45,7 +48,7 @@ def begun(store, under=HERE):
     return claim.experiment_id
 
 
-def test_it_is_recorded_with_the_first_claim(store):
+def test_it_is_recorded_with_the_first_claim(store: Store) -> None:
     id_ = submission.submit_experiment(store, toy(repetitions=2)).id
     assert provenance.read(store, id_).uses == ()
 
@@ -56,7 +59,7 @@ def test_it_is_recorded_with_the_first_claim(store):
     assert found.computed_with == f"analytic (of gaplab's own), {HERE.architecture}, spec {SPEC_VERSION}"
 
 
-def test_of_two_that_begin_it_at_once_one_is_bound_and_the_other_leaves_it_alone(store):
+def test_of_two_that_begin_it_at_once_one_is_bound_and_the_other_leaves_it_alone(store: Store) -> None:
     id_ = submission.submit_experiment(store, toy(repetitions=2)).id
 
     with ThreadPoolExecutor(1) as pool:
@@ -70,7 +73,7 @@ def test_of_two_that_begin_it_at_once_one_is_bound_and_the_other_leaves_it_alone
     assert [each.provenance for each in provenance.read(store, id_).uses] == [HERE]
 
 
-def test_it_names_the_library_and_the_version_of_every_engine():
+def test_it_names_the_library_and_the_version_of_every_engine() -> None:
     assert HERE.engines["pybullet"].startswith("pybullet 3.")
     assert HERE.engines["mujoco"].startswith("mujoco ")
     assert "none" not in {*HERE.engines["mujoco"].split(), *HERE.engines["physx"].split()}
@@ -78,13 +81,15 @@ def test_it_names_the_library_and_the_version_of_every_engine():
     assert HERE.libraries.keys() >= {"numpy", "scipy", "cma"}
 
 
-def test_a_library_may_come_in_a_distribution_of_another_name():
+def test_a_library_may_come_in_a_distribution_of_another_name() -> None:
     assert versions._version("attr") == version("attrs")
     assert versions._version("no_such_library") == "none"
 
 
-def test_it_knows_the_commit_and_whether_the_code_was_changed_since(tmp_path, monkeypatch):
-    def git(*command):
+def test_it_knows_the_commit_and_whether_the_code_was_changed_since(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def git(*command: Any) -> None:
         subprocess.run(["git", "-C", tmp_path, *command], check=True, capture_output=True)
 
     monkeypatch.setattr(versions, "ROOT", tmp_path / "gaplab")
@@ -104,7 +109,9 @@ def test_it_knows_the_commit_and_whether_the_code_was_changed_since(tmp_path, mo
 
 
 @pytest.mark.parametrize("what", OTHERS)
-def test_a_supervisor_with_another_of_what_decides_leaves_it_alone_and_the_experiment_says_why(store, what):
+def test_a_supervisor_with_another_of_what_decides_leaves_it_alone_and_the_experiment_says_why(
+    store: Store, what: Any
+) -> None:
     id_ = begun(store)
 
     assert execution.claim(store, "other", 9, OTHERS[what]) == ()
@@ -118,13 +125,13 @@ def test_a_supervisor_with_another_of_what_decides_leaves_it_alone_and_the_exper
     assert len(execution.claim(store, "me", 9)) == 2
 
 
-def with_own(**files):
+def with_own(**files: Any) -> Any:
     """A provenance with plug-ins from outside: by kind and name, the file."""
     return HERE.model_copy(update={"outside": {key.replace("__", " "): file for key, file in files.items()}})
 
 
 @pytest.mark.parametrize("kind", ["strategy__simulated_fit", "robot__toy_function", "tunable__dynamic_friction"])
-def test_a_plug_in_of_ones_own_that_was_edited_or_is_gone_decides_too(store, kind):
+def test_a_plug_in_of_ones_own_that_was_edited_or_is_gone_decides_too(store: Store, kind: Any) -> None:
     mine = with_own(**{kind: "own.py 0123456789ab", "strategy__other": "other.py 0123456789ab"})
     id_ = begun(store, mine)
 
@@ -138,7 +145,7 @@ def test_a_plug_in_of_ones_own_that_was_edited_or_is_gone_decides_too(store, kin
     assert len(execution.claim(store, "me", 9, edited_another)) == 2
 
 
-def test_what_decides_may_be_long(store):
+def test_what_decides_may_be_long(store: Store) -> None:
     kind, file = "strategy__simulated_fit", f"{'long' * 100}.py 0123456789ab"
     id_ = begun(store, with_own(**{kind: file}))
 
@@ -146,13 +153,13 @@ def test_what_decides_may_be_long(store):
     assert len(execution.claim(store, "me", 9, with_own(**{kind: file}))) == 2
 
 
-def test_one_that_differs_only_in_what_changes_no_number_goes_on(store):
+def test_one_that_differs_only_in_what_changes_no_number_goes_on(store: Store) -> None:
     begun(store)
 
     assert len(execution.claim(store, "other", 9, ALIKE)) == 2
 
 
-def test_what_it_leaves_alone_keeps_nothing_else_waiting(store):
+def test_what_it_leaves_alone_keeps_nothing_else_waiting(store: Store) -> None:
     begun(store)
     later = submission.submit_experiment(store, toy(repetitions=1)).id
 
@@ -161,7 +168,7 @@ def test_what_it_leaves_alone_keeps_nothing_else_waiting(store):
     assert [each.experiment_id for each in claims] == [later]
 
 
-def test_accepted_it_goes_on_from_its_log_and_both_are_recorded(store):
+def test_accepted_it_goes_on_from_its_log_and_both_are_recorded(store: Store) -> None:
     id_ = begun(store)
     other = OTHERS["engine"]
     execution.claim(store, "other", 9, other)
@@ -183,7 +190,7 @@ def test_accepted_it_goes_on_from_its_log_and_both_are_recorded(store):
     assert execution.claim(store, "me", 9) == ()  # it is bound to the others now
 
 
-def test_there_is_nothing_to_accept_before_it_has_begun_or_after_it_has_ended(store):
+def test_there_is_nothing_to_accept_before_it_has_begun_or_after_it_has_ended(store: Store) -> None:
     id_ = submission.submit_experiment(store, toy(repetitions=1)).id
 
     with pytest.raises(Conflict, match="has not begun"):
@@ -193,7 +200,7 @@ def test_there_is_nothing_to_accept_before_it_has_begun_or_after_it_has_ended(st
         provenance.accept_versions(store, id_)
 
 
-def test_over_http(sqlite_store):
+def test_over_http(sqlite_store: Store) -> None:
     id_ = begun(sqlite_store)
     with TestClient(create_app(sqlite_store)) as api:
         shown = api.get(f"/experiments/{id_}/provenance").json()
@@ -205,7 +212,7 @@ def test_over_http(sqlite_store):
     assert missing.status_code == 404
 
 
-def test_a_spec_of_a_later_version_is_not_read_and_not_run(store):
+def test_a_spec_of_a_later_version_is_not_read_and_not_run(store: Store) -> None:
     id_ = submission.submit_experiment(store, toy()).id
     with store.transaction() as session:
         session.execute(text("UPDATE experiment SET spec_version = 99"))

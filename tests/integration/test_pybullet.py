@@ -59,7 +59,7 @@ def test_equal_frictions_cost_no_look_at_the_contacts(engine: PyBullet, monkeypa
 def test_a_robot_in_its_gait_sticks_and_slides(engine: PyBullet, monkeypatch: pytest.MonkeyPatch) -> None:
     slid: list[int] = []
     original = StickSlip._slide
-    monkeypatch.setattr(StickSlip, "_slide", lambda self, link: (slid.append(link), original(self, link))[1])
+    monkeypatch.setattr(StickSlip, "_slide", lambda self, link: (slid.append(link), original(self, link))[1])  # type: ignore[func-returns-value]
 
     path(engine, ROBOT.world)
 

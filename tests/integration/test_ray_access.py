@@ -53,7 +53,7 @@ with cluster(Settings(workers=1)):
 LOOPBACK = {"0100007F", "0000000000000000FFFF00000100007F", "00000000000000000000000001000000"}
 
 
-def test_our_own_ray_listens_on_loopback_and_refuses_a_stranger_whatever_the_environment_says(tmp_path: Path):
+def test_our_own_ray_listens_on_loopback_and_refuses_a_stranger_whatever_the_environment_says(tmp_path: Path) -> None:
     root = Path(__file__).parents[2]
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
 
@@ -77,7 +77,7 @@ def test_our_own_ray_listens_on_loopback_and_refuses_a_stranger_whatever_the_env
     assert not (tmp_path / ".ray").exists()  # where Ray keeps a token that everybody may read
 
 
-def test_a_ray_of_our_own_that_would_ask_nobody_is_not_started(monkeypatch: pytest.MonkeyPatch):
+def test_a_ray_of_our_own_that_would_ask_nobody_is_not_started(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RAY_AUTH_MODE", "disabled")
 
     with pytest.raises(ClusterUnusable, match="RAY_AUTH_MODE"), cluster(Settings(workers=1)):
@@ -95,7 +95,7 @@ def test_a_ray_of_our_own_that_would_ask_nobody_is_not_started(monkeypatch: pyte
 )
 def test_only_a_cluster_of_others_may_go_without_a_token(
     monkeypatch: pytest.MonkeyPatch, address: str | None, before: str | None, after: str
-):
+) -> None:
     monkeypatch.setenv("RAY_AUTH_TOKEN", "theirs")  # Ray has read its own already; what is set here must not stay
     monkeypatch.setenv("RAY_AUTH_MODE", before or "")
     if before is None:

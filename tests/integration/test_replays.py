@@ -2,6 +2,8 @@
 
 import os
 import signal
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +21,7 @@ from gaplab.services.replay.predictions import predictions
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.queries.experiments import get_experiment
+from gaplab.services.store.session import Store
 from tests.experiments import run, toy
 
 UNTUNED, BEST = (0.5, 0.3), (1.1, 0.7)
@@ -26,24 +29,24 @@ HIDDEN = {"static_friction": 0.9, "dynamic_friction": 0.6}
 
 
 @pytest.fixture
-def app(sqlite_store):
+def app(sqlite_store: Store) -> Iterator[Any]:
     found = create_app(sqlite_store)
     yield found
     found.state.rollout_process.close()
 
 
 @pytest.fixture
-def api(app):
+def api(app: Any) -> Any:
     return TestClient(app)
 
 
-def quadruped(**changes):
+def quadruped(**changes: Any) -> Any:
     small = {"strategy": "simulated_fit", "iterations": 2, "repetitions": 2, "budget": "smoke"}
     named = {"tunables": list(HIDDEN), "reality": {"parameters": HIDDEN}, "engine": "pybullet"}
     return ExperimentSpec.model_validate(small | named | changes)
 
 
-def walked(store, **changes):
+def walked(store: Store, **changes: Any) -> Any:
     """Id and log of an experiment of which one iteration is over, and the next is measured but not tuned."""
     submitted = submission.submit_experiment(store, quadruped(**changes)).id
     (claim,) = execution.claim(store, "me", 1)
@@ -51,7 +54,7 @@ def walked(store, **changes):
     known = Quadruped().known
     moved = frozen(np.mod(known + 0.05, 1.0))
 
-    def simulated(genome, parameters):
+    def simulated(genome: Any, parameters: Any) -> Any:
         return float(setting_.simulate(genome[None], np.array([parameters]))[0, 0])
 
     log = [
@@ -67,11 +70,13 @@ def walked(store, **changes):
         Measured(2, Sample(known, setting_.reality(known))),
     ]
     for step in log:
-        assert execution.record(store, claim, step)
+        assert execution.record(store, claim, step)  # type: ignore[arg-type]
     return submitted, log, claim
 
 
-def test_a_transferred_controller_walks_in_its_simulator_and_in_reality_as_it_was_recorded(sqlite_store, api):
+def test_a_transferred_controller_walks_in_its_simulator_and_in_reality_as_it_was_recorded(
+    sqlite_store: Store, api: Any
+) -> None:
     experiment, log, _ = walked(sqlite_store)
 
     answer = api.get(f"/experiments/{experiment}/replay?iteration=1&kind=transfer")
@@ -94,7 +99,9 @@ def test_a_transferred_controller_walks_in_its_simulator_and_in_reality_as_it_wa
         assert np.mean(counted) == pytest.approx(world.fitness, rel=0.2)
 
 
-def test_a_sample_is_shown_in_the_simulator_that_it_was_selected_in_or_in_any_other(sqlite_store, api):
+def test_a_sample_is_shown_in_the_simulator_that_it_was_selected_in_or_in_any_other(
+    sqlite_store: Store, api: Any
+) -> None:
     experiment, log, _ = walked(sqlite_store)
     address = f"/experiments/{experiment}/replay?kind=sample&iteration=1"
 
@@ -107,7 +114,7 @@ def test_a_sample_is_shown_in_the_simulator_that_it_was_selected_in_or_in_any_ot
     assert own["simulation"]["fitness"] != after["simulation"]["fitness"] == log[6].fitness
 
 
-def test_what_is_not_there_is_not_found_and_what_is_not_yet_there_is_a_conflict(sqlite_store, api):
+def test_what_is_not_there_is_not_found_and_what_is_not_yet_there_is_a_conflict(sqlite_store: Store, api: Any) -> None:
     experiment, _, _ = walked(sqlite_store)
     there = f"/experiments/{experiment}/replay"
 
@@ -128,9 +135,9 @@ def test_what_is_not_there_is_not_found_and_what_is_not_yet_there_is_a_conflict(
         assert (answer.status_code, words in answer.json()["detail"]) == (status, True), (address, answer.json())
 
 
-def test_a_robot_without_a_body_has_nothing_to_show(sqlite_store, api):
+def test_a_robot_without_a_body_has_nothing_to_show(sqlite_store: Store, api: Any) -> None:
     experiment = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
-    run(sqlite_store, *execution.claim(sqlite_store, "me", 1))
+    run(sqlite_store, *execution.claim(sqlite_store, "me", 1))  # type: ignore[arg-type]
 
     answer = api.get(f"/experiments/{experiment}/replay")
 
@@ -138,7 +145,7 @@ def test_a_robot_without_a_body_has_nothing_to_show(sqlite_store, api):
     assert answer.json()["detail"].startswith("id: the robot 'toy_function' has no body")
 
 
-def test_the_direct_baseline_is_seen_in_reality_alone(sqlite_store, api):
+def test_the_direct_baseline_is_seen_in_reality_alone(sqlite_store: Store, api: Any) -> None:
     experiment = submission.submit_experiment(sqlite_store, quadruped(strategy="direct")).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     known = Quadruped().known
@@ -153,7 +160,7 @@ def test_the_direct_baseline_is_seen_in_reality_alone(sqlite_store, api):
     assert api.get(f"/experiments/{experiment}/replay?simulator=0").status_code == 404
 
 
-def test_reality_that_an_archive_left_out_is_not_shown(sqlite_store, api):
+def test_reality_that_an_archive_left_out_is_not_shown(sqlite_store: Store, api: Any) -> None:
     experiment, _, _ = walked(sqlite_store)
     with sqlite_store.transaction() as session:
         row = get_experiment(session, experiment)
@@ -165,7 +172,7 @@ def test_reality_that_an_archive_left_out_is_not_shown(sqlite_store, api):
     assert shown["simulation"]["fitness"] > 0
 
 
-def test_physics_that_fails_has_no_frames(sqlite_store, api):
+def test_physics_that_fails_has_no_frames(sqlite_store: Store, api: Any) -> None:
     experiment, _, _ = walked(sqlite_store)
     with sqlite_store.transaction() as session:
         row = get_experiment(session, experiment)
@@ -177,7 +184,7 @@ def test_physics_that_fails_has_no_frames(sqlite_store, api):
     assert len(shown["shapes"]) == 18
 
 
-def test_the_gait_is_drawn_in_every_format(sqlite_store, api):
+def test_the_gait_is_drawn_in_every_format(sqlite_store: Store, api: Any) -> None:
     experiment, _, _ = walked(sqlite_store)
     address = f"/figures/gait?experiment={experiment}&iteration=1&kind=sample"
 
@@ -190,7 +197,7 @@ def test_the_gait_is_drawn_in_every_format(sqlite_store, api):
     assert api.get(f"/figures/gait?experiment={experiment}&repetition=1").status_code == 409
 
 
-def test_a_crash_of_physics_never_ends_the_api(sqlite_store, app, api):
+def test_a_crash_of_physics_never_ends_the_api(sqlite_store: Store, app: Any, api: Any) -> None:
     experiment, _, _ = walked(sqlite_store)
     first = api.get(f"/experiments/{experiment}/replay")
     os.kill(app.state.rollout_process.pid, signal.SIGKILL)
@@ -203,7 +210,7 @@ def test_a_crash_of_physics_never_ends_the_api(sqlite_store, app, api):
     assert (first.status_code, again.status_code) == (200, 200)
 
 
-def test_what_was_computed_once_is_remembered(sqlite_store, app, api):
+def test_what_was_computed_once_is_remembered(sqlite_store: Store, app: Any, api: Any) -> None:
     experiment, _, _ = walked(sqlite_store)
     first = api.get(f"/experiments/{experiment}/replay").content
     app.state.rollout_process.close()
@@ -213,7 +220,7 @@ def test_what_was_computed_once_is_remembered(sqlite_store, app, api):
     assert (other.status_code, other.headers["Retry-After"]) == (503, "5")
 
 
-def test_predictions_are_of_the_simulators_before_and_after_a_sample(store, app):
+def test_predictions_are_of_the_simulators_before_and_after_a_sample(store: Store, app: Any) -> None:
     experiment = submission.submit_experiment(store, toy(repetitions=2)).id
     errors = {}
     for claim in execution.claim(store, "me", 2):
@@ -232,7 +239,7 @@ def test_predictions_are_of_the_simulators_before_and_after_a_sample(store, app)
         assert abs(each.simulated_after - each.fitness) <= abs(each.simulated_before - each.fitness) + 1e-9
 
 
-def test_predictions_take_a_while_and_are_pending_meanwhile(sqlite_store, app):
+def test_predictions_take_a_while_and_are_pending_meanwhile(sqlite_store: Store, app: Any) -> None:
     experiment, log, claim = walked(sqlite_store)
     execution.record(sqlite_store, claim, Tuned(2, (Simulator(frozen(BEST)),)))
 
@@ -245,7 +252,9 @@ def test_predictions_take_a_while_and_are_pending_meanwhile(sqlite_store, app):
     assert second.items[1].simulated_before == second.items[1].simulated_after  # the same simulator
 
 
-def test_samples_for_which_there_is_no_room_are_left_out_and_not_waited_for(sqlite_store, app, api, monkeypatch):
+def test_samples_for_which_there_is_no_room_are_left_out_and_not_waited_for(
+    sqlite_store: Store, app: Any, api: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     experiment, _, claim = walked(sqlite_store)
     execution.record(sqlite_store, claim, Tuned(2, (Simulator(frozen(BEST)),)))
     monkeypatch.setattr("gaplab.services.replay.predictions.MOST_KEPT", 1)
@@ -258,7 +267,7 @@ def test_samples_for_which_there_is_no_room_are_left_out_and_not_waited_for(sqli
     assert "of later repetitions left out" in figure["caption"]
 
 
-def test_samples_that_nothing_is_tuned_on_yet_have_no_prediction(sqlite_store, api):
+def test_samples_that_nothing_is_tuned_on_yet_have_no_prediction(sqlite_store: Store, api: Any) -> None:
     experiment, _, _ = walked(sqlite_store)
 
     shown = api.get(f"/experiments/{experiment}/predictions").json()

@@ -1,6 +1,7 @@
 """Curves and comparisons read from the store."""
 
 import csv
+from typing import Any
 
 import pytest
 
@@ -10,10 +11,11 @@ from gaplab.services.core.errors import InvalidSpec, NotFound
 from gaplab.services.experiments import submission
 from gaplab.services.results import curves
 from gaplab.services.running import execution
+from gaplab.services.store.session import Store
 from tests.experiments import run, some_log, toy
 
 
-def study_with_results(store, recorded=(1.0, 2.0)):
+def study_with_results(store: Store, recorded: Any = (1.0, 2.0)) -> Any:
     """A study of simulated fit and direct, two repetitions each, of which the first strategy's second is half done."""
     spec = toy().model_dump(exclude={"strategy", "name"}) | {
         "repetitions": 2,
@@ -30,7 +32,7 @@ def study_with_results(store, recorded=(1.0, 2.0)):
     return study
 
 
-def test_a_curve_has_the_recorded_fitness_of_each_repetition_at_each_count(store):
+def test_a_curve_has_the_recorded_fitness_of_each_repetition_at_each_count(store: Store) -> None:
     study = study_with_results(store)
 
     found = curves.curve(store, study.experiments[0].id)
@@ -43,7 +45,7 @@ def test_a_curve_has_the_recorded_fitness_of_each_repetition_at_each_count(store
     assert found.points[0].mean == 1.5
 
 
-def test_the_curve_of_direct_is_one_point_at_zero(store):
+def test_the_curve_of_direct_is_one_point_at_zero(store: Store) -> None:
     study = study_with_results(store)
 
     found = curves.curve(store, study.experiments[1].id)
@@ -52,7 +54,7 @@ def test_the_curve_of_direct_is_one_point_at_zero(store):
     assert [(point.evaluations, point.values) for point in found.points] == [(0, (1.0, 2.0))]
 
 
-def test_a_curve_without_results_has_empty_points(store):
+def test_a_curve_without_results_has_empty_points(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy()).id
 
     found = curves.curve(store, experiment)
@@ -60,7 +62,7 @@ def test_a_curve_without_results_has_empty_points(store):
     assert [(point.n, point.mean) for point in found.points] == [(0, None)] * 3
 
 
-def test_a_failed_measurement_is_no_value_of_the_curve(store):
+def test_a_failed_measurement_is_no_value_of_the_curve(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy(repetitions=1)).id
     (claim,) = execution.claim(store, "me", 1)
     run(store, claim, some_log(recorded=float("nan")))
@@ -70,7 +72,7 @@ def test_a_failed_measurement_is_no_value_of_the_curve(store):
     assert [point.values for point in found.points] == [(None,)] * 3
 
 
-def test_the_curves_of_a_study_are_those_of_its_experiments_in_order(store):
+def test_the_curves_of_a_study_are_those_of_its_experiments_in_order(store: Store) -> None:
     study = study_with_results(store)
     ids = [each.id for each in study.experiments]
 
@@ -80,7 +82,7 @@ def test_the_curves_of_a_study_are_those_of_its_experiments_in_order(store):
     assert found == curves.curves(store, ids) == tuple(curves.curve(store, each) for each in ids)
 
 
-def test_the_curves_of_what_is_not_there_are_not_found(store):
+def test_the_curves_of_what_is_not_there_are_not_found(store: Store) -> None:
     study = study_with_results(store)
 
     with pytest.raises(NotFound, match="no-such"):
@@ -89,7 +91,7 @@ def test_the_curves_of_what_is_not_there_are_not_found(store):
         curves.study_curves(store, "no-such")
 
 
-def test_a_comparison_pools_the_whole_range_and_direct_counts_at_any(sqlite_store):
+def test_a_comparison_pools_the_whole_range_and_direct_counts_at_any(sqlite_store: Store) -> None:
     study = study_with_results(sqlite_store)
     ids = [each.id for each in study.experiments]
 
@@ -102,7 +104,7 @@ def test_a_comparison_pools_the_whole_range_and_direct_counts_at_any(sqlite_stor
     assert (one.n_first, one.n_second, one.difference) == (2, 2, 1.0)
 
 
-def test_a_comparison_is_of_every_pair(sqlite_store):
+def test_a_comparison_is_of_every_pair(sqlite_store: Store) -> None:
     ids = [submission.submit_experiment(sqlite_store, toy()).id for _ in range(3)]
 
     found = curves.compare(sqlite_store, ids)
@@ -112,14 +114,14 @@ def test_a_comparison_is_of_every_pair(sqlite_store):
 
 
 @pytest.mark.parametrize("bounds", [(2, 1), (-1, 2), (3, None)])
-def test_a_range_that_is_none_is_refused(sqlite_store, bounds):
+def test_a_range_that_is_none_is_refused(sqlite_store: Store, bounds: Any) -> None:
     ids = [submission.submit_experiment(sqlite_store, toy()).id for _ in range(2)]
 
     with pytest.raises(InvalidSpec, match="range"):
         curves.compare(sqlite_store, ids, from_evaluations=bounds[0], to_evaluations=bounds[1])
 
 
-def test_a_comparison_needs_two_experiments(sqlite_store):
+def test_a_comparison_needs_two_experiments(sqlite_store: Store) -> None:
     one = submission.submit_experiment(sqlite_store, toy()).id
 
     for ids in ([], [one], [one, one]):
@@ -127,7 +129,7 @@ def test_a_comparison_needs_two_experiments(sqlite_store):
             curves.compare(sqlite_store, ids)
 
 
-def test_the_csv_has_a_line_for_each_value(sqlite_store):
+def test_the_csv_has_a_line_for_each_value(sqlite_store: Store) -> None:
     study = study_with_results(sqlite_store, recorded=(0.1 + 0.2, 1 / 3))
 
     lines = list(csv.DictReader(curves.curves_csv(curves.study_curves(sqlite_store, study.id)).splitlines()))

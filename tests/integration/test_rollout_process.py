@@ -5,8 +5,10 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,13 +19,13 @@ DEADLINE_S = 120.0
 
 
 @pytest.fixture
-def rollouts():
+def rollouts() -> Iterator[Any]:
     found = RolloutProcess()
     yield found
     found.close()
 
 
-def gone(pid):
+def gone(pid: Any) -> bool:
     """Whether a process has ended, waited for or not."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
@@ -31,14 +33,14 @@ def gone(pid):
         return True
 
 
-def wait_until(holds):
+def wait_until(holds: Any) -> None:
     until = time.monotonic() + DEADLINE_S
     while not holds():
         assert time.monotonic() < until
         time.sleep(0.05)
 
 
-def test_calls_are_executed_by_one_subprocess_of_lower_priority(rollouts):
+def test_calls_are_executed_by_one_subprocess_of_lower_priority(rollouts: Any) -> None:
     assert rollouts.pid is None
 
     first, second = rollouts.call(os.getpid), rollouts.call(os.getpid)
@@ -47,7 +49,7 @@ def test_calls_are_executed_by_one_subprocess_of_lower_priority(rollouts):
     assert os.getpriority(os.PRIO_PROCESS, first) == min(19, os.nice(0) + NICENESS)
 
 
-def test_a_process_that_was_killed_is_replaced(rollouts):
+def test_a_process_that_was_killed_is_replaced(rollouts: Any) -> None:
     killed = rollouts.call(os.getpid)
     os.kill(killed, signal.SIGKILL)
     wait_until(lambda: gone(killed))
@@ -55,8 +57,10 @@ def test_a_process_that_was_killed_is_replaced(rollouts):
     assert rollouts.call(os.getpid) not in {killed, os.getpid()}
 
 
-def test_a_process_that_could_not_be_started_is_started_by_the_next_call(rollouts, monkeypatch):
-    def out_of_memory(_):
+def test_a_process_that_could_not_be_started_is_started_by_the_next_call(
+    rollouts: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def out_of_memory(_: Any) -> None:
         raise OSError(12, "Cannot allocate memory")
 
     with monkeypatch.context() as patch:
@@ -67,7 +71,7 @@ def test_a_process_that_could_not_be_started_is_started_by_the_next_call(rollout
     assert rollouts.call(os.getpid) not in {None, os.getpid()}
 
 
-def test_physics_that_kills_its_process_is_an_error_of_that_call_alone(rollouts):
+def test_physics_that_kills_its_process_is_an_error_of_that_call_alone(rollouts: Any) -> None:
     first = rollouts.call(os.getpid)
 
     with pytest.raises(EngineInterrupted, match="ended its process"):
@@ -76,7 +80,7 @@ def test_physics_that_kills_its_process_is_an_error_of_that_call_alone(rollouts)
     assert rollouts.call(os.getpid) not in {first, os.getpid()}
 
 
-def test_physics_that_takes_too_long_is_ended():
+def test_physics_that_takes_too_long_is_ended() -> None:
     rollouts = RolloutProcess(longest_s=60)
     first = rollouts.call(os.getpid)
     rollouts._longest_s = 0.2
@@ -90,7 +94,7 @@ def test_physics_that_takes_too_long_is_ended():
     rollouts.close()
 
 
-def test_an_error_of_the_function_reaches_the_caller_and_the_process_goes_on(rollouts):
+def test_an_error_of_the_function_reaches_the_caller_and_the_process_goes_on(rollouts: Any) -> None:
     first = rollouts.call(os.getpid)
 
     with pytest.raises(RuntimeError, match="ValueError: invalid literal"):
@@ -101,11 +105,11 @@ def test_an_error_of_the_function_reaches_the_caller_and_the_process_goes_on(rol
     assert rollouts.call(os.getpid) == first
 
 
-def _unavailable():
+def _unavailable() -> None:
     raise EngineUnavailable("pip install it")
 
 
-def test_a_call_that_waits_too_long_for_others_is_refused():
+def test_a_call_that_waits_too_long_for_others_is_refused() -> None:
     rollouts = RolloutProcess(queue_s=0.1)
     rollouts.call(abs, -1)
     with ThreadPoolExecutor(1) as other:
@@ -122,7 +126,7 @@ def test_a_call_that_waits_too_long_for_others_is_refused():
         rollouts.call(abs, -1)
 
 
-def test_the_process_ends_with_its_parent_even_if_that_is_killed():
+def test_the_process_ends_with_its_parent_even_if_that_is_killed() -> None:
     program = (
         "import os; from gaplab.services.replay.process import RolloutProcess\n"
         "rollouts = RolloutProcess(); print(rollouts.call(os.getpid), flush=True); input()"
@@ -138,7 +142,7 @@ def test_the_process_ends_with_its_parent_even_if_that_is_killed():
     wait_until(lambda: gone(child))
 
 
-def test_the_cache_drops_the_least_recently_used_answers_first():
+def test_the_cache_drops_the_least_recently_used_answers_first() -> None:
     cache = AnswerCache(most_bytes=10)
     cache.keep(("a",), "A", 4)
     cache.keep(("b",), "B", 4)
@@ -151,7 +155,7 @@ def test_the_cache_drops_the_least_recently_used_answers_first():
     assert [cache.get((each,)) for each in "ac"] == ["AA", "C"]
 
 
-def test_an_answer_that_is_too_large_for_the_cache_is_not_kept():
+def test_an_answer_that_is_too_large_for_the_cache_is_not_kept() -> None:
     cache = AnswerCache(most_bytes=10)
     cache.keep(("a",), "A", 4)
 

@@ -1,6 +1,7 @@
 """Sensitivity checks in the store: queued with experiments, run under a lease, told as warnings; on both databases."""
 
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import pytest
 
@@ -16,17 +17,18 @@ from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import subject
 from gaplab.services.specs.resolution import resolve_sensitivity
 from gaplab.services.store.models import SensitivityRow
+from gaplab.services.store.session import Store
 from tests.experiments import toy
 
 SECRET = 0.987654321
 
 
-def settings(**changes):
+def settings(**changes: Any) -> Any:
     small = {"robot": "toy_function", "tunables": ["static_friction", "dynamic_friction"]}
     return SensitivitySpec.model_validate(small | changes)
 
 
-def shown(verdict, name="grip", effect=0.001):
+def shown(verdict: Any, name: Any = "grip", effect: Any = 0.001) -> Any:
     return Sensitivity(
         name=name,
         effect=0.1,
@@ -39,12 +41,12 @@ def shown(verdict, name="grip", effect=0.001):
     )
 
 
-def stored_checks(store):
+def stored_checks(store: Store) -> Any:
     with store.reading() as session:
         return [row.id for row in session.query(SensitivityRow)]
 
 
-def test_submitting_an_experiment_queues_a_check_of_what_it_tunes(store):
+def test_submitting_an_experiment_queues_a_check_of_what_it_tunes(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy())
 
     found = checks.read(store, experiment.sensitivity)
@@ -59,7 +61,7 @@ def test_submitting_an_experiment_queues_a_check_of_what_it_tunes(store):
     assert (found.unit, found.tunables, found.warnings) == ("m/s", (), ())
 
 
-def test_the_same_robot_engine_and_tunables_are_checked_once(store):
+def test_the_same_robot_engine_and_tunables_are_checked_once(store: Store) -> None:
     first = submission.submit_experiment(store, toy())
     second = submission.submit_experiment(
         store, toy(strategy="random", seed=7, budget="desk", reality={"parameters": {"static_friction": SECRET}})
@@ -75,8 +77,10 @@ def test_the_same_robot_engine_and_tunables_are_checked_once(store):
 
 
 @pytest.mark.parametrize("kind", ["robot toy_function", "engine analytic", "tunable dynamic_friction"])
-def test_what_was_edited_since_is_checked_anew_and_earlier_experiments_keep_their_check(store, monkeypatch, kind):
-    def edited(file):
+def test_what_was_edited_since_is_checked_anew_and_earlier_experiments_keep_their_check(
+    store: Store, monkeypatch: pytest.MonkeyPatch, kind: Any
+) -> None:
+    def edited(file: Any) -> None:
         monkeypatch.setattr(checks, "external_plugins", lambda: {kind: file, "robot other": file})
 
     edited("own.py 0123456789ab")
@@ -92,7 +96,7 @@ def test_what_was_edited_since_is_checked_anew_and_earlier_experiments_keep_thei
     assert other.sensitivity not in {before.sensitivity, after.sensitivity}
 
 
-def test_a_study_has_one_check_and_the_direct_baseline_alone_has_none(store):
+def test_a_study_has_one_check_and_the_direct_baseline_alone_has_none(store: Store) -> None:
     common = toy().model_dump(exclude={"strategy", "name"})
     study = submission.submit_study(store, StudySpec.model_validate(common | {"strategies": ["random", "direct"]}))
 
@@ -104,14 +108,14 @@ def test_a_study_has_one_check_and_the_direct_baseline_alone_has_none(store):
     assert len(stored_checks(store)) == 1
 
 
-def test_experiments_that_are_submitted_at_once_share_a_check(store):
+def test_experiments_that_are_submitted_at_once_share_a_check(store: Store) -> None:
     with ThreadPoolExecutor(4) as pool:
         submitted = list(pool.map(lambda seed: submission.submit_experiment(store, toy(seed=seed)), range(8)))
 
     assert len({each.sensitivity for each in submitted}) == len(stored_checks(store)) == 1
 
 
-def test_what_a_check_finds_is_shown_and_warns_the_experiments(store):
+def test_what_a_check_finds_is_shown_and_warns_the_experiments(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy()).id
     claim = sensitivity.claim(store, "me")
     found = check(subject(claim.spec), SteadyState(), Effort(claim.spec.points, claim.spec.evaluations))
@@ -129,7 +133,7 @@ def test_what_a_check_finds_is_shown_and_warns_the_experiments(store):
     assert listing.list_experiments(store).items[0].warnings == read.warnings
 
 
-def test_the_toys_tunables_are_smooth_and_warn_of_nothing(store):
+def test_the_toys_tunables_are_smooth_and_warn_of_nothing(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy(tunables=["static_friction", "restitution"])).id
     claim = sensitivity.claim(store, "me")
     found = check(subject(claim.spec), SteadyState(), Effort(claim.spec.points, claim.spec.evaluations))
@@ -140,7 +144,7 @@ def test_the_toys_tunables_are_smooth_and_warn_of_nothing(store):
     assert reading.read_experiment(store, experiment).warnings == ()
 
 
-def test_a_tunable_between_bounds_too_narrow_to_matter_does_nothing():
+def test_a_tunable_between_bounds_too_narrow_to_matter_does_nothing() -> None:
     spec = settings(tunables=["static_friction", {"name": "restitution", "lower": 0.3, "upper": 0.301}])
 
     _, narrow = check(subject(resolve_sensitivity(spec)), SteadyState(), Effort(17, 100))
@@ -148,7 +152,7 @@ def test_a_tunable_between_bounds_too_narrow_to_matter_does_nothing():
     assert narrow.verdict is Verdict.NOTHING
 
 
-def test_a_failed_check_fails_no_experiment_and_says_why(store):
+def test_a_failed_check_fails_no_experiment_and_says_why(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy()).id
     claim = sensitivity.claim(store, "me")
 
@@ -162,7 +166,7 @@ def test_a_failed_check_fails_no_experiment_and_says_why(store):
     assert len(execution.claim(store, "me", 9)) == 3
 
 
-def test_a_failed_check_is_queued_again_when_it_is_asked_for_again(store):
+def test_a_failed_check_is_queued_again_when_it_is_asked_for_again(store: Store) -> None:
     check_id = checks.submit(store, settings()).id
     sensitivity.fail(store, sensitivity.claim(store, "me"), "out of luck")
 
@@ -172,7 +176,7 @@ def test_a_failed_check_is_queued_again_when_it_is_asked_for_again(store):
     assert sensitivity.claim(store, "me").epoch == 2
 
 
-def test_a_check_is_claimed_once_the_oldest_first(store):
+def test_a_check_is_claimed_once_the_oldest_first(store: Store) -> None:
     first, second = (checks.submit(store, settings(points=points)).id for points in (20, 21))
 
     with ThreadPoolExecutor(4) as pool:
@@ -183,7 +187,7 @@ def test_a_check_is_claimed_once_the_oldest_first(store):
     assert {checks.read(store, each).state for each in (first, second)} == {State.RUNNING}
 
 
-def test_a_lost_check_is_queued_again_and_its_old_holder_can_write_no_more(store):
+def test_a_lost_check_is_queued_again_and_its_old_holder_can_write_no_more(store: Store) -> None:
     check_id = checks.submit(store, settings()).id
     old = sensitivity.claim(store, "first")
 
@@ -200,7 +204,7 @@ def test_a_lost_check_is_queued_again_and_its_old_holder_can_write_no_more(store
     assert checks.read(store, check_id).state is State.COMPLETED
 
 
-def test_a_check_that_loses_its_worker_again_and_again_is_what_kills_them(store):
+def test_a_check_that_loses_its_worker_again_and_again_is_what_kills_them(store: Store) -> None:
     check_id = checks.submit(store, settings()).id
 
     for _ in range(MAX_LOSSES):
@@ -211,7 +215,7 @@ def test_a_check_that_loses_its_worker_again_and_again_is_what_kills_them(store)
     assert sensitivity.claim(store, "me") is None
 
 
-def test_a_check_that_is_handed_back_is_queued_as_if_it_had_not_been_claimed(store):
+def test_a_check_that_is_handed_back_is_queued_as_if_it_had_not_been_claimed(store: Store) -> None:
     check_id = checks.submit(store, settings()).id
 
     assert sensitivity.hand_back(store, sensitivity.claim(store, "me"))
@@ -221,14 +225,14 @@ def test_a_check_that_is_handed_back_is_queued_as_if_it_had_not_been_claimed(sto
 
 
 @pytest.mark.parametrize("name", ["no-such", "", "nul\0", "'; DROP TABLE sensitivity; --"])
-def test_an_unknown_check_is_not_found(store, name):
+def test_an_unknown_check_is_not_found(store: Store, name: Any) -> None:
     with pytest.raises(NotFound) as caught:
         checks.read(store, name)
 
     assert repr(name) in str(caught.value)
 
 
-def test_settings_that_no_experiment_could_have_are_refused_with_every_violation(store):
+def test_settings_that_no_experiment_could_have_are_refused_with_every_violation(store: Store) -> None:
     with pytest.raises(InvalidSpec) as caught:
         checks.submit(store, settings(engine="pybullet", tunables=["grip"], optimizer="no_such"))
 

@@ -8,6 +8,7 @@ step is there twice or missing, and what was stored before stands.
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -26,29 +27,30 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import AttemptRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.session import Store
 from tests.fakes import flat
 
 MOST_ITERATIONS, MOST_REPETITIONS = 2, 3
 BUDGET = {"controller_evaluations": 20, "selection_evaluations": 20, "simulator_evaluations": 20}
 
 
-def spec(iterations, repetitions):
+def spec(iterations: Any, repetitions: Any) -> Any:
     toy = {"strategy": "simulated_fit", "robot": "toy_function", "optimizer": {"name": "steady_state"}}
     return ExperimentSpec.model_validate(toy | {"budget": BUDGET, "iterations": iterations, "repetitions": repetitions})
 
 
 @cache
-def whole(number):
+def whole(number: Any) -> Any:
     """The log of a repetition that nothing ever happened to, of as many iterations as any has here."""
     resolved = resolve_experiment(spec(MOST_ITERATIONS, MOST_REPETITIONS))
     return tuple(flat(step) for step in repetition(setting(resolved, number)))
 
 
-def length(iterations):
+def length(iterations: Any) -> Any:
     return 3 + 5 * iterations
 
 
-def points(steps):
+def points(steps: Any) -> Any:
     """Iterations that are done, number 0 included."""
     return (steps + 2) // 5
 
@@ -63,7 +65,7 @@ class Repetition:
     endings: list = field(default_factory=list)
     claim: Claim | None = None
 
-    def leave(self, state, ending):
+    def leave(self, state: Any, ending: Any) -> None:
         self.state, self.claim = state, None
         self.endings[-1] = ending
 
@@ -77,10 +79,10 @@ class Experiment:
     repetitions: list
     state: State = State.QUEUED
 
-    def of(self, *states):
+    def of(self, *states: Any) -> Any:
         return [each for each in self.repetitions if each.state in states]
 
-    def settle(self):
+    def settle(self) -> None:
         if self.state is State.STOPPING:
             for each in self.of(State.QUEUED):
                 each.state = State.COMPLETED if points(each.steps) else State.CANCELLED
@@ -94,7 +96,7 @@ class Experiment:
         elif self.state is State.QUEUED and self.of(State.RUNNING):
             self.state = State.RUNNING
 
-    def ask(self, verb):
+    def ask(self, verb: Any) -> None:
         running = bool(self.of(State.RUNNING))
         if verb is Verb.CANCEL:
             for each in self.of(State.RUNNING):
@@ -116,32 +118,32 @@ class LifeCycle(RuleBasedStateMachine):
     store = None
     picks = st.integers(0, 10)
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__()
-        self.experiments = []
-        self.gone = []  # claims that hold no more
-        self.states = {}
-        self.kept = {}  # the longest log that was seen of each repetition
+        self.experiments: list[Any] = []
+        self.gone: list[Any] = []  # claims that hold no more
+        self.states: dict[Any, Any] = {}
+        self.kept: dict[Any, Any] = {}  # the longest log that was seen of each repetition
 
-    def running(self):
+    def running(self) -> Any:
         return [(one, each) for one in self.experiments for each in one.repetitions if each.claim]
 
-    def one_of(self, found, pick):
+    def one_of(self, found: Any, pick: Any) -> Any:
         return found[pick % len(found)]
 
-    def claims(self):
+    def claims(self) -> Any:
         return [each.claim for _, each in self.running()]
 
     @precondition(lambda self: len(self.experiments) < 2)
     @rule(iterations=st.integers(1, MOST_ITERATIONS), repetitions=st.integers(1, MOST_REPETITIONS - 1))
-    def submit(self, iterations, repetitions):
+    def submit(self, iterations: Any, repetitions: Any) -> None:
         read = submission.submit_experiment(self.store, spec(iterations, repetitions))
         made = [Repetition() for _ in range(repetitions)]
         self.experiments.append(Experiment(read.id, iterations, made))
 
     @precondition(lambda self: self.experiments)
     @rule(pick=picks, verb=st.sampled_from([Verb.PAUSE, Verb.RESUME, Verb.STOP, Verb.PAUSE, Verb.RESUME, Verb.CANCEL]))
-    def ask(self, pick, verb):
+    def ask(self, pick: Any, verb: Any) -> None:
         experiment = self.one_of(self.experiments, pick)
         held = self.claims()
         if experiment.state not in PERMITTED[verb]:
@@ -154,7 +156,7 @@ class LifeCycle(RuleBasedStateMachine):
 
     @precondition(lambda self: any(each.state is State.COMPLETED for each in self.experiments))
     @rule(pick=picks, iterations=st.integers(1, MOST_ITERATIONS), repetitions=st.integers(1, MOST_REPETITIONS))
-    def extend(self, pick, iterations, repetitions):
+    def extend(self, pick: Any, iterations: Any, repetitions: Any) -> None:
         experiment = self.one_of([each for each in self.experiments if each.state is State.COMPLETED], pick)
         totals = ExtensionSpec(iterations=iterations, repetitions=repetitions)
         new = repetitions - len(experiment.repetitions)
@@ -176,7 +178,7 @@ class LifeCycle(RuleBasedStateMachine):
         extension.extend_experiment(self.store, experiment.id, totals)
 
     @rule(limit=st.integers(1, 3))
-    def claim(self, limit):
+    def claim(self, limit: Any) -> None:
         able = [each for each in self.experiments if each.state in (State.QUEUED, State.RUNNING)]
         queued = sum(len(each.of(State.QUEUED)) for each in able)
         claims = execution.claim(self.store, "a worker", limit)
@@ -192,7 +194,7 @@ class LifeCycle(RuleBasedStateMachine):
 
     @precondition(lambda self: self.running())
     @rule(pick=picks, count=st.integers(1, 6), again=st.booleans())
-    def work(self, pick, count, again):
+    def work(self, pick: Any, count: Any, again: Any) -> None:
         """The next steps by the real loop from the stored log; some are delivered a second time with them."""
         experiment, each = self.one_of(self.running(), pick)
         claim = each.claim
@@ -216,7 +218,7 @@ class LifeCycle(RuleBasedStateMachine):
 
     @precondition(lambda self: self.running())
     @rule(pick=picks)
-    def complete(self, pick):
+    def complete(self, pick: Any) -> None:
         experiment, each = self.one_of(self.running(), pick)
         if each.steps < length(experiment.iterations):
             with pytest.raises(Conflict):
@@ -226,14 +228,14 @@ class LifeCycle(RuleBasedStateMachine):
 
     @precondition(lambda self: self.running())
     @rule(pick=picks, seldom=st.integers(0, 3))
-    def fail(self, pick, seldom):
+    def fail(self, pick: Any, seldom: Any) -> None:
         if not seldom:
             experiment, each = self.one_of(self.running(), pick)
-            self.end(experiment, each, State.FAILED, Ending.FAILED, lambda *held: execution.fail(*held, "broken"))
+            self.end(experiment, each, State.FAILED, Ending.FAILED, lambda *held: execution.fail(*held, "broken"))  # type: ignore[call-arg]
 
     @precondition(lambda self: self.running())
     @rule(pick=picks)
-    def hand_back(self, pick):
+    def hand_back(self, pick: Any) -> None:
         experiment, each = self.one_of(self.running(), pick)
         asked = {State.PAUSING: Ending.PAUSED, State.STOPPING: Ending.STOPPED}
         ending = asked.get(experiment.state, Ending.HANDED_BACK)
@@ -241,16 +243,16 @@ class LifeCycle(RuleBasedStateMachine):
 
     @precondition(lambda self: self.running())
     @rule(pick=picks)
-    def crash(self, pick):
+    def crash(self, pick: Any) -> None:
         """The worker of one is killed, and its supervisor says so."""
         experiment, each = self.one_of(self.running(), pick)
         each.losses += 1
         state = State.FAILED if each.losses == 5 else State.QUEUED
-        self.end(experiment, each, state, Ending.LOST, lambda *held: execution.release(*held, "killed"))
+        self.end(experiment, each, state, Ending.LOST, lambda *held: execution.release(*held, "killed"))  # type: ignore[call-arg]
 
     @precondition(lambda self: self.running())
     @rule()
-    def restart(self):
+    def restart(self) -> None:
         """Everything that ran is forgotten; a new supervisor finds the leases run out."""
         held = self.running()
         assert execution.requeue_lost(self.store, stale_after_s=-1) == len(held)
@@ -262,7 +264,7 @@ class LifeCycle(RuleBasedStateMachine):
 
     @precondition(lambda self: self.gone)
     @rule(pick=picks)
-    def wake_up_late(self, pick):
+    def wake_up_late(self, pick: Any) -> None:
         """Who holds no more can change nothing, whatever it tries."""
         late = self.one_of(self.gone, pick)
         (following,) = [step for _, step in zip(range(1), repetition(setting(late.spec, late.number)), strict=False)]
@@ -273,27 +275,27 @@ class LifeCycle(RuleBasedStateMachine):
         assert not execution.hand_back(self.store, late)
         assert execution.heartbeat(self.store, [late]) == ()
 
-    def end(self, experiment, each, state, ending, how):
+    def end(self, experiment: Any, each: Any, state: Any, ending: Any, how: Any) -> None:
         self.gone.append(each.claim)
         assert how(self.store, each.claim)
         each.leave(state, ending)
         experiment.settle()
 
-    def stored(self, experiment):
+    def stored(self, experiment: Any) -> Any:
         """The row and the log of each repetition."""
-        with self.store.reading() as session:
+        with self.store.reading() as session:  # type: ignore[attr-defined]
             return self.read(session, experiment)
 
-    def read(self, session, experiment):
+    def read(self, session: Any, experiment: Any) -> Any:
         of_this = session.query(RepetitionRow).filter_by(experiment_id=experiment.id)
         rows = of_this.order_by(RepetitionRow.number).all()
         found = logs(session, [row.id for row in rows])
         return [(row, found[row.id]) for row in rows]
 
     @invariant()
-    def the_store_says_what_the_model_says(self):
+    def the_store_says_what_the_model_says(self) -> None:
         for experiment in self.experiments:
-            with self.store.reading() as session:
+            with self.store.reading() as session:  # type: ignore[attr-defined]
                 row, found = session.get_one(ExperimentRow, experiment.id), self.read(session, experiment)
                 ids = [each.id for each, _ in found]
                 tried = session.query(AttemptRow).where(AttemptRow.repetition_id.in_(ids)).order_by(AttemptRow.epoch)
@@ -303,7 +305,7 @@ class LifeCycle(RuleBasedStateMachine):
             for each, log in found:
                 self.no_step_is_missing_or_there_twice_and_old_ones_stand(each, log)
 
-    def compare(self, experiment, row, repetitions):
+    def compare(self, experiment: Any, row: Any, repetitions: Any) -> None:
         expected = experiment.repetitions
         assert row.state is experiment.state
         assert (row.ended_at is not None) == (row.state in ENDS)
@@ -316,18 +318,18 @@ class LifeCycle(RuleBasedStateMachine):
             assert state is before or before.may_become(state), (which, before, state)
             self.states[experiment.id, which] = state
 
-    def no_step_is_missing_or_there_twice_and_old_ones_stand(self, row, log):
+    def no_step_is_missing_or_there_twice_and_old_ones_stand(self, row: Any, log: Any) -> None:
         assert tuple(map(flat, log)) == whole(row.number)[: row.steps]
         assert row.steps >= self.kept.get(row.id, 0)
         self.kept[row.id] = row.steps
 
-    def teardown(self):
+    def teardown(self) -> None:
         for each in self.experiments:
             with suppress(Conflict):
                 lifecycle.ask_experiment(self.store, each.id, Verb.CANCEL)
 
 
-def drive(store, examples, steps):
+def drive(store: Store, examples: Any, steps: Any) -> None:
     machine = type("OnThisStore", (LifeCycle,), {"store": store})
     chosen = settings(
         max_examples=examples,
@@ -339,9 +341,9 @@ def drive(store, examples, steps):
     run_state_machine_as_test(machine, settings=chosen)
 
 
-def test_any_order_of_events_on_sqlite(sqlite_store):
+def test_any_order_of_events_on_sqlite(sqlite_store: Store) -> None:
     drive(sqlite_store, examples=25, steps=40)
 
 
-def test_any_order_of_events_on_postgres(postgres_store):
+def test_any_order_of_events_on_postgres(postgres_store: Store) -> None:
     drive(postgres_store, examples=5, steps=30)

@@ -5,6 +5,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Barrier
+from typing import Any
 
 import psycopg
 import pytest
@@ -23,14 +24,14 @@ class Killed(Exception):
     """Stands for the end of the process."""
 
 
-def claim_anew(store, claim):
+def claim_anew(store: Store, claim: Any) -> Any:
     """The only repetition as the next supervisor finds it; handed back any number of times, it is never given up."""
     assert execution.hand_back(store, claim)
     (claim,) = execution.claim(store, "again", 1)
     return claim
 
 
-def log_of(store):
+def log_of(store: Store) -> Any:
     """The log of the only repetition, and a new claim of it."""
     execution.requeue_lost(store, stale_after_s=-1)  # even what was recorded within the clock's last millisecond
     (claim,) = execution.claim(store, "again", 1)
@@ -38,7 +39,7 @@ def log_of(store):
 
 
 @pytest.mark.parametrize("steps", range(1, 6))
-def test_a_kill_between_any_two_statements_leaves_nothing_half_written(store, steps):
+def test_a_kill_between_any_two_statements_leaves_nothing_half_written(store: Store, steps: Any) -> None:
     submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     log = list(some_log())[: steps + 3]
@@ -62,17 +63,17 @@ def test_a_kill_between_any_two_statements_leaves_nothing_half_written(store, st
 class KilledAtStatement:
     """Raises at the statement of that number, and says whether it did."""
 
-    def __init__(self, store, number):
-        self.engine, self.left, self.hits = store._engine, number, []
+    def __init__(self, store: Store, number: Any) -> None:
+        self.engine, self.left, self.hits = store._engine, number, []  # type: ignore[var-annotated]
 
-    def __enter__(self):
+    def __enter__(self) -> Any:
         event.listen(self.engine, "before_cursor_execute", self.strike)
         return self.hits
 
-    def __exit__(self, *error):
+    def __exit__(self, *error: Any) -> None:
         event.remove(self.engine, "before_cursor_execute", self.strike)
 
-    def strike(self, connection, cursor, statement, *rest):
+    def strike(self, connection: Any, cursor: Any, statement: Any, *rest: Any) -> None:
         if statement.startswith(("BEGIN", "SELECT 1")):
             return
         if self.left == 0:
@@ -81,7 +82,7 @@ class KilledAtStatement:
         self.left -= 1
 
 
-def record_or_die(store, claim, step):
+def record_or_die(store: Store, claim: Any, step: Any) -> str:
     try:
         execution.record(store, claim, step)
     except Killed:
@@ -102,7 +103,7 @@ for count, step in enumerate(some_log(30), start=1):
 """
 
 
-def test_what_was_acknowledged_survives_kill_9(sqlite_url, sqlite_store):
+def test_what_was_acknowledged_survives_kill_9(sqlite_url: str, sqlite_store: Store) -> None:
     submission.submit_experiment(sqlite_store, toy(repetitions=1, iterations=30))
     root = Path(__file__).parents[2]
 
@@ -115,7 +116,7 @@ def test_what_was_acknowledged_survives_kill_9(sqlite_url, sqlite_store):
     assert same(log, tuple(some_log(30))[: len(log)])
 
 
-def test_on_sqlite_a_commit_returns_when_no_power_loss_can_undo_it(sqlite_store):
+def test_on_sqlite_a_commit_returns_when_no_power_loss_can_undo_it(sqlite_store: Store) -> None:
     with sqlite_store.reading() as session:
         journal, synchronous = (session.scalar(text(f"PRAGMA {name}")) for name in ("journal_mode", "synchronous"))
 
@@ -123,12 +124,12 @@ def test_on_sqlite_a_commit_returns_when_no_power_loss_can_undo_it(sqlite_store)
     assert synchronous == 2  # FULL
 
 
-def test_a_commit_whose_answer_was_lost_is_delivered_again_without_harm(store):
+def test_a_commit_whose_answer_was_lost_is_delivered_again_without_harm(store: Store) -> None:
     submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "me", 1)
     first, *_ = some_log()
 
-    def lose_the_answer(session):
+    def lose_the_answer(session: Any) -> None:
         raise Killed
 
     event.listen(store._writer, "after_commit", lose_the_answer)
@@ -140,10 +141,10 @@ def test_a_commit_whose_answer_was_lost_is_delivered_again_without_harm(store):
     assert same(log_of(store).log, (first,))
 
 
-def test_writers_wait_for_each_other(store):
+def test_writers_wait_for_each_other(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy()).id
 
-    def rename(number):
+    def rename(number: Any) -> None:
         with store.transaction() as session:
             session.execute(text("SELECT name FROM experiment"))
             session.execute(text("UPDATE experiment SET position = position + 1 WHERE id = :id"), {"id": experiment})
@@ -155,7 +156,7 @@ def test_writers_wait_for_each_other(store):
         assert session.scalar(text("SELECT position FROM experiment")) == 24
 
 
-def test_a_read_sees_one_moment(postgres_store):
+def test_a_read_sees_one_moment(postgres_store: Store) -> None:
     with postgres_store.reading() as session:
         before = session.scalar(text("SELECT count(*) FROM experiment"))
         submission.submit_experiment(postgres_store, toy())
@@ -164,12 +165,12 @@ def test_a_read_sees_one_moment(postgres_store):
     assert before == after == 0
 
 
-def test_a_deadlock_is_tried_again(postgres_store):
+def test_a_deadlock_is_tried_again(postgres_store: Store) -> None:
     ids = [submission.submit_experiment(postgres_store, toy()).id for _ in range(2)]
     together, attempts = Barrier(2), []
 
-    def lock_both(order):
-        def work(session):
+    def lock_both(order: Any) -> Any:
+        def work(session: Any) -> Any:
             first_time = order not in attempts
             attempts.append(order)
             lock(session, [order[0]])
@@ -188,7 +189,7 @@ def test_a_deadlock_is_tried_again(postgres_store):
     assert len(attempts) >= 3
 
 
-def test_the_store_recovers_from_lost_connections(postgres_store):
+def test_the_store_recovers_from_lost_connections(postgres_store: Store) -> None:
     submission.submit_experiment(postgres_store, toy())
     url = postgres_store._engine.url.set(drivername="postgresql").render_as_string(hide_password=False)
 
@@ -201,16 +202,18 @@ def test_the_store_recovers_from_lost_connections(postgres_store):
     assert len(listing.list_experiments(postgres_store).items) == 1
 
 
-def test_a_connection_lost_in_the_midst_is_unavailability(postgres_store):
+def test_a_connection_lost_in_the_midst_is_unavailability(postgres_store: Store) -> None:
     with pytest.raises(StoreUnavailable, match="cannot be used now"), postgres_store.transaction() as session:
         session.execute(text("SELECT pg_terminate_backend(pg_backend_pid())"))
 
 
 @pytest.mark.parametrize("use", [listing.list_studies, lambda store: execution.claim(store, "me", 1)])
-def test_to_have_no_connection_free_is_unavailability(sqlite_store, monkeypatch, use):
+def test_to_have_no_connection_free_is_unavailability(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, use: Any
+) -> None:
     pool = sqlite_store._engine.pool
     monkeypatch.setattr(pool, "_timeout", 0.01)
-    taken = [sqlite_store._engine.connect() for _ in range(pool.size() + pool._max_overflow)]
+    taken = [sqlite_store._engine.connect() for _ in range(pool.size() + pool._max_overflow)]  # type: ignore[attr-defined]
 
     with pytest.raises(StoreUnavailable, match="all connections"):
         use(sqlite_store)
@@ -220,7 +223,7 @@ def test_to_have_no_connection_free_is_unavailability(sqlite_store, monkeypatch,
         each.close()
 
 
-def test_an_unreachable_database_is_unavailable_and_recovers_by_itself(tmp_path):
+def test_an_unreachable_database_is_unavailable_and_recovers_by_itself(tmp_path: Path) -> None:
     folder = tmp_path / "not-yet"
     url = f"sqlite:///{folder / 'gaplab.db'}"
     store = Store(url)
@@ -235,7 +238,7 @@ def test_an_unreachable_database_is_unavailable_and_recovers_by_itself(tmp_path)
 
 
 @pytest.mark.parametrize("use", [Store.check, listing.list_studies, lambda store: execution.claim(store, "me", 1)])
-def test_an_unreachable_server_is_unavailable_and_the_message_has_no_password(use):
+def test_an_unreachable_server_is_unavailable_and_the_message_has_no_password(use: Any) -> None:
     store = Store("postgresql://me:secret@127.0.0.1:1/none")
 
     with pytest.raises(StoreUnavailable) as caught:
@@ -245,7 +248,7 @@ def test_an_unreachable_server_is_unavailable_and_the_message_has_no_password(us
 
 
 @pytest.mark.parametrize("use", [Store.check, listing.list_studies, lambda store: execution.claim(store, "me", 1)])
-def test_a_database_without_the_schema_is_unavailable(database_url, use):
+def test_a_database_without_the_schema_is_unavailable(database_url: str, use: Any) -> None:
     store = Store(database_url)
 
     with pytest.raises(StoreUnavailable):
@@ -254,7 +257,7 @@ def test_a_database_without_the_schema_is_unavailable(database_url, use):
     store.dispose()
 
 
-def test_a_file_that_is_no_database_is_unavailable(tmp_path):
+def test_a_file_that_is_no_database_is_unavailable(tmp_path: Path) -> None:
     file = tmp_path / "gaplab.db"
     file.write_text("no database " * 1000)
     store = Store(f"sqlite:///{file}")
@@ -266,12 +269,12 @@ def test_a_file_that_is_no_database_is_unavailable(tmp_path):
 
 
 @pytest.mark.parametrize("url", ["nonsense", "mysql://me@host/db", ""])
-def test_a_url_of_no_known_database_is_refused(url):
+def test_a_url_of_no_known_database_is_refused(url: Any) -> None:
     with pytest.raises(StoreUnavailable):
         Store(url)
 
 
-def test_sqlite_is_set_to_lose_nothing(sqlite_store):
+def test_sqlite_is_set_to_lose_nothing(sqlite_store: Store) -> None:
     with sqlite_store.reading() as session:
         found = {
             name: session.scalar(text(f"PRAGMA {name}")) for name in ("synchronous", "foreign_keys", "busy_timeout")

@@ -4,9 +4,10 @@ What is asked is read from the supervisor's own source, so that nothing new is f
 """
 
 import ast
+import shutil
 from functools import partial
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import pytest
 from ray.exceptions import RayTaskError, WorkerCrashedError
@@ -21,6 +22,7 @@ from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.store.models import CheckpointRow, RepetitionRow, SensitivityRow
 from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.session import Store
 from gaplab.workers import repetitions, supervisor
 from gaplab.workers import sensitivity as checking
 from gaplab.workers.checkpoints import recorded
@@ -31,7 +33,7 @@ from tests.without_ray import OPEN, SPEC, Here, HereRepetitions, HereRun, Stop
 MODULES = {"execution": execution, "sensitivity": sensitivity}
 
 
-def asked_by_the_supervisor():
+def asked_by_the_supervisor() -> Any:
     """Every `execution.…(…)` and `sensitivity.…(…)` in the workers' source."""
     found = set()
     for path in (Path(__file__).parents[2] / "workers").glob("*.py"):
@@ -45,11 +47,11 @@ def asked_by_the_supervisor():
 class Troubled(HereRun):
     """A run whose worker is lost, or whose code raises."""
 
-    def __init__(self, claim, stream, trouble):
+    def __init__(self, claim: Any, stream: Any, trouble: Any) -> None:
         super().__init__(claim, stream)
         self.trouble = trouble
 
-    def receive(self):
+    def receive(self) -> None:
         self.begun = True
         self.lost, self.failed = ("the worker was lost", None) if self.trouble == "lost" else (None, "it is broken")
 
@@ -57,7 +59,7 @@ class Troubled(HereRun):
 class TryingRepetitions(HereRepetitions):
     """Everything that may happen to a repetition: the second of the first experiment loses its first worker."""
 
-    def launch(self, claim):
+    def launch(self, claim: Any) -> Any:
         stream = batches(recorded(setting(claim.spec, claim.number), claim.log, claim.checkpoints, 0.0))
         if claim.spec.name == "broken":
             return Troubled(claim, stream, "failed")
@@ -72,10 +74,10 @@ class Trying(Here):
 
     repetitions = TryingRepetitions
     lost = False
-    late: ClassVar = set()
+    late: ClassVar = set()  # type: ignore[var-annotated]
     """The modules whose leases have run out: much time passes before each supervisor, and none while it works."""
 
-    def __init__(self, store):
+    def __init__(self, store: Store) -> None:
         super().__init__(store)
         self._checks = checking.Checks(store, self._owner)
         Trying.late = set(MODULES.values())
@@ -84,22 +86,22 @@ class Trying(Here):
 class Ray:
     """In the place of Ray for sensitivity checks: the first loses its worker, others take two looks."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.looks = 0
         self.lost = False
 
-    def remote(self, spec, expected):
+    def remote(self, spec: Any, expected: Any) -> Any:
         self.looks = 2
         return spec
 
-    def wait(self, refs, timeout):
+    def wait(self, refs: Any, timeout: Any) -> Any:
         self.looks -= 1
         return (refs, []) if self.looks < 0 else ([], refs)
 
-    def cancel(self, ref, force):
+    def cancel(self, ref: Any, force: Any) -> None:
         """It is no longer ours."""
 
-    def get(self, spec):
+    def get(self, spec: Any) -> Any:
         if not self.lost:
             self.lost = True
             raise WorkerCrashedError
@@ -108,7 +110,7 @@ class Ray:
         return check(subject(spec), SteadyState(), Effort(spec.points, spec.evaluations))
 
 
-def unfinished(store):
+def unfinished(store: Store) -> Any:
     with store.reading() as session:
         return [
             row
@@ -123,13 +125,14 @@ BROKEN = ExperimentSpec.model_validate(
 )
 
 
-def outcome(store):
+def outcome(store: Store) -> Any:
     """What came of everything, after supervisors that are stopped and started until all has ended."""
     names = {submission.submit_experiment(store, each).id: each.name for each in (SPEC, BROKEN)}
     rounds = 0
     while unfinished(store):
         assert rounds < 100
-        Trying(store).serve(Stop(12 if rounds else 2))  # the first is stopped while a check is under way
+        # the first is stopped while a check is under way
+        Trying(store).serve(Stop(12 if rounds else 2))  # type: ignore[arg-type]
         rounds += 1
     with store.reading() as session:
         rows = session.query(RepetitionRow).all()
@@ -143,15 +146,14 @@ def outcome(store):
     return repetitions, checks
 
 
-def requeue_late(module, requeue_lost, store, **_):
+def requeue_late(module: Any, requeue_lost: Any, store: Store, **_: Any) -> Any:
     found = requeue_lost(store, stale_after_s=-1.0) if module in Trying.late else 0
     Trying.late.discard(module)
     return found
 
 
-@pytest.fixture(autouse=True)
-def quick(monkeypatch):
-    """Nothing waits for the clock, and no lease depends on it."""
+def hurry(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let nothing wait for the clock, and no lease depend on it."""
     for name, value in {"HEARTBEATS": 1e9, "RETRY_S": 0.0}.items():
         monkeypatch.setattr(supervisor, name, value)
     monkeypatch.setattr(repetitions, "WAIT_S", 0.0)
@@ -164,26 +166,30 @@ def quick(monkeypatch):
     monkeypatch.setattr(Trying, "lost", False)
 
 
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    hurry(monkeypatch)
+
+
 @pytest.fixture(scope="module")
-def undisturbed():
-    """What comes of it without faults; computed by the first test that wants it."""
-    return []
+def undisturbed(sqlite_template: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The outcome without faults."""
+    store = Store(f"sqlite:///{shutil.copy(sqlite_template, tmp_path_factory.mktemp('undisturbed'))}")
+    with pytest.MonkeyPatch.context() as patch:
+        hurry(patch)
+        found = outcome(store)
+    store.dispose()
+    return found
 
 
-def expected(undisturbed, store):
-    if not undisturbed:
-        undisturbed.append(outcome(store))
-    return undisturbed[0]
-
-
-def test_without_faults_all_that_may_happen_happens(sqlite_store, undisturbed):
-    repetitions, checks = expected(undisturbed, sqlite_store)
+def test_without_faults_all_that_may_happen_happens(undisturbed: Any) -> None:
+    repetitions, checks = undisturbed
 
     assert [state for state, *_ in repetitions.values()] == [State.COMPLETED, State.COMPLETED, State.FAILED]
     assert [state for state, _ in checks] == [State.COMPLETED, State.FAILED]
 
 
-def times_out_at_first(claims, answer):
+def times_out_at_first(claims: Any, answer: Any) -> Any:
     claims.append(answer)
     if len(claims) == 1:
         msg = "it did it, and timed out"
@@ -193,10 +199,12 @@ def times_out_at_first(claims, answer):
 
 @pytest.mark.parametrize("when", ["before", "after"])
 @pytest.mark.parametrize(("module", "name"), asked_by_the_supervisor())
-def test_a_fault_of_the_store_loses_nothing_and_does_nothing_twice(store, undisturbed, monkeypatch, module, name, when):
+def test_a_fault_of_the_store_loses_nothing_and_does_nothing_twice(
+    store: Store, undisturbed: Any, monkeypatch: pytest.MonkeyPatch, module: Any, name: Any, when: Any
+) -> None:
     ask, calls = getattr(MODULES[module], name), []
 
-    def faulty(*arguments, **named):
+    def faulty(*arguments: Any, **named: Any) -> Any:
         calls.append(name)
         fault = len(calls) % 4 in {1, 2}
         if fault and when == "before":
@@ -210,8 +218,8 @@ def test_a_fault_of_the_store_loses_nothing_and_does_nothing_twice(store, undist
 
     monkeypatch.setattr(MODULES[module], name, faulty)
     if name == "hand_back_unheard":  # is asked only when a claim could not be heard of
-        claim, claims = execution.claim, []
+        claim, claims = execution.claim, []  # type: ignore[var-annotated]
         monkeypatch.setattr(execution, "claim", lambda *arguments: times_out_at_first(claims, claim(*arguments)))
 
-    assert outcome(store) == undisturbed[0]
+    assert outcome(store) == undisturbed
     assert calls

@@ -6,10 +6,12 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.settings import Settings
+from gaplab.services.store.session import Store
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import toy
@@ -17,7 +19,7 @@ from tests.experiments import toy
 DEADLINE_S = 180
 
 
-def raylet_of(process):
+def raylet_of(process: Any) -> Any:
     """The raylet that a process started, once it is there."""
     for path in Path(f"/proc/{process.pid}/task").glob("*/children"):
         for child in path.read_text().split():
@@ -26,7 +28,7 @@ def raylet_of(process):
     return None
 
 
-def test_a_supervisor_whose_ray_died_ends_so_that_another_is_started(sqlite_url, tmp_path):
+def test_a_supervisor_whose_ray_died_ends_so_that_another_is_started(sqlite_url: str, tmp_path: Path) -> None:
     environment = os.environ | {"GAPLAB_DATABASE_URL": sqlite_url, "GAPLAB_WORKERS": "1"}
     log, deadline = tmp_path / "log", time.monotonic() + DEADLINE_S
     with log.open("wb") as output:
@@ -42,7 +44,7 @@ def test_a_supervisor_whose_ray_died_ends_so_that_another_is_started(sqlite_url,
     assert "Ray died on this machine" in log.read_text()
 
 
-def test_work_goes_to_another_when_its_holder_was_silent_for_as_long_as_a_lease_is_set_to(store):
+def test_work_goes_to_another_when_its_holder_was_silent_for_as_long_as_a_lease_is_set_to(store: Store) -> None:
     submission.submit_experiment(store, toy(repetitions=1))
     (claim,) = execution.claim(store, "silent", 1)
     patient, hasty = (Supervisor(store, lambda: 0, lease_s=lease_s) for lease_s in (60, 0.2))

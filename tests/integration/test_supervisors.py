@@ -5,10 +5,12 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 import pytest
 
@@ -22,6 +24,7 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.session import Store
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import cancel
@@ -33,12 +36,12 @@ DEADLINE_S = 180
 
 
 @pytest.fixture(scope="module", autouse=True)
-def ray_of_our_own():
+def ray_of_our_own() -> Iterator[None]:
     with cluster(Settings(workers=2)):
         yield
 
 
-def spec(repetitions, controller_evaluations=200):
+def spec(repetitions: Any, controller_evaluations: Any = 200) -> Any:
     """Work enough in each repetition for something to happen meanwhile."""
     budget = {"controller_evaluations": controller_evaluations, "selection_evaluations": 60}
     return ExperimentSpec.model_validate(
@@ -53,34 +56,34 @@ def spec(repetitions, controller_evaluations=200):
 
 
 @cache
-def expected(repetitions):
+def expected(repetitions: Any) -> Any:
     resolved = resolve_experiment(spec(repetitions))
     return [[flat(step) for step in repetition(setting(resolved, number))] for number in range(repetitions)]
 
 
-def stored(store, experiment):
+def stored(store: Store, experiment: Any) -> Any:
     with store.reading() as session:
         rows = session.query(RepetitionRow).filter_by(experiment_id=experiment).order_by(RepetitionRow.number).all()
         found = logs(session, [row.id for row in rows])
         return [[flat(step) for step in found[row.id]] for row in rows]
 
 
-def wait(until, do=lambda: time.sleep(0.1)):
+def wait(until: Any, do: Any = lambda: time.sleep(0.1)) -> None:
     deadline = time.monotonic() + DEADLINE_S
     while not until():
         assert time.monotonic() < deadline
         do()
 
 
-def state(store, experiment):
+def state(store: Store, experiment: Any) -> Any:
     return reading.read_experiment(store, experiment).state
 
 
-def attempts(store, experiment, repetitions):
+def attempts(store: Store, experiment: Any, repetitions: Any) -> Any:
     return [each for number in range(repetitions) for each in reading.list_attempts(store, experiment, number)]
 
 
-def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numbers(store):
+def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numbers(store: Store) -> None:
     experiment = submission.submit_experiment(store, spec(3)).id
     supervisor = Supervisor(store, lambda: 3)
     wait(lambda: len(stored(store, experiment)[0]) > 1, supervisor.step)
@@ -100,7 +103,7 @@ def test_a_paused_experiment_gives_its_cores_back_and_goes_on_with_the_same_numb
     assert Ending.PAUSED in {each.ending for each in attempts(store, experiment, 3)}
 
 
-def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sqlite_store):
+def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, spec(3)).id
     supervisor = Supervisor(sqlite_store, lambda: 3)
     done = lambda: reading.read_experiment(sqlite_store, experiment).progress.iterations_done  # noqa: E731
@@ -116,7 +119,7 @@ def test_a_stopped_experiment_is_completed_with_the_steps_that_were_under_way(sq
     wait(lambda: not (supervisor.busy or processes_of_ray("run")), supervisor.step)
 
 
-def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite_store):
+def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite_store: Store) -> None:
     large = submission.submit_experiment(sqlite_store, spec(8)).id
     supervisor = Supervisor(sqlite_store, lambda: 4)
     wait(lambda: len(stored(sqlite_store, large)[0]) > 1, supervisor.step)
@@ -130,7 +133,7 @@ def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite
     assert sum(begun) <= 4  # the two that ran, and who had the cores that they left
 
 
-def test_two_supervisors_on_one_database_do_nothing_twice(store):
+def test_two_supervisors_on_one_database_do_nothing_twice(store: Store) -> None:
     ids = [submission.submit_experiment(store, spec(2)).id for _ in range(2)]
     stop = Event()
 
@@ -149,7 +152,7 @@ def test_two_supervisors_on_one_database_do_nothing_twice(store):
 
 
 @pytest.fixture
-def other(store_url, tmp_path):
+def other(store_url: str, tmp_path: Path) -> Iterator[Any]:
     """A supervisor in a process of its own, with a Ray of its own, and what it says."""
     said = tmp_path / "other.log"
     with said.open("w") as log:
@@ -168,7 +171,9 @@ def other(store_url, tmp_path):
         process.kill()
 
 
-def test_a_supervisor_that_slept_past_its_lease_writes_nothing_any_more(store, other, monkeypatch):
+def test_a_supervisor_that_slept_past_its_lease_writes_nothing_any_more(
+    store: Store, other: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     impatient(monkeypatch.setattr)
     process, said = other
     experiment = submission.submit_experiment(store, spec(2)).id

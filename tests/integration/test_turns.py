@@ -1,23 +1,26 @@
 """Whose turn it is, on both databases: priority, then fairness, then age; and who gives way."""
 
+from typing import Any
+
 from sqlalchemy import text
 
 from gaplab.schemas.schedule import ScheduleChange
 from gaplab.services.experiments import lifecycle, reading, submission
 from gaplab.services.running import execution, turns
+from gaplab.services.store.session import Store
 from tests.experiments import run, toy
 
 
-def submitted(store, **changes):
+def submitted(store: Store, **changes: Any) -> Any:
     return submission.submit_experiment(store, toy(**changes)).id
 
 
-def claimed(store, limit):
+def claimed(store: Store, limit: Any) -> Any:
     """Experiment and number of each, in the order in which they are given out."""
     return [(each.experiment_id, each.number) for each in execution.claim(store, "me", limit)]
 
 
-def test_experiments_take_turns_and_their_repetitions_come_in_order(store):
+def test_experiments_take_turns_and_their_repetitions_come_in_order(store: Store) -> None:
     first, second = submitted(store), submitted(store, repetitions=2)
 
     found = [*claimed(store, 3), *claimed(store, 9)]
@@ -26,7 +29,7 @@ def test_experiments_take_turns_and_their_repetitions_come_in_order(store):
     assert claimed(store, 9) == []
 
 
-def test_who_has_the_fewest_running_is_next(store):
+def test_who_has_the_fewest_running_is_next(store: Store) -> None:
     large = submitted(store, repetitions=9)
     claims = execution.claim(store, "me", 4)
     small = submitted(store, repetitions=2)
@@ -40,7 +43,7 @@ def test_who_has_the_fewest_running_is_next(store):
     assert later == [(large, 5)]
 
 
-def test_the_higher_priority_comes_first_whatever_runs(store):
+def test_the_higher_priority_comes_first_whatever_runs(store: Store) -> None:
     usual, urgent, idle = (submitted(store, priority=each) for each in (0, 10, -10))
 
     found = claimed(store, 9)
@@ -48,7 +51,7 @@ def test_the_higher_priority_comes_first_whatever_runs(store):
     assert found == [(each, number) for each in (urgent, usual, idle) for number in range(3)]
 
 
-def test_no_more_than_max_parallel_run_at_once(store):
+def test_no_more_than_max_parallel_run_at_once(store: Store) -> None:
     narrow = submitted(store, max_parallel=2, repetitions=4)
     claims = execution.claim(store, "me", 9)
     wide = submitted(store, repetitions=1)
@@ -61,7 +64,7 @@ def test_no_more_than_max_parallel_run_at_once(store):
     assert claimed(store, 9) == [(narrow, 2)]
 
 
-def test_the_schedule_can_be_changed_and_is_shown_and_the_spec_is_as_it_was(store):
+def test_the_schedule_can_be_changed_and_is_shown_and_the_spec_is_as_it_was(store: Store) -> None:
     first, second = submitted(store, max_parallel=1), submitted(store)
     spec = reading.read_experiment(store, second).spec
 
@@ -73,13 +76,13 @@ def test_the_schedule_can_be_changed_and_is_shown_and_the_spec_is_as_it_was(stor
     assert claimed(store, 5) == [*((second, n) for n in range(3)), (first, 0), (first, 1)]
 
 
-def test_two_experiments_that_differ_only_in_their_schedule_have_one_spec(store):
+def test_two_experiments_that_differ_only_in_their_schedule_have_one_spec(store: Store) -> None:
     plain, hurried = submitted(store), submitted(store, priority=9, max_parallel=2)
 
     assert reading.read_experiment(store, plain).spec == reading.read_experiment(store, hurried).spec
 
 
-def test_what_waits_for_a_core_gives_way_to_who_has_less(store):
+def test_what_waits_for_a_core_gives_way_to_who_has_less(store: Store) -> None:
     large = submitted(store, repetitions=9)
     running, *waiting = execution.claim(store, "me", 4)
     assert execution.give_way(store, waiting) == ()
@@ -94,7 +97,7 @@ def test_what_waits_for_a_core_gives_way_to_who_has_less(store):
     assert [each.attempts for each in reading.list_repetitions(store, large)][:4] == [1, 1, 1, 0]
 
 
-def test_nobody_gives_way_for_what_would_be_no_fairer(store):
+def test_nobody_gives_way_for_what_would_be_no_fairer(store: Store) -> None:
     submitted(store, repetitions=9)
     submitted(store, repetitions=9)
     waiting = execution.claim(store, "me", 3)
@@ -102,7 +105,7 @@ def test_nobody_gives_way_for_what_would_be_no_fairer(store):
     assert execution.give_way(store, waiting) == ()
 
 
-def test_the_next_turn_is_found_by_an_index(store):
+def test_the_next_turn_is_found_by_an_index(store: Store) -> None:
     submitted(store)
     with store.reading() as session:
         dialect = session.connection().dialect.name

@@ -3,8 +3,10 @@
 import os
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 import pytest
 import ray
@@ -23,6 +25,7 @@ from gaplab.services.specs.assembly import setting, subject
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import CheckpointRow, RepetitionRow
 from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.session import Store
 from gaplab.workers import repetitions as task
 from gaplab.workers import sensitivity as checking
 from gaplab.workers.checkpoints import recorded
@@ -36,12 +39,12 @@ DEADLINE_S = 180
 
 
 @pytest.fixture(scope="module", autouse=True)
-def ray_of_our_own():
+def ray_of_our_own() -> Iterator[None]:
     with cluster(Settings(workers=2)):
         yield
 
 
-def toy(**changes):
+def toy(**changes: Any) -> Any:
     return ExperimentSpec.model_validate(
         {
             "strategy": "simulated_fit_and_informative",
@@ -55,12 +58,12 @@ def toy(**changes):
     )
 
 
-def long_toy():
+def long_toy() -> Any:
     """Some seconds of work in each repetition."""
     return toy(repetitions=2, budget={"controller_evaluations": 3_000, "selection_evaluations": 300}, iterations=1)
 
 
-def run(supervisor, store, experiment, until=lambda: False):
+def run(supervisor: Any, store: Store, experiment: Any, until: Any = lambda: False) -> None:
     """Rounds of the supervisor until the experiment has ended, or something else is so."""
     deadline = time.monotonic() + DEADLINE_S
     while not (reading.read_experiment(store, experiment).state.ended or until()):
@@ -68,12 +71,12 @@ def run(supervisor, store, experiment, until=lambda: False):
         supervisor.step()
 
 
-def expected(spec):
+def expected(spec: Any) -> Any:
     resolved = resolve_experiment(spec)
     return [[flat(step) for step in repetition(setting(resolved, number))] for number in range(resolved.repetitions)]
 
 
-def stored(store, experiment):
+def stored(store: Store, experiment: Any) -> Any:
     """The logs of an experiment's repetitions, as the supervisor after this one would read them."""
     with store.reading() as session:
         rows = session.query(RepetitionRow).filter_by(experiment_id=experiment).order_by(RepetitionRow.number).all()
@@ -82,7 +85,7 @@ def stored(store, experiment):
 
 
 @pytest.mark.parametrize("at_once", [1, 2, 4])
-def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store, at_once):
+def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store: Store, at_once: Any) -> None:
     experiment = submission.submit_experiment(store, toy()).id
 
     run(Supervisor(store, lambda: at_once), store, experiment)
@@ -91,7 +94,7 @@ def test_the_numbers_do_not_depend_on_how_many_repetitions_run_at_once(store, at
     assert stored(store, experiment) == expected(toy())
 
 
-def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store):
+def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, long_toy()).id
     supervisor = Supervisor(sqlite_store, lambda: 1)
     run(supervisor, sqlite_store, experiment, until=lambda: processes_of_ray("run"))
@@ -107,9 +110,11 @@ def test_a_worker_killed_in_the_middle_costs_no_result(sqlite_store):
     assert stored(sqlite_store, experiment) == expected(long_toy())
 
 
-def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others_go_on(sqlite_store, monkeypatch):
+def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others_go_on(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-    def raising(claim, expected, checkpoint_s):
+    def raising(claim: Any, expected: Any, checkpoint_s: Any) -> Iterator[Any]:
         if claim.number == 1:
             msg = "the second one is broken"
             raise ZeroDivisionError(msg)
@@ -127,11 +132,11 @@ def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others
     assert read.reasons == ("ZeroDivisionError: the second one is broken",)
 
 
-def delivering(left_out, attempts):
+def delivering(left_out: Any, attempts: Any) -> Any:
     """A task whose repetition 1 leaves out some of what it has done in its first attempts."""
 
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-    def task_(claim, expected, checkpoint_s):
+    def task_(claim: Any, expected: Any, checkpoint_s: Any) -> Iterator[Any]:
         delivered = list(recorded(setting(claim.spec, claim.number), claim.log, ()))
         if claim.number == 1 and claim.epoch <= attempts:
             del delivered[left_out]
@@ -147,7 +152,9 @@ def delivering(left_out, attempts):
         (slice(-2, None), "it ended too early: repetition 1"),
     ],
 )
-def test_a_repetition_that_its_log_refuses_is_queued_again_alone(sqlite_store, monkeypatch, left_out, reason):
+def test_a_repetition_that_its_log_refuses_is_queued_again_alone(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, left_out: Any, reason: Any
+) -> None:
     monkeypatch.setattr(task, "run", delivering(left_out, attempts=1))
     experiment = submission.submit_experiment(sqlite_store, toy()).id
 
@@ -160,7 +167,9 @@ def test_a_repetition_that_its_log_refuses_is_queued_again_alone(sqlite_store, m
     assert stored(sqlite_store, experiment) == expected(toy())
 
 
-def test_a_repetition_that_its_log_refuses_again_and_again_is_failed_alone(sqlite_store, monkeypatch):
+def test_a_repetition_that_its_log_refuses_again_and_again_is_failed_alone(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(task, "run", delivering(slice(0, 1), attempts=99))
     experiment = submission.submit_experiment(sqlite_store, toy()).id
 
@@ -171,10 +180,12 @@ def test_a_repetition_that_its_log_refuses_again_and_again_is_failed_alone(sqlit
     assert "cannot be recorded" in repetitions[1].error
 
 
-def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_twice(sqlite_store, monkeypatch):
+def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_twice(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     record_all, calls = execution.record_all, []
 
-    def flaky(store, deliveries):
+    def flaky(store: Store, deliveries: Any) -> Any:
         calls.append(1)
         if len(calls) % 3 == 1:
             raise StoreUnavailable("before anything was written")
@@ -199,7 +210,7 @@ def test_a_database_that_is_away_for_a_while_loses_nothing_and_writes_nothing_tw
     assert stored(sqlite_store, experiment) == expected(toy())
 
 
-def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store):
+def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, long_toy()).id
     supervisor = Supervisor(sqlite_store, lambda: 2)
     run(
@@ -219,7 +230,7 @@ def test_cancelling_stops_what_runs_and_keeps_what_is_stored(sqlite_store):
     assert reading.read_experiment(sqlite_store, experiment).progress.iterations_done
 
 
-def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_store):
+def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, toy()).id
     first, stop = Supervisor(sqlite_store, lambda: 2), Event()
     first.step()
@@ -232,21 +243,23 @@ def test_a_supervisor_that_is_told_to_stop_hands_its_work_to_the_next(sqlite_sto
     assert stored(sqlite_store, experiment) == expected(toy())
 
 
-def long_steps():
+def long_steps() -> Any:
     """A step of some seconds, twice."""
     budget = {"controller_evaluations": 4_000, "selection_evaluations": 20, "simulator_evaluations": 20}
     return toy(strategy="random", repetitions=1, budget=budget, iterations=1)
 
 
-def parts_stored(store):
+def parts_stored(store: Store) -> Any:
     with store.reading() as session:
         return session.query(CheckpointRow).count()
 
 
-def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(sqlite_store, monkeypatch):
-    claim, checkpoints = execution.claim, []
+def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    claim, checkpoints = execution.claim, []  # type: ignore[var-annotated]
 
-    def watched(store, owner, limit):
+    def watched(store: Store, owner: Any, limit: Any) -> Any:
         claims = claim(store, owner, limit)
         checkpoints.extend(len(each.checkpoints) for each in claims)
         return claims
@@ -266,7 +279,7 @@ def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(
     assert parts_stored(sqlite_store) == 0
 
 
-def test_told_to_stop_in_the_middle_of_a_step_it_hands_over_what_the_step_has(sqlite_store):
+def test_told_to_stop_in_the_middle_of_a_step_it_hands_over_what_the_step_has(sqlite_store: Store) -> None:
     experiment = submission.submit_experiment(sqlite_store, long_steps()).id
     first, stop = Supervisor(sqlite_store, lambda: 1, checkpoint_s=0.05), Event()
     run(first, sqlite_store, experiment, until=lambda: parts_stored(sqlite_store))
@@ -280,7 +293,7 @@ def test_told_to_stop_in_the_middle_of_a_step_it_hands_over_what_the_step_has(sq
     assert stored(sqlite_store, experiment) == expected(long_steps())
 
 
-def checked(store, check, supervisor):
+def checked(store: Store, check: Any, supervisor: Any) -> Any:
     deadline = time.monotonic() + DEADLINE_S
     while not checks.read(store, check).state.ended:
         assert time.monotonic() < deadline
@@ -288,7 +301,7 @@ def checked(store, check, supervisor):
     return checks.read(store, check)
 
 
-def test_a_sensitivity_check_runs_beside_repetitions_and_tells_the_same_as_in_one_process(store):
+def test_a_sensitivity_check_runs_beside_repetitions_and_tells_the_same_as_in_one_process(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy())
     supervisor = Supervisor(store, lambda: 1)
 
@@ -300,9 +313,9 @@ def test_a_sensitivity_check_runs_beside_repetitions_and_tells_the_same_as_in_on
     assert stored(store, experiment.id) == expected(toy())
 
 
-def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store, monkeypatch):
+def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     @ray.remote(num_cpus=0, max_retries=0)
-    def raising(spec, expected):
+    def raising(spec: Any, expected: Any) -> None:
         msg = "the check is broken"
         raise ZeroDivisionError(msg)
 
@@ -320,14 +333,16 @@ def test_a_sensitivity_check_that_raises_fails_alone(sqlite_store, monkeypatch):
 
 
 @ray.remote(num_cpus=0, max_retries=0)
-def killed_once(spec, mark):
+def killed_once(spec: Any, mark: Any) -> Any:
     if not os.path.exists(mark):
         Path(mark).touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return check(subject(spec), SteadyState(), Effort(spec.points, spec.evaluations))
 
 
-def test_a_sensitivity_check_whose_worker_is_killed_runs_again(sqlite_store, monkeypatch, tmp_path):
+def test_a_sensitivity_check_whose_worker_is_killed_runs_again(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr(checking.check, "remote", lambda spec, _: killed_once.remote(spec, str(tmp_path / "killed")))
     check_id = submission.submit_experiment(sqlite_store, toy()).sensitivity
 
@@ -338,7 +353,9 @@ def test_a_sensitivity_check_whose_worker_is_killed_runs_again(sqlite_store, mon
     assert {each.verdict for each in found.tunables} == {Verdict.SMOOTH}
 
 
-def test_a_supervisor_that_is_told_to_stop_hands_its_check_to_the_next(sqlite_store, monkeypatch):
+def test_a_supervisor_that_is_told_to_stop_hands_its_check_to_the_next(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     check_id = submission.submit_experiment(sqlite_store, toy()).sensitivity
     first, stop = Supervisor(sqlite_store, lambda: 2), Event()
     first.step()
@@ -352,7 +369,7 @@ def test_a_supervisor_that_is_told_to_stop_hands_its_check_to_the_next(sqlite_st
     assert checked(sqlite_store, check_id, Supervisor(sqlite_store, lambda: 2)).state is State.COMPLETED
 
 
-def test_a_check_that_was_taken_over_is_dropped(sqlite_store):
+def test_a_check_that_was_taken_over_is_dropped(sqlite_store: Store) -> None:
     check_id = checks.submit(sqlite_store, SensitivitySpec(robot="toy_function")).id
     first = checking.Checks(sqlite_store, "first")
     first.step()
@@ -365,7 +382,7 @@ def test_a_check_that_was_taken_over_is_dropped(sqlite_store):
     assert checks.read(sqlite_store, check_id).state is State.RUNNING
 
 
-def test_a_check_on_a_node_with_other_versions_is_not_stored(sqlite_store):
+def test_a_check_on_a_node_with_other_versions_is_not_stored(sqlite_store: Store) -> None:
     check_id = checks.submit(sqlite_store, SensitivitySpec(robot="toy_function")).id
     supervisor = Supervisor(sqlite_store, lambda: 2, {"gaplab": "0.0.1"})
 

@@ -1,6 +1,9 @@
 """A database that any released revision left behind upgrades to head and goes on computing, to the same numbers."""
 
 import lzma
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 from alembic.script import ScriptDirectory
@@ -20,7 +23,7 @@ KEPT = sorted(FOLDER.glob("*.db.xz"))
 
 
 @pytest.fixture(params=KEPT, ids=lambda file: file.name)
-def store(request, tmp_path):
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Any]:
     """What the revision left behind, upgraded."""
     file = tmp_path / "kept.db"
     file.write_bytes(lzma.decompress(request.param.read_bytes()))
@@ -30,7 +33,7 @@ def store(request, tmp_path):
     store.dispose()
 
 
-def compute(store):
+def compute(store: Store) -> None:
     """What a supervisor does, until nothing is queued."""
     while claims := execution.claim(store, "me", 4):
         for claim in claims:
@@ -39,7 +42,7 @@ def compute(store):
             assert execution.complete(store, claim)
 
 
-def numbers(store, experiment):
+def numbers(store: Store, experiment: Any) -> Any:
     """Every number that the experiment found, but for when and by whom it was found."""
     samples = reading.list_samples(store, experiment).items
     return (
@@ -50,7 +53,7 @@ def numbers(store, experiment):
     )
 
 
-def test_it_goes_on_to_the_same_end_as_a_run_that_never_stopped(store):
+def test_it_goes_on_to_the_same_end_as_a_run_that_never_stopped(store: Store) -> None:
     kept = {each.name: each for each in listing.list_experiments(store).items}
     before = numbers(store, kept["complete"].id)
     assert kept["complete"].state is State.COMPLETED
@@ -67,21 +70,21 @@ def test_it_goes_on_to_the_same_end_as_a_run_that_never_stopped(store):
         assert numbers(store, kept[name].id) == numbers(store, again)
 
 
-def stored(store, experiment):
+def stored(store: Store, experiment: Any) -> Any:
     """The spec with nothing hidden, as the repetitions of the experiment have it."""
     spec = reading.read_experiment(store, experiment).spec
     truth = {"static_friction": 1.0, "dynamic_friction": 0.8}
     return ExperimentSpec.model_validate(spec | {"reality": spec["reality"] | {"parameters": truth}})
 
 
-def test_a_kept_file_is_of_a_revision_that_there_is_and_small():
+def test_a_kept_file_is_of_a_revision_that_there_is_and_small() -> None:
     revisions = {each.revision for each in ScriptDirectory.from_config(migrations.configuration()).walk_revisions()}
 
     assert {"0001", "0002"} <= {file.name.removesuffix(".db.xz") for file in KEPT} <= revisions
     assert all(file.stat().st_size < 100_000 for file in KEPT)
 
 
-def test_a_revision_is_kept_once(tmp_path):
+def test_a_revision_is_kept_once(tmp_path: Path) -> None:
     keep(tmp_path / "head.db.xz")
 
     with pytest.raises(FileExistsError):

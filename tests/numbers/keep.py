@@ -10,6 +10,7 @@ import lzma
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from gaplab import migrations
 from gaplab.services.archives import export_study
@@ -29,7 +30,7 @@ STEPS, CHECKPOINTS = 6, 3
 """The kept database has these many steps of repetition 0, and these many checkpoints of the step after them."""
 
 
-def keep(folder):
+def keep(folder: Path) -> None:
     """Compute all studies and write their archives, a database that is half-way, and the machine into the folder."""
     folder.mkdir(exist_ok=True)
     for name, spec in STUDIES.items():
@@ -42,13 +43,13 @@ def keep(folder):
     (folder / MACHINE.name).write_text(json.dumps(machine(), indent=2) + "\n")
 
 
-def new_store(file):
+def new_store(file: Any) -> Any:
     """An empty database at head."""
     migrations.upgrade(f"sqlite:///{file}")
     return Store(f"sqlite:///{file}")
 
 
-def computed(store, spec):
+def computed(store: Store, spec: Any) -> Any:
     """The archive of a study, computed by the pure loop."""
     study = submission.submit_study(store, spec).id
     while claims := execution.claim(store, OWNER, 100):
@@ -62,7 +63,7 @@ def computed(store, spec):
     return data
 
 
-def interrupt(store):
+def interrupt(store: Store) -> None:
     """Leave `HALF_WAY_SPEC` as a supervisor leaves it that is killed in the middle of a step."""
     submission.submit_experiment(store, HALF_WAY_SPEC)
     claim, *_ = execution.claim(store, OWNER, 2)
@@ -74,7 +75,7 @@ def interrupt(store):
         assert execution.record_all(store, [(claim, (item,))])
         if checkpoints == CHECKPOINTS:
             break
-    delivered.close()
+    delivered.close()  # type: ignore[attr-defined]
     store.dispose()
 
 

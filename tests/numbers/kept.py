@@ -5,6 +5,7 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
@@ -30,18 +31,18 @@ NUMBERS = {
 """Tables of an archive, with the columns that follow from the spec; times, owners and attempts do not."""
 
 
-def archive(name):
+def archive(name: Any) -> Any:
     """The bytes of a kept archive."""
     return (FOLDER / f"{name}.zip").read_bytes()
 
 
-def members(data):
+def members(data: Any) -> Any:
     """The members of an archive, by their names without ending: rows as dictionaries; JSON as it is."""
     with ZipFile(BytesIO(data)) as opened:
         return {each.partition(".")[0]: _content(each, opened.read(each)) for each in opened.namelist()}
 
 
-def _content(name, data):
+def _content(name: Any, data: Any) -> Any:
     if name.endswith(".parquet"):
         return pyarrow.parquet.read_table(BytesIO(data)).to_pylist()
     if name.endswith(".jsonl"):
@@ -49,7 +50,7 @@ def _content(name, data):
     return json.loads(data)
 
 
-def exact(value):
+def exact(value: Any) -> Any:
     """The value with each float as its bits in hexadecimal, so that -0.0 differs from 0.0."""
     if isinstance(value, float):
         return value.hex()
@@ -60,10 +61,12 @@ def exact(value):
     return value
 
 
-def numbers(found):
+def numbers(found: Any) -> Any:
     """The numbers of an archive: for each experiment, for each repetition, for each table its rows, in exact floats."""
     experiments = found["experiment"]
-    repetitions = {each["id"]: [{} for _ in range(each["spec"]["repetitions"])] for each in experiments}
+    repetitions: dict[str, list[dict[str, Any]]] = {
+        each["id"]: [{} for _ in range(each["spec"]["repetitions"])] for each in experiments
+    }
     for table, columns in NUMBERS.items():
         for row in found[table]:
             owner = row["experiment_id" if table == "repetition" else "experiment"]
@@ -72,7 +75,7 @@ def numbers(found):
     return [repetitions[each["id"]] for each in experiments]
 
 
-def machine():
+def machine() -> Any:
     """What the last bits of floats depend on besides the code and its libraries."""
     simd = np.show_config(mode="dicts")["SIMD Extensions"]
     try:
@@ -89,14 +92,14 @@ def machine():
     }
 
 
-def other_machine():
+def other_machine() -> Any:
     """What differs between this machine and that of the archives, as a sentence; "" if nothing does."""
     kept, here = json.loads(MACHINE.read_text()), machine()
     different = [name for name in kept if kept[name] != here[name]]
     return "; ".join(f"{name} is {here[name]} here, {kept[name]} there" for name in different)
 
 
-def other_versions(found):
+def other_versions(found: Any) -> Any:
     """Libraries whose version differs from those that computed an archive, as a sentence; "" if none does."""
     used = found["provenance"][0]["facts"]
     libraries = used["libraries"] | dict(each.split() for each in used["engines"].values() if each.count(" ") == 1)
@@ -105,7 +108,7 @@ def other_versions(found):
                      if here[name] != libraries[name])  # fmt: skip
 
 
-def _version(library):
+def _version(library: Any) -> Any:
     for name in (library, f"{library}-core"):
         try:
             return version(name)

@@ -4,10 +4,12 @@ The budgets are tiny, so that all of it together is computed in seconds. A chang
 `python -m tests.numbers.keep`; the tests read what the archives hold.
 """
 
+from typing import Any
+
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 
 _ENSEMBLE = {"simulators": 3}
-_QUADRUPED = {
+_QUADRUPED: dict[str, Any] = {
     "robot": "quadruped",
     "optimizer": {"name": "steady_state", "options": {"population": 4}},
     "iterations": 2,
@@ -25,7 +27,7 @@ _QUADRUPED = {
         "direct",
     ],
 }
-_TOY = {
+_TOY: dict[str, Any] = {
     "robot": "toy_function",
     "iterations": 2,
     "repetitions": 2,

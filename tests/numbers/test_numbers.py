@@ -5,6 +5,7 @@ Only a change whose CHANGELOG entry announces other numbers may write the archiv
 
 from io import BytesIO
 from math import isfinite
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from gaplab.services.core.types import Measured, Probed, Selected, Transferred, 
 from gaplab.services.experiments import reading
 from gaplab.services.results import curves
 from gaplab.services.specs.assembly import setting
+from gaplab.services.store.session import Store
 from tests.numbers.kept import FOLDER, ITERATION, archive, exact, members, numbers, other_machine, other_versions
 from tests.numbers.specs import STUDIES
 
@@ -24,9 +26,9 @@ SIMULATOR = ("repetition", "iteration", "rank", "parameters", "squared_error")
 KEPT = sorted(file.stem for file in FOLDER.glob("*.zip"))
 
 
-def rows(steps):
+def rows(steps: Any) -> Any:
     """The rows that an archive has of the steps of one repetition, in exact floats."""
-    iterations, samples, simulators = {}, [], []
+    iterations, samples, simulators = {}, [], []  # type: ignore[var-annotated]
     for step in steps:
         row = iterations.setdefault(step.iteration, {"number": step.iteration, **dict.fromkeys(ITERATION)})
         match step:
@@ -64,26 +66,26 @@ def rows(steps):
     }  # fmt: skip
 
 
-def vector(values):
+def vector(values: Any) -> Any:
     assert values.dtype == np.float64
     return exact(values.tolist())
 
 
-def number(value):
+def number(value: Any) -> Any:
     """As a database has it: without nan, infinities, and the sign of a zero."""
     return exact(float(value) + 0.0) if isfinite(value) else None
 
 
-def cost(phase, step):
+def cost(phase: Any, step: Any) -> Any:
     return {f"{phase}_{name}": getattr(step.cost, name) for name in ("rollouts", "failures", "saved")}
 
 
 @pytest.mark.parametrize("name", KEPT)
-def test_the_pure_loop_computes_the_kept_numbers(name):
+def test_the_pure_loop_computes_the_kept_numbers(name: Any) -> None:
     found = members(archive(name))
     specs = [ExperimentSpec.model_validate(each["spec"]) for each in found["experiment"]]
 
-    computed = [[rows(list(repetition(setting(spec, each)))) for each in range(spec.repetitions)] for spec in specs]
+    computed = [[rows(list(repetition(setting(spec, each)))) for each in range(spec.repetitions)] for spec in specs]  # type: ignore[arg-type]
 
     if computed != numbers(found) and (other := other_machine()):
         pytest.skip(f"the numbers differ, and so does the machine: {other}")
@@ -91,13 +93,13 @@ def test_the_pure_loop_computes_the_kept_numbers(name):
 
 
 @pytest.fixture(scope="module", params=KEPT)
-def kept(request):
+def kept(request: pytest.FixtureRequest) -> Any:
     """A kept archive: its bytes, and what is in it."""
     data = archive(request.param)
     return data, members(data)
 
 
-def test_an_import_shows_and_exports_the_kept_numbers(kept, store):
+def test_an_import_shows_and_exports_the_kept_numbers(kept: Any, store: Store) -> None:
     data, found = kept
 
     imported = import_archive(store, BytesIO(data))
@@ -109,7 +111,7 @@ def test_an_import_shows_and_exports_the_kept_numbers(kept, store):
         assert_exported(members(file.read()), found)
 
 
-def assert_shown(store, found):
+def assert_shown(store: Store, found: Any) -> None:
     for experiment, curve in zip(found["experiment"], found["curves"], strict=True):
         id_ = experiment["id"]
         assert reading.read_experiment(store, id_).spec == experiment["spec"]
@@ -120,18 +122,18 @@ def assert_shown(store, found):
         assert points(shown) == kept_points(found, id_)
 
 
-def assert_exported(exported, found):
+def assert_exported(exported: Any, found: Any) -> None:
     for table in set(found) - {"manifest"}:
         pairs = zip(exported[table], found[table], strict=True)
         assert [chosen(row, old) for row, old in pairs] == exact(found[table])
 
 
-def chosen(row, columns):
+def chosen(row: Any, columns: Any) -> Any:
     """These columns of a row, in exact floats; later versions may add others."""
     return exact({name: row[name] for name in columns})
 
 
-def pages(read, store, experiment, columns):
+def pages(read: Any, store: Store, experiment: Any, columns: Any) -> Any:
     """These columns of everything that all pages show."""
     items, cursor = [], None
     while True:
@@ -141,37 +143,37 @@ def pages(read, store, experiment, columns):
             return items
 
 
-def kept_samples(found, experiment):
+def kept_samples(found: Any, experiment: Any) -> Any:
     """In the order of the log: the sample of an iteration before its probe."""
     own = [row for row in found["measurement"] if row["experiment"] == experiment]
     own.sort(key=lambda row: (row["repetition"], row["iteration"], row["kind"] == "probe"))
     return [chosen(row, SAMPLE) for row in own]
 
 
-def kept_simulators(found, experiment):
+def kept_simulators(found: Any, experiment: Any) -> Any:
     names = [each["name"] for each in experiment["spec"]["tunables"]]
     own = [row for row in found["simulator"] if row["experiment"] == experiment["id"]]
     named = [row | {"parameters": dict(zip(names, row["parameters"], strict=True))} for row in own]
     return [chosen(row, SIMULATOR) for row in named]
 
 
-def points(curve):
+def points(curve: Any) -> Any:
     """The values of a curve, by real-world evaluations and repetition."""
     return exact({(at.evaluations, number): value for at in curve.points for number, value in enumerate(at.values)})
 
 
-def kept_points(found, experiment):
+def kept_points(found: Any, experiment: Any) -> Any:
     own = [row for row in found["iteration"] if row["experiment"] == experiment]
     return exact({(row["number"], row["repetition"]): row["recorded_fitness"] for row in own})
 
 
-def test_every_study_is_kept_and_small():
+def test_every_study_is_kept_and_small() -> None:
     assert set(STUDIES) == set(KEPT)
     assert sum(file.stat().st_size for file in FOLDER.iterdir()) < 1_000_000
 
 
 @pytest.mark.parametrize("table", ["iteration", "measurement", "simulator"])
-def test_the_last_bit_of_a_float_makes_a_difference(table):
+def test_the_last_bit_of_a_float_makes_a_difference(table: Any) -> None:
     found = members(archive("options"))
     before = numbers(found)
     row, column = next((row, name) for row in found[table] for name in row if isinstance(row[name], float))

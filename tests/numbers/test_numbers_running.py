@@ -5,6 +5,9 @@ import os
 import signal
 import sqlite3
 import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -26,17 +29,17 @@ DEADLINE_S = 400
 
 
 @pytest.fixture(scope="module", autouse=True)
-def own_ray():
+def own_ray() -> Iterator[None]:
     with cluster(Settings(workers=2)):
         yield
 
 
 @pytest.fixture(params=["one worker", "two workers"])
-def at_once(request):
+def at_once(request: pytest.FixtureRequest) -> Any:
     return 1 if request.param == "one worker" else 2
 
 
-def submit(store, found):
+def submit(store: Store, found: Any) -> Any:
     """Submit the kept specs; the ids of their experiments."""
     return [
         submission.submit_experiment(store, ExperimentSpec.model_validate(each["spec"])).id
@@ -44,7 +47,7 @@ def submit(store, found):
     ]
 
 
-def run(supervisor, store, ids, until=lambda: False):
+def run(supervisor: Any, store: Store, ids: Any, until: Any = lambda: False) -> None:
     """Let the supervisor work until all experiments have ended, or the condition holds."""
     deadline = time.monotonic() + DEADLINE_S
     while not (all(reading.read_experiment(store, each).state.ended for each in ids) or until()):
@@ -52,7 +55,7 @@ def run(supervisor, store, ids, until=lambda: False):
         supervisor.step()
 
 
-def stored(store, ids):
+def stored(store: Store, ids: Any) -> Any:
     """The numbers of these experiments, by way of an archive."""
     found = []
     for each in ids:
@@ -61,13 +64,13 @@ def stored(store, ids):
     return found
 
 
-def assert_kept(computed, kept):
+def assert_kept(computed: Any, kept: Any) -> None:
     if computed != kept and (other := other_machine()):
         pytest.skip(f"the numbers differ, and so does the machine: {other}")
     assert computed == kept
 
 
-def test_any_number_of_workers_computes_the_kept_numbers(store, at_once):
+def test_any_number_of_workers_computes_the_kept_numbers(store: Store, at_once: Any) -> None:
     studies = [members(archive(name)) for name in ("analytic", "cma_es", "options")]
     ids = [submit(store, found) for found in studies]
 
@@ -78,7 +81,7 @@ def test_any_number_of_workers_computes_the_kept_numbers(store, at_once):
         assert_kept(stored(store, own), numbers(found))
 
 
-def test_a_robot_among_idle_workers_has_the_kept_numbers(sqlite_store):
+def test_a_robot_among_idle_workers_has_the_kept_numbers(sqlite_store: Store) -> None:
     found = members(archive("elsewhere"))
     ids = submit(sqlite_store, found)
 
@@ -87,7 +90,7 @@ def test_a_robot_among_idle_workers_has_the_kept_numbers(sqlite_store):
     assert_kept(stored(sqlite_store, ids), numbers(found))
 
 
-def test_workers_killed_in_the_middle_of_a_step_cost_no_number(store):
+def test_workers_killed_in_the_middle_of_a_step_cost_no_number(store: Store) -> None:
     found = members(archive("long"))
     ids = submit(store, found)
     supervisor = Supervisor(store, lambda: 2, checkpoint_s=0.05)
@@ -102,12 +105,12 @@ def test_workers_killed_in_the_middle_of_a_step_cost_no_number(store):
     assert_kept(stored(store, ids), numbers(found))
 
 
-def done(store, ids):
+def done(store: Store, ids: Any) -> Any:
     """Whether a repetition is in the middle, with iteration 0 behind it."""
     return any(reading.read_experiment(store, each).progress.iterations_done for each in ids)
 
 
-def test_a_database_of_a_killed_supervisor_ends_with_the_kept_numbers(tmp_path):
+def test_a_database_of_a_killed_supervisor_ends_with_the_kept_numbers(tmp_path: Path) -> None:
     file = tmp_path / "half-way.db"
     file.write_bytes(lzma.decompress(HALF_WAY.read_bytes()))
     connection = sqlite3.connect(file)

@@ -9,6 +9,7 @@ from pathlib import Path
 from random import SystemRandom
 from statistics import median
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -22,7 +23,7 @@ FAULT_S = 5.5
 """That a fault took on two cores, with what came after it, while the other database had its own."""
 
 
-def main():
+def main() -> Any:
     parser = argparse.ArgumentParser(prog="python -m tests.soak", description=__doc__)
     parser.add_argument("--faults", type=int, default=1000, help="in all; half of them on each database")
     parser.add_argument("--seed", type=int, help="left out: a new one")
@@ -37,7 +38,7 @@ def main():
         return here(given) if given.database else side_by_side(given)
 
 
-def here(given):
+def here(given: Any) -> Any:
     """Hurt a service on one database."""
     console = Console()
     expected = given.faults * FAULT_S + 120
@@ -50,7 +51,7 @@ def here(given):
     return 1 if outcome.violations else 0
 
 
-def side_by_side(given):
+def side_by_side(given: Any) -> Any:
     """Hurt a service on each database, in processes of their own."""
     common = ["--seed", str(given.seed), "--at-once", str(given.at_once), "--folder", str(given.folder)]
     running = []
@@ -68,7 +69,7 @@ def side_by_side(given):
             each.wait()
 
 
-def show(console, outcome):
+def show(console: Any, outcome: Any) -> None:
     """The figures of an outcome, and what was violated."""
     table = Table(title=f"{outcome.database}: {outcome.faults} faults in {_duration(outcome.seconds)}")
     for column in ("fault", "times", "well again after: median", "worst"):
@@ -86,11 +87,11 @@ def show(console, outcome):
         console.print(f"  {each}", markup=False, highlight=False)
 
 
-def _share(number, index, parts):
+def _share(number: Any, index: Any, parts: Any) -> Any:
     return number // parts + (index < number % parts)
 
 
-def _duration(seconds):
+def _duration(seconds: Any) -> Any:
     minutes = round(seconds / 60)
     return f"{minutes // 60} h {minutes % 60} min" if minutes >= 60 else f"{minutes} min"
 

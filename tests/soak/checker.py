@@ -4,8 +4,11 @@ Each check takes the history and the evidence and gives a sentence for each viol
 """
 
 from collections import Counter, defaultdict
+from collections.abc import Iterator
+from typing import Any
 
 from gaplab.schemas.lifecycle import State
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
 from tests.soak.evidence import undisturbed
@@ -14,7 +17,7 @@ GIVEN_UP = "lost 5 times without progress"
 """Why the service may fail a repetition whose worker dies again and again; it is counted, and shown in the table."""
 
 
-def violations(history, evidence, expected=undisturbed):
+def violations(history: Any, evidence: Any, expected: Any = undisturbed) -> Any:
     """Everything that is wrong; nothing, if the service kept its word.
 
     Args:
@@ -33,7 +36,7 @@ def violations(history, evidence, expected=undisturbed):
     ]
 
 
-def submissions(history, evidence):
+def submissions(history: Any, evidence: Any) -> Iterator[Any]:
     """Each acknowledged one is there exactly once, each other at most once, and nothing else is."""
     names = Counter(evidence.studies.values())
     names.update(each.name for each in evidence.experiments if each.study is None)
@@ -52,11 +55,11 @@ def submissions(history, evidence):
         yield f"{name}: nobody submitted it"
 
 
-def _extensions(history):
+def _extensions(history: Any) -> Any:
     return {record.id for record in history if record.verb == "extend"}
 
 
-def _as_submitted(record, found, studies, extended):
+def _as_submitted(record: Any, found: Any, studies: Any, extended: Any) -> Iterator[Any]:
     name, answer = record.body["name"], record.answer
     if record.path == "/studies":
         wanted, ids = resolve_study(StudySpec.model_validate(record.body)), [one["id"] for one in answer["experiments"]]
@@ -73,8 +76,8 @@ def _as_submitted(record, found, studies, extended):
             yield f"{name}: the experiment {each} that was acknowledged is not there"
 
 
-def _unlike(experiment, spec, larger):
-    there = ExperimentSpec.model_validate(experiment.spec)
+def _unlike(experiment: Any, spec: Any, larger: Any) -> Iterator[Any]:
+    there = ResolvedSpec.model_validate(experiment.spec)
     if larger:
         spec = spec.model_copy(update={"iterations": there.iterations, "repetitions": there.repetitions})
     if there != spec:
@@ -83,7 +86,7 @@ def _unlike(experiment, spec, larger):
         yield f"the experiment {experiment.id} has other repetitions than 0 to {there.repetitions - 1}"
 
 
-def answers(history, evidence):
+def answers(history: Any, evidence: Any) -> Iterator[Any]:
     """No request fails inside the service, and what was acknowledged is never said not to exist."""
     for record in history:
         if record.status == 500:
@@ -92,7 +95,7 @@ def answers(history, evidence):
             yield f"{record.verb} {record.path}: acknowledged before, and said not to exist"
 
 
-def verbs(history, evidence):
+def verbs(history: Any, evidence: Any) -> Iterator[Any]:
     """Each acknowledged one took effect."""
     found = {each.id: each for each in evidence.experiments}
     moves = defaultdict(list)
@@ -106,15 +109,15 @@ def verbs(history, evidence):
                 yield f"{record.path}: acknowledged, and without effect: it is {experiment.state}"
 
 
-def _cancelled(record, experiment, moves, history):
+def _cancelled(record: Any, experiment: Any, moves: Any, history: Any) -> Any:
     later = [move for move in moves if move.at > record.answered_at and move.steps != move.steps_was]
     return experiment.state == State.CANCELLED and not later
 
 
-def _held(*ends):
+def _held(*ends: Any) -> Any:
     """Nothing of it is begun until somebody may have asked for that."""
 
-    def held(record, experiment, moves, history):
+    def held(record: Any, experiment: Any, moves: Any, history: Any) -> bool:
         asked = [each.sent_at for each in history if each.verb in ends and each.id == record.id]
         until = min((at for at in asked if at > record.sent_at), default=float("inf"))
         return not any(_claims(move) and record.answered_at < move.at < until for move in moves)
@@ -122,18 +125,18 @@ def _held(*ends):
     return held
 
 
-def _extended(record, experiment, moves, history):
+def _extended(record: Any, experiment: Any, moves: Any, history: Any) -> Any:
     return all(experiment.spec[name] >= total for name, total in record.body.items())
 
 
-def _claims(move):
+def _claims(move: Any) -> Any:
     return move.state == State.RUNNING and move.was != State.RUNNING
 
 
 EFFECTS = {"cancel": _cancelled, "stop": _held("extend"), "pause": _held("resume", "extend"), "extend": _extended}
 
 
-def ends(evidence):
+def ends(evidence: Any) -> Iterator[Any]:
     """Nothing is stuck, and an experiment ends as its repetitions do."""
     for experiment in evidence.experiments:
         states = {each.state for each in experiment.repetitions}
@@ -149,7 +152,7 @@ def ends(evidence):
             yield f"the sensitivity check {check} is stuck: {state}"
 
 
-def results(history, evidence, expected):
+def results(history: Any, evidence: Any, expected: Any) -> Iterator[Any]:
     """No log has holes, and each has the numbers of an undisturbed one: all of them, if it was completed."""
     cut_short = {record.id for record in history if record.verb == "stop"}
     for experiment in evidence.experiments:
@@ -171,9 +174,9 @@ def results(history, evidence, expected):
                 yield f"{where}: COMPLETED with {len(each.log)} of {len(whole)} steps"
 
 
-def epochs(evidence):
+def epochs(evidence: Any) -> Iterator[Any]:
     """One winner an epoch, no step by anybody else, and no forbidden move."""
-    winners, steps = {}, Counter()
+    winners, steps = {}, Counter()  # type: ignore[var-annotated]
     for move in evidence.moves:
         where = f"move {move.id} of repetition {move.repetition}"
         yield from (f"{where}: {wrong}" for wrong in (*_of_state(move, winners), *_of_steps(move, winners, steps)))
@@ -184,7 +187,7 @@ def epochs(evidence):
                 yield f"{experiment.id}/{each.number}: {each.steps} steps, and {steps[each.id]} by its moves"
 
 
-def _of_state(move, winners):
+def _of_state(move: Any, winners: Any) -> Iterator[Any]:
     claimed = _claims(move)
     if move.was != move.state and not State(move.was).may_become(State(move.state)):
         yield f"from {move.was} to {move.state}"
@@ -196,7 +199,7 @@ def _of_state(move, winners):
         winners[move.repetition, move.epoch] = move.owner
 
 
-def _of_steps(move, winners, steps):
+def _of_steps(move: Any, winners: Any, steps: Any) -> Iterator[Any]:
     if move.steps_was != steps[move.repetition] or move.steps < move.steps_was:
         yield f"from {move.steps_was} to {move.steps} steps, after {steps[move.repetition]}"
     if move.steps > move.steps_was and winners.get((move.repetition, move.epoch)) != move.owner:

@@ -6,8 +6,10 @@ is for the checker to find out.
 
 import random
 import time
+from collections.abc import Iterator
 from itertools import count
 from threading import Event, Thread
+from typing import Any
 
 import httpx2
 
@@ -40,7 +42,7 @@ STRATEGIES = ("simulated_fit", "random", "known_fit", "direct")
 TOY_STRATEGIES = (*STRATEGIES, {"name": "simulated_fit_and_informative", "options": {"simulators": 4}})
 
 
-def specs(rng):
+def specs(rng: Any) -> Iterator[Any]:
     """Specs without end, of few kinds: what they should come to is computed once for each."""
     for number in count():
         base, strategies = (QUADRUPED, STRATEGIES) if number % 4 == 3 else (TOY, TOY_STRATEGIES)
@@ -60,53 +62,53 @@ class Clients:
         number: of clients.
     """
 
-    def __init__(self, url, history, seed, number=3):
+    def __init__(self, url: Any, history: Any, seed: Any, number: Any = 3) -> None:
         self._history = history
         self._http = httpx2.Client(base_url=url, timeout=PATIENCE_S, trust_env=False)
         self._stopping = Event()
-        self._known = []
+        self._known: list[Any] = []
         self._open = 0
-        self._verbs = []
+        self._verbs: list[Any] = []
         self._threads = [
             Thread(target=self._use, args=(name, random.Random(f"{seed}-{name}")), daemon=True)
             for name in range(number)
         ]
 
-    def start(self):
+    def start(self) -> None:
         """Find out what the service can do, and begin."""
         paths = self._http.get("/openapi.json").json()["paths"]
         self._verbs = [verb for verb in VERBS if f"/experiments/{{id}}/{verb}" in paths]
         for thread in self._threads:
             thread.start()
 
-    def stop(self):
+    def stop(self) -> None:
         """Ask for nothing more."""
         self._stopping.set()
         for thread in self._threads:
             if thread.is_alive():
                 thread.join()
 
-    def close(self):
+    def close(self) -> None:
         """Let go of the connections."""
         self.stop()
         self._http.close()
 
-    def wake(self):
+    def wake(self) -> None:
         """Resume what is paused, so that it can end."""
         for state in {str(each) for each in State} & {"PAUSING", "PAUSED"}:
             for paused in self._in(state):
                 self._ask("resume", "POST", f"/experiments/{paused}/resume")
 
-    def under_way(self):
+    def under_way(self) -> Any:
         """Experiments that have not ended."""
         return [each for state in State if not state.ended for each in self._in(state)]
 
-    def _in(self, state):
+    def _in(self, state: Any) -> Any:
         answer = self._http.get("/experiments", params={"limit": 500, "state": str(state)})
         answer.raise_for_status()
         return [each["id"] for each in answer.json()["items"]]
 
-    def _use(self, name, rng):
+    def _use(self, name: Any, rng: Any) -> None:
         wanted = specs(rng)
         for number in count():
             if self._stopping.wait(rng.uniform(0.1, 0.6)):
@@ -118,7 +120,7 @@ class Clients:
             if self._known and rng.random() < 0.1:
                 self._move(rng)
 
-    def _look(self, rng):
+    def _look(self, rng: Any) -> None:
         """Read something that exists, and what is under way."""
         if self._known:
             one, _ = rng.choice(self._known)
@@ -128,7 +130,7 @@ class Clients:
         except (httpx2.HTTPError, ValueError):
             return
 
-    def _move(self, rng):
+    def _move(self, rng: Any) -> None:
         """An experiment to another state, if it may: one of the latest, or to be extended any."""
         verb = rng.choices(self._verbs, [VERBS[each] for each in self._verbs])[0]
         one, spec = rng.choice(self._known if verb == "extend" else self._known[-OPEN:])
@@ -136,14 +138,14 @@ class Clients:
         body = {what: spec[what] + 1} if verb == "extend" else None
         self._ask(verb, "POST", f"/experiments/{one}/{verb}", body)
 
-    def _submit(self, path, spec):
+    def _submit(self, path: Any, spec: Any) -> None:
         record = self._ask("submit", "POST", path, spec)
         if record.acknowledged:
             found = record.answer.get("experiments", [record.answer])
             self._known += [(each["id"], spec) for each in found]
             self._open += len(found)
 
-    def _ask(self, verb, method, path, body=None):
+    def _ask(self, verb: Any, method: Any, path: Any, body: Any = None) -> Any:
         record = self._history.ask(self._http, verb, method, path, body)
         if record.status is None:
             time.sleep(0.2)

@@ -7,6 +7,7 @@ import subprocess
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import psycopg
 
@@ -24,23 +25,23 @@ class SmallDisk:
         small: whether it can be filled.
     """
 
-    def __init__(self, folder, mebibytes):
+    def __init__(self, folder: Path, mebibytes: Any) -> None:
         self.folder = Path(folder)
         self.folder.mkdir()
         mount = ["mount", "-t", "tmpfs", "-o", f"size={mebibytes}m,mode=755", "gaplab-soak", str(self.folder)]
         self.small = os.geteuid() == 0 and subprocess.run(mount, capture_output=True).returncode == 0
 
-    def fill(self):
+    def fill(self) -> None:
         """Take all the room that is left."""
         with (self.folder / "filler").open("ab", buffering=0) as filler, suppress(OSError):
             while True:
                 filler.write(b"\0" * 4096)
 
-    def free(self):
+    def free(self) -> None:
         """Give the room back."""
         (self.folder / "filler").unlink(missing_ok=True)
 
-    def remove(self):
+    def remove(self) -> None:
         if self.small:
             subprocess.run(["umount", "--lazy", str(self.folder)], check=True)
 
@@ -50,12 +51,12 @@ class Sqlite:
 
     name = "SQLite"
 
-    def __init__(self, folder):
+    def __init__(self, folder: Path) -> None:
         self.disk = SmallDisk(Path(folder) / "disk", 64)
         self._file = self.disk.folder / "gaplab.db"
         self.url = f"sqlite:///{self._file}"
 
-    def stall(self, seconds):
+    def stall(self, seconds: Any) -> None:
         """Hold the exclusive lock for seconds: a disk on which a commit takes so long."""
         connection = sqlite3.connect(self._file, isolation_level=None, timeout=60)
         try:
@@ -65,7 +66,7 @@ class Sqlite:
         finally:
             connection.close()
 
-    def complaints(self):
+    def complaints(self) -> Any:
         """What the database's own check of its file finds."""
         connection = sqlite3.connect(self._file)
         found = [row[0] for row in connection.execute("PRAGMA integrity_check")]
@@ -73,7 +74,7 @@ class Sqlite:
         connection.close()
         return [each for each in found if each != "ok"]
 
-    def close(self):
+    def close(self) -> None:
         self.disk.remove()
 
 
@@ -82,7 +83,7 @@ class Postgres:
 
     name = "Postgres"
 
-    def __init__(self, folder):
+    def __init__(self, folder: Path) -> None:
         folder = Path(folder)
         self.disk = SmallDisk(folder / "disk", 256)
         installation, data = Installation(folder), self.disk.folder / "data"
@@ -92,16 +93,16 @@ class Postgres:
         self._kept = Kept(command, folder / "postgres.log", user=installation.user)
         self._wait()
 
-    def restart(self):
+    def restart(self) -> None:
         """An orderly restart that waits for nobody: open transactions are given up."""
         send(self._kept.pid, signal.SIGINT)
 
-    def kill(self):
+    def kill(self) -> None:
         """The server and all that it started, outright."""
         for pid in [self._kept.pid, *self._children()]:
             send(pid, signal.SIGKILL)
 
-    def stall(self, seconds):
+    def stall(self, seconds: Any) -> None:
         """Stop the server's processes that answer clients: a disk on which their writes take so long."""
         stopped = [pid for pid in self._children() if send(pid, signal.SIGSTOP)]
         try:
@@ -110,7 +111,7 @@ class Postgres:
             for pid in stopped:
                 send(pid, signal.SIGCONT)
 
-    def complaints(self):
+    def complaints(self) -> Any:
         """What reading every page finds, each of which has its checksum."""
         found = []
         with psycopg.connect(self.url, autocommit=True) as connection:
@@ -122,18 +123,18 @@ class Postgres:
                     found.append(f"{name}: {error}")
         return found
 
-    def close(self):
+    def close(self) -> None:
         self._kept.stop(signal.SIGINT)
         self.disk.remove()
 
-    def _children(self):
+    def _children(self) -> Any:
         return [
             int(pid)
             for path in Path(f"/proc/{self._kept.pid}/task").glob("*/children")
             for pid in path.read_text().split()
         ]
 
-    def _wait(self):
+    def _wait(self) -> None:
         deadline = time.monotonic() + 60
         while not answers(self.url):
             assert time.monotonic() < deadline, "Postgres does not start"

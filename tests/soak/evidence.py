@@ -4,6 +4,7 @@ import json
 from dataclasses import dataclass, field
 from functools import cache
 from hashlib import sha256
+from typing import Any
 
 from sqlalchemy import select
 
@@ -14,6 +15,7 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import ExperimentRow, RepetitionRow, SensitivityRow, StudyRow
 from gaplab.services.store.queries import step_rows as mapping
 from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.session import Store
 from tests.soak import witness
 
 
@@ -62,22 +64,22 @@ class Evidence:
     complaints: tuple[str, ...] = ()
 
 
-def gather(store, database) -> Evidence:
+def gather(store: Store, database: Any) -> Evidence:
     """Read everything."""
     with store.reading() as session:
         studies = dict(session.execute(select(StudyRow.id, StudyRow.name)).all())
         checks = dict(session.execute(select(SensitivityRow.id, SensitivityRow.state)).all())
         experiments = tuple(_experiment(session, row) for row in session.scalars(select(ExperimentRow)).all())
-    return Evidence(experiments, studies, checks, tuple(witness.moves(store)), tuple(database.complaints()))
+    return Evidence(experiments, studies, checks, tuple(witness.moves(store)), tuple(database.complaints()))  # type: ignore[arg-type]
 
 
-def checks_under_way(store) -> bool:
+def checks_under_way(store: Store) -> bool:
     """Whether sensitivity checks have not ended; the API lists none."""
     with store.reading() as session:
         return any(not state.ended for state in session.scalars(select(SensitivityRow.state)))
 
 
-def _experiment(session, row):
+def _experiment(session: Any, row: Any) -> Any:
     rows = session.scalars(
         select(RepetitionRow).where(RepetitionRow.experiment_id == row.id).order_by(RepetitionRow.number)
     ).all()
@@ -107,7 +109,7 @@ def undisturbed(spec: dict, number: int) -> tuple[str, ...]:
 
 @cache
 def _undisturbed(spec: str, number: int) -> tuple[str, ...]:
-    return tuple(map(digest, repetition(setting(ExperimentSpec.model_validate_json(spec), number))))
+    return tuple(map(digest, repetition(setting(ExperimentSpec.model_validate_json(spec), number))))  # type: ignore[arg-type]
 
 
 def digest(step: Step) -> str:

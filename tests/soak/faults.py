@@ -4,8 +4,11 @@ import random
 import signal
 import time
 from collections import namedtuple
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
+from gaplab.services.store.session import Store
 from tests.soak import witness
 from tests.soak.stage import send, until
 
@@ -18,15 +21,15 @@ DISK_S = 3.0
 Fault = namedtuple("Fault", "name inflict")
 
 
-def _kill(role):
-    def inflict(stage):
+def _kill(role: Any) -> Any:
+    def inflict(stage: Any) -> bool:
         return _signal(stage, role, signal.SIGKILL) is not None
 
     return Fault(f"SIGKILL {role}", inflict)
 
 
-def _pause(role):
-    def inflict(stage):
+def _pause(role: Any) -> Any:
+    def inflict(stage: Any) -> bool:
         pid = _signal(stage, role, signal.SIGSTOP)
         if pid is None:
             return False
@@ -39,15 +42,15 @@ def _pause(role):
     return Fault(f"SIGSTOP {role}", inflict)
 
 
-def _signal(stage, role, number):
+def _signal(stage: Any, role: Any, number: Any) -> Any:
     """Send it to one of those that play the role; its id, or None if there is none to be found in a while."""
     found = []
-    until(lambda: found.extend(stage.of(role)) or found, 20)
+    until(lambda: found.extend(stage.of(role)) or found, 20)  # type: ignore[func-returns-value]
     pid = random.choice(found) if found else None
     return pid if pid and send(pid, number) else None
 
 
-def _fill(stage):
+def _fill(stage: Any) -> bool:
     stage.database.disk.fill()
     try:
         time.sleep(DISK_S)
@@ -56,22 +59,22 @@ def _fill(stage):
     return True
 
 
-def _stall(stage):
+def _stall(stage: Any) -> bool:
     stage.database.stall(DISK_S)
     return True
 
 
-def _restart(stage):
+def _restart(stage: Any) -> bool:
     stage.database.restart()
     return True
 
 
-def _kill_database(stage):
+def _kill_database(stage: Any) -> bool:
     stage.database.kill()
     return True
 
 
-def faults(database):
+def faults(database: Any) -> Any:
     """What can be done to a service on this database."""
     found = [make(role) for role in ("api", "supervisor", "worker", "raylet") for make in (_kill, _pause)]
     found.append(Fault("disk slow", _stall))
@@ -82,9 +85,9 @@ def faults(database):
     return found
 
 
-def volleys(database, rng, at_once):
+def volleys(database: Any, rng: Any, at_once: Any) -> Iterator[Any]:
     """Faults without end, one to so many at a time, each kind in turn, in an order that is shuffled."""
-    kinds, order = faults(database), []
+    kinds, order = faults(database), []  # type: ignore[var-annotated]
     while True:
         size = rng.randint(1, at_once)
         while len(order) < size:
@@ -93,10 +96,10 @@ def volleys(database, rng, at_once):
         order = order[size:]
 
 
-def strike(stage, volley):
+def strike(stage: Any, volley: Any) -> Any:
     """Inflict faults at about the same time; those that hit something."""
 
-    def one(fault):
+    def one(fault: Any) -> Any:
         time.sleep(random.uniform(0, 1.5))
         return fault.name if fault.inflict(stage) else None
 
@@ -104,7 +107,7 @@ def strike(stage, volley):
         return [name for name in threads.map(one, volley) if name]
 
 
-def recovered(stage, store, within_s):
+def recovered(stage: Any, store: Store, within_s: Any) -> Any:
     """Seconds until all is well; None if that never came.
 
     That is when the API answers and each of two supervisors has stored a step, and then another: the first may be one
@@ -112,13 +115,13 @@ def recovered(stage, store, within_s):
     """
     begun = time.monotonic()
     for _ in range(2):
-        since, left_s = [], within_s - (time.monotonic() - begun)
+        since, left_s = [], within_s - (time.monotonic() - begun)  # type: ignore[var-annotated]
         if not until(lambda since=since: _well(stage, store, since), left_s):
             return None
     return time.monotonic() - begun
 
 
-def _well(stage, store, since):
+def _well(stage: Any, store: Store, since: Any) -> Any:
     if not since:
         since.append(witness.last(store))
     owners = {int(owner.split(":")[1]) for owner in witness.owners_since(store, since[0])}

@@ -4,6 +4,7 @@ import json
 import time
 from dataclasses import asdict, dataclass, field
 from threading import Lock
+from typing import Any
 
 import httpx2
 
@@ -30,11 +31,11 @@ class Record:
     answer: dict = field(default_factory=dict)
 
     @property
-    def acknowledged(self):
+    def acknowledged(self) -> Any:
         return self.status is not None and 200 <= self.status < 300
 
     @property
-    def id(self):
+    def id(self) -> Any:
         """Of what a verb is about: the second part of /experiments/ID/cancel."""
         return self.path.split("/")[2]
 
@@ -42,11 +43,11 @@ class Record:
 class History:
     """Appends to a file, from many threads, so that it outlives whoever writes it."""
 
-    def __init__(self, path):
+    def __init__(self, path: Any) -> None:
         self._path = path
         self._lock = Lock()
 
-    def ask(self, http, verb, method, path, body=None):
+    def ask(self, http: Any, verb: Any, method: Any, path: Any, body: Any = None) -> Any:
         """Ask, write down what came, and return it."""
         sent_at, status, answer = time.time(), None, {}
         try:
@@ -61,5 +62,5 @@ class History:
             file.write(json.dumps(asdict(record)) + "\n")
         return record
 
-    def records(self):
+    def records(self) -> Any:
         return [Record(**json.loads(line)) for line in self._path.read_text().splitlines()]

@@ -5,6 +5,7 @@ import time
 from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import httpx2
 
@@ -46,11 +47,11 @@ class Outcome:
     seconds: float = 0.0
 
     @property
-    def faults(self):
+    def faults(self) -> Any:
         return sum(map(len, self.recoveries.values()))
 
 
-def soak(folder, kind, number, seed, at_once=4, say=lambda sentence: None):
+def soak(folder: Path, kind: Any, number: Any, seed: Any, at_once: Any = 4, say: Any = lambda sentence: None) -> Any:
     """Run so many faults on a service in this folder, and check it; the evidence stays there.
 
     Args:
@@ -83,7 +84,7 @@ def soak(folder, kind, number, seed, at_once=4, say=lambda sentence: None):
     return outcome
 
 
-def _attack(stage, store, outcome, number, volleys, say):
+def _attack(stage: Any, store: Store, outcome: Any, number: Any, volleys: Any, say: Any) -> None:
     faults.recovered(stage, store, RECOVERY_S)  # from the start
     while outcome.faults < number:
         hit = faults.strike(stage, next(volleys)[: number - outcome.faults])
@@ -96,8 +97,8 @@ def _attack(stage, store, outcome, number, volleys, say):
             outcome.recoveries[name].append(RECOVERY_S if seconds is None else seconds)
 
 
-def _peace(clients, store, outcome):
-    def quiet():
+def _peace(clients: Any, store: Store, outcome: Any) -> None:
+    def quiet() -> Any:
         try:
             clients.wake()
             return not clients.under_way() and not checks_under_way(store)
@@ -108,7 +109,7 @@ def _peace(clients, store, outcome):
         outcome.violations.append(f"not at rest {STUCK_S} s after the last fault")
 
 
-def _check(history, evidence, outcome):
+def _check(history: Any, evidence: Any, outcome: Any) -> None:
     outcome.violations += checker.violations(history, evidence)
     outcome.acknowledged = sum(each.acknowledged for each in history if each.verb != "read")
     outcome.unanswered = sum(each.status is None for each in history if each.verb != "read")

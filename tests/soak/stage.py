@@ -14,6 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 from tempfile import mkdtemp
 from threading import Event, Thread
+from typing import Any
 
 import httpx2
 
@@ -32,7 +33,7 @@ class Kept:
         pid: of the process that runs now.
     """
 
-    def __init__(self, command, log, environment=None, user=None):
+    def __init__(self, command: Any, log: Any, environment: Any = None, user: Any = None) -> None:
         self._command, self._log, self._environment, self._user = command, log, environment, user
         self._stopping = Event()
         self._process = self._start()
@@ -40,10 +41,10 @@ class Kept:
         self._thread.start()
 
     @property
-    def pid(self):
+    def pid(self) -> Any:
         return self._process.pid
 
-    def stop(self, how=signal.SIGINT, patience_s=60):
+    def stop(self, how: Any = signal.SIGINT, patience_s: Any = 60) -> bool:
         """Ask it to end, and say whether it did; if not, it is killed."""
         self._stopping.set()
         self._thread.join()
@@ -55,12 +56,12 @@ class Kept:
         self._process.wait()
         return False
 
-    def _keep(self):
+    def _keep(self) -> None:
         while not self._stopping.wait(0.1):
             if self._process.poll() is not None and not self._stopping.wait(RESTART_S):
                 self._process = self._start()
 
-    def _start(self):
+    def _start(self) -> Any:
         with self._log.open("ab") as log:
             return subprocess.Popen(
                 self._command,
@@ -82,7 +83,7 @@ class Stage:
         lease_s: for which a supervisor may be silent.
     """
 
-    def __init__(self, folder, database, lease_s):
+    def __init__(self, folder: Path, database: Any, lease_s: Any) -> None:
         self.database, self.lease_s = database, lease_s
         self._folder = Path(folder)
         with socket.socket() as probe:
@@ -96,9 +97,9 @@ class Stage:
             "GAPLAB_LEASE_S": str(lease_s),
             "RAY_TMPDIR": mkdtemp(prefix="gaplab-"),  # Ray leaves logs behind; the paths of its sockets must be short
         }
-        self._kept = []
+        self._kept: list[Any] = []
 
-    def start(self):
+    def start(self) -> None:
         """Migrate, set the witness, start the processes, and wait until the API answers."""
         migrations.upgrade(self.database.url)
         witness.install(self.database.url)
@@ -107,14 +108,14 @@ class Stage:
             self._kept.append(Kept([sys.executable, "-m", module, "serve"], log, self._environment))
         assert until(self.answers, 120), self.logs()
 
-    def stop(self):
+    def stop(self) -> Any:
         """End all in order; what did not end when asked, and what was left behind, in words."""
         left = [f"{each.pid} did not end within a minute" for each in self._kept if not each.stop()]
         if not until(lambda: not self.processes(), 60):
             left += [f"left running: {pid} {command}" for pid, command in self.processes().items()]
         return left
 
-    def kill(self):
+    def kill(self) -> None:
         """End what is left outright, and remove what it left."""
         for each in self._kept:
             each.stop(signal.SIGKILL)
@@ -122,14 +123,14 @@ class Stage:
             send(pid, signal.SIGKILL)
         shutil.rmtree(self._environment["RAY_TMPDIR"], ignore_errors=True)
 
-    def answers(self):
+    def answers(self) -> bool:
         """Whether the API answers and can use its database."""
         try:
             return httpx2.get(f"{self.url}/readyz", timeout=5, trust_env=False).status_code == 200
         except httpx2.HTTPError:
             return False
 
-    def processes(self):
+    def processes(self) -> Any:
         """All processes of the service that live, by id, with their commands."""
         mark = f"GAPLAB_PORT={self._port}".encode()
         found: dict[int, str] = {}
@@ -141,15 +142,15 @@ class Stage:
                 continue
         return {pid: command for pid, command in found.items() if command}
 
-    def of(self, role):
+    def of(self, role: Any) -> Any:
         """The ids of the processes that play a role: api, supervisor, worker or raylet."""
         return [pid for pid, command in self.processes().items() if role_of(command) == role]
 
-    def logs(self):
+    def logs(self) -> Any:
         return "\n".join(path.read_text(errors="replace")[-3000:] for path in sorted(self._folder.glob("*.log")))
 
 
-def role_of(command):
+def role_of(command: Any) -> Any:
     program = command.partition(" ")[0]
     if "-m gaplab serve" in command:
         return "api"
@@ -160,7 +161,7 @@ def role_of(command):
     return "raylet" if program.endswith("/raylet") else None
 
 
-def send(pid, number):
+def send(pid: Any, number: Any) -> bool:
     """A signal to a process, if it is still there."""
     try:
         os.kill(pid, number)
@@ -169,7 +170,7 @@ def send(pid, number):
     return True
 
 
-def until(condition, within_s, every_s=0.2):
+def until(condition: Any, within_s: Any, every_s: Any = 0.2) -> bool:
     """Whether the condition came to hold in time; a database that is away does not count as an answer."""
     deadline = time.monotonic() + within_s
     while time.monotonic() < deadline:

@@ -4,6 +4,7 @@ Nothing escapes them, whoever writes: what the database ends with says little ab
 """
 
 from collections import namedtuple
+from typing import Any
 
 from sqlalchemy import text
 
@@ -34,7 +35,7 @@ _POSTGRES = (
 )
 
 
-def install(url):
+def install(url: Any) -> None:
     """Set the triggers on a database at head."""
     store = Store(url)
     with store.transaction() as session:
@@ -43,20 +44,20 @@ def install(url):
     store.dispose()
 
 
-def moves(store):
+def moves(store: Store) -> Any:
     """All moves, in their order."""
     with store.reading() as session:
         rows = session.execute(text(f"SELECT id, {_COLUMNS} FROM witness ORDER BY id")).all()
     return [Move(*row) for row in rows]
 
 
-def last(store):
+def last(store: Store) -> Any:
     """The number of the last move."""
     with store.reading() as session:
         return session.execute(text("SELECT coalesce(max(id), 0) FROM witness")).scalar_one()
 
 
-def owners_since(store, number):
+def owners_since(store: Store, number: Any) -> Any:
     """Who stored steps after the move of this number."""
     query = text("SELECT DISTINCT owner FROM witness WHERE id > :number AND steps > steps_was AND owner IS NOT NULL")
     with store.reading() as session:

@@ -1,6 +1,7 @@
 """A step that was interrupted is repeated from what simulators had answered, to the last bit."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,32 +24,32 @@ class Interrupted(Exception):
 class Interruption:
     """A recorder of answers that interrupts the step after some calls."""
 
-    def __init__(self, calls):
+    def __init__(self, calls: Any) -> None:
         self.left = calls
-        self.answers = []
+        self.answers = []  # type: ignore[var-annotated]
 
-    def genomes_per_call(self, simulators):
+    def genomes_per_call(self, simulators: Any) -> int:
         if not self.left:
             raise Interrupted
         self.left -= 1
         return 1_000
 
-    def record(self, answers):
+    def record(self, answers: Any) -> None:
         self.answers += answers
 
 
-def half_broken(genomes, parameters):
+def half_broken(genomes: Any, parameters: Any) -> Any:
     """The paraboloid, where physics fails on a part of the space."""
     return np.where(genomes[:, :1] < 0.3, np.nan, paraboloid(genomes, parameters))
 
 
-def setting_of(strategy, optimizer, simulate=half_broken, batch=1):
+def setting_of(strategy: Any, optimizer: Any, simulate: Any = half_broken, batch: Any = 1) -> Any:
     chosen = optimizers.create(PluginRef(name=optimizer, options={"population": 6}))
     small = small_setting(strategy, optimizer=chosen, budget=BUDGET, simulate=simulate, batch_size=lambda: batch)
     return replace(small, iterations=2)
 
 
-def interrupted(setting, history, calls, answers=()):
+def interrupted(setting: Any, history: Any, calls: Any, answers: Any = ()) -> Any:
     """What the step had been answered when it was interrupted after so many calls; None if it was not."""
     recorder = Interruption(calls)
     try:
@@ -58,7 +59,7 @@ def interrupted(setting, history, calls, answers=()):
     return None
 
 
-def resumed(setting, history, answers):
+def resumed(setting: Any, history: Any, answers: Any) -> Any:
     """The step after the interruption, and how many rollouts it still took."""
     simulate = Recorder(setting.simulate)
     return next_step(setting, history, Answers(simulate, setting.batch_size, answers)), simulate.rollouts
@@ -67,7 +68,9 @@ def resumed(setting, history, answers):
 @pytest.mark.parametrize(("before", "after"), [(1, 1), (1, 8), (8, 1)])
 @pytest.mark.parametrize("optimizer", sorted(optimizers))
 @pytest.mark.parametrize("strategy", sorted(strategies))
-def test_a_step_interrupted_anywhere_equals_one_that_was_not(strategy, optimizer, before, after):
+def test_a_step_interrupted_anywhere_equals_one_that_was_not(
+    strategy: Any, optimizer: Any, before: Any, after: Any
+) -> None:
     whole = setting_of(strategy, optimizer)
     history = History()
     for step in repetition(whole):
@@ -81,7 +84,7 @@ def test_a_step_interrupted_anywhere_equals_one_that_was_not(strategy, optimizer
 
 @pytest.mark.parametrize("optimizer", sorted(optimizers))
 @pytest.mark.parametrize("strategy", sorted(strategies))
-def test_nothing_that_was_answered_is_simulated_again(strategy, optimizer):
+def test_nothing_that_was_answered_is_simulated_again(strategy: Any, optimizer: Any) -> None:
     setting = setting_of(strategy, optimizer)
     history = History()
     for step in repetition(setting):
@@ -94,11 +97,11 @@ def test_nothing_that_was_answered_is_simulated_again(strategy, optimizer):
         history = history.after(step)
 
 
-def test_a_step_may_be_interrupted_again_and_again():
+def test_a_step_may_be_interrupted_again_and_again() -> None:
     setting = setting_of("informative", "steady_state", batch=8)
     history = History()
     for step in repetition(setting):
-        answers = []
+        answers = []  # type: ignore[var-annotated]
         while (more := interrupted(setting, history, 3, answers)) is not None:
             answers.append(more)
         again, left = resumed(setting, history, answers)
@@ -107,7 +110,7 @@ def test_a_step_may_be_interrupted_again_and_again():
         history = history.after(step)
 
 
-def test_answers_of_another_step_are_of_no_use_and_do_no_harm():
+def test_answers_of_another_step_are_of_no_use_and_do_no_harm() -> None:
     setting = setting_of("simulated_fit", "steady_state")
     steps = list(repetition(setting))
     histories = [History()]
@@ -122,7 +125,7 @@ def test_answers_of_another_step_are_of_no_use_and_do_no_harm():
     assert rollouts == resumed(setting, histories[tuning], ())[1]
 
 
-def test_answers_survive_packing_to_the_last_bit():
+def test_answers_survive_packing_to_the_last_bit() -> None:
     rng = np.random.default_rng(0)
     awkward = np.array([[np.nan, -0.0, 5e-324], [np.inf, 0.1 + 0.2, -1.7976931348623157e308]])
     answers = [(rng.bytes(16), row) for row in (awkward[0], awkward[1], awkward[0, :1])]
@@ -133,7 +136,7 @@ def test_answers_survive_packing_to_the_last_bit():
     assert len(pack(answers)) == 2 * 8 + 3 * 16 + 7 * 8
 
 
-def test_many_simulators_are_asked_in_parts():
+def test_many_simulators_are_asked_in_parts() -> None:
     simulate = Recorder()
     genomes, parameters = (
         np.random.default_rng(0).random((2, 2)),

@@ -2,7 +2,10 @@
 
 import ast
 import sys
+from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -23,7 +26,7 @@ ROOMS = {
     "experiments": (("core", "engines", "store", "specs", "plugins", "settings"), {"sqlalchemy"}),
     "running": (("core", "engines", "store", "plugins", "experiments"), {"sqlalchemy"}),
     "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
-    "replay": (("core", "store", "specs", "experiments"), {"numpy", "cachetools"}),
+    "replay": (("core", "store", "specs", "plugins", "experiments"), {"numpy", "cachetools"}),
     "archives": (("core", "store", "specs", "experiments", "results"), {"pydantic", "pyarrow"}),
 }
 """Rooms of services, each below those that may import it: what of services each may import, and what of others."""
@@ -59,7 +62,7 @@ ARROWS = {
 IMPURE = {"os", "time", "datetime", "random", "threading", "logging", "pickle", "secrets", "uuid", "io", "socket"}
 
 
-def imports(path):
+def imports(path: Any) -> Iterator[Any]:
     """Every module that the file imports, inside functions too."""
     for node in ast.walk(ast.parse((ROOT / path).read_text())):
         if isinstance(node, ast.Import):
@@ -68,16 +71,21 @@ def imports(path):
             yield node.module
 
 
-def rule(path):
+def name_of(path: Path) -> str:
+    """Return the dotted name of a file's module, without `gaplab`."""
+    return ".".join(path.with_suffix("").parts).removesuffix(".__init__")
+
+
+def rule(path: Any) -> Any:
     return next(rule for prefix, rule in ARROWS.items() if f"{path.as_posix()}/".startswith(f"{prefix}/"))
 
 
-def is_under(module, allowed):
+def is_under(module: Any, allowed: Any) -> Any:
     return any(module == each or module.startswith(f"{each}.") for each in allowed)
 
 
 @pytest.mark.parametrize("path", MODULES, ids=str)
-def test_imports_follow_the_arrows(path):
+def test_imports_follow_the_arrows(path: Any) -> None:
     ours, others = rule(path)
 
     for module in imports(path):
@@ -89,7 +97,7 @@ def test_imports_follow_the_arrows(path):
             assert top in others, f"{path} may not import {module}"
 
 
-def test_each_room_of_services_imports_only_rooms_before_it():
+def test_each_room_of_services_imports_only_rooms_before_it() -> None:
     """So there is no circle of rooms."""
     order = [*ROOMS, "settings"]
 
@@ -99,7 +107,7 @@ def test_each_room_of_services_imports_only_rooms_before_it():
     assert folders == set(ROOMS)
 
 
-def test_states_are_written_in_one_place():
+def test_states_are_written_in_one_place() -> None:
     """`move` alone, which uses the table of permitted moves; what is inserted or imported is no move."""
     writers = set()
     for path in MODULES:
@@ -117,13 +125,26 @@ def test_states_are_written_in_one_place():
     assert writers == {"services/experiments/states.py"}
 
 
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    names = {name_of(path) for path in MODULES}
+    graph: dict[str, set[str]] = {}
+    for path in MODULES:
+        for node in ast.walk(ast.parse((ROOT / path).read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                package = node.module.removeprefix("gaplab.")
+                found = {f"{package}.{alias.name}" for alias in node.names} & names or {package} & names
+                graph[name_of(path)] = graph.get(name_of(path), set()) | found
+
+    TopologicalSorter(graph).prepare()  # raises CycleError with the circle
+
+
 @pytest.mark.parametrize("path", [each for each in MODULES if each.as_posix().startswith("services/core/")], ids=str)
-def test_the_core_has_no_clock_no_chance_of_its_own_and_no_side_effects(path):
+def test_the_core_has_no_clock_no_chance_of_its_own_and_no_side_effects(path: Any) -> None:
     assert not {module.partition(".")[0] for module in imports(path)} & IMPURE
 
 
 @pytest.mark.parametrize("path", [each for each in MODULES if not each.as_posix().startswith("workers/")], ids=str)
-def test_only_the_workers_know_ray_and_nobody_imports_physics_at_the_top(path):
+def test_only_the_workers_know_ray_and_nobody_imports_physics_at_the_top(path: Any) -> None:
     tops = {module.partition(".")[0] for module in imports(path)}
 
     assert "ray" not in tops
@@ -131,7 +152,7 @@ def test_only_the_workers_know_ray_and_nobody_imports_physics_at_the_top(path):
 
 
 @pytest.mark.parametrize("path", [each for each in MODULES if each.parts[0] == "api"], ids=str)
-def test_the_api_imports_what_only_notebooks_need_where_it_is_needed(path):
+def test_the_api_imports_what_only_notebooks_need_where_it_is_needed(path: Any) -> None:
     top = [node for node in ast.parse((ROOT / path).read_text()).body if isinstance(node, ast.Import | ast.ImportFrom)]
     names = {alias.name for node in top for alias in node.names} | {getattr(node, "module", None) or "" for node in top}
 
@@ -139,7 +160,7 @@ def test_the_api_imports_what_only_notebooks_need_where_it_is_needed(path):
 
 
 @pytest.mark.parametrize("path", [each for each in MODULES if "versions" not in each.parts], ids=str)
-def test_a_module_stays_under_250_lines_and_a_function_under_40(path):
+def test_a_module_stays_under_250_lines_and_a_function_under_40(path: Any) -> None:
     source = (ROOT / path).read_text()
 
     assert len(source.splitlines()) <= 250
@@ -149,7 +170,7 @@ def test_a_module_stays_under_250_lines_and_a_function_under_40(path):
 
 
 @pytest.mark.parametrize("path", MODULES, ids=str)
-def test_every_module_says_what_it_is(path):
+def test_every_module_says_what_it_is(path: Any) -> None:
     assert ast.get_docstring(ast.parse((ROOT / path).read_text()))
 
 

@@ -7,34 +7,34 @@ from gaplab.services.store.tables import Kind
 TABLES = Base.metadata.tables
 
 
-def test_every_table_is_exported_or_left_out_for_a_reason():
+def test_every_table_is_exported_or_left_out_for_a_reason() -> None:
     assert set(EXPORTED) | set(LEFT_OUT) == set(TABLES)
     assert not set(EXPORTED) & set(LEFT_OUT)
     reasons = [reason for columns in COLUMNS_LEFT_OUT.values() for reason in columns.values()]
     assert all(len(reason) > 10 for reason in (*LEFT_OUT.values(), *reasons))
 
 
-def test_every_column_that_is_left_out_exists():
+def test_every_column_that_is_left_out_exists() -> None:
     assert set(COLUMNS_LEFT_OUT) <= set(EXPORTED)
     for table, columns in COLUMNS_LEFT_OUT.items():
         assert set(columns) <= set(TABLES[table].columns.keys())
 
 
-def test_a_table_comes_after_those_that_it_refers_to():
+def test_a_table_comes_after_those_that_it_refers_to() -> None:
     for place, name in enumerate(EXPORTED):
         for key in TABLES[name].foreign_keys:
             if (other := key.column.table.name) in EXPORTED:
                 assert EXPORTED.index(other) <= place, (name, other)
 
 
-def test_no_exported_column_refers_to_a_table_that_is_left_out():
+def test_no_exported_column_refers_to_a_table_that_is_left_out() -> None:
     for name in EXPORTED:
         kept = {each.name for each in columns_of(name)}
         outside = {key.parent.name for key in TABLES[name].foreign_keys if key.column.table.name in LEFT_OUT}
         assert not kept & outside, name
 
 
-def test_every_column_is_exported_or_can_be_left_out():
+def test_every_column_is_exported_or_can_be_left_out() -> None:
     for name in EXPORTED:
         kept = {each.name for each in columns_of(name)}
         for column in TABLES[name].columns:
@@ -43,12 +43,12 @@ def test_every_column_is_exported_or_can_be_left_out():
                 assert column.nullable or column.default is not None, (name, column.name)
 
 
-def test_every_exported_table_belongs_to_an_experiment_or_is_its_study():
+def test_every_exported_table_belongs_to_an_experiment_or_is_its_study() -> None:
     for name in set(EXPORTED) - {"study", "experiment", "provenance"}:  # the last is shared by those that name it
         assert {"experiment_id", "repetition_id"} & set(TABLES[name].columns.keys()), name
 
 
-def test_lists_of_numbers_are_told_from_nested_json():
+def test_lists_of_numbers_are_told_from_nested_json() -> None:
     kinds = {(name, each.name): each.kind for name in EXPORTED for each in columns_of(name)}
 
     assert kinds["measurement", "genome"] is kinds["iteration", "selected_genome"] is Kind.VECTOR

@@ -1,5 +1,7 @@
 """The MuJoCo engine's law of motors and contacts, as plain functions."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -12,23 +14,23 @@ KNOWN = settings(WORLD, 7, [])
 SURFACE = np.array([1.0, 1.0, 0.8, 0.5, 0.0])
 
 
-def pressed(inverse, excess, friction, sweeps=50):
+def pressed(inverse: Any, excess: Any, friction: Any, sweeps: Any = 50) -> Any:
     impulses = np.zeros(len(excess))
     press(sweeps, inverse, excess, np.full(len(excess), friction), impulses)
     return impulses
 
 
-def mass(rows, seed=0):
+def mass(rows: Any, seed: Any = 0) -> Any:
     """Some inverse inertia: symmetric, positive definite."""
     square = np.random.default_rng(seed).normal(size=(rows, rows))
     return square @ square.T + np.eye(rows)
 
 
-def test_a_contact_that_leaves_is_let_go():
+def test_a_contact_that_leaves_is_let_go() -> None:
     assert np.array_equal(pressed(mass(3), np.array([0.5, 0.0, 0.0]), 1.0), np.zeros(3))
 
 
-def test_a_contact_that_grips_has_the_speed_that_it_wants():
+def test_a_contact_that_grips_has_the_speed_that_it_wants() -> None:
     excess = np.array([-1.0, 0.1, -0.1])
 
     pressed(mass(3), excess, 10.0)
@@ -36,7 +38,7 @@ def test_a_contact_that_grips_has_the_speed_that_it_wants():
     assert excess == pytest.approx(np.zeros(3), abs=1e-9)
 
 
-def test_friction_stays_in_its_cone_and_opposes_the_slide():
+def test_friction_stays_in_its_cone_and_opposes_the_slide() -> None:
     excess = np.array([-1.0, 3.0, 4.0])
 
     normal, *friction = pressed(np.eye(3), excess, 0.5)
@@ -47,7 +49,7 @@ def test_friction_stays_in_its_cone_and_opposes_the_slide():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_many_contacts_obey_the_law_all_at_once(seed):
+def test_many_contacts_obey_the_law_all_at_once(seed: Any) -> None:
     inverse, free = mass(12, seed), np.random.default_rng(seed).normal(size=12)
     after = free.copy()
 
@@ -65,12 +67,12 @@ def test_many_contacts_obey_the_law_all_at_once(seed):
 
 
 @pytest.mark.parametrize(("sliding", "friction"), [(0.0, 1.0), (0.005, 1.0), (0.02, 0.8), (3.0, 0.8)])
-def test_what_slides_has_the_dynamic_coefficient(sliding, friction):
+def test_what_slides_has_the_dynamic_coefficient(sliding: Any, friction: Any) -> None:
     assert touch(KNOWN, 0.0, np.array([0.0, 0.6 * sliding, 0.8 * sliding]), SURFACE, np.zeros(3)) == friction
 
 
 @pytest.mark.parametrize(("approach", "leaves"), [(3.0, 1.5), (0.3, 0.15), (0.15, 0.0)])
-def test_only_fast_approaches_bounce(approach, leaves):
+def test_only_fast_approaches_bounce(approach: Any, leaves: Any) -> None:
     excess = np.zeros(3)
 
     touch(KNOWN, 0.0, np.array([-approach, 0.0, 0.0]), SURFACE, excess)
@@ -78,7 +80,7 @@ def test_only_fast_approaches_bounce(approach, leaves):
     assert -excess[0] == pytest.approx(leaves)
 
 
-def test_what_is_in_the_ground_is_pushed_out_a_fifth_of_its_depth_in_a_step():
+def test_what_is_in_the_ground_is_pushed_out_a_fifth_of_its_depth_in_a_step() -> None:
     excess = np.zeros(3)
 
     touch(KNOWN, 0.01, np.zeros(3), SURFACE, excess)
@@ -86,7 +88,7 @@ def test_what_is_in_the_ground_is_pushed_out_a_fifth_of_its_depth_in_a_step():
     assert -excess[0] * STEP_S == pytest.approx(0.002)
 
 
-def test_a_motor_that_is_told_no_number_gives_none():
+def test_a_motor_that_is_told_no_number_gives_none() -> None:
     known = settings(WORLD, 7, [Drive(6, 0.1, 20.0, 8.0, 0.01)])
     forces = np.array([*np.zeros(6), np.nan])
 
@@ -95,7 +97,7 @@ def test_a_motor_that_is_told_no_number_gives_none():
     assert np.isnan(forces[6])
 
 
-def test_impulses_act_on_the_degrees_of_freedom_as_these_move_the_contacts():
+def test_impulses_act_on_the_degrees_of_freedom_as_these_move_the_contacts() -> None:
     rng = np.random.default_rng(0)
     jacobian, accelerations, impulses, before = (
         rng.normal(size=(3, 7)),

@@ -1,5 +1,7 @@
 """Curves: the numbers that the figure shows."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from gaplab.services.core.curves import curve_point, curve_points
 RECORDED = np.array([[0.9, 1.2], [0.8, 1.4], [1.0, np.nan]])
 
 
-def test_a_point_has_mean_deviation_and_students_interval():
+def test_a_point_has_mean_deviation_and_students_interval() -> None:
     point = curve_point(1, np.array([1.0, 2.0, 3.0, 4.0]))
 
     sd = (5 / 3) ** 0.5
@@ -18,11 +20,11 @@ def test_a_point_has_mean_deviation_and_students_interval():
     assert (point.lower, point.upper) == pytest.approx((2.5 - half, 2.5 + half))
 
 
-def test_there_is_a_point_for_every_number_of_evaluations_from_none_on():
+def test_there_is_a_point_for_every_number_of_evaluations_from_none_on() -> None:
     assert [each.evaluations for each in curve_points(RECORDED)] == [0, 1]
 
 
-def test_what_is_missing_counts_in_no_statistic_and_stays_visible_by_repetition():
+def test_what_is_missing_counts_in_no_statistic_and_stays_visible_by_repetition() -> None:
     _, second = curve_points(RECORDED)
 
     assert second.n == 2
@@ -30,20 +32,20 @@ def test_what_is_missing_counts_in_no_statistic_and_stays_visible_by_repetition(
     assert second.values == (1.2, 1.4, None)
 
 
-def test_one_value_has_a_mean_and_no_spread_and_none_has_nothing():
+def test_one_value_has_a_mean_and_no_spread_and_none_has_nothing() -> None:
     one, none = curve_points(np.array([[1.0, np.nan]]))
 
     assert (one.mean, one.sd, one.lower) == (1.0, None, None)
     assert (none.n, none.mean, none.values) == (0, None, (None,))
 
 
-def test_a_curve_may_fall():
+def test_a_curve_may_fall() -> None:
     means = [each.mean for each in curve_points(np.array([[1.0, 0.5], [1.0, 0.7]]))]
 
     assert means[1] < means[0]
 
 
-def test_equal_values_do_not_spread_though_their_mean_is_rounded():
+def test_equal_values_do_not_spread_though_their_mean_is_rounded() -> None:
     (point,) = curve_points(np.full((3, 1), 0.1))
 
     assert point.sd == 0
@@ -51,7 +53,7 @@ def test_equal_values_do_not_spread_though_their_mean_is_rounded():
 
 
 @pytest.mark.parametrize("large", [1e200, 1.7e308])
-def test_values_too_large_to_be_squared_have_no_spread_and_are_no_error(large):
+def test_values_too_large_to_be_squared_have_no_spread_and_are_no_error(large: Any) -> None:
     (point,) = curve_points(np.array([[large], [-large / 2], [large]]))
 
     assert (point.sd, point.lower, point.upper) == (None, None, None)

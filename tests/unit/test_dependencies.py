@@ -40,20 +40,20 @@ def needed() -> dict[str, str]:
     return found
 
 
-def test_everything_that_is_needed_is_pinned_to_what_is_installed():
+def test_everything_that_is_needed_is_pinned_to_what_is_installed() -> None:
     found = needed()
 
     assert len(found) > 50
-    assert {name: (PINS.get(name), version) for name, version in found.items() if PINS.get(name) != version} == {}
+    assert {name: (PINS.get(name), version) for name, version in found.items() if PINS.get(name) != version} == {}  # type: ignore[call-overload]
 
 
-def test_every_line_of_the_constraints_is_a_version():
+def test_every_line_of_the_constraints_is_a_version() -> None:
     assert [line for line in LINES if not re.fullmatch(r"[A-Za-z0-9_.-]+==[0-9][0-9a-z.+]*", line)] == []
     assert len(PINS) == len(LINES)
 
 
 @pytest.mark.parametrize("requirement", declared("mujoco", "physx", "notebook", "dev"), ids=str)
-def test_what_is_declared_has_a_lower_bound_that_its_pin_fulfils(requirement: Requirement):
+def test_what_is_declared_has_a_lower_bound_that_its_pin_fulfils(requirement: Requirement) -> None:
     assert requirement.specifier
     assert requirement.specifier.contains(PINS[canonicalize_name(requirement.name)])
     assert requirement.url is None

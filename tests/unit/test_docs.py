@@ -54,11 +54,11 @@ def dead(path: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("path", [*DOCUMENTS, *NOTEBOOKS], ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_no_link_is_dead(path: Path):
+def test_no_link_is_dead(path: Path) -> None:
     assert dead(path) == []
 
 
-def test_dead_links_would_be_found(tmp_path: Path):
+def test_dead_links_would_be_found(tmp_path: Path) -> None:
     (tmp_path / "other.md").write_text("# A `heading` of two\n\n# A heading of two\n")
     document = tmp_path / "a.md"
     document.write_text(
@@ -70,7 +70,7 @@ def test_dead_links_would_be_found(tmp_path: Path):
     assert dead(document) == ["gone.md", "#there", "other.md#no"]
 
 
-def test_every_document_is_reached_from_the_index():
+def test_every_document_is_reached_from_the_index() -> None:
     index = ROOT / "docs" / "README.md"
     linked = {(index.parent / link.partition("#")[0]).resolve() for link in LINK.findall(prose(index))}
     beside = {path for path in DOCUMENTS if path.parent.name in {"docs", "how-to", "reference"}} - {index}
@@ -79,18 +79,18 @@ def test_every_document_is_reached_from_the_index():
     assert "(docs/README.md)" in (ROOT / "README.md").read_text()
 
 
-def test_the_reference_is_what_the_code_says():
+def test_the_reference_is_what_the_code_says() -> None:
     kept = {path.name: path.read_text() for path in FOLDER.glob("*.md")}
 
     assert {name for name, text in pages().items() if kept.get(name) != text} == set(), "run `make docs`"
     assert set(kept) == set(pages())
 
 
-def test_the_types_of_the_page_are_those_of_the_openapi_document():
+def test_the_types_of_the_page_are_those_of_the_openapi_document() -> None:
     assert typescript.FILE.read_text() == typescript.declarations(), "run `make docs`"
 
 
-def test_documents_name_no_path_of_a_machine():
+def test_documents_name_no_path_of_a_machine() -> None:
     listed = subprocess.run(
         ["git", "ls-files", "docs", "examples"], cwd=ROOT, capture_output=True, text=True, check=False
     )

@@ -20,7 +20,7 @@ ARM = World(
 LEVEL = np.array([[0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0]])
 
 
-def test_bodies_are_where_their_joints_carry_them_in_whatever_order_they_are_listed():
+def test_bodies_are_where_their_joints_carry_them_in_whatever_order_they_are_listed() -> None:
     positions, orientations = body_poses(ARM, LEVEL, np.array([[QUARTER, QUARTER]]))
 
     assert positions[0, 2] == pytest.approx([0.5, 0, 2])
@@ -28,7 +28,7 @@ def test_bodies_are_where_their_joints_carry_them_in_whatever_order_they_are_lis
     assert rotated(orientations[0, 1], np.array([1.0, 0, 0])) == pytest.approx([-1, 0, 0])
 
 
-def test_the_base_carries_all():
+def test_the_base_carries_all() -> None:
     turned = np.array([[1.0, 2.0, 3.0, *about(np.array([0.0, 1.0, 0.0]), np.array([QUARTER]))[0]]])
 
     positions, _ = body_poses(ARM, turned, np.zeros((1, 2)))
@@ -36,14 +36,14 @@ def test_the_base_carries_all():
     assert positions[0, 1] == pytest.approx([1, 2, 1.5])
 
 
-def test_turns_compose():
+def test_turns_compose() -> None:
     x, z = (about(np.array(axis), np.array([QUARTER])) for axis in ([1.0, 0, 0], [0, 0, 1.0]))
 
     assert rotated(product(z, x), np.array([0.0, 1.0, 0.0])) == pytest.approx(np.array([[0, 0, 1]]), abs=1e-12)
     assert rotated(product(x, z), np.array([1.0, 0.0, 0.0])) == pytest.approx(np.array([[0, 0, 1]]), abs=1e-12)
 
 
-def test_clearance_is_of_the_lowest_point():
+def test_clearance_is_of_the_lowest_point() -> None:
     edge = Body("box", 1.0, Box((0.2, 0.2, 0.2)))
     tilted = about(np.array([1.0, 0.0, 0.0]), np.array([np.pi / 4]))
     ball = Body("ball", 1.0, Sphere(0.1), center_m=(0.0, 0.0, -0.5))
@@ -52,7 +52,7 @@ def test_clearance_is_of_the_lowest_point():
     assert clearances_m(ball, np.array([[0, 0, 1.0]]), np.array([[0, 0, 0, 1.0]])) == pytest.approx([0.4])
 
 
-def test_bullet_has_the_bodies_at_the_same_places():
+def test_bullet_has_the_bodies_at_the_same_places() -> None:
     from gaplab.services.engines.pybullet import PyBullet
 
     robot, engine = Quadruped(), PyBullet()
@@ -64,15 +64,15 @@ def test_bullet_has_the_bodies_at_the_same_places():
 
     positions, orientations = body_poses(robot.world, scene.pose()[None], scene.angles()[None])
 
-    for link, joint in enumerate(robot.world.joints):
+    for link, joint in enumerate(robot.world.joints):  # type: ignore[assignment]
         state = scene.bullet.getLinkState(scene.robot, link, 0, 1, physicsClientId=scene.client)
-        place = [body.name for body in robot.world.bodies].index(joint.child)
+        place = [body.name for body in robot.world.bodies].index(joint.child)  # type: ignore[attr-defined]
         assert positions[0, place] == pytest.approx(state[4], abs=1e-6)
         assert abs(orientations[0, place] @ state[5]) == pytest.approx(1, abs=1e-6)
     engine.close()
 
 
-def test_a_quadruped_is_seen_with_shins_between_knees_and_feet():
+def test_a_quadruped_is_seen_with_shins_between_knees_and_feet() -> None:
     world = Quadruped().world
     shapes = shapes_of(world)
 
@@ -84,7 +84,7 @@ def test_a_quadruped_is_seen_with_shins_between_knees_and_feet():
     assert shin.position_m == (0.0, 0.0, -0.075)
 
 
-def test_what_reaches_to_the_side_lies_along_its_way():
+def test_what_reaches_to_the_side_lies_along_its_way() -> None:
     arm = World(bodies=(ARM.bodies[0], Body("hand", 1.0, Sphere(0.1), center_m=(0.3, 0.0, -0.4))))
 
     strut = shapes_of(arm)[2]

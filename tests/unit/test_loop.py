@@ -1,6 +1,7 @@
 """The algorithm of Fig. 2."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from tests.fakes import CountedReality, Recorder, flat, paraboloid, small_settin
 PHASES = (Selected, Measured, Tuned, Transferred, Probed)
 
 
-def test_iteration_0_tunes_nothing_and_the_others_run_through_every_phase():
+def test_iteration_0_tunes_nothing_and_the_others_run_through_every_phase() -> None:
     steps = list(repetition(small_setting()))
 
     assert [type(step) for step in steps] == [Tuned, Transferred, Probed, *PHASES * 3]
@@ -24,7 +25,7 @@ def test_iteration_0_tunes_nothing_and_the_others_run_through_every_phase():
 
 
 @pytest.mark.parametrize("strategy", sorted(strategies))
-def test_a_resumed_repetition_equals_an_uninterrupted_one_wherever_it_stopped(strategy):
+def test_a_resumed_repetition_equals_an_uninterrupted_one_wherever_it_stopped(strategy: Any) -> None:
     setting = small_setting(strategy)
     whole = [flat(step) for step in repetition(setting)]
 
@@ -36,7 +37,7 @@ def test_a_resumed_repetition_equals_an_uninterrupted_one_wherever_it_stopped(st
 
 @pytest.mark.parametrize("batch", [2, 9, 1_000])
 @pytest.mark.parametrize("strategy", sorted(strategies))
-def test_no_number_depends_on_how_many_rollouts_are_asked_for_at_a_time(strategy, batch):
+def test_no_number_depends_on_how_many_rollouts_are_asked_for_at_a_time(strategy: Any, batch: Any) -> None:
     one_by_one = [flat(step) for step in repetition(small_setting(strategy))]
 
     together = repetition(replace(small_setting(strategy), batch_size=lambda: batch))
@@ -44,8 +45,8 @@ def test_no_number_depends_on_how_many_rollouts_are_asked_for_at_a_time(strategy
     assert [flat(step) for step in together] == one_by_one
 
 
-def test_newcomers_are_foreseen_so_that_fewer_calls_are_waited_for():
-    def calls_of_a_transfer(batch):
+def test_newcomers_are_foreseen_so_that_fewer_calls_are_waited_for() -> None:
+    def calls_of_a_transfer(batch: Any) -> Any:
         simulate = Recorder()
         setting = small_setting("random", simulate=simulate, batch_size=lambda: batch)
         steps = repetition(setting)
@@ -56,7 +57,7 @@ def test_newcomers_are_foreseen_so_that_fewer_calls_are_waited_for():
     assert calls_of_a_transfer(8) < 0.8 * calls_of_a_transfer(1)
 
 
-def test_reality_is_asked_once_for_each_sample_and_each_probe():
+def test_reality_is_asked_once_for_each_sample_and_each_probe() -> None:
     reality = CountedReality()
 
     list(repetition(small_setting(reality=reality)))
@@ -64,7 +65,7 @@ def test_reality_is_asked_once_for_each_sample_and_each_probe():
     assert reality.asked == 3 + 4
 
 
-def test_a_resumed_repetition_does_not_measure_again_what_is_in_the_log():
+def test_a_resumed_repetition_does_not_measure_again_what_is_in_the_log() -> None:
     log = list(repetition(small_setting()))[:5]
     reality = CountedReality()
 
@@ -86,7 +87,9 @@ def test_a_resumed_repetition_does_not_measure_again_what_is_in_the_log():
         ("known_fit", {}, 160 + 300),
     ],
 )
-def test_budgets_are_honoured_to_the_rollout_and_reported_in_the_steps(strategy, options, expected):
+def test_budgets_are_honoured_to_the_rollout_and_reported_in_the_steps(
+    strategy: Any, options: Any, expected: Any
+) -> None:
     simulate = Recorder()
 
     steps = list(repetition(small_setting(strategy, options, simulate=simulate)))
@@ -98,8 +101,8 @@ def test_budgets_are_honoured_to_the_rollout_and_reported_in_the_steps(strategy,
 
 
 @pytest.mark.parametrize("failed", [{2}, {1, 2}, {1, 2, 3}])
-def test_what_a_failed_measurement_does_not_take_of_the_budget_is_saved(failed):
-    reality = CountedReality(lambda genome: float("nan") if reality.asked // 2 in failed else float(genome.sum()))
+def test_what_a_failed_measurement_does_not_take_of_the_budget_is_saved(failed: Any) -> None:
+    reality = CountedReality(lambda genome: float("nan") if reality.asked // 2 in failed else float(genome.sum()))  # type: ignore[has-type]
 
     steps = list(repetition(small_setting("random", reality=reality)))
 
@@ -107,7 +110,7 @@ def test_what_a_failed_measurement_does_not_take_of_the_budget_is_saved(failed):
     assert sum(cost.rollouts + cost.saved for cost in costs) == 160 + 300
 
 
-def test_a_strategy_that_transfers_the_best_of_many_simulators_saves_the_budget_of_all():
+def test_a_strategy_that_transfers_the_best_of_many_simulators_saves_the_budget_of_all() -> None:
     class Fittest(Informative):
         selects_transferred = True
 
@@ -121,12 +124,12 @@ def test_a_strategy_that_transfers_the_best_of_many_simulators_saves_the_budget_
 @pytest.mark.parametrize(
     ("said", "wrong"), [(True, "'eager' searches twice"), (False, "'eager' says that it does not search")]
 )
-def test_a_search_for_which_there_is_no_budget_is_refused(said, wrong):
+def test_a_search_for_which_there_is_no_budget_is_refused(said: Any, wrong: Any) -> None:
     class Eager(Strategy):
         name = "eager"
         searches = said
 
-        def select(self, belief, search, rng):
+        def select(self, belief: Any, search: Any, rng: Any) -> Any:
             search(lambda genomes, fitnesses: fitnesses[:, 0])
             return search(lambda genomes, fitnesses: -fitnesses[:, 0])
 
@@ -138,7 +141,7 @@ def test_a_search_for_which_there_is_no_budget_is_refused(said, wrong):
     assert simulate.rollouts <= of_a_transfer + of_a_search * said
 
 
-def test_a_budget_that_the_population_does_not_divide_is_honoured_too():
+def test_a_budget_that_the_population_does_not_divide_is_honoured_too() -> None:
     simulate = Recorder()
     budget = Budget(controller_evaluations=7, selection_evaluations=6, simulator_evaluations=9, reuse_transfer=False)
 
@@ -148,7 +151,7 @@ def test_a_budget_that_the_population_does_not_divide_is_honoured_too():
     assert sum(cost.rollouts + cost.saved for cost in costs) == 7 + 6 + 9 + 7
 
 
-def test_simulated_fit_tries_the_controller_that_was_just_transferred():
+def test_simulated_fit_tries_the_controller_that_was_just_transferred() -> None:
     steps = list(repetition(small_setting()))
 
     transferred = [step.genome for step in steps if isinstance(step, Transferred)]
@@ -157,7 +160,7 @@ def test_simulated_fit_tries_the_controller_that_was_just_transferred():
     assert {(step.cost.rollouts, step.cost.saved) for step in selected} == {(0, 30)}
 
 
-def test_without_reuse_simulated_fit_searches_anew():
+def test_without_reuse_simulated_fit_searches_anew() -> None:
     steps = list(repetition(small_setting(budget=Budget(40, 30, 50, reuse_transfer=False))))
 
     assert {step.cost.rollouts for step in steps if isinstance(step, Selected)} == {30}
@@ -165,7 +168,7 @@ def test_without_reuse_simulated_fit_searches_anew():
     assert not any(np.array_equal(step.genome, transferred[0]) for step in steps if isinstance(step, Selected))
 
 
-def test_fit_strategies_close_the_gap():
+def test_fit_strategies_close_the_gap() -> None:
     steps = list(repetition(small_setting(budget=Budget(400, 400, 400))))
 
     start, *_, end = (step.recorded for step in steps if isinstance(step, Probed))
@@ -173,7 +176,7 @@ def test_fit_strategies_close_the_gap():
     assert start < 0.95
 
 
-def test_the_recorded_fitness_is_the_larger_of_probe_and_best_sample():
+def test_the_recorded_fitness_is_the_larger_of_probe_and_best_sample() -> None:
     samples = [Sample(np.zeros(1), 0.4), Sample(np.zeros(1), 0.9), Sample(np.zeros(1), float("nan"))]
 
     assert recorded_fitness(0.5, samples) == 0.9
@@ -182,7 +185,7 @@ def test_the_recorded_fitness_is_the_larger_of_probe_and_best_sample():
     assert np.isnan(recorded_fitness(float("nan"), []))
 
 
-def test_a_measurement_that_failed_counts_but_teaches_nothing():
+def test_a_measurement_that_failed_counts_but_teaches_nothing() -> None:
     reality = CountedReality(lambda genome: float("nan"))
 
     steps = list(repetition(small_setting(reality=reality)))
@@ -192,8 +195,8 @@ def test_a_measurement_that_failed_counts_but_teaches_nothing():
     assert all(step.simulators[0].squared_error == 0.0 for step in steps if isinstance(step, Tuned))
 
 
-def test_physics_that_fails_everywhere_is_counted_and_ends_in_no_fitness():
-    def broken(genomes, parameters):
+def test_physics_that_fails_everywhere_is_counted_and_ends_in_no_fitness() -> None:
+    def broken(genomes: Any, parameters: Any) -> Any:
         return np.full((len(genomes), len(parameters)), np.nan)
 
     steps = list(repetition(small_setting(simulate=broken)))
@@ -203,8 +206,8 @@ def test_physics_that_fails_everywhere_is_counted_and_ends_in_no_fitness():
     assert all(step.cost.failures == step.cost.rollouts > 0 for step in transfers)
 
 
-def test_a_controller_whose_physics_fails_never_wins():
-    def broken_on_the_left(genomes, parameters):
+def test_a_controller_whose_physics_fails_never_wins() -> None:
+    def broken_on_the_left(genomes: Any, parameters: Any) -> Any:
         return np.where(genomes[:, :1] < 0.8, np.nan, paraboloid(genomes, parameters))
 
     steps = list(repetition(small_setting(simulate=broken_on_the_left)))
@@ -212,7 +215,7 @@ def test_a_controller_whose_physics_fails_never_wins():
     assert all(step.genome[0] >= 0.8 for step in steps if isinstance(step, Selected | Transferred))
 
 
-def test_repetitions_strategies_and_seeds_draw_different_simulators():
+def test_repetitions_strategies_and_seeds_draw_different_simulators() -> None:
     settings = [small_setting(), small_setting(repetition=5), small_setting(seed=12), small_setting("random")]
 
     drawn = {flat(next(repetition(setting))) for setting in settings}
@@ -220,24 +223,24 @@ def test_repetitions_strategies_and_seeds_draw_different_simulators():
     assert len(drawn) == len(settings)
 
 
-def test_an_ensemble_strategy_keeps_as_many_simulators_as_it_asks_for():
+def test_an_ensemble_strategy_keeps_as_many_simulators_as_it_asks_for() -> None:
     steps = list(repetition(small_setting("informative", {"simulators": 7})))
 
     assert {len(step.simulators) for step in steps if isinstance(step, Tuned)} == {7}
 
 
-def test_the_population_of_a_fit_strategy_yields_its_one_best_simulator():
+def test_the_population_of_a_fit_strategy_yields_its_one_best_simulator() -> None:
     steps = list(repetition(small_setting("simulated_fit")))
 
     assert {len(step.simulators) for step in steps if isinstance(step, Tuned)} == {1}
 
 
-def test_the_transfer_evolves_in_the_best_simulator():
+def test_the_transfer_evolves_in_the_best_simulator() -> None:
     best = np.array([0.3, 0.6])
     setting = small_setting(budget=Budget(500, 10, 10))
-    step = Tuned(1, tuple(replace(each) for each in next(repetition(setting)).simulators))
+    step = Tuned(1, tuple(replace(each) for each in next(repetition(setting)).simulators))  # type: ignore[union-attr]
     step = replace(step, simulators=(replace(step.simulators[0], parameters=best),))
 
     transferred = next(repetition(setting, [step]))
 
-    np.testing.assert_allclose(transferred.genome, best, atol=0.01)
+    np.testing.assert_allclose(transferred.genome, best, atol=0.01)  # type: ignore[union-attr]

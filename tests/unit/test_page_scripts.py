@@ -54,7 +54,7 @@ def imported(path: Path) -> list[Path]:
 
 
 @pytest.mark.parametrize("path", TESTS, ids=lambda path: path.name)
-def test_scripts_pass_their_tests(path: Path, tmp_path: Path):
+def test_scripts_pass_their_tests(path: Path, tmp_path: Path) -> None:
     done = deno(tmp_path, "test", "--no-check", path)
 
     assert done.returncode == 0, done.stdout + done.stderr
@@ -62,17 +62,17 @@ def test_scripts_pass_their_tests(path: Path, tmp_path: Path):
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.relative_to(PAGE).as_posix())
-def test_no_script_names_a_plugin(path: Path):
+def test_no_script_names_a_plugin(path: Path) -> None:
     assert named_plugins(path.read_text()) == []
 
 
-def test_names_of_plugins_would_be_found():
+def test_names_of_plugins_would_be_found() -> None:
     text = "strategy === \"direct\"; // `known_fit`\nnames = ['toy_function', random]"
 
     assert named_plugins(text) == ["direct", "known_fit", "toy_function"]
 
 
-def test_scripts_import_each_other_in_no_circle():
+def test_scripts_import_each_other_in_no_circle() -> None:
     left = {path: imported(path) for path in SCRIPTS}
     assert left[PAGE / "views" / "compare" / "pairs.js"]
 
@@ -83,7 +83,7 @@ def test_scripts_import_each_other_in_no_circle():
             del left[path]
 
 
-def test_the_page_permits_the_actions_that_the_service_permits(tmp_path: Path):
+def test_the_page_permits_the_actions_that_the_service_permits(tmp_path: Path) -> None:
     permitted = exported(tmp_path, "lib/life_cycle.js", "PERMITTED")
 
     assert isinstance(permitted, dict)
@@ -92,12 +92,12 @@ def test_the_page_permits_the_actions_that_the_service_permits(tmp_path: Path):
     }
 
 
-def test_the_page_knows_every_state(tmp_path: Path):
+def test_the_page_knows_every_state(tmp_path: Path) -> None:
     assert exported(tmp_path, "lib/state_badge.js", "STATES") == [state.value for state in State]
     assert exported(tmp_path, "lib/state_badge.js", "ENDED") == [state.value for state in State if state.ended]
 
 
-def test_the_page_has_words_for_every_event(tmp_path: Path):
+def test_the_page_has_words_for_every_event(tmp_path: Path) -> None:
     kinds = exported(tmp_path, "views/experiment/event_words.js", "KINDS")
 
     assert isinstance(kinds, list)

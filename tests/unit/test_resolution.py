@@ -1,5 +1,7 @@
 """From what a user wrote to what is run."""
 
+from typing import Any
+
 import pytest
 
 from gaplab.schemas.spec import ExperimentSpec, Schedule, StudySpec
@@ -12,17 +14,17 @@ from gaplab.services.specs.resolution import expected_rollouts, resolve_experime
 EMBODIED = [name for name, engine in engines.items() if engine.runs(Quadruped().world)]
 
 
-def experiment(**spec):
+def experiment(**spec: Any) -> Any:
     return ExperimentSpec.model_validate({"strategy": "simulated_fit"} | spec)
 
 
-def refused(**spec):
+def refused(**spec: Any) -> Any:
     with pytest.raises(InvalidSpec) as refusal:
         resolve_experiment(experiment(**spec))
     return {each.pointer: each for each in refusal.value.violations}
 
 
-def test_every_default_is_the_papers():
+def test_every_default_is_the_papers() -> None:
     resolved = resolve_experiment(experiment())
 
     assert (resolved.iterations, resolved.repetitions) == (10, 40)
@@ -36,7 +38,7 @@ def test_every_default_is_the_papers():
     assert (resolved.robot.name, resolved.engine.name, resolved.reality.engine.name) == ("quadruped", *["pybullet"] * 2)
 
 
-def test_a_resolved_spec_has_nothing_left_out_and_resolves_to_itself():
+def test_a_resolved_spec_has_nothing_left_out_and_resolves_to_itself() -> None:
     resolved = resolve_experiment(experiment(budget="desk", tunables=["restitution"]))
 
     settled = resolved.model_dump(exclude=set(Schedule.model_fields))
@@ -45,7 +47,7 @@ def test_a_resolved_spec_has_nothing_left_out_and_resolves_to_itself():
 
 
 @pytest.mark.parametrize("preset", sorted(PRESETS))
-def test_any_number_of_a_budget_can_be_given_instead(preset):
+def test_any_number_of_a_budget_can_be_given_instead(preset: Any) -> None:
     resolved = resolve_experiment(
         experiment(budget={"preset": preset, "simulator_evaluations": 777}, iterations=3, repetitions=5)
     )
@@ -54,7 +56,7 @@ def test_any_number_of_a_budget_can_be_given_instead(preset):
     assert resolved.budget.controller_evaluations == PRESETS[preset].controller_evaluations
 
 
-def test_the_papers_whole_figure_4_is_220_million_rollouts():
+def test_the_papers_whole_figure_4_is_220_million_rollouts() -> None:
     strategies = [each for each in resolve_study(StudySpec()) if each.strategy.name != "direct"]
 
     total = sum(expected_rollouts(each) * each.repetitions for each in strategies)
@@ -64,17 +66,17 @@ def test_the_papers_whole_figure_4_is_220_million_rollouts():
     assert total == 40 * (2 * each_fit + 2 * (each_fit + 19 * 100_000) + 2 * (each_fit - 100_000)) == 220_800_000
 
 
-def test_the_toy_runs_on_its_own_engine_if_none_is_named():
+def test_the_toy_runs_on_its_own_engine_if_none_is_named() -> None:
     assert resolve_experiment(experiment(robot="toy_function")).engine.name == "analytic"
 
 
-def test_the_baseline_of_a_study_may_have_more_repetitions():
+def test_the_baseline_of_a_study_may_have_more_repetitions() -> None:
     *_, direct = resolve_study(StudySpec(repetitions=4, direct_repetitions=10))
 
     assert (direct.strategy.name, direct.repetitions) == ("direct", 10)
 
 
-def test_an_experiment_is_called_after_what_sets_it_apart():
+def test_an_experiment_is_called_after_what_sets_it_apart() -> None:
     plain = resolve_experiment(experiment())
     weighted = experiment(strategy={"name": "simulated_fit_and_informative", "options": {"fit_weight": 2}})
     named = experiment(name="mine")
@@ -84,14 +86,14 @@ def test_an_experiment_is_called_after_what_sets_it_apart():
     assert resolve_experiment(named).name == "mine"
 
 
-def test_a_misspelt_name_is_refused_with_the_nearest_one():
+def test_a_misspelt_name_is_refused_with_the_nearest_one() -> None:
     violation = refused(strategy="simulated_fti")["/strategy"]
 
     assert violation.nearest == "simulated_fit"
     assert "random" in violation.permitted
 
 
-def test_everything_that_is_wrong_is_said_at_once():
+def test_everything_that_is_wrong_is_said_at_once() -> None:
     violations = refused(
         tunables=["frction", {"name": "restitution", "lower": 0.5, "upper": 0.1}],
         reality={"parameters": {"static_friction": -1, "mass": 1}},
@@ -120,19 +122,19 @@ def test_everything_that_is_wrong_is_said_at_once():
         ({"strategy": {"name": "known_fit", "options": {"spred": 1}}}, "/strategy/options/spred", ("spread",)),
     ],
 )
-def test_what_cannot_be_run_is_refused_with_its_place_and_what_can(spec, pointer, permitted):
+def test_what_cannot_be_run_is_refused_with_its_place_and_what_can(spec: Any, pointer: Any, permitted: Any) -> None:
     violations = refused(**spec)
 
     assert violations[pointer].permitted == permitted
 
 
-def test_an_ensemble_larger_than_the_search_is_refused():
+def test_an_ensemble_larger_than_the_search_is_refused() -> None:
     strategy = {"name": "informative", "options": {"simulators": 300}}
 
     assert refused(strategy=strategy, budget="desk")["/budget/simulator_evaluations"].permitted == "at least 300"
 
 
-def test_an_engine_that_is_not_installed_is_refused_with_its_install_line(monkeypatch):
+def test_an_engine_that_is_not_installed_is_refused_with_its_install_line(monkeypatch: pytest.MonkeyPatch) -> None:
     from gaplab.services.engines import engines
 
     monkeypatch.setattr(engines["pybullet"], "library", "a_library_that_is_not_there")
@@ -140,7 +142,7 @@ def test_an_engine_that_is_not_installed_is_refused_with_its_install_line(monkey
     assert "pip install" in refused()["/engine"].message
 
 
-def test_what_is_wrong_with_a_study_points_into_the_study():
+def test_what_is_wrong_with_a_study_points_into_the_study() -> None:
     spec = StudySpec.model_validate({"strategies": ["random", "nonsense"], "engine": "analytic"})
 
     with pytest.raises(InvalidSpec) as refusal:

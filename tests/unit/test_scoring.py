@@ -10,16 +10,16 @@ FITNESSES = np.array([[1.0, 3.0], [2.0, 2.0]])
 WEIGHTS = np.array([0.75, 0.25])
 
 
-def test_the_weighted_mean_counts_accurate_simulators_more():
+def test_the_weighted_mean_counts_accurate_simulators_more() -> None:
     np.testing.assert_allclose(weighted_mean(FITNESSES, WEIGHTS), [1.5, 2.0])
 
 
-def test_the_weighted_deviation_is_the_disagreement_of_the_simulators():
+def test_the_weighted_deviation_is_the_disagreement_of_the_simulators() -> None:
     # mean 1.5: 0.75 (1 - 1.5)^2 + 0.25 (3 - 1.5)^2 = 0.75
     np.testing.assert_allclose(weighted_deviation(FITNESSES, WEIGHTS), [0.75**0.5, 0.0])
 
 
-def test_the_penalty_is_the_mean_inverse_distance_over_a_hundred():
+def test_the_penalty_is_the_mean_inverse_distance_over_a_hundred() -> None:
     samples = [Sample(np.array([0.0, 0.0]), 0.0), Sample(np.array([0.0, 3.0]), 4.0)]
 
     penalty = uniqueness_penalty(np.array([[0.0, 3.0]]), np.array([4.0]), samples[:1])
@@ -29,7 +29,7 @@ def test_the_penalty_is_the_mean_inverse_distance_over_a_hundred():
     assert of_two == pytest.approx((1 / 34**0.5 + 1 / 3) / 2 / 100)
 
 
-def test_the_distance_is_over_genome_and_fitness_together():
+def test_the_distance_is_over_genome_and_fitness_together() -> None:
     sample = [Sample(np.array([0.5]), 1.0)]
 
     penalty = uniqueness_penalty(np.array([[0.5]]), np.array([3.0]), sample)
@@ -37,38 +37,38 @@ def test_the_distance_is_over_genome_and_fitness_together():
     assert penalty == pytest.approx(1 / 2 / 100)
 
 
-def test_before_the_first_sample_there_is_no_penalty():
+def test_before_the_first_sample_there_is_no_penalty() -> None:
     np.testing.assert_array_equal(uniqueness_penalty(np.zeros((3, 2)), np.zeros(3), []), np.zeros(3))
 
 
-def test_a_controller_on_top_of_a_sample_has_a_large_but_finite_penalty():
+def test_a_controller_on_top_of_a_sample_has_a_large_but_finite_penalty() -> None:
     penalty = uniqueness_penalty(np.array([[0.5]]), np.array([1.0]), [Sample(np.array([0.5]), 1.0)])
 
     assert np.isfinite(penalty).all()
     assert penalty[0] > 1_000
 
 
-def test_weights_are_the_simulators_fitnesses_normalised():
+def test_weights_are_the_simulators_fitnesses_normalised() -> None:
     # fitness 1/0.1 = 10 and 1/0.4 = 2.5
     np.testing.assert_allclose(simulator_weights(np.array([0.1, 0.4]), floor=1e-9), [0.8, 0.2])
 
 
-def test_weights_are_equal_before_any_sample():
+def test_weights_are_equal_before_any_sample() -> None:
     np.testing.assert_allclose(simulator_weights(np.zeros(4), floor=1e-6), np.full(4, 0.25))
 
 
-def test_a_perfect_simulator_takes_the_weight_that_the_floor_allows():
+def test_a_perfect_simulator_takes_the_weight_that_the_floor_allows() -> None:
     weights = simulator_weights(np.array([0.0, 0.03]), floor=0.01)
 
     np.testing.assert_allclose(weights, [0.75, 0.25])
 
 
-def test_a_failed_simulator_weighs_nothing_and_if_all_fail_they_weigh_alike():
+def test_a_failed_simulator_weighs_nothing_and_if_all_fail_they_weigh_alike() -> None:
     np.testing.assert_allclose(simulator_weights(np.array([0.5, np.inf]), floor=0.01), [1.0, 0.0])
     np.testing.assert_allclose(simulator_weights(np.array([np.inf, np.inf]), floor=0.01), [0.5, 0.5])
 
 
-def test_a_simulator_that_failed_on_a_sample_cannot_rule_controllers_out():
+def test_a_simulator_that_failed_on_a_sample_cannot_rule_controllers_out() -> None:
     weights = simulator_weights(np.array([0.1, 0.1, np.inf]), floor=1e-9)
     fitnesses = np.array([[1.0, 3.0, np.nan], [2.0, 2.0, 5.0]])
 
@@ -76,7 +76,7 @@ def test_a_simulator_that_failed_on_a_sample_cannot_rule_controllers_out():
     np.testing.assert_allclose(weighted_deviation(fitnesses, weights), [1.0, 0.0])
 
 
-def test_a_failed_rollout_makes_the_score_nan():
+def test_a_failed_rollout_makes_the_score_nan() -> None:
     failed = np.array([[1.0, np.nan]])
 
     assert np.isnan(weighted_mean(failed, WEIGHTS)).all()

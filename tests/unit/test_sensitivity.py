@@ -1,5 +1,7 @@
 """The sensitivity check: what is nothing, rough or smooth, and that it is the same whenever it is asked."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -24,21 +26,21 @@ BOX = Space.box([0.0, 0.0], [1.0, 1.0])
 VALUES = np.linspace(0.0, 1.0, 17)
 
 
-def subject(simulate=paraboloid):
+def subject(simulate: Any = paraboloid) -> Any:
     return Subject(simulate, BOX, np.array([0.3, 0.6]), BOX, ("first", "second"))
 
 
-def found(simulate=paraboloid):
+def found(simulate: Any = paraboloid) -> Any:
     return check(subject(simulate), SteadyState(), EFFORT)
 
 
-def jumping(genomes, parameters):
+def jumping(genomes: Any, parameters: Any) -> Any:
     """The second tunable is noise: a number that its digits decide."""
     noise = np.modf(np.sin(1e5 * parameters[:, 1] + 7 * genomes[:, :1]) * 4e4)[0]
     return paraboloid(genomes, np.column_stack([parameters[:, 0], np.full(len(parameters), 0.5)])) + 0.3 * noise
 
 
-def test_a_tunable_that_changes_nothing_is_found_out():
+def test_a_tunable_that_changes_nothing_is_found_out() -> None:
     ignoring = lambda genomes, parameters: paraboloid(genomes, parameters * [1.0, 0.0])  # noqa: E731
 
     first, second = found(ignoring)
@@ -49,7 +51,7 @@ def test_a_tunable_that_changes_nothing_is_found_out():
     assert warning(first) is None
 
 
-def test_a_tunable_whose_effect_is_noise_is_rough():
+def test_a_tunable_whose_effect_is_noise_is_rough() -> None:
     _, second = found(jumping)
 
     assert second.verdict is Verdict.ROUGH
@@ -57,26 +59,26 @@ def test_a_tunable_whose_effect_is_noise_is_rough():
     assert "is rough" in warning(second)
 
 
-def test_a_straight_line_has_no_roughness_and_its_standard_deviation_as_its_effect():
+def test_a_straight_line_has_no_roughness_and_its_standard_deviation_as_its_effect() -> None:
     effect, roughness = effect_and_roughness(np.array([2.0 * VALUES, -2.0 * VALUES]))
 
     assert effect == pytest.approx(2.0 * VALUES.std(ddof=1))
     assert roughness == pytest.approx(0.0, abs=1e-12)
 
 
-def test_white_noise_has_a_roughness_of_one():
+def test_white_noise_has_a_roughness_of_one() -> None:
     _, roughness = effect_and_roughness(np.random.default_rng(1).normal(size=(400, 17)))
 
     assert roughness == pytest.approx(1.0, abs=0.03)
 
 
-def test_a_step_is_not_rough_for_tuning_can_find_it():
+def test_a_step_is_not_rough_for_tuning_can_find_it() -> None:
     _, roughness = effect_and_roughness(np.where(VALUES > 0.5, 1.0, 0.0)[None, :])
 
     assert verdict(1.0, roughness) is Verdict.SMOOTH
 
 
-def test_a_controller_on_which_a_tunable_acts_counts_for_more_than_many_that_stand_still():
+def test_a_controller_on_which_a_tunable_acts_counts_for_more_than_many_that_stand_still() -> None:
     still = np.random.default_rng(1).normal(scale=0.001, size=(7, 17))
     moving = VALUES[None, :]
 
@@ -86,7 +88,7 @@ def test_a_controller_on_which_a_tunable_acts_counts_for_more_than_many_that_sta
     assert roughness < 0.1
 
 
-def test_failed_physics_counts_in_no_number_but_that_of_failures():
+def test_failed_physics_counts_in_no_number_but_that_of_failures() -> None:
     line = np.tile(VALUES, (3, 1))
     line[0] = np.nan
     line[1, 5] = np.nan
@@ -100,7 +102,7 @@ def test_failed_physics_counts_in_no_number_but_that_of_failures():
     assert shown.effect == pytest.approx(VALUES.std(ddof=1), rel=0.02)
 
 
-def test_where_all_physics_fails_nothing_is_known():
+def test_where_all_physics_fails_nothing_is_known() -> None:
     first, _ = found(lambda genomes, parameters: np.full((len(genomes), len(parameters)), np.nan))
 
     assert first.verdict is Verdict.UNKNOWN
@@ -109,7 +111,7 @@ def test_where_all_physics_fails_nothing_is_known():
     assert "physics failed in 136" in warning(first)
 
 
-def test_where_controllers_do_not_differ_an_effect_has_no_relation_to_them():
+def test_where_controllers_do_not_differ_an_effect_has_no_relation_to_them() -> None:
     same = np.tile(VALUES, (8, 1))
 
     assert spread_between(same) == 0.0
@@ -129,11 +131,11 @@ def test_where_controllers_do_not_differ_an_effect_has_no_relation_to_them():
         (1.0, float("nan"), Verdict.UNKNOWN),
     ],
 )
-def test_the_thresholds_are_as_documented(relative, roughness, expected):
+def test_the_thresholds_are_as_documented(relative: Any, roughness: Any, expected: Any) -> None:
     assert verdict(relative, roughness) is expected
 
 
-def test_a_check_takes_the_rollouts_that_it_says_and_no_more():
+def test_a_check_takes_the_rollouts_that_it_says_and_no_more() -> None:
     recorder = Recorder()
 
     found(recorder)
@@ -142,14 +144,14 @@ def test_a_check_takes_the_rollouts_that_it_says_and_no_more():
     assert recorder.rollouts > 0.9 * EFFORT.rollouts(2)
 
 
-def test_a_check_is_the_same_to_the_bit_whenever_it_is_asked():
+def test_a_check_is_the_same_to_the_bit_whenever_it_is_asked() -> None:
     assert found() == found()
 
 
-def test_the_others_stay_in_the_middle_of_their_bounds():
+def test_the_others_stay_in_the_middle_of_their_bounds() -> None:
     asked = []
 
-    def listening(genomes, parameters):
+    def listening(genomes: Any, parameters: Any) -> Any:
         asked.append(parameters)
         return paraboloid(genomes, parameters)
 
@@ -160,8 +162,8 @@ def test_the_others_stay_in_the_middle_of_their_bounds():
     np.testing.assert_array_equal(second, np.column_stack([np.full(17, 0.5), VALUES]))
 
 
-def test_evolved_controllers_are_fitter_than_random_ones():
-    def hill(genomes, parameters):
+def test_evolved_controllers_are_fitter_than_random_ones() -> None:
+    def hill(genomes: Any, parameters: Any) -> Any:
         return np.repeat(paraboloid(genomes, np.array([[0.5, 0.5]])), len(parameters), axis=1)
 
     genomes = controllers(subject(hill), SteadyState(), 100)

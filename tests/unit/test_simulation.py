@@ -1,5 +1,7 @@
 """What a robot says of a trajectory, and what is made of it."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -14,17 +16,17 @@ class Endless(ToyFunction):
 
     name = "endless"
 
-    def __init__(self, worth):
+    def __init__(self, worth: Any) -> None:
         super().__init__()
         self.worth = worth
 
-    def fitness(self, trajectory):
+    def fitness(self, trajectory: Any) -> Any:
         travelled = super().fitness(trajectory)
         return np.where(travelled > 0.3, self.worth, travelled)
 
 
 @pytest.mark.parametrize("worth", [np.inf, -np.inf, np.nan])
-def test_a_fitness_that_is_not_finite_is_physics_that_failed_in_simulation_and_in_reality(worth):
+def test_a_fitness_that_is_not_finite_is_physics_that_failed_in_simulation_and_in_reality(worth: Any) -> None:
     whole, broken = (Simulation(robot, Analytic(), ()) for robot in (ToyFunction(), Endless(worth)))
     genomes, parameters = np.linspace(0.0, 1.0, 50)[:, None], np.empty((1, 0))
     answers = Answers(broken)

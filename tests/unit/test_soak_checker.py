@@ -1,6 +1,7 @@
 """The soak's checker finds what it looks for: histories and databases that were broken by hand."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -17,12 +18,22 @@ SPEC = resolve_experiment(ExperimentSpec.model_validate(BODY)).model_dump(mode="
 STUDY = {name: value for name, value in BODY.items() if name != "strategy"} | {"name": "two", "strategies": ["random"]}
 
 
-def expected(spec, number):
+def expected(spec: Any, number: Any) -> Any:
     return LOG
 
 
-def move(number, was, state, *, epochs=(1, 1), owner="a", steps=(0, 0), at=10.0, repetition=1):
-    return Move(number, repetition, was, state, *epochs, owner, *steps, at)
+def move(
+    number: Any,
+    was: Any,
+    state: Any,
+    *,
+    epochs: Any = (1, 1),
+    owner: Any = "a",
+    steps: Any = (0, 0),
+    at: Any = 10.0,
+    repetition: Any = 1,
+) -> Any:
+    return Move(number, repetition, was, state, *epochs, owner, *steps, at)  # type: ignore[call-arg]
 
 
 CLAIMED = move(1, "QUEUED", "RUNNING", epochs=(0, 1), at=3.0)
@@ -34,23 +45,23 @@ EXPERIMENT = Experiment("e1", None, "one", "COMPLETED", SPEC, (DONE,))
 EVIDENCE = Evidence((EXPERIMENT,), {}, {"c1": "COMPLETED"}, (CLAIMED, STORED, ENDED))
 
 
-def found(history=(SUBMITTED,), evidence=EVIDENCE):
+def found(history: Any = (SUBMITTED,), evidence: Any = EVIDENCE) -> Any:
     return violations(list(history), evidence, expected)
 
 
-def with_repetition(**changes):
+def with_repetition(**changes: Any) -> Any:
     return replace(EVIDENCE, experiments=(replace(EXPERIMENT, repetitions=(replace(DONE, **changes),)),))
 
 
-def verb(name, status=200, sent_at=6.0):
+def verb(name: Any, status: Any = 200, sent_at: Any = 6.0) -> Any:
     return Record(name, f"/experiments/e1/{name}", None, sent_at, sent_at + 0.5, status)
 
 
-def test_a_service_that_kept_its_word_has_no_violations():
+def test_a_service_that_kept_its_word_has_no_violations() -> None:
     assert found() == []
 
 
-def test_a_study_that_is_there_as_it_was_submitted_is_none():
+def test_a_study_that_is_there_as_it_was_submitted_is_none() -> None:
     (resolved,) = resolve_study(StudySpec.model_validate(STUDY))
     answer = {"id": "s1", "experiments": [{"id": "e1"}]}
     submitted = Record("submit", "/studies", STUDY, 1.0, 2.0, 202, answer)
@@ -62,14 +73,14 @@ def test_a_study_that_is_there_as_it_was_submitted_is_none():
 
 
 @pytest.mark.parametrize("status", [None, 503])
-def test_a_submission_without_an_acknowledgement_may_be_there_or_not(status):
+def test_a_submission_without_an_acknowledgement_may_be_there_or_not(status: Any) -> None:
     silent = replace(SUBMITTED, status=status, answer={})
 
     assert found([silent]) == []
     assert found([silent], Evidence()) == []
 
 
-def test_what_was_cancelled_while_it_ran_keeps_the_beginning_of_its_log():
+def test_what_was_cancelled_while_it_ran_keeps_the_beginning_of_its_log() -> None:
     cancelled = with_repetition(state="CANCELLED", steps=2, log=LOG[:2], places=(0, 1))
     cancelled = replace(
         cancelled,
@@ -80,17 +91,17 @@ def test_what_was_cancelled_while_it_ran_keeps_the_beginning_of_its_log():
     assert found([SUBMITTED, verb("cancel")], cancelled) == []
 
 
-def test_what_was_held_until_it_was_resumed_is_no_violation():
+def test_what_was_held_until_it_was_resumed_is_no_violation() -> None:
     assert found([SUBMITTED, verb("pause", sent_at=1.0), verb("resume", sent_at=2.5)]) == []
 
 
-def test_what_was_extended_may_have_more_than_was_submitted():
+def test_what_was_extended_may_have_more_than_was_submitted() -> None:
     larger = replace(EVIDENCE, experiments=(replace(EXPERIMENT, spec=SPEC | {"iterations": 3}),))
 
     assert found([SUBMITTED, replace(verb("extend"), body={"iterations": 3})], larger) == []
 
 
-def replace_steps(move, was, steps):
+def replace_steps(move: Any, was: Any, steps: Any) -> Any:
     return move._replace(steps_was=was, steps=steps)
 
 
@@ -185,13 +196,13 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_it_finds_what_was_broken(case):
+def test_it_finds_what_was_broken(case: Any) -> None:
     sentence, history, evidence = BROKEN[case]
 
     assert any(sentence in each for each in found(history, evidence)), found(history, evidence)
 
 
-def test_what_is_expected_is_computed_once_and_differs_between_repetitions():
+def test_what_is_expected_is_computed_once_and_differs_between_repetitions() -> None:
     first = undisturbed(SPEC, 0)
 
     assert undisturbed(SPEC | {"name": "other"}, 0) is first

@@ -1,5 +1,7 @@
 """Boxes of real vectors."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,37 +12,37 @@ from gaplab.services.core.types import Space
 SPACE = Space.box([0.0, -1.0], [1.0, 3.0], [True, False])
 
 
-def test_periodic_coordinates_wrap_and_others_clip():
+def test_periodic_coordinates_wrap_and_others_clip() -> None:
     contained = SPACE.contain(np.array([[1.25, 9.0], [-0.25, -9.0], [0.5, 2.0]]))
 
     np.testing.assert_allclose(contained, [[0.25, 3.0], [0.75, -1.0], [0.5, 2.0]])
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=2))
-def test_whatever_is_contained_lies_in_the_box(vector):
+def test_whatever_is_contained_lies_in_the_box(vector: Any) -> None:
     contained = SPACE.contain(np.array(vector))
 
     assert np.all(contained >= SPACE.lower)
     assert np.all(contained <= SPACE.upper)
 
 
-def test_drawn_vectors_fill_the_box_evenly():
+def test_drawn_vectors_fill_the_box_evenly() -> None:
     drawn = SPACE.draw(4000, np.random.default_rng(0))
 
     np.testing.assert_allclose(drawn.mean(axis=0), [0.5, 1.0], atol=0.05)
     np.testing.assert_allclose(drawn.std(axis=0), SPACE.extent / 12**0.5, rtol=0.05)
 
 
-def test_reversed_bounds_are_refused_with_their_place_and_values():
+def test_reversed_bounds_are_refused_with_their_place_and_values() -> None:
     with pytest.raises(ValueError, match=r"coordinate 1 has 5\.0 and 2\.0"):
         Space.box([0.0, 5.0], [1.0, 2.0])
 
 
-def test_vectors_of_different_lengths_are_refused():
+def test_vectors_of_different_lengths_are_refused() -> None:
     with pytest.raises(ValueError, match="one length"):
         Space.box([0.0], [1.0, 2.0])
 
 
-def test_a_space_cannot_be_changed():
+def test_a_space_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
         SPACE.lower[0] = 5.0

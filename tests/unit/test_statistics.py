@@ -1,5 +1,7 @@
 """The paper's t-tests and their companions, against formulas written out and scipy's own."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,7 +14,7 @@ FIRST = np.array([1.2, 1.4, 1.1, 1.3, 1.5])
 SECOND = np.array([1.0, 0.9, 1.2, 1.1])
 
 
-def test_students_t_is_the_pooled_variance_formula():
+def test_students_t_is_the_pooled_variance_formula() -> None:
     student, _, _ = compare(FIRST, SECOND)
 
     # by hand: means 1.3 and 1.05, sums of squares 0.1 and 0.05, pooled variance 0.15 / 7
@@ -22,7 +24,7 @@ def test_students_t_is_the_pooled_variance_formula():
     assert student.p == pytest.approx(2 * stats.t.sf(t, 7))
 
 
-def test_welchs_t_does_not_pool_the_variances():
+def test_welchs_t_does_not_pool_the_variances() -> None:
     _, welch, _ = compare(FIRST, SECOND)
 
     a, b = 0.1 / 4 / 5, 0.05 / 3 / 4
@@ -32,18 +34,18 @@ def test_welchs_t_does_not_pool_the_variances():
     assert welch.p == pytest.approx(2 * stats.t.sf(welch.statistic, freedom))
 
 
-def test_mann_whitney_counts_the_pairs_in_which_the_first_is_larger():
+def test_mann_whitney_counts_the_pairs_in_which_the_first_is_larger() -> None:
     *_, mann_whitney = compare(FIRST, SECOND)
 
     u = sum(float(x > y) + 0.5 * float(x == y) for x in FIRST for y in SECOND)
     assert mann_whitney.statistic == u
 
 
-def test_cohens_d_is_the_difference_over_the_pooled_deviation():
+def test_cohens_d_is_the_difference_over_the_pooled_deviation() -> None:
     assert effect_size(FIRST, SECOND) == pytest.approx(0.25 / (0.15 / 7) ** 0.5)
 
 
-def test_equal_values_have_no_effect_size_though_their_variance_is_rounded():
+def test_equal_values_have_no_effect_size_though_their_variance_is_rounded() -> None:
     constant = np.full(3, 0.1)
     assert constant.var(ddof=1) > 0
 
@@ -51,7 +53,7 @@ def test_equal_values_have_no_effect_size_though_their_variance_is_rounded():
 
 
 @pytest.mark.parametrize("values", [[1e200, -1e200, 1e200], [1e308, 1e308, -1e308], [0.0, 1e-200, 0.0]])
-def test_what_cannot_be_squared_has_no_test_and_is_no_error(values):
+def test_what_cannot_be_squared_has_no_test_and_is_no_error(values: Any) -> None:
     (found,) = compare_all({"large": np.array(values)[:, None], "constant": np.zeros((3, 1))}, frozenset(), 0, 0)
 
     assert found.student.p is None or 0 <= found.student.p <= 1
@@ -68,11 +70,11 @@ def test_what_cannot_be_squared_has_no_test_and_is_no_error(values):
         (np.ones(4), np.ones(5)),
     ],
 )
-def test_what_has_no_test_has_none_rather_than_nan(first, second):
+def test_what_has_no_test_has_none_rather_than_nan(first: Any, second: Any) -> None:
     assert [test.p for test in compare(first, second)] == [None, None, None]
 
 
-def test_two_constant_groups_that_differ_have_only_the_rank_test():
+def test_two_constant_groups_that_differ_have_only_the_rank_test() -> None:
     student, welch, mann_whitney = compare(np.ones(5), np.zeros(5))
 
     assert student.p is None
@@ -80,23 +82,23 @@ def test_two_constant_groups_that_differ_have_only_the_rank_test():
     assert mann_whitney.p < 0.05
 
 
-def test_nan_counts_for_nothing():
+def test_nan_counts_for_nothing() -> None:
     with_nan = np.append(FIRST, np.nan)
 
     assert compare(with_nan, SECOND) == compare(FIRST, SECOND)
 
 
-def test_holm_multiplies_the_smallest_p_by_all_and_never_lets_a_larger_one_overtake():
+def test_holm_multiplies_the_smallest_p_by_all_and_never_lets_a_larger_one_overtake() -> None:
     # Holm 1979 by hand: 0.01·4 = 0.04, 0.02·3 = 0.06, 0.03·2 = 0.06, 0.9·1
     assert holm([0.9, 0.01, 0.03, 0.02]) == pytest.approx((0.9, 0.04, 0.06, 0.06))
 
 
-def test_an_undefined_test_is_not_of_the_family():
+def test_an_undefined_test_is_not_of_the_family() -> None:
     assert holm([0.01, None, 0.02]) == pytest.approx((0.02, None, 0.02))
 
 
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=20))
-def test_a_corrected_p_is_never_smaller_and_keeps_the_order(p_values):
+def test_a_corrected_p_is_never_smaller_and_keeps_the_order(p_values: Any) -> None:
     corrected = holm(p_values)
 
     assert all(after >= before for after, before in zip(corrected, p_values, strict=True))
@@ -105,7 +107,7 @@ def test_a_corrected_p_is_never_smaller_and_keeps_the_order(p_values):
     assert list(np.array(corrected)[order]) == sorted(corrected)
 
 
-def test_counts_are_pooled_over_the_range_and_the_baseline_has_but_one():
+def test_counts_are_pooled_over_the_range_and_the_baseline_has_but_one() -> None:
     recorded = {
         "fit": np.array([[0.9, 1.2, 1.3, 1.4], [0.8, 1.1, 1.3, 1.5]]),
         "random": np.array([[0.7, 0.8, np.nan, 1.0], [0.9, 0.9, 1.0, 1.1]]),
@@ -121,5 +123,5 @@ def test_counts_are_pooled_over_the_range_and_the_baseline_has_but_one():
     assert [each.student.p_holm for each in (fit_random, fit_direct, random_direct)] == list(holm(p_values))
 
 
-def test_one_experiment_alone_has_nothing_to_be_compared_with():
+def test_one_experiment_alone_has_nothing_to_be_compared_with() -> None:
     assert compare_all({"fit": np.ones((3, 2))}, frozenset(), 0, 1) == ()

@@ -1,5 +1,7 @@
 """Simulator tuning."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -14,28 +16,28 @@ GENOMES = np.array([[0.1, 0.9], [0.8, 0.3], [0.4, 0.4]])
 SAMPLES = [Sample(genome, float(paraboloid(genome[None], TRUTH[None])[0, 0])) for genome in GENOMES]
 
 
-def test_squared_errors_are_summed_over_samples():
+def test_squared_errors_are_summed_over_samples() -> None:
     fitnesses = np.array([[1.0, 2.0], [3.0, 5.0]])
 
     np.testing.assert_allclose(squared_errors(fitnesses, np.array([1.5, 3.0])), [0.25, 4.25])
 
 
-def test_the_fitness_of_a_simulator_is_one_over_its_squared_error():
+def test_the_fitness_of_a_simulator_is_one_over_its_squared_error() -> None:
     np.testing.assert_allclose(simulator_fitness(np.array([0.25, 4.0, np.inf])), [4.0, 0.25, 0.0])
     assert simulator_fitness(np.array([0.0]))[0] == np.inf
 
 
-def test_a_simulator_that_fails_on_a_sample_has_an_infinite_error():
+def test_a_simulator_that_fails_on_a_sample_has_an_infinite_error() -> None:
     assert squared_errors(np.array([[1.0, np.nan], [1.0, 1.0]]), np.array([1.0, 1.0])).tolist() == [0.0, np.inf]
 
 
-def test_tuning_finds_the_parameters_of_reality():
+def test_tuning_finds_the_parameters_of_reality() -> None:
     best, *_ = tune(Misfit(Answers(paraboloid), SAMPLES), SPACE, SteadyState(), 1000, np.random.default_rng(1))
 
     np.testing.assert_allclose(best.parameters, TRUTH, atol=0.01)
 
 
-def many_samples(count):
+def many_samples(count: Any) -> Any:
     genomes = np.random.default_rng(9).random((count, 2))
     return [Sample(genome, float(paraboloid(genome[None], TRUTH[None])[0, 0])) for genome in genomes]
 
@@ -43,18 +45,20 @@ def many_samples(count):
 class Thorough(SteadyState):
     """The same evolution, but it knows no threshold: every simulator is asked for every sample."""
 
-    def rejection_thresholds(self, state, genomes):
+    def rejection_thresholds(self, state: Any, genomes: Any) -> Any:
         return np.full(len(genomes), -np.inf)
 
-    def diverse(self, size):
+    def diverse(self, size: Any) -> Any:
         return Thorough(super().diverse(size).options)
 
 
 @pytest.mark.parametrize("batch", [1, 4])
 @pytest.mark.parametrize("count", [1, 3, 10])
 @pytest.mark.parametrize("diverse", [False, True])
-def test_giving_up_simulators_below_their_threshold_saves_rollouts_and_changes_no_bit(count, diverse, batch):
-    def tuned(optimizer):
+def test_giving_up_simulators_below_their_threshold_saves_rollouts_and_changes_no_bit(
+    count: Any, diverse: Any, batch: Any
+) -> None:
+    def tuned(optimizer: Any) -> Any:
         simulate = Recorder()
         optimizer = optimizer.diverse(8) if diverse else optimizer
         misfit = Misfit(Answers(simulate, lambda: batch), many_samples(count))
@@ -69,18 +73,18 @@ def test_giving_up_simulators_below_their_threshold_saves_rollouts_and_changes_n
     assert count <= batch or rollouts < 0.9 * all_rollouts
 
 
-def test_a_simulator_whose_physics_fails_is_given_up_too():
-    def half_broken(genomes, parameters):
+def test_a_simulator_whose_physics_fails_is_given_up_too() -> None:
+    def half_broken(genomes: Any, parameters: Any) -> Any:
         return np.where(parameters[None, :, 0] < 0.5, np.nan, paraboloid(genomes, parameters))
 
-    def tuned(optimizer):
+    def tuned(optimizer: Any) -> Any:
         found = tune(Misfit(Answers(half_broken), many_samples(5)), SPACE, optimizer, 200, np.random.default_rng(1))
         return [(each.parameters.tobytes(), each.squared_error) for each in found]
 
     assert tuned(SteadyState()) == tuned(Thorough())
 
 
-def test_a_simulators_error_does_not_depend_on_how_many_are_asked_for_at_once():
+def test_a_simulators_error_does_not_depend_on_how_many_are_asked_for_at_once() -> None:
     rng = np.random.default_rng(0)
     fitnesses, measured = rng.normal(size=(50, 20)), rng.normal(size=50)
 
@@ -89,7 +93,7 @@ def test_a_simulators_error_does_not_depend_on_how_many_are_asked_for_at_once():
     assert squared_errors(fitnesses, measured).tolist() == one_by_one
 
 
-def test_simulators_come_best_first_with_their_own_error():
+def test_simulators_come_best_first_with_their_own_error() -> None:
     simulators = tune(Misfit(Answers(paraboloid), SAMPLES), SPACE, SteadyState(), 100, np.random.default_rng(1))
 
     errors = [each.squared_error for each in simulators]
@@ -99,8 +103,8 @@ def test_simulators_come_best_first_with_their_own_error():
     np.testing.assert_array_equal(again, errors)
 
 
-def test_a_diverse_ensemble_stays_farther_apart_than_a_converged_population():
-    def spread(optimizer):
+def test_a_diverse_ensemble_stays_farther_apart_than_a_converged_population() -> None:
+    def spread(optimizer: Any) -> Any:
         found = tune(Misfit(Answers(paraboloid), SAMPLES), SPACE, optimizer, 500, np.random.default_rng(1))
         return np.array([each.parameters for each in found]).std(axis=0).mean()
 
@@ -109,8 +113,8 @@ def test_a_diverse_ensemble_stays_farther_apart_than_a_converged_population():
     assert spread(population.diverse(10)) > 10 * spread(population)
 
 
-def test_failing_physics_never_wins():
-    def half_broken(genomes, parameters):
+def test_failing_physics_never_wins() -> None:
+    def half_broken(genomes: Any, parameters: Any) -> Any:
         return np.where(parameters[None, :, 0] < 0.5, np.nan, paraboloid(genomes, parameters))
 
     best, *_ = tune(Misfit(Answers(half_broken), SAMPLES), SPACE, SteadyState(), 300, np.random.default_rng(1))
@@ -119,7 +123,7 @@ def test_failing_physics_never_wins():
 
 
 @pytest.mark.parametrize("count", [1, 20])
-def test_simulators_drawn_before_any_sample_have_no_error(count):
+def test_simulators_drawn_before_any_sample_have_no_error(count: Any) -> None:
     drawn = draw_simulators(SPACE, count, np.random.default_rng(0))
 
     assert len(drawn) == count

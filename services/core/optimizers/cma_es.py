@@ -1,4 +1,4 @@
-"""Covariance matrix adaptation: a search that learns which genes go together."""
+"""Covariance matrix adaptation: a search that learns correlations between genes."""
 
 from copy import deepcopy
 from dataclasses import dataclass
@@ -16,22 +16,22 @@ from gaplab.services.core.optimizers.replacement import insert, least_fit, less_
 from gaplab.services.core.types import Space
 
 CONVERGED = 1e-4
-"""A search that has shrunk to this share of each gene's extent starts anew elsewhere."""
+"""Share of each gene's extent at which a search has converged, and restarts."""
 
 
 class CmaEsOptions(Frozen):
     """The options of CMA-ES; the defaults are its authors'."""
 
     population: Annotated[int, Field(strict=True, ge=4, le=10_000)] | None = Field(
-        default=None, description="genomes of a generation; left out: 4 + 3 ln g for g genes"
+        default=None, description="genomes of a generation; default: 4 + 3 ln g for g genes"
     )
     initial_scale: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
         default=0.3, description="standard deviation of the first generation after the start, as a share of the extent"
     )
     members: Annotated[int, Field(strict=True, ge=1, le=10_000)] = Field(
-        default=20, description="of the best genomes that are kept as the result"
+        default=20, description="number of best genomes kept as the result"
     )
-    diverse: bool = Field(default=False, strict=True, description="keep members that differ; tuning an ensemble does")
+    diverse: bool = Field(default=False, strict=True, description="keep diverse members, as in tuning an ensemble")
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class Search(Population):
     """The members, and the distribution that the next generation is drawn from.
 
     Attributes:
-        distribution: of the library; a value: it is copied before anything changes it. None before a start.
+        distribution: state of the library, copied before each change; None before a start.
     """
 
     distribution: Any = None
@@ -48,8 +48,8 @@ class Search(Population):
 class CmaEs(Optimizer):
     """CMA-ES: generations drawn from a normal distribution that learns scale and correlations from ranks.
 
-    It starts from the best of a generation drawn uniformly, and does so again once it has converged. Genes are scaled
-    to their extents; periodic ones wrap, others clip.
+    It starts from the best of a uniform generation, and restarts in the same way after convergence. Genes are scaled to
+    their extents; periodic ones wrap, others clip.
     """
 
     name = "cma_es"
@@ -58,16 +58,16 @@ class CmaEs(Optimizer):
     options: CmaEsOptions
 
     def init(self, space: Space) -> Search:
-        """No member, and no distribution yet."""
+        """Return a state without members or distribution."""
         return Search(space, np.empty((0, space.size)), np.empty(0))
 
     @property
     def least_evaluations(self) -> int:
-        """Enough for the members."""
+        """Return the number of members."""
         return max(self.options.population or 4, self.options.members)
 
     def ask(self, state: Population, rng: Generator) -> Genomes:
-        """A generation: uniform at a start, else from the distribution."""
+        """Return a generation: uniform at a start, else drawn from the distribution."""
         assert isinstance(state, Search)
         if state.distribution is None:
             return state.space.draw(self._size(state.space), rng)
@@ -76,7 +76,7 @@ class CmaEs(Optimizer):
         return state.space.contain(_genomes(state.space, np.array(distribution.ask())))
 
     def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> Search:
-        """The members with the newcomers among them, and the distribution that has learned from their ranks."""
+        """Return the state with the newcomers among the members, and the updated distribution."""
         assert isinstance(state, Search)
         rule = less_fit_of_most_similar if self.options.diverse else least_fit
         kept = insert(state, genomes, fitness, self.options.members, rule)
@@ -84,17 +84,17 @@ class CmaEs(Optimizer):
         return Search(state.space, kept.genomes, kept.fitness, learned)
 
     def diverse(self, size: int) -> "CmaEs":
-        """This search, but its members are `size` that differ."""
+        """Return this optimizer with a diverse set of `size` members."""
         return CmaEs(self.options.model_copy(update={"members": size, "diverse": True}))
 
     def _learned(self, state: Search, genomes: Genomes, fitness: FloatArray) -> Any:  # noqa: ANN401 - of the library
         if len(genomes) < self._size(state.space):
-            return state.distribution  # the budget's end cut the generation short
+            return state.distribution  # the budget ended within the generation
         if state.distribution is None:
             return self._start(state.space, genomes[fitness.argmax()])
         distribution = deepcopy(state.distribution)
         distribution.opts["randn"].rng = np.random.default_rng(0)
-        distribution.ask(1)  # the library wants to be asked before it is told; what it draws here is not used
+        distribution.ask(1)  # the library requires `ask` before `tell`; the draw is not used
         ranks = np.argsort(np.argsort(-fitness, kind="stable"), kind="stable")
         distribution.tell(list(_near(state.space, genomes, distribution.mean)), ranks.tolist(), check_points=False)
         return None if distribution.stop() else distribution
@@ -104,7 +104,7 @@ class CmaEs(Optimizer):
             "popsize": self._size(space),
             "randn": Draws(),
             "seed": np.nan,
-            "CMA_mirrors": 0,  # they are remembered from one call to the next
+            "CMA_mirrors": 0,  # kept between calls
             "tolx": CONVERGED,
             "tolfun": 0,
             "tolfunhist": 0,
@@ -119,12 +119,12 @@ class CmaEs(Optimizer):
 
 
 class Draws:
-    """The library's source of normal random numbers: whatever generator it was last given."""
+    """The library's source of normal random numbers, which uses the current generator."""
 
     rng: Generator
 
     def __call__(self, *shape: int) -> FloatArray:
-        """Standard normal numbers of that shape."""
+        """Return standard normal numbers of a shape."""
         return self.rng.standard_normal(shape)
 
 
@@ -133,7 +133,7 @@ def _genomes(space: Space, scaled: FloatArray) -> Genomes:
 
 
 def _near(space: Space, genomes: Genomes, mean: FloatArray) -> FloatArray:
-    """`(n, g)` scaled genomes; a periodic gene at the turn that is nearest to the mean."""
+    """Return scaled genomes `(n, g)`; periodic genes are shifted by whole turns to be nearest to the mean."""
     scaled = (genomes - space.lower) / space.extent
     turned = mean + np.mod(scaled - mean + 0.5, 1.0) - 0.5
     return np.where(space.periodic, turned, scaled)

@@ -1,4 +1,4 @@
-"""Which member leaves a steady-state population that has grown by one."""
+"""Rules for the member that leaves a steady-state population after one joins."""
 
 from collections.abc import Callable
 from typing import TypeAlias
@@ -9,18 +9,18 @@ from gaplab.services.core.arrays import FloatArray, Genome, Genomes
 from gaplab.services.core.optimizers.base import Population
 
 Replacement: TypeAlias = Callable[[Population], int]
-"""The index of the member to drop."""
+"""A function from a population to the index of the member to drop."""
 
 Bound: TypeAlias = Callable[[Population, Genome], float]
-"""The fitness below which a newcomer to a full population is itself the member to drop, whatever it is exactly."""
+"""A function that returns the fitness below which a newcomer to a full population is itself dropped."""
 
 
 def insert(
     population: Population, genomes: Genomes, fitness: FloatArray, size: int, replacement: Replacement
 ) -> Population:
-    """The population with each newcomer added in turn, and a member dropped for each beyond `size`.
+    """Add newcomers in turn, and drop a member for each beyond `size`; return the population.
 
-    The members keep their order, so age stays readable from it.
+    Members keep their order, which is their age.
     """
     for genome, value in zip(genomes, fitness, strict=True):
         population = Population(
@@ -33,7 +33,7 @@ def insert(
 
 
 def least_fit(population: Population) -> int:
-    """The least fit member; of equals, the oldest.
+    """Return the least fit member; of equals, the oldest.
 
     Source: paper, section 2, [10].
     """
@@ -41,10 +41,10 @@ def least_fit(population: Population) -> int:
 
 
 def most_similar(population: Population) -> tuple[int, int]:
-    """The pair whose genomes are most similar, the older first.
+    """Return the pair with the most similar genomes, the older first.
 
-    Similar means near in Euclidean distance, with each coordinate in units of its extent, and the shorter way around in
-    those that wrap.
+    Similarity is Euclidean distance, with each coordinate in units of its extent, and the shorter way around in
+    periodic coordinates.
     """
     scaled = population.genomes / population.space.extent
     squares = np.einsum("ij,ij->i", scaled, scaled)
@@ -58,9 +58,9 @@ def most_similar(population: Population) -> tuple[int, int]:
 
 
 def less_fit_of_most_similar(population: Population) -> int:
-    """The less fit member of the pair whose genomes are most similar; of equals, the older.
+    """Return the less fit member of the pair with the most similar genomes; of equals, the older.
 
-    The fittest member of all never leaves.
+    The fittest of all members never leaves.
 
     Source: paper, section 2, *Informative*.
     """
@@ -69,14 +69,14 @@ def less_fit_of_most_similar(population: Population) -> int:
 
 
 def bound_of_least_fit(population: Population, newcomer: Genome) -> float:  # noqa: ARG001 - as the other bound
-    """The least fitness of all members: below it the newcomer is the least fit."""
+    """Return the lowest fitness of all members: below it the newcomer is the least fit."""
     return float(population.fitness.min())
 
 
 def bound_of_most_similar(population: Population, newcomer: Genome) -> float:
-    """The fitness of the member that is most similar to the newcomer, if they are the most similar pair; else -inf.
+    """Return the fitness of the newcomer's partner in the most similar pair; -inf if the newcomer is not in that pair.
 
-    A newcomer that is not of that pair stays, however unfit it is.
+    A newcomer outside that pair stays at any fitness.
     """
     joined = Population(population.space, np.vstack([population.genomes, newcomer]), population.fitness)
     older, newer = most_similar(joined)

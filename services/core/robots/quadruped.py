@@ -16,22 +16,22 @@ BODY_KG = 1.5
 THIGH_M, THIGH_KG = 0.10, 0.15
 SHIN_M = 0.15
 FOOT_RADIUS_M, FOOT_KG = 0.025, 0.15
-"""The shin's mass is in its foot."""
+"""Radius and mass of a foot, which includes the shin's mass."""
 
 HIP_M, HIP_KG = 0.03, 0.05
-"""The hip is a small cube, and as thick as the thigh."""
+"""Size and mass of a hip, a small cube as thick as the thigh."""
 
 MOTOR = Motor(position_gain=0.07, max_torque_nm=8.0)
 AMPLITUDES_RAD = (0.63, 0.42, 0.49)
-"""Of hip yaw, hip roll and knee: a pulse holds the joint at plus this, and at minus this between pulses."""
+"""Amplitudes of hip yaw, hip roll and knee: plus this during a pulse, minus this between pulses."""
 
 PERIOD_S = 0.5
 SETTLING_S = 0.5
-"""Not counted: the robot drops to the ground and falls into its gait."""
+"""Time before the counted time: the robot drops to the ground and starts its gait."""
 
 COUNTED_S = 2.5
 NARROWEST, WIDEST = 0.1, 0.9
-"""Widths of a pulse in periods, at genes 0 and 1."""
+"""Width of a pulse in periods, at gene values 0 and 1."""
 
 LEGS: dict[str, tuple[int, int]] = {
     "front_left": (1, 1),
@@ -39,14 +39,15 @@ LEGS: dict[str, tuple[int, int]] = {
     "rear_left": (-1, 1),
     "rear_right": (-1, -1),
 }
-"""Where each leg is: the signs of x (ahead) and y (to the left)."""
+"""Position of each leg: the signs of x (ahead) and y (left)."""
 
 
 class QuadrupedOptions(Frozen):
-    """How long a controller is watched."""
+    """Options of the quadruped."""
 
     counted_s: Annotated[Real, Field(gt=0, le=600)] = Field(
-        default=COUNTED_S, description="seconds that count, after the robot has settled; a rollout's cost grows with it"
+        default=COUNTED_S,
+        description="counted seconds, after the robot has settled; the cost of a rollout grows with it",
     )
 
 
@@ -55,8 +56,8 @@ class Quadruped(Robot):
 
     Gene 2i is the phase of actuator i, and gene 2i + 1 the width of its pulse, both in [0, 1]; phases wrap around. The
     actuators are leg by leg, front left, front right, rear left, rear right; positive is forwards for a yaw, upwards
-    for a roll, outwards for a knee. Fitness is the distance over ground, in whatever direction, over the time that
-    counts. A reconstruction: the paper refers for its robot's details to a publication that could not be found.
+    for a roll, outwards for a knee. Fitness is the distance over ground in any direction, divided by the counted
+    time. This is a reconstruction: the publication that describes the paper's robot could not be found.
     """
 
     name = "quadruped"
@@ -74,7 +75,7 @@ class Quadruped(Robot):
         self.known = _trot()
 
     def motion(self, genome: Genome) -> Motion:
-        """Each actuator at plus its amplitude during its pulse, at minus it otherwise; in the neutral pose never."""
+        """Return the motion: each actuator is at plus its amplitude during its pulse, else at minus."""
         phases, widths = genome[0::2], NARROWEST + (WIDEST - NARROWEST) * genome[1::2]
         duration_s = SETTLING_S + self.options.counted_s
         edges = np.mod(np.concatenate([phases, phases + widths]), 1.0)
@@ -90,13 +91,13 @@ class Quadruped(Robot):
         )
 
     def fitness(self, trajectory: Trajectory) -> FloatArray:
-        """`(...)`: from where the first observation saw it to where the last did, over the time between them."""
+        """Return `(...)`: the distance between first and last observation, divided by the time between them."""
         travelled = trajectory.positions_m[..., -1, :2] - trajectory.positions_m[..., 0, :2]
         return np.asarray(np.linalg.norm(travelled, axis=-1) / (trajectory.times_s[-1] - trajectory.times_s[0]))
 
 
 def _world() -> World:
-    """The robot in reality. Source: its material, the paper's section 2; all else docs/robot.md."""
+    """Return the robot in reality. Source: its material, the paper's section 2; all else docs/robot.md."""
     bodies = [Body("trunk", BODY_KG, Box(BODY_M))]
     joints: list[Joint] = []
     for leg, (ahead, left) in LEGS.items():
@@ -113,7 +114,7 @@ def _world() -> World:
 
 
 def _leg(name: str, ahead: int, left: int) -> tuple[list[Body], list[Joint]]:
-    """A leg on a corner of the trunk: a thigh held level to the side, a shin hanging from it, a ball as its foot."""
+    """Return a leg at a corner of the trunk: a level thigh to the side, a hanging shin, and a ball as foot."""
     hip, thigh, shin = f"{name}_hip", f"{name}_thigh", f"{name}_shin"
     corner = (ahead * BODY_M[0] / 2, left * BODY_M[1] / 2, 0.0)
     bodies = [
@@ -130,10 +131,10 @@ def _leg(name: str, ahead: int, left: int) -> tuple[list[Body], list[Joint]]:
 
 
 def _trot() -> Genome:
-    """By hand: diagonal legs together, the pairs half a period apart.
+    """Return a hand-designed trot: diagonal legs move together, the two pairs half a period apart.
 
-    Every pulse lasts for half a period. A leg is lifted a tenth of a period before it swings forwards, and its knee
-    opens a quarter after; these two numbers were found by trying a few.
+    Every pulse lasts half a period. A leg lifts a tenth of a period before it swings forwards, and its knee opens a
+    quarter after; these two numbers were found by trial.
     """
     starts = {"front_left": 0.0, "front_right": 0.5, "rear_left": 0.5, "rear_right": 0.0}
     yaw, roll, knee = 0.0, 0.9, 0.25

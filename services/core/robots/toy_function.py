@@ -1,4 +1,4 @@
-"""The paper's toy: a function of one number in the place of a robot."""
+"""The paper's toy: a function of one number in place of a robot."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from gaplab.services.core.world import Material, Motion, Trajectory, World
 
 
 class ToyFunction(Robot):
-    """A function of one gene with a hill and a peak: simulator tuning that can be watched, and runs in seconds.
+    """A function of one gene with a hill and a peak, which shows simulator tuning in seconds.
 
     Its world has no bodies, only a material, whose three coefficients shape the function. Its fitness is the speed.
     """
@@ -26,10 +26,10 @@ class ToyFunction(Robot):
     _end = frozen([0.0, 1.0])
 
     def motion(self, genome: Genome) -> Motion:
-        """The gene as the only target, for one second."""
+        """Return the motion with the gene as the only target, for one second."""
         return Motion(times_s=self._start, targets=genome[None, :], observe_s=self._end)
 
     def fitness(self, trajectory: Trajectory) -> FloatArray:
-        """`(...)`: the distance along x over the time, in m/s."""
+        """Return `(...)`: the distance along x divided by time, in m/s."""
         distance_m = trajectory.positions_m[..., -1, 0] - trajectory.positions_m[..., 0, 0]
         return np.asarray(distance_m / (trajectory.times_s[-1] - trajectory.times_s[0]))

@@ -1,4 +1,4 @@
-"""Strategies: one file in this folder is one strategy."""
+"""Strategies: each file in this folder is one strategy."""
 
 from gaplab.services.core.registry import Registry
 from gaplab.services.core.strategies.base import Strategy

@@ -1,4 +1,4 @@
-"""What a strategy is: given what is believed, which controller to try in reality next."""
+"""The contract of a strategy: from beliefs to the next controller to try in reality."""
 
 from abc import abstractmethod
 from collections.abc import Callable
@@ -13,28 +13,28 @@ from gaplab.services.core.registry import Plugin
 from gaplab.services.core.types import Belief
 
 Score: TypeAlias = Callable[[Genomes, Fitnesses], FloatArray]
-"""`(n, g)` genomes and their `(n, m)` fitnesses in the believed simulators -> `(n,)`, maximised."""
+"""A function from genomes `(n, g)` and their fitnesses `(n, m)` in the tuned simulators to scores `(n,)`, maximised."""
 
 
 class Search(Protocol):
-    """A search over controllers, with the whole budget of a selection: there is one for each, and no second."""
+    """A search over controllers, with the whole budget of a selection; it can be called once."""
 
     def __call__(self, score: Score) -> Genome:
-        """The genome `(g,)` with the highest score that was found.
+        """Return the genome `(g,)` with the highest score found.
 
         Raises:
-            PluginBroken: the selection has searched before, or the strategy says that it does not search.
+            PluginBroken: the selection has searched before, or the strategy has `searches = False`.
         """
         ...
 
 
 class Strategy(Plugin):
-    """Selects the samples: the controllers whose evaluation in reality guides simulator tuning.
+    """Selects the samples: the controllers whose evaluation in reality guides tuning.
 
     Attributes:
-        searches: its selection spends a search's budget, on one search.
-        selects_transferred: its search is the transfer's: for the fittest controller in the best simulator.
-        in_reality: the experiment is the direct baseline, which evolves in reality and takes no samples.
+        searches: true if a selection searches, which spends its budget.
+        selects_transferred: true if its search has the transfer's goal, the fittest controller in the best simulator.
+        in_reality: true for the direct baseline, which evolves in reality and takes no samples.
     """
 
     searches: ClassVar[bool] = True
@@ -43,32 +43,32 @@ class Strategy(Plugin):
 
     @property
     def ensemble(self) -> int:
-        """How many simulators it wants tuned: one, or a diverse ensemble of many."""
+        """Return the number of simulators to tune: one, or a diverse ensemble."""
         return 1
 
     @abstractmethod
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:
-        """The genome `(g,)` to try in reality next.
+        """Return the next genome `(g,)` to try in reality.
 
         Args:
-            belief: the samples so far, and simulators tuned on them.
-            search: finds the controller that maximises a score; a strategy that needs none does not call it.
-            rng: the strategy's own randomness; the search has another.
+            belief: samples so far, and simulators tuned on them.
+            search: finds the controller that maximises a score; optional.
+            rng: random generator of the strategy; the search has its own.
         """
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """How many simulators it tunes, and whether it is the baseline."""
+        """Return the number of simulators and whether this is the baseline, for the catalogue."""
         return {"simulators": cls().ensemble, "baseline": cls.in_reality}
 
 
 class EnsembleOptions(Frozen):
-    """Options of the strategies that weigh a diverse ensemble of simulators."""
+    """Options of strategies with a diverse ensemble of simulators."""
 
     simulators: Annotated[int, Field(strict=True, ge=2, le=1_000)] = Field(
         default=20, description="size of the diverse ensemble; the paper: 20"
     )
     least_error: Annotated[float, Field(strict=True, gt=0, le=1e6)] = Field(
         default=0.03,
-        description="in the unit of fitness: simulators whose error is below this weigh alike (a floor under Σe²)",
+        description="simulators with a smaller error have equal weight (a floor under Σe²), in the unit of fitness",
     )

@@ -1,13 +1,13 @@
-"""The baseline that every strategy is measured against."""
+"""The baseline of all comparisons."""
 
 from gaplab.services.core.strategies.simulated_fit import SimulatedFit
 
 
 class Direct(SimulatedFit):
-    """Evolution in reality itself: the fitness that a perfect simulator would lead to.
+    """Evolution in reality itself: the fitness that a perfect simulator would give.
 
-    It takes no samples and tunes nothing; every one of its evaluations would be a real one. An experiment of this
-    strategy is iteration 0 of the algorithm, with reality in the place of the simulator.
+    It takes no samples and tunes nothing; each of its evaluations would be a real one. An experiment of this strategy
+    is iteration 0 of the algorithm, with reality as the simulator.
     """
 
     name = "direct"

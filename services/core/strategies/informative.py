@@ -1,4 +1,4 @@
-"""Try what the simulators disagree about."""
+"""Try a controller on which the simulators disagree."""
 
 from numpy.random import Generator
 
@@ -9,9 +9,9 @@ from gaplab.services.core.types import Belief
 
 
 class Informative(Strategy):
-    """The controller whose fitness a diverse ensemble of simulators disagrees about most.
+    """The controller on whose fitness a diverse ensemble of simulators disagrees most.
 
-    The disagreement is a standard deviation, in which accurate simulators weigh more.
+    Disagreement is the standard deviation, weighted by the accuracy of simulators.
     """
 
     name = "informative"
@@ -21,10 +21,10 @@ class Informative(Strategy):
 
     @property
     def ensemble(self) -> int:
-        """The diverse ensemble."""
+        """Return the size of the diverse ensemble."""
         return self.options.simulators
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
-        """The controller found that maximises the weighted deviation of its simulated fitnesses."""
+        """Return the controller with the highest weighted deviation of simulated fitness found."""
         weights = simulator_weights(belief.squared_errors, self.options.least_error**2)
         return search(lambda _, fitnesses: weighted_deviation(fitnesses, weights))

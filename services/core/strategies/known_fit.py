@@ -1,4 +1,4 @@
-"""Try variations of what is known to work."""
+"""Try variations of the hand-designed controller."""
 
 from typing import Annotated
 
@@ -12,17 +12,18 @@ from gaplab.services.core.types import Belief
 
 
 class KnownFitOptions(Frozen):
-    """How far the variations go."""
+    """Options of `known_fit`."""
 
     spread: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
-        default=0.25, description="each gene gets a uniform number from 0 to this added, as a share of its extent"
+        default=0.25,
+        description="upper end of the uniform number from 0 that is added to each gene, as a share of its extent",
     )
 
 
 class KnownFit(Strategy):
     """The robot's hand-designed controller with a uniform random number added to each gene.
 
-    Like *random*, it needs no loop; but its samples are of middling fitness, where most random ones are unfit.
+    Like *random*, it needs no loop. Its samples have medium fitness, while most random ones are unfit.
     """
 
     name = "known_fit"
@@ -32,6 +33,6 @@ class KnownFit(Strategy):
     options: KnownFitOptions
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
-        """The known genome plus U[0, spread] on each gene; phases wrap, widths clip."""
+        """Return the known genome plus U[0, spread] on each gene; phases wrap, widths clip."""
         space = belief.space
         return space.contain(belief.known + self.options.spread * space.extent * rng.random(space.size))

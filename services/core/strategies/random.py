@@ -1,4 +1,4 @@
-"""Try anything."""
+"""Try a random controller."""
 
 from numpy.random import Generator
 
@@ -10,8 +10,8 @@ from gaplab.services.core.types import Belief
 class Random(Strategy):
     """A controller drawn uniformly.
 
-    Selections are independent of each other, so the loop is not needed: k samples and one tuning would do. Here the
-    k-th point of the curve is tuned on the first k samples, which is the same.
+    Selections are independent, so k samples and one tuning would suffice. Here the k-th point of the curve is tuned on
+    the first k samples, which is equivalent.
     """
 
     name = "random"
@@ -19,6 +19,6 @@ class Random(Strategy):
     searches = False
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
-        """A genome, uniform over its space."""
+        """Return a genome, uniform over its space."""
         genome: Genome = belief.space.draw(1, rng)[0]
         return genome

@@ -1,4 +1,4 @@
-"""Try what is fittest in simulation."""
+"""Try the controller that is fittest in simulation."""
 
 from numpy.random import Generator
 
@@ -18,5 +18,5 @@ class SimulatedFit(Strategy):
     selects_transferred = True
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
-        """The fittest controller found in the best simulator."""
+        """Return the fittest controller found in the best simulator."""
         return search(lambda _, fitnesses: fitnesses[:, 0])

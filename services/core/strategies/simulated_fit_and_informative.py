@@ -1,4 +1,4 @@
-"""Try what is expected to be fit and what the simulators disagree about."""
+"""Try a controller that is expected to be fit and on which simulators disagree."""
 
 from typing import Annotated
 
@@ -14,14 +14,14 @@ Weight = Annotated[float, Field(strict=True, ge=0, le=1e6)]
 
 
 class SimulatedFitAndInformativeOptions(EnsembleOptions):
-    """Options of the mixture: the paper's is a plain sum, and it proposes the weighted one."""
+    """Weights of fitness and disagreement; the paper uses a plain sum, and proposes a weighted one."""
 
-    fit_weight: Weight = Field(default=1.0, description="of the weighted mean of the simulated fitnesses")
-    informative_weight: Weight = Field(default=1.0, description="of their weighted standard deviation")
+    fit_weight: Weight = Field(default=1.0, description="weight of the mean simulated fitness")
+    informative_weight: Weight = Field(default=1.0, description="weight of the standard deviation of simulated fitness")
 
 
 class SimulatedFitAndInformative(Strategy):
-    """The controller whose simulated fitness is high on average over a diverse ensemble, and disputed within it.
+    """The controller with high mean fitness in a diverse ensemble of simulators that disagree on it.
 
     The paper's most promising strategy: nearly perfect after one sample.
     """
@@ -33,11 +33,11 @@ class SimulatedFitAndInformative(Strategy):
 
     @property
     def ensemble(self) -> int:
-        """The diverse ensemble."""
+        """Return the size of the diverse ensemble."""
         return self.options.simulators
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
-        """The controller found that maximises the sum of weighted mean and weighted deviation."""
+        """Return the controller with the highest sum of weighted mean and weighted deviation found."""
         weights = simulator_weights(belief.squared_errors, self.options.least_error**2)
 
         def score(_: Genomes, fitnesses: Fitnesses) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Try what is fit in simulation and unlike what was tried."""
+"""Try a controller that is fit in simulation and unlike earlier samples."""
 
 from numpy.random import Generator
 
@@ -9,16 +9,16 @@ from gaplab.services.core.types import Belief
 
 
 class SimulatedFitAndUnique(Strategy):
-    """The controller that is fittest in the latest simulator, less a penalty for being near earlier samples.
+    """The fittest controller in the latest simulator, with a penalty for closeness to earlier samples.
 
-    Several tightly clustered samples would teach little more than one.
+    A cluster of samples teaches little more than one sample.
     """
 
     name = "simulated_fit_and_unique"
     source = "Paper, section 2, Simulated Fit and Unique"
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
-        """The controller found that maximises f_sim(x) − 1/(100 N) Σ 1/d(x, y)."""
+        """Return the controller with the highest f_sim(x) − 1/(100 N) Σ 1/d(x, y) found."""
 
         def score(genomes: Genomes, fitnesses: Fitnesses) -> FloatArray:
             fitness = fitnesses[:, 0]

@@ -1,4 +1,4 @@
-"""Tunables: one file in this folder is one parameter of the simulator."""
+"""Tunables: each file in this folder is one parameter of the simulator."""
 
 from gaplab.services.core.registry import Registry
 from gaplab.services.core.tunables.base import Tunable

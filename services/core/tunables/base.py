@@ -1,4 +1,4 @@
-"""What a tunable is: a number with bounds, and how it edits a World."""
+"""The contract of a tunable: a number with bounds that edits a World."""
 
 from abc import abstractmethod
 from dataclasses import replace
@@ -12,10 +12,10 @@ class Tunable(Plugin):
     """One parameter of the simulator.
 
     Attributes:
-        field: the World field that it edits, as engines declare it in `honours`.
-        unit: of its value.
-        lower, upper: its bounds when a spec names none.
-        least, greatest: beyond these it means nothing, in any engine.
+        field: World field that it edits, as named in the `honours` of engines.
+        unit: unit of its value.
+        lower, upper: default bounds.
+        least, greatest: limits of meaningful values in any engine.
     """
 
     field: ClassVar[str]
@@ -27,30 +27,30 @@ class Tunable(Plugin):
 
     @abstractmethod
     def read(self, world: World) -> float:
-        """The parameter's value in the world."""
+        """Return the parameter's value in the world."""
 
     @abstractmethod
     def edit(self, world: World, value: float) -> World:
-        """The world with the parameter set to the value."""
+        """Return the world with the parameter set to the value."""
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """The field, the unit and the bounds."""
+        """Return field, unit and bounds, for the catalogue."""
         names = ("field", "unit", "lower", "upper", "least", "greatest")
         return {name: getattr(cls, name) for name in names}
 
 
 class MaterialTunable(Tunable):
-    """A coefficient of the one material that robot and ground share; its file names which."""
+    """A coefficient of the material that robot and ground share; `name` says which."""
 
     unit = "1"
 
     def read(self, world: World) -> float:
-        """The coefficient of the world's material."""
+        """Return the coefficient of the world's material."""
         return float(getattr(world.material, self._coefficient))
 
     def edit(self, world: World, value: float) -> World:
-        """The world with that coefficient of its material replaced."""
+        """Return the world with the coefficient of its material replaced."""
         return replace(world, material=replace(world.material, **{self._coefficient: float(value)}))
 
     @property

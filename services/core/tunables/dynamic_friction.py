@@ -4,7 +4,7 @@ from gaplab.services.core.tunables.base import MaterialTunable
 
 
 class DynamicFriction(MaterialTunable):
-    """The tangential force that resists a sliding contact, over the normal force."""
+    """The tangential force that resists a sliding contact, divided by the normal force."""
 
     name = "dynamic_friction"
     source = "Paper, section 2"

@@ -4,7 +4,7 @@ from gaplab.services.core.tunables.base import MaterialTunable
 
 
 class Restitution(MaterialTunable):
-    """The speed after a bounce over the speed before it; engines gain energy near 1, so it stays below."""
+    """The speed after a bounce divided by the speed before; bounds stay below 1, where engines gain energy."""
 
     name = "restitution"
     source = "Paper, section 2"

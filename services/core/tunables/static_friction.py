@@ -4,7 +4,7 @@ from gaplab.services.core.tunables.base import MaterialTunable
 
 
 class StaticFriction(MaterialTunable):
-    """The tangential force that a contact at rest withstands, over the normal force."""
+    """The tangential force that a contact at rest withstands, divided by the normal force."""
 
     name = "static_friction"
     source = "Paper, section 2"

@@ -1,7 +1,6 @@
-"""The law as machine code, which MuJoCo calls in the middle of each step, from any thread, without Python.
+"""The contact law as compiled code, which MuJoCo calls in the middle of each step, from any thread, without Python.
 
-Numba compiles it; MuJoCo's own description of its structures says where its data are. What Numba makes and takes is
-untyped, so here much is `Any`.
+Numba compiles it. `mujoco.introspect` describes the layout of MuJoCo's data. Numba's values are untyped, hence `Any`.
 """
 
 from ctypes import CDLL, c_int, c_void_p
@@ -16,15 +15,15 @@ from gaplab.services.engines.mujoco.law import DOFS, ROWS, STEP, SWEEPS, coast, 
 from gaplab.services.engines.mujoco.layout import layout
 
 MANY = 1 << 20
-"""Length of a view whose true length compiled code does not ask for."""
+"""Length of an array view whose true length the compiled code does not need."""
 
 
 @cache
 def callbacks() -> tuple[Any, Any]:
-    """The law, and a clock that stands still, as C functions for `mjcb_control` and `mjcb_time`.
+    """Return the law and a constant clock, as C functions for `mjcb_control` and `mjcb_time`.
 
-    MuJoCo asks for the time at every stage of a step, which takes longer than some stages. Compiling takes about two
-    seconds, once in a process.
+    MuJoCo reads the time at every stage of a step, which takes longer than some stages; the constant clock saves that.
+    Compiling takes about two seconds, once in a process.
     Source: https://mujoco.readthedocs.io/en/stable/programming/simulation.html#physics-callbacks
     """
     numba = import_module("numba")
@@ -35,7 +34,7 @@ def callbacks() -> tuple[Any, Any]:
 
 
 def _law(numba: Any) -> Any:
-    """Torques; then, if anything touches, contacts: their forces join the torques, and MuJoCo is left none to find."""
+    """Compute torques, then contact forces, which are added to them; MuJoCo's solver has no contacts left."""
     at = layout(import_module("mujoco.introspect.structs"), "mjData")[0]
     time, rows_of, forces_of, angles_of = at["time"] // 8, at["nefc"] // 4, at["qfrc_applied"] // 8, at["qpos"] // 8
     known_of, speeds_of, accelerations_of = at["userdata"] // 8, at["qvel"] // 8, at["qacc"] // 8
@@ -62,7 +61,7 @@ def _law(numba: Any) -> Any:
 
 
 def _meet(numba: Any) -> Any:
-    """The contacts: their speeds without forces, what they want, the impulses, and these as forces on all joints."""
+    """Compute the impulses of all contacts, and add them as forces on the joints."""
     structs = import_module("mujoco.introspect.structs")
     at, (contact, size) = layout(structs, "mjData")[0], layout(structs, "mjContact")
     bias_of, smooth_of, free_of = at["qfrc_bias"] // 8, at["qfrc_smooth"] // 8, at["qacc_smooth"] // 8
@@ -100,7 +99,7 @@ def _meet(numba: Any) -> Any:
 
 
 def _pointer(numba: Any) -> Any:
-    """For compiled code: an address as a pointer."""
+    """Convert an address to a pointer, in compiled code."""
     types = numba.types
 
     def typed(_: Any, __: Any) -> Any:
@@ -113,7 +112,7 @@ def _pointer(numba: Any) -> Any:
 
 
 def _solve() -> Any:
-    """MuJoCo's `mj_solveM(model, data, x, y, n)`: accelerations x that forces y cause."""
+    """Return MuJoCo's `mj_solveM(model, data, x, y, n)`: accelerations x caused by forces y."""
     folder = Path(str(import_module("mujoco").__file__)).parent
     library = next(each for each in sorted(folder.iterdir()) if each.name.startswith(("libmujoco", "mujoco.dll")))
     solve = CDLL(str(library)).mj_solveM

@@ -1,4 +1,4 @@
-"""The engine itself: worlds sorted by kind, and each kind's rollouts made in one go."""
+"""The MuJoCo engine: worlds are grouped by kind, and each kind's rollouts run in one call."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,18 +19,18 @@ from gaplab.services.engines.stepping import WarmScenes, recording
 
 
 class MuJoCoOptions(Frozen):
-    """How many cores one call may use."""
+    """Options of the engine `mujoco`."""
 
     threads: Annotated[int, Field(ge=1, le=256)] = Field(
-        default=1, description="that share the rollouts of a call; the numbers do not depend on it"
+        default=1, description="threads that share the rollouts of a call; the numbers do not depend on it"
     )
 
 
 class MuJoCo(Engine):
-    """MuJoCo's rigid bodies in batches, with motors and contacts that obey the same law as PyBullet's.
+    """MuJoCo's rigid bodies in batches, with motors and contacts that follow the same law as PyBullet's.
 
-    Static and dynamic friction are told apart by whether a contact slides; restitution acts on impacts faster than what
-    gravity adds in two steps. Deterministic within one version and architecture, for any number of threads.
+    A contact that slides has dynamic friction, any other static friction. Restitution acts on impacts faster than the
+    speed that gravity adds in two steps. Deterministic within one version and architecture, for any number of threads.
     """
 
     name = "mujoco"
@@ -53,21 +53,21 @@ class MuJoCo(Engine):
 
     @classmethod
     def runs(cls, world: World) -> bool:
-        """Any world with bodies."""
+        """Return whether the world has bodies."""
         return bool(world.bodies)
 
     @classmethod
     def available(cls) -> bool:
-        """Whether MuJoCo is installed, and Numba, which makes machine code of the law of contacts."""
+        """Return whether MuJoCo is installed, and Numba, which compiles the contact law."""
         return super().available() and find_spec("numba") is not None
 
     def rollout(self, world: World, motion: Motion) -> Trajectory:
-        """The base's trajectory, `(t, 3)`; times are rounded to whole time steps."""
+        """Return the trajectory of the base, `(t, 3)`; times are rounded to whole time steps."""
         poses = self._scene(_kind(world)).poses([world.material], [motion])[0, 0]
         return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
 
     def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion]) -> Trajectory:
-        """Every motion in every world; worlds that differ in their material alone share their calls of MuJoCo."""
+        """Return every motion in every world; worlds that differ only in material share calls of MuJoCo."""
         poses = np.empty((len(motions), len(worlds), len(motions[0].observe_s), 7))
         kinds = [_kind(world) for world in worlds]
         left = list(range(len(worlds)))
@@ -79,16 +79,16 @@ class MuJoCo(Engine):
         return Trajectory(motions[0].observe_s, poses[..., :3], poses[..., 3:])
 
     def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
-        """The same rollout, with its joints."""
+        """Return the same rollout with joint angles."""
         return recording(motion, times_s, *self._scene(_kind(world)).record(world.material, motion, times_s))
 
     def close(self) -> None:
-        """Give all threads up."""
+        """End all threads."""
         self._latest = None
         self._scenes.close()
 
     def _scene(self, kind: World) -> Scene:
-        """Equality sees at once that the bodies are the very same objects; a hash looks into each, in 25 µs."""
+        """Return the cached scene of a world, found by equality: a hash would take 25 µs."""
         if self._latest is None or self._latest.world != kind:
             self._latest = self._scenes[kind]
         return self._latest

@@ -1,8 +1,8 @@
-"""The law of motors and contacts, in the place of MuJoCo's own.
+"""The law of motors and contacts, in place of MuJoCo's own.
 
-A World has static and dynamic friction and a restitution; MuJoCo's contacts have none of the three in that sense. So
-MuJoCo does what it is fast at, kinematics, collisions and the inverse inertia that contacts feel, and this law finds
-the forces. These are its terms, as plain functions on arrays; `callback` makes machine code of them.
+A World has static friction, dynamic friction and restitution; MuJoCo's contacts have none of these. Therefore MuJoCo
+computes kinematics, collisions and the inverse inertia at contacts, and this law computes the forces, in plain
+functions on arrays. `callback` compiles them.
 """
 
 from collections.abc import Sequence
@@ -15,26 +15,26 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.world import World
 
 SLIDES_M_S = 0.01
-"""A contact that moves along the ground faster than this slides: a tenth of the speed that gravity adds in 1/100 s."""
+"""Speed along the ground above which a contact slides: a tenth of the speed that gravity adds in 1/100 s."""
 
 PUSHED_OUT = 0.2
-"""Share of its depth that a contact is pushed out of the ground in a step: Bullet's."""
+"""Share of its depth by which a step pushes a contact out of the ground, as in Bullet."""
 
 BOUNCES = 2.0
-"""Only approaches faster than gravity adds in so many steps bounce: at 1/100 s Bullet's threshold of 0.2 m/s."""
+"""Bounce threshold: the speed that gravity adds in this many steps; at 1/100 s Bullet's 0.2 m/s."""
 
 STEP, FALL, SWEEPS, DOFS, MOTORS, FIRST = 0, 1, 2, 3, 4, 5
-"""Places in the settings: the time step, the speed that gravity adds in it, the solver's iterations, how many degrees
-of freedom and motors there are, and the first motor."""
+"""Indices into the settings: time step, speed that gravity adds in it, solver iterations, numbers of degrees of freedom
+and motors, and the first motor."""
 
 DOF, GAIN, FASTEST, STRONGEST, ROTOR, EACH = 0, 1, 2, 3, 4, 5
-"""Places in a motor's settings, and how many there are."""
+"""Indices into a motor's settings, and their number."""
 
 STATIC, DYNAMIC, RESTITUTION = 0, 2, 3
-"""Places among a contact's five coefficients."""
+"""Indices into a contact's five coefficients."""
 
 ROWS = 3
-"""Of a contact: away from the ground, and two directions along it."""
+"""Rows of a contact: away from the ground, and two directions along it."""
 
 
 class Drive(NamedTuple):
@@ -48,26 +48,25 @@ class Drive(NamedTuple):
 
 
 def settings(world: World, dofs: int, drives: Sequence[Drive]) -> FloatArray:
-    """What the law knows of a world, as it reads it."""
+    """Return the settings of a world, as an array for the law."""
     step, sweeps = world.time_step_s, max(1, world.solver_iterations)
     motors = [value for drive in drives for value in drive]
     return np.array([step, abs(world.gravity_m_s2) * step, sweeps, dofs, len(drives), *motors])
 
 
 def drive(known: Any, forces: Any, angles: Any, speeds: Any, accelerations: Any) -> None:
-    """The torques of the motors.
+    """Compute the torques of the motors.
 
-    A motor wants the speed that closes its share of the error in a step. Its rotor turns with its hinge, and the torque
-    that would bring the rotor alone to that speed acts as if it looked at the speed at the end of the step: stable
-    however strong it is. The hinge is to get the torque, not the rotor: what the rotor took in the last step is added
-    to what the motor may do at most.
+    A motor targets the speed that closes its share of the error in a step. Its rotor turns with its hinge, and the
+    torque would bring the rotor alone to that speed. This acts like an implicit servo, which is stable at any strength.
+    The hinge should get the whole torque, so the torque that the rotor took in the last step is added to the limit.
 
     Args:
         known: settings.
-        forces: `(6 + hinges,)`: the targets, rad; torques when it returns.
-        angles: `(7 + hinges,)`, the first seven being the pose of the base.
-        speeds: `(6 + hinges,)`, the first six being the base's.
-        accelerations: `(6 + hinges,)`, of the last step; zeros in the first.
+        forces: `(6 + hinges,)`: targets, rad; overwritten with torques.
+        angles: `(7 + hinges,)`; the first seven are the pose of the base.
+        speeds: `(6 + hinges,)`; the first six are the base's.
+        accelerations: `(6 + hinges,)`, of the last step; zeros in the first step.
     """
     for motor in range(int(known[MOTORS])):
         at = FIRST + EACH * motor
@@ -80,11 +79,11 @@ def drive(known: Any, forces: Any, angles: Any, speeds: Any, accelerations: Any)
 
 
 def coast(step: float, jacobian: Any, before: Any, accelerations: Any, excess: Any, impulses: Any) -> None:
-    """The speeds of the contacts' rows at the end of the step if they exerted no force.
+    """Compute the speeds of the contacts' rows at the end of the step without contact forces.
 
     Args:
-        step: its length, s.
-        jacobian: `(r, d)`: speeds of the rows for speeds of the degrees of freedom.
+        step: length of the step, s.
+        jacobian: `(r, d)`: speeds of the rows by speeds of the degrees of freedom.
         before: `(r,)`: speeds at the start of the step.
         accelerations: `(d,)`, without contacts.
         excess: `(r,)`, written to.
@@ -97,17 +96,17 @@ def coast(step: float, jacobian: Any, before: Any, accelerations: Any, excess: A
 
 
 def touch(known: Any, depth: float, before: Any, coefficients: Any, excess: Any) -> Any:
-    """What a contact wants, and its coefficient of friction: the dynamic one if it slides, else the static one.
+    """Compute a contact's target speeds, and return its friction: dynamic if it slides, else static.
 
-    Along the ground it wants to rest; away from it, to leave with the restitution's share of the speed of its approach,
-    or to be pushed out, whichever is faster.
+    The target along the ground is rest. The target away from the ground is the larger of two: the restitution's share
+    of the speed of approach, and the speed that pushes it out.
 
     Args:
         known: settings.
-        depth: in the ground, m.
-        before: `(3,)`: its speeds at the start of the step: away from the ground, and along it.
+        depth: depth in the ground, m.
+        before: `(3,)`: speeds at the start of the step: away from the ground, and along it.
         coefficients: `(5,)`: static friction twice, dynamic friction, restitution, unused.
-        excess: `(3,)`: its speeds at the end of the step if it exerted no force; minus those wanted when it returns.
+        excess: `(3,)`: speeds at the end of the step without force; the target speeds are subtracted.
     """
     wanted = PUSHED_OUT * depth / known[STEP]
     if -before[0] > BOUNCES * known[FALL]:
@@ -117,14 +116,14 @@ def touch(known: Any, depth: float, before: Any, coefficients: Any, excess: Any)
 
 
 def press(sweeps: int, inverse: Any, excess: Any, frictions: Any, impulses: Any) -> None:
-    """Coulomb's law by projected Gauss-Seidel: contacts push, never pull, and friction stays in its cone.
+    """Solve Coulomb's law by projected Gauss-Seidel: contacts push, never pull, and friction stays in its cone.
 
     Args:
-        sweeps: over all contacts.
-        inverse: `(r, r)`, inverse inertia: the speed of each row for an impulse in each row; symmetric.
-        excess: `(r,)`: speeds above the wanted ones, without the impulses; with them when it returns.
-        frictions: `(r,)`: coefficients of the contacts, each in the first of its three rows.
-        impulses: `(r,)`: zeros; the contacts' impulses, N·s, when it returns.
+        sweeps: number of sweeps over all contacts.
+        inverse: `(r, r)`, symmetric: inverse inertia, the speed of each row by the impulse in each row.
+        excess: `(r,)`: speeds above the targets without the impulses; updated to include them.
+        frictions: `(r,)`: coefficient of each contact, in the first of its three rows.
+        impulses: `(r,)`: zeros; overwritten with the impulses of the contacts, N·s.
     """
     rows = len(excess)
     for _ in range(sweeps):
@@ -145,7 +144,7 @@ def press(sweeps: int, inverse: Any, excess: Any, frictions: Any, impulses: Any)
 
 
 def spread(step: float, jacobian: Any, impulses: Any, forces: Any) -> None:
-    """Add the contacts' impulses `(r,)` in a step, as forces on the degrees of freedom, to `forces`, `(d,)`."""
+    """Add the impulses `(r,)` of the contacts in a step to `forces` `(d,)`, as forces on the degrees of freedom."""
     for row in range(len(impulses)):
         for dof in range(len(forces)):
             forces[dof] += jacobian[row, dof] * impulses[row] / step

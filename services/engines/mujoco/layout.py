@@ -1,4 +1,4 @@
-"""Where MuJoCo's C structures have their fields, from its own description of them."""
+"""Memory layout of MuJoCo's C structures, from `mujoco.introspect`."""
 
 from types import ModuleType
 from typing import Any
@@ -10,11 +10,11 @@ _SCALARS["uintptr_t"] = _SCALARS["pointer"] = 8
 
 
 def layout(structs: ModuleType, name: str) -> tuple[Offsets, int]:
-    """The offset of each field of a structure, and the size of the whole, in bytes; of a 64-bit machine.
+    """Return the offset of each field of a structure, and the total size, in bytes on a 64-bit machine.
 
     Args:
         structs: the module `mujoco.introspect.structs`.
-        name: of the structure, like `mjContact`.
+        name: name of the structure, like `mjContact`.
     """
     offsets, size, _ = _struct(structs, name)
     return offsets, size
@@ -31,7 +31,7 @@ def _struct(structs: ModuleType, name: str) -> tuple[Offsets, int, int]:
 
 
 def _measure(structs: ModuleType, kind: Any) -> tuple[int, int]:
-    """Size and alignment of a field."""
+    """Return size and alignment of a field."""
     if type(kind).__name__ == "PointerType":
         return _SCALARS["pointer"], _SCALARS["pointer"]
     if type(kind).__name__ == "ArrayType":

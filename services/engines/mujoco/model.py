@@ -1,4 +1,4 @@
-"""A World as a MuJoCo model: what the compiler makes of it once, and what a material changes in it."""
+"""A World as a MuJoCo model: compiled once, and edited for each material."""
 
 from collections.abc import Iterator
 from types import ModuleType
@@ -12,18 +12,18 @@ from gaplab.services.engines.mujoco.law import EACH, FIRST, Drive
 GROUND = "the ground"
 
 RIGID = (0.9999, 0.9999, 1.0, 0.5, 1.0)
-"""Impedance of a contact: all but rigid, at any depth."""
+"""Impedance of a contact: almost rigid, at any depth."""
 
 UNUSED = (-1.0, -1.0)
-"""A spring and a damper, in MuJoCo's direct format: the law asks for something else."""
+"""Spring and damper in MuJoCo's direct format, which the law does not use."""
 
 ROTOR = 8.0
-"""Inertia of a motor's rotor, over that of what its hinge carries in the zero pose: in one step a free limb gets to
-eight ninths of the speed that its motor wants. See docs/engines.md for what other values did."""
+"""Inertia of a motor's rotor, relative to that of the bodies that its hinge carries in the zero pose: in one step a
+free limb reaches eight ninths of the target speed. docs/engines.md has results for other values."""
 
 SWITCHED_OFF = (
-    "mjDSBL_AUTORESET",  # what blew up stays so, and is seen
-    "mjDSBL_WARMSTART",  # its solver has nothing to do
+    "mjDSBL_AUTORESET",  # a diverged simulation stays visible
+    "mjDSBL_WARMSTART",  # its solver has no work
     "mjDSBL_REFSAFE",
     "mjDSBL_EULERDAMP",
     "mjDSBL_ISLAND",
@@ -35,11 +35,11 @@ SWITCHED_OFF = (
     "mjDSBL_LIMIT",
     "mjDSBL_EQUALITY",
 )
-"""What a World has not, and need not be paid for."""
+"""Features of MuJoCo that a World does not need."""
 
 
 def compiled(mujoco: ModuleType, world: World) -> Any:
-    """The model of a world, in any material."""
+    """Compile the model of a world, in any material."""
     spec = mujoco.MjSpec()
     _set_up_physics(mujoco, spec, world)
     spec.worldbody.add_geom(name=GROUND, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=0, conaffinity=0)
@@ -55,12 +55,12 @@ def compiled(mujoco: ModuleType, world: World) -> Any:
 
 
 def driven(world: World) -> list[Joint]:
-    """The joints whose motors have any strength."""
+    """Return the joints whose motors have any strength."""
     return [joint for joint in world.actuators if joint.motor is not None and joint.motor.max_torque_nm > 0]
 
 
 def drives(model: Any, world: World) -> list[Drive]:
-    """The motors of a world, in the order of its actuators, as the law knows them."""
+    """Return the settings of a world's motors for the law, in the order of its actuators."""
     found = []
     for joint in driven(world):
         assert joint.motor is not None
@@ -71,7 +71,7 @@ def drives(model: Any, world: World) -> list[Drive]:
 
 
 def paint(model: Any, material: Material) -> None:
-    """Make all contacts of a model those of a material, where the law finds it."""
+    """Write a material into all contact pairs of a model, where the law reads it."""
     dynamic = material.dynamic_friction
     static = max(material.static_friction, dynamic)
     model.pair_friction[:] = (static, static, dynamic, material.restitution, 0.0)  # STATIC, twice, DYNAMIC, RESTITUTION
@@ -86,7 +86,7 @@ def _set_up_physics(mujoco: ModuleType, spec: Any, world: World) -> None:
     option.timestep = world.time_step_s
     option.gravity = [0.0, 0.0, -world.gravity_m_s2]
     option.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    option.solver = mujoco.mjtSolver.mjSOL_PGS  # not used, but for it MuJoCo prepares the contacts' inverse inertia
+    option.solver = mujoco.mjtSolver.mjSOL_PGS  # unused, but it makes MuJoCo compute the inverse inertia at contacts
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     option.disableflags = sum(int(getattr(mujoco.mjtDisableBit, each)) for each in SWITCHED_OFF)
@@ -106,7 +106,7 @@ def _add_bodies(mujoco: ModuleType, spec: Any, world: World) -> None:
 
 
 def _add_shape(mujoco: ModuleType, made: Any, body: Body) -> None:
-    """Inertia of even density; collisions only where pairs say so."""
+    """Add a shape with inertia of uniform density, which collides only in declared pairs."""
     if isinstance(body.shape, Box):
         kind, size = mujoco.mjtGeom.mjGEOM_BOX, [edge / 2 for edge in body.shape.size_m]
     else:
@@ -115,7 +115,7 @@ def _add_shape(mujoco: ModuleType, made: Any, body: Body) -> None:
 
 
 def _let_collide(spec: Any, body: Body) -> None:
-    """With the ground, in points that have friction in two directions."""
+    """Declare contacts with the ground, with friction in two directions."""
     spec.add_pair(
         geomname1=GROUND,
         geomname2=body.name,

@@ -1,4 +1,4 @@
-"""One kind of world, warm: motions in it, in materials, many at a time and each from the very same start."""
+"""One kind of world with a cached model: many motions in many materials, each from the same start."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -18,24 +18,24 @@ from gaplab.services.engines.mujoco.model import compiled, driven, drives, paint
 from gaplab.services.engines.stepping import plausible
 
 ROWS = 64
-"""Rollouts of one call of MuJoCo's, for each thread; more would only take memory, 0.1 MB each for the quadruped."""
+"""Rollouts per thread in one call of MuJoCo; more would only take memory, 0.1 MB each for the quadruped."""
 
 TIME, POSE = 0, slice(1, 8)
-"""Places in a state."""
+"""Indices into a state."""
 
 TURNED = np.array((0, 1, 2, 4, 5, 6, 3))
-"""MuJoCo's poses have w first, a Trajectory's have it last."""
+"""Order of a pose: MuJoCo's quaternions have w first, a Trajectory's last."""
 
 
 class Scene:
     """A world in any material.
 
-    Nothing is carried from one rollout to the next: each sets the whole state, and the solver begins anew each step.
+    Rollouts are independent: each sets the whole state, and the solver starts from zero in each step.
 
     Args:
-        mujoco: the library.
-        world: whatever its material.
-        threads: that share the rollouts of a call.
+        mujoco: the library module.
+        world: world to build; its material is ignored.
+        threads: number of threads that share the rollouts of a call.
     """
 
     def __init__(self, mujoco: ModuleType, world: World, threads: int) -> None:
@@ -56,7 +56,7 @@ class Scene:
         self._pool = import_module("mujoco.rollout").Rollout(nthread=threads if threads > 1 else 0)
 
     def poses(self, materials: Sequence[Material], motions: Sequence[Motion]) -> FloatArray:
-        """`(n, m, t, 7)`: positions and quaternions x, y, z, w of the base; nan throughout where the physics failed."""
+        """Return `(n, m, t, 7)`: positions and quaternions x, y, z, w of the base; all nan where the physics failed."""
         steps = self._steps(motions[0].observe_s)
         rows = ROWS * len(self._datas)
         found = np.empty((len(motions), len(materials), len(steps), 7))
@@ -70,7 +70,7 @@ class Scene:
         return found
 
     def record(self, material: Material, motion: Motion, times_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """`(t, 7)`: what `poses` gives; and base and joints at other times, `(k, 7 + joints)`."""
+        """Return the result of `poses`, `(t, 7)`, and base and joints at other times, `(k, 7 + joints)`."""
         observed = self._steps(motion.observe_s)
         with _in_force(self._mujoco, *self._callbacks):
             controls = self._controls([motion], max(1, int(observed[-1])))
@@ -79,14 +79,14 @@ class Scene:
         return self._seen(states, observed)[0], np.hstack([looked[:, POSE][:, TURNED], looked[:, self._angles]])
 
     def close(self) -> None:
-        """Give the threads up."""
+        """End the threads."""
         self._pool.close()
 
     def _steps(self, times_s: FloatArray) -> NDArray[np.int_]:
         return np.rint(times_s / self.world.time_step_s).astype(int)
 
     def _controls(self, motions: Sequence[Motion], steps: int) -> FloatArray:
-        """`(n, steps, degrees of freedom)`: the targets in each step, where the law looks for them."""
+        """Return `(n, steps, degrees of freedom)`: the targets in each step, where the law reads them."""
         controls = np.zeros((len(motions), steps, self.model.nv))
         for motion, each in zip(motions, controls, strict=True):
             current = np.searchsorted(self._steps(motion.times_s), np.arange(steps), side="right") - 1
@@ -94,7 +94,7 @@ class Scene:
         return controls
 
     def _rolled(self, models: list[Any], controls: FloatArray) -> FloatArray:
-        """`(n · m, steps, state)`: states after each step, of each motion in each model; nan where MuJoCo gave up."""
+        """Return `(n · m, steps, state)`: states after each step, by motion and model; nan where MuJoCo stopped."""
         count, steps = len(models) * len(controls), controls.shape[1]
         states = self._room(count, steps)
         try:
@@ -113,7 +113,7 @@ class Scene:
         return states
 
     def _seen(self, states: FloatArray, steps: NDArray[np.int_]) -> FloatArray:
-        """`(rows, t, 7)`: poses after so many steps; nan of a rollout that MuJoCo stopped at a warning, or got lost."""
+        """Return `(rows, t, 7)`: poses after the given steps; nan if MuJoCo stopped or the pose is implausible."""
         complete = states[:, -1, TIME] > (states.shape[1] - 0.5) * self.world.time_step_s
         poses = states[:, np.maximum(steps, 1) - 1, POSE]
         poses[:, steps == 0] = self._start[POSE]
@@ -121,14 +121,14 @@ class Scene:
         return poses[..., TURNED]
 
     def _room(self, count: int, steps: int) -> FloatArray:
-        """`(count, steps, state)`, in the same memory as the last time if it is large enough."""
+        """Return an array `(count, steps, state)`, in the memory of the last call if it is large enough."""
         size = count * steps * len(self._start)
         if self._memory.size < size:
             self._memory = np.empty(size)
         return self._memory[:size].reshape(count, steps, -1)
 
     def _painted(self, materials: Sequence[Material]) -> list[Any]:
-        """A model for each material: copies that are painted anew for each call, never compiled."""
+        """Return a model for each material: copies that are rewritten in each call, never compiled."""
         while len(self._models) < len(materials):
             self._models.append(copy(self.model))
         models = self._models[: len(materials)]
@@ -156,9 +156,9 @@ def _slices(count: int, size: int) -> Iterator[slice]:
 
 @contextmanager
 def _in_force(mujoco: ModuleType, law: Any, clock: Any) -> Iterator[None]:
-    """The law is in force, and MuJoCo neither prints its warnings nor writes a file of them.
+    """Activate the law, and stop MuJoCo from printing warnings or writing them to a file.
 
-    All this belongs to the process, so it is put back.
+    These settings are process-wide, so they are restored.
     """
     before, log = (mujoco.get_mjcb_control(), mujoco.get_mjcb_time()), mujoco.MjLogConfig.get()
     silent = mujoco.MjLogConfig.get()

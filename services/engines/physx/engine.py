@@ -1,4 +1,4 @@
-"""The engine itself: motions in worlds, one scene for each kind of world, kept warm."""
+"""The PhysX engine, with one cached scene for each kind of world."""
 
 from dataclasses import replace
 from functools import partial
@@ -18,9 +18,9 @@ from gaplab.services.engines.stepping import WarmScenes, plausible, record, reco
 
 
 class PhysX(Engine):
-    """PhysX on the CPU, the paper's own engine, with static friction, dynamic friction and restitution of its own.
+    """PhysX on the CPU, the paper's own engine, which has all three coefficients itself.
 
-    Deterministic within one version and architecture; needs neither a GPU nor Vulkan. Numbers are of single precision.
+    Deterministic within one version and architecture; single precision; needs neither a GPU nor Vulkan.
     Restitution acts on impacts faster than 0.2 m/s.
     """
 
@@ -39,22 +39,22 @@ class PhysX(Engine):
 
     @classmethod
     def runs(cls, world: World) -> bool:
-        """Any world with bodies."""
+        """Return whether the world has bodies."""
         return bool(world.bodies)
 
     def rollout(self, world: World, motion: Motion) -> Trajectory:
-        """The base's trajectory, `(t, 3)`; times are rounded to whole time steps."""
+        """Return the trajectory of the base, `(t, 3)`; times are rounded to whole time steps."""
         bare = replace(world, material=Material())
         scene = self._scenes[bare]
         scene.start(world.material)
         poses = watch(scene, scene.step, motion)
         if not plausible(poses):
             poses = np.full_like(poses, np.nan)
-            self._scenes.drop(bare)  # nan in a scene stays there
+            self._scenes.drop(bare)  # nan in a scene persists
         return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
 
     def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
-        """The same rollout, with its joints."""
+        """Return the same rollout with joint angles."""
         bare = replace(world, material=Material())
         scene = self._scenes[bare]
         scene.start(world.material)
@@ -64,12 +64,12 @@ class PhysX(Engine):
         return recording(motion, times_s, poses, seen)
 
     def close(self) -> None:
-        """Give all scenes up."""
+        """Close all scenes."""
         self._scenes.close()
 
 
 def _sapien() -> ModuleType:
-    """The library, without what it has to say about graphics: nothing is drawn here."""
+    """Import the library without its warnings about graphics, which is not used."""
     with catch_warnings():
-        simplefilter("ignore")  # no Vulkan on the machine; in older versions, `pkg_resources` is deprecated
+        simplefilter("ignore")  # no Vulkan on the machine; older versions import `pkg_resources`
         return import_module("sapien")

@@ -11,37 +11,37 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.world import Body, Box, Joint, Motor, Vector, World
 
 Handle: TypeAlias = Any
-"""Something that SAPIEN made: its types cannot be named where the library must not be imported."""
+"""An object of SAPIEN, untyped because the library must not be imported here."""
 
 ROBOT_GROUPS = [1, 0, 0, 0]
-"""Bodies meet the ground, whose groups are SAPIEN's default, and not each other: a shape's first group must share a bit
-with the other's second."""
+"""Collision groups: bodies collide with the ground, which has SAPIEN's default groups, but not with each other. Two
+shapes collide if the first group of one shares a bit with the second group of the other."""
 
 CONTACT_OFFSET_M = 0.01
-"""Surfaces nearer than this are looked at as possible contacts; they touch at distance 0."""
+"""Distance below which surfaces are candidates for contact; they touch at distance 0."""
 
 UNLIMITED = 1e6
-"""In m/s and rad/s: PhysX's defaults, 10 m/s and 50 rad/s for a link, would brake what World does not brake."""
+"""Speed limit of links, m/s and rad/s: PhysX's defaults, 10 m/s and 50 rad/s, would brake permitted motions."""
 
 RIGIDITY = 1e4
-"""How much more a motor's target speed counts than the speed that the joint has: see `_drive`."""
+"""Weight of a motor's target speed relative to the current speed of the joint: see `_drive`."""
 
 LARGEST_GAIN = 0.999
-"""A motor that closes all of the error in a step would be infinitely stiff."""
+"""Largest gain: a motor that closes the whole error in a step would be infinitely stiff."""
 
 MOST_ITERATIONS = 255
-"""PhysX keeps their number in a byte."""
+"""Largest number of iterations: PhysX stores it in a byte."""
 
 
 @dataclass(frozen=True)
 class Robot:
-    """What a World became.
+    """A World's robot in PhysX.
 
     Attributes:
-        links: the bodies, by name, the base first.
-        entities: what carries them, to be added to a scene in this order.
-        articulation: all of them together.
-        motors: the joints that are actuators, in the World's order.
+        links: bodies by name, the base first.
+        entities: entities of the bodies, to add to a scene in this order.
+        articulation: the articulation of all bodies.
+        motors: joints with actuators, in the World's order.
     """
 
     links: dict[str, Handle]
@@ -51,7 +51,7 @@ class Robot:
 
 
 def build_robot(sapien: ModuleType, world: World, material: Handle) -> Robot:
-    """The robot of the world at its start, its surfaces of the one material, not yet in a scene."""
+    """Build the robot of a world at its start, with one material, without adding it to a scene."""
     bodies = {body.name: body for body in world.bodies}
     base = world.bodies[0]
     links = {base.name: _link(sapien, base, None, material)}
@@ -62,13 +62,13 @@ def build_robot(sapien: ModuleType, world: World, material: Handle) -> Robot:
     entities[0].pose = sapien.Pose([0.0, 0.0, world.start_height_m])
     articulation = links[base.name].articulation
     articulation.solver_position_iterations = min(world.solver_iterations, MOST_ITERATIONS)
-    articulation.solver_velocity_iterations = 1  # takes out the speed that pushing bodies apart has added
+    articulation.solver_velocity_iterations = 1  # removes the speed that separating overlapping bodies adds
     articulation.sleep_threshold = 0.0
     return Robot(links, entities, articulation, tuple(links[joint.child].joint for joint in world.actuators))
 
 
 def _outwards(world: World) -> Iterator[Joint]:
-    """The joints, each after the one that carries its parent."""
+    """Return the joints in order from the base outwards."""
     reached = [world.bodies[0].name]
     for name in reached:
         for joint in world.joints:
@@ -78,7 +78,7 @@ def _outwards(world: World) -> Iterator[Joint]:
 
 
 def _link(sapien: ModuleType, body: Body, parent: Handle | None, material: Handle) -> Handle:
-    """A body with the inertia of its solid shape, and nothing that slows it but contacts."""
+    """Create a link with the inertia of its solid shape, slowed only by contacts."""
     link = sapien.physx.PhysxArticulationLinkComponent(parent)
     center = sapien.Pose(body.center_m)
     if body.collides:
@@ -102,13 +102,13 @@ def _shape(sapien: ModuleType, body: Body, material: Handle) -> Handle:
 
 
 def set_offsets(shape: Handle) -> None:
-    """Where a shape touches, whatever this process made SAPIEN's default."""
+    """Set the contact distances of a shape, overriding SAPIEN's process-wide defaults."""
     shape.contact_offset = CONTACT_OFFSET_M
     shape.rest_offset = 0.0
 
 
 def _inertia(body: Body) -> FloatArray:
-    """`(3,)`: principal moments of inertia of even density, kg m²."""
+    """Return `(3,)`: principal moments of inertia at uniform density, kg m²."""
     if isinstance(body.shape, Box):
         squares = np.square(body.shape.size_m)
         return np.asarray(body.mass_kg / 12 * (squares.sum() - squares))
@@ -116,7 +116,7 @@ def _inertia(body: Body) -> FloatArray:
 
 
 def _hinge(sapien: ModuleType, hinge: Handle, joint: Joint, time_step_s: float) -> None:
-    """A joint without limits or friction; PhysX's hinges turn about their own x."""
+    """Configure a hinge without limits or friction; PhysX's hinges turn about their own x."""
     turn = _turn_from_x(joint.axis)
     hinge.type = "revolute_unwrapped"
     hinge.pose_in_parent = sapien.Pose(joint.origin_m, turn)
@@ -129,7 +129,7 @@ def _hinge(sapien: ModuleType, hinge: Handle, joint: Joint, time_step_s: float) 
 
 
 def _turn_from_x(axis: Vector) -> FloatArray:
-    """`(4,)`: the shortest turn from the x axis to a unit vector, as a quaternion w, x, y, z."""
+    """Return `(4,)`: the shortest rotation from the x axis to a unit vector, as a quaternion w, x, y, z."""
     if axis[0] < -0.999999:
         return np.array([0.0, 0.0, 0.0, 1.0])
     turn = np.array([1.0 + axis[0], 0.0, -axis[2], axis[1]])
@@ -137,13 +137,13 @@ def _turn_from_x(axis: Vector) -> FloatArray:
 
 
 def _drive(hinge: Handle, motor: Motor, time_step_s: float) -> None:
-    """World's motor as a PhysX drive, a spring k with a damper d.
+    """Configure a World's motor as a PhysX drive, a spring k with a damper d.
 
-    A drive in acceleration mode is solved implicitly and apart from the inertia that it moves: from speed v and error
-    e, a step h leads to v' = (v + h k e) / (1 + h d + h² k). With d = R/h and k = g (1 + R) / (1 - g) / h² that is
-    v' = g e/h + v (1 - g) / (1 + R): for a large R, World's velocity constraint, which closes the share g of the error
-    in each step. The drive's greatest force is the motor's torque; the greatest speed is the joint's, whatever
-    turns it.
+    A drive in acceleration mode is solved implicitly and independently of inertia: from speed v and error e, a step h
+    leads to v' = (v + h k e) / (1 + h d + h² k). With d = R/h and k = g (1 + R) / (1 - g) / h² that is
+    v' = g e/h + v (1 - g) / (1 + R): for a large R, this is World's velocity constraint, which closes the share g of
+    the error in each step. The largest force of the drive is the motor's torque. The largest speed applies to the
+    joint, whatever turns it.
     """
     gain = min(motor.position_gain, LARGEST_GAIN)
     stiffness = gain * (1 + RIGIDITY) / (1 - gain) / time_step_s**2

@@ -1,4 +1,4 @@
-"""A World in a PhysX scene of its own, built once and put back to its start before each rollout."""
+"""A World in its own PhysX scene, built once and reset before each rollout."""
 
 from types import ModuleType
 
@@ -9,21 +9,21 @@ from gaplab.services.core.world import Material, World
 from gaplab.services.engines.physx.robot import Handle, build_robot, set_offsets
 
 BOUNCE_THRESHOLD_M_S = 0.2
-"""Slower impacts do not bounce; Bullet's threshold too. PhysX's own, 2 m/s, is faster than a walking robot's feet."""
+"""Impacts slower than this do not bounce, as in Bullet. PhysX's default, 2 m/s, is faster than walking feet."""
 
 LARGEST = float(np.finfo(np.float32).max)
-"""PhysX computes in single precision."""
+"""Largest number in single precision, in which PhysX computes."""
 
 
 class Scene:
-    """One world in one scene, with its state at time 0 kept.
+    """One world in one scene, with its saved state at time 0.
 
-    Robot and ground share one material, as in the paper: PhysX averages the coefficients of two surfaces, and the
-    average of a number with itself is that number. Source: the PhysX 5.3 guide; SAPIEN's `physx_system.cpp`.
+    Robot and ground share one material, as in the paper: PhysX averages the coefficients of two surfaces, so equal
+    ones stay unchanged. Source: the PhysX 5.3 guide; SAPIEN's `physx_system.cpp`.
 
     Args:
-        sapien: the library.
-        world: whose material does not count; `start` is given one.
+        sapien: the library module.
+        world: world to build; `start` sets its material.
     """
 
     def __init__(self, sapien: ModuleType, world: World) -> None:
@@ -42,7 +42,7 @@ class Scene:
         self._initial: bytes = self._system.pack()
 
     def start(self, material: Material) -> None:
-        """Back to time 0, in a material. What is not put back, contacts, PhysX forgets when bodies are moved."""
+        """Reset to time 0, in a material. PhysX itself drops contacts when bodies are moved."""
         ours = self._material
         ours.static_friction = max(material.static_friction, material.dynamic_friction)
         ours.dynamic_friction = material.dynamic_friction
@@ -50,34 +50,34 @@ class Scene:
         self._system.unpack(self._initial)
 
     def command(self, actuator: int, target: float) -> None:
-        """A new target for a motor, rad."""
+        """Set a new target for a motor, rad."""
         self.robot.motors[actuator].set_drive_target(target)
 
     def step(self, count: int) -> None:
-        """Go on by so many time steps."""
+        """Advance by a number of time steps."""
         advance = self._system.step
         for _ in range(count):
             advance()
 
     def pose(self) -> FloatArray:
-        """`(7,)`: position and quaternion of the base's frame."""
+        """Return `(7,)`: position and quaternion of the base's frame."""
         pose = self.articulation.root_pose
         w, x, y, z = pose.q
         return np.array([*pose.p, x, y, z, w], dtype=float)
 
     def angles(self) -> FloatArray:
-        """`(joints,)`, rad; PhysX counts joints by their distance from the base."""
+        """Return the joint angles `(joints,)`, rad, in the world's order, which is not PhysX's."""
         return np.asarray(self.articulation.qpos, dtype=float)[self._places]
 
     def close(self) -> None:
-        """Give the scene up; PhysX frees it with the last reference."""
+        """Close the scene; PhysX frees it with the last reference."""
 
 
 def _system(sapien: ModuleType, world: World) -> Handle:
-    """The solver that the world asks for.
+    """Create a system with the world's solver.
 
-    SAPIEN reads a configuration that belongs to the whole process while it makes a system: it is set, and put back.
-    The default solver, TGS, lets a foot break loose at 0.8 of the static friction; PGS holds to what it is told.
+    SAPIEN reads a process-wide configuration when it creates a system: it is set, and then restored. The default
+    solver, TGS, lets a foot break loose at 0.8 of the static friction; PGS at 1.0.
     """
     physx = sapien.physx
     before = physx.get_scene_config()

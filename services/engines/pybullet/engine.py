@@ -1,4 +1,4 @@
-"""The engine itself: motions in worlds, one server for each kind of world, kept warm."""
+"""The PyBullet engine, with one cached server for each kind of world."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,10 +18,10 @@ from gaplab.services.engines.stepping import WarmScenes, plausible, record, reco
 
 
 class PyBullet(Engine):
-    """Bullet's rigid bodies, with static and dynamic friction told apart by stick-slip switching at each contact.
+    """Bullet's rigid bodies; stick-slip switching at each contact distinguishes static and dynamic friction.
 
     Deterministic within one version and architecture. Restitution acts on impacts faster than 0.2 m/s, Bullet's
-    threshold. Where dynamic friction is not below static friction, no switching is needed and none is paid for.
+    threshold. If dynamic friction is not below static friction, there is no switching and no cost of it.
     """
 
     name = "pybullet"
@@ -40,11 +40,11 @@ class PyBullet(Engine):
 
     @classmethod
     def runs(cls, world: World) -> bool:
-        """Any world with bodies."""
+        """Return whether the world has bodies."""
         return bool(world.bodies)
 
     def rollout(self, world: World, motion: Motion) -> Trajectory:
-        """The base's trajectory, `(t, 3)`; times are rounded to whole time steps."""
+        """Return the trajectory of the base, `(t, 3)`; times are rounded to whole time steps."""
         bare = replace(world, material=Material())
         scene = self._scenes[bare]
         try:
@@ -53,11 +53,11 @@ class PyBullet(Engine):
             poses = np.full((len(motion.observe_s), 7), np.nan)
         if not plausible(poses):
             poses = np.full_like(poses, np.nan)
-            self._scenes.drop(bare)  # Bullet drops bodies that it loses sight of: such a scene is spoilt
+            self._scenes.drop(bare)  # Bullet drops bodies that are too far away: the scene is broken
         return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
 
     def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
-        """The same rollout, with its joints."""
+        """Return the same rollout with joint angles."""
         bare = replace(world, material=Material())
         scene = self._scenes[bare]
         try:
@@ -70,12 +70,12 @@ class PyBullet(Engine):
         return recording(motion, times_s, poses, seen)
 
     def close(self) -> None:
-        """Give all servers up."""
+        """Close all servers."""
         self._scenes.close()
 
 
 def _started(scene: Scene, material: Material) -> Callable[[int], None]:
-    """A scene at time 0 in a material; what goes on by so many time steps from there."""
+    """Return a scene at time 0 in a material, and the function that advances it by time steps."""
     scene.start(material, max(material.static_friction, material.dynamic_friction))
     switches = material.dynamic_friction < material.static_friction
     return StickSlip(scene, material).step if switches else scene.step

@@ -1,4 +1,4 @@
-"""A World as bodies in a Bullet server of its own, built once and put back to its start before each rollout."""
+"""A World as bodies in its own Bullet server, built once and reset before each rollout."""
 
 from dataclasses import dataclass
 from types import ModuleType
@@ -10,19 +10,19 @@ from gaplab.services.core.world import Body, Box, Joint, Material, World
 
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
 BASE = -1
-"""Bullet's index of the base; the links count from 0, and link i hangs on joint i."""
+"""Bullet's index of the base. Links count from 0, and link i belongs to joint i."""
 
 
 class Scene:
-    """One world in one server, with its state at time 0 kept.
+    """One world in one server, with its saved state at time 0.
 
-    Source: the PyBullet Quickstart Guide. `restoreState` puts back positions, speeds and contacts, but not what
-    `changeDynamics` set nor the motors: `start` applies the material again, and a rollout commands every motor.
+    Source: the PyBullet Quickstart Guide. `restoreState` resets positions, speeds and contacts, but neither motors nor
+    values set by `changeDynamics`. Therefore `start` applies the material again, and a rollout commands every motor.
 
     Attributes:
-        client: the server; every call names it, so that scenes do not disturb each other.
-        robot: Bullet's number of the body made from `world`.
-        colliding: the links that touch the ground, by Bullet's index.
+        client: id of the server; every call names it, so scenes do not interfere.
+        robot: Bullet's id of the robot.
+        colliding: Bullet's indices of the links that can touch the ground.
     """
 
     def __init__(self, bullet: ModuleType, world: World) -> None:
@@ -41,7 +41,7 @@ class Scene:
         self._initial: int = bullet.saveState(physicsClientId=self.client)
 
     def start(self, material: Material, friction: float) -> None:
-        """Back to time 0, with a material whose contacts have this coefficient of friction."""
+        """Reset to time 0, with a material and the initial coefficient of friction of its contacts."""
         self.bullet.restoreState(self._initial, physicsClientId=self.client)
         bounce, client = material.restitution, self.client
         for link in self.colliding:
@@ -49,11 +49,11 @@ class Scene:
             self.set_friction(link, friction)
 
     def set_friction(self, link: int, friction: float) -> None:
-        """The coefficient of the link's contacts from the next step on."""
+        """Set the coefficient of friction of a link from the next step on."""
         self.bullet.changeDynamics(self.robot, link, lateralFriction=friction, physicsClientId=self.client)
 
     def command(self, actuator: int, target: float) -> None:
-        """A new target for a motor, rad."""
+        """Set a new target for a motor, rad."""
         index, motor = self._motors[actuator]
         self.bullet.setJointMotorControl2(
             self.robot,
@@ -68,25 +68,25 @@ class Scene:
         )
 
     def step(self, count: int) -> None:
-        """Go on by so many time steps."""
+        """Advance by a number of time steps."""
         advance, client = self.bullet.stepSimulation, self.client
         for _ in range(count):
             advance(physicsClientId=client)
 
     def pose(self) -> FloatArray:
-        """`(7,)`: position and quaternion of the base's frame."""
+        """Return `(7,)`: position and quaternion of the base's frame."""
         position, turn = self.bullet.getBasePositionAndOrientation(self.robot, physicsClientId=self.client)
         origin, turn = self.bullet.multiplyTransforms(position, turn, self._from_center_of_mass, UNTURNED)
         return np.array([*origin, *turn])
 
     def angles(self) -> FloatArray:
-        """`(joints,)`, rad."""
+        """Return the joint angles `(joints,)`, rad."""
         joints = range(len(self.world.joints))
         states = self.bullet.getJointStates(self.robot, joints, physicsClientId=self.client) if joints else ()
         return np.array([state[0] for state in states], dtype=float)
 
     def close(self) -> None:
-        """Give the server up."""
+        """Close the server."""
         self.bullet.disconnect(physicsClientId=self.client)
 
     def _set_up_physics(self) -> None:
@@ -101,7 +101,7 @@ class Scene:
         bullet.setGravity(0, 0, -self.world.gravity_m_s2, physicsClientId=client)
         plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
         self.ground: int = bullet.createMultiBody(0, plane, physicsClientId=client)
-        # Bullet multiplies the coefficients of the two bodies in contact: with 1 here, the robot's are the contact's.
+        # Bullet multiplies the coefficients of two bodies in contact: with 1 here, the robot's apply.
         bullet.changeDynamics(self.ground, BASE, lateralFriction=1.0, restitution=1.0, physicsClientId=client)
 
     def _create_robot(self, tree: "_Tree") -> int:
@@ -133,10 +133,10 @@ class Scene:
         return int(self.bullet.createCollisionShape(self.bullet.GEOM_SPHERE, radius=shape.radius_m, **options))
 
     def _finish_robot(self, tree: "_Tree") -> None:
-        """No damping, no collisions of bodies that have none, and hinges that are free unless they have a motor.
+        """Remove damping and unwanted collisions, and free the hinges without motors.
 
-        Bullet takes a link's inertia from its collision shape. A link without a shape would have none, and setting it
-        by `changeDynamics(localInertiaDiagonal=...)` changes the base's instead: so every body gets its shape.
+        Bullet computes a link's inertia from its collision shape. A link without a shape would have none, and
+        `changeDynamics(localInertiaDiagonal=...)` would change the base's instead. Therefore every body gets its shape.
         """
         bullet, robot, client = self.bullet, self.robot, self.client
         for index, body in enumerate(tree.bodies, start=BASE):
@@ -149,7 +149,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class _Tree:
-    """Bodies in Bullet's order: the base, then the child of each joint; `parents` count from 1, the base is 0."""
+    """Bodies in Bullet's order: the base, then the child of each joint; in `parents`, the base is 0."""
 
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]

@@ -1,4 +1,4 @@
-"""Two coefficients of friction in an engine that has one: each link in contact sticks or slides."""
+"""Static and dynamic friction in an engine with one coefficient: each link in contact sticks or slides."""
 
 from math import hypot
 from typing import Any
@@ -7,23 +7,23 @@ from gaplab.services.core.world import Material
 from gaplab.services.engines.pybullet.scene import Scene
 
 SLIDES = 0.999
-"""A sticking link slides when its friction reaches this share of what the static coefficient allows."""
+"""Share of the largest static friction above which a sticking link slides."""
 
 STICKS_AGAIN = 0.9
-"""A sliding link sticks again when its friction falls below this share of what the dynamic coefficient allows."""
+"""Share of the largest dynamic friction below which a sliding link sticks again."""
 
 LINK, NORMAL_FORCE, FRICTION_1, FRICTION_2 = 3, 9, 10, 12
-"""Places in a contact point, as `getContactPoints` returns it."""
+"""Indices into a contact point from `getContactPoints`."""
 
 UNLOADED = (0.0, 0.0)
 
 
 class StickSlip:
-    """Steps a scene, and after each step gives each link the coefficient of its state: static or dynamic.
+    """Steps a scene, and sets the coefficient of each link after each step: static or dynamic.
 
-    A link in contact starts out sticking. It slides once its friction is all that the static coefficient allows. It
-    sticks again once its friction is clearly less than the dynamic one allows, for then less was enough to hold it; or
-    once it bears no load. Of a link with several contact points the sums count.
+    A link in contact first sticks. It slides when its friction reaches the static limit. It sticks again when its
+    friction is clearly below the dynamic limit, which shows that less was enough to hold it, or when it bears no load.
+    For a link with several contact points, their sums count.
     """
 
     def __init__(self, scene: Scene, material: Material) -> None:
@@ -34,7 +34,7 @@ class StickSlip:
         self._sliding: set[int] = set()
 
     def step(self, count: int) -> None:
-        """Go on by so many time steps."""
+        """Advance by a number of time steps."""
         bullet, robot, client = self._scene.bullet, self._scene.robot, self._scene.client
         advance, contacts = bullet.stepSimulation, bullet.getContactPoints
         for _ in range(count):

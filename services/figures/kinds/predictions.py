@@ -30,13 +30,7 @@ def predictions_figure(
         left_out: samples of later repetitions that will not be computed.
         title: above the figure.
     """
-    told, drawn = [], {BEFORE: list[Pair](), AFTER: list[Pair]()}
-    for each in items:
-        before, after, real = map(drawable, (each.simulated_before, each.simulated_after, each.fitness))
-        if before is not None and after is not None and real is not None:
-            told.append(f"repetition {each.repetition}, iteration {each.iteration}")
-            drawn[BEFORE].append((before, real))
-            drawn[AFTER].append((after, real))
+    told, drawn = _pairs(items)
     values = [value for pairs in drawn.values() for both in pairs for value in both]
     ends = limits(values)
     marks = (
@@ -59,6 +53,18 @@ def predictions_figure(
         table=_table(items),
         nothing="no results yet" if not pending else "being computed",
     )
+
+
+def _pairs(items: Sequence[Prediction]) -> tuple[list[str], dict[str, list[Pair]]]:
+    """Return the hover texts of the complete samples, and their pairs before and after tuning."""
+    told, drawn = list[str](), {BEFORE: list[Pair](), AFTER: list[Pair]()}
+    for each in items:
+        before, after, real = map(drawable, (each.simulated_before, each.simulated_after, each.fitness))
+        if before is not None and after is not None and real is not None:
+            told.append(f"repetition {each.repetition}, iteration {each.iteration}")
+            drawn[BEFORE].append((before, real))
+            drawn[AFTER].append((after, real))
+    return told, drawn
 
 
 def _points(name: str, pairs: Sequence[Pair], told: Sequence[str], style: Style, *, hollow: bool) -> Points:

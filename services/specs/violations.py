@@ -1,0 +1,84 @@
+"""What is wrong with a spec: every violation, with its pointer into the spec and the permitted values."""
+
+from collections import Counter
+from collections.abc import Iterator
+
+from gaplab.schemas.plugin import TunableRef
+from gaplab.schemas.resolved import ResolvedBudget
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.errors import Violation, unknown_name
+from gaplab.services.core.optimizers.base import Optimizer
+from gaplab.services.core.strategies.base import Strategy
+from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.engines import engines
+from gaplab.services.engines.base import Engine
+
+
+def tunable_violations(spec: ExperimentSpec, engine: type[Engine]) -> Iterator[Violation]:
+    """Yield unknown and repeated tunables, those that the engine ignores, and bounds that are out of range."""
+    counts = Counter(ref.name for ref in spec.tunables)
+    for index, ref in enumerate(spec.tunables):
+        pointer = f"/tunables/{index}"
+        if ref.name not in tunables:
+            yield unknown_name(pointer, "tunable", ref.name, list(tunables))
+            continue
+        yield from _honour_violations(ref.name, engine, pointer)
+        yield from _bound_violations(ref, pointer)
+        if counts[ref.name] > 1:
+            yield Violation(pointer, ref.name, f"{ref.name} is named {counts[ref.name]} times; once is permitted")
+
+
+def bounds_of(ref: TunableRef) -> tuple[float, float]:
+    """Return the bounds of a tunable that is installed; a missing one is the tunable's own."""
+    tunable = tunables[ref.name]
+    return tunable.lower if ref.lower is None else ref.lower, tunable.upper if ref.upper is None else ref.upper
+
+
+def _bound_violations(ref: TunableRef, pointer: str) -> Iterator[Violation]:
+    (lower, upper), tunable = bounds_of(ref), tunables[ref.name]
+    for side in ("lower", "upper"):
+        if (given := getattr(ref, side)) is not None:
+            yield from _range_violations(tunable, given, f"{pointer}/{side}")
+    if lower >= upper:
+        yield Violation(pointer, [lower, upper], f"lower must be below upper, not {lower:g} and {upper:g}")
+
+
+def _range_violations(tunable: type[Tunable], value: float, pointer: str) -> Iterator[Violation]:
+    if not tunable.least <= value <= tunable.greatest:
+        permitted = f"{tunable.least:g} to {tunable.greatest:g}"
+        yield Violation(pointer, value, f"{tunable.name} is {permitted}, not {value:g}", permitted)
+
+
+def _honour_violations(name: str, engine: type[Engine], pointer: str) -> Iterator[Violation]:
+    field = tunables[name].field
+    if field not in engine.honours:
+        able = [each.name for each in engines.values() if field in each.honours]
+        message = f"{engine.name} does not honour {name}; {' and '.join(able) or 'no engine'} does"
+        yield Violation(pointer, name, message, able)
+
+
+def reality_violations(spec: ExperimentSpec, engine: type[Engine]) -> Iterator[Violation]:
+    """Yield parameters of reality that are unknown, out of range, or ignored by its engine."""
+    for name, value in spec.reality.parameters.items():
+        pointer = f"/reality/parameters/{name}"
+        if name not in tunables:
+            yield unknown_name(pointer, "tunable", name, list(tunables))
+            continue
+        yield from _honour_violations(name, engine, pointer)
+        yield from _range_violations(tunables[name], value, pointer)
+
+
+def budget_violations(budget: ResolvedBudget, strategy: Strategy, optimizer: Optimizer) -> Iterator[Violation]:
+    """Yield searches whose budget is smaller than the population that they start with."""
+    least = optimizer.least_evaluations
+    tuning = optimizer.diverse(strategy.ensemble).least_evaluations if strategy.ensemble > 1 else least
+    needed = {"controller_evaluations": (budget.controller_evaluations, least)}
+    if strategy.searches and not strategy.in_reality:
+        needed["selection_evaluations"] = (budget.selection_evaluations, least)
+    if not strategy.in_reality:
+        needed["simulator_evaluations"] = (budget.simulator_evaluations, tuning)
+    for name, (given, minimum) in needed.items():
+        if given < minimum:
+            message = f"{given} evaluations do not fill the population of {minimum} that the search starts with"
+            yield Violation(f"/budget/{name}", given, message, f"at least {minimum}")
