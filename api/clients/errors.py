@@ -15,8 +15,7 @@ class ServiceError(Exception):
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        lines = lines_of(problem)
-        super().__init__("\n".join(lines) if len(lines) > 1 else problem.detail)
+        super().__init__("\n".join(lines_of(problem)) if len(problem.errors) > 1 else problem.detail)
 
 
 class ServiceUnreachable(Exception):

@@ -21,10 +21,8 @@ def main() -> None:
     """Run the command; an error prints a sentence and sets the exit code, without a traceback."""
     try:
         app(prog_name="gaplab")
-    except ServiceError as error:
-        _exit(lines_of(error.problem), code_of(error))
-    except (ServiceUnreachable, CommandError) as error:
-        _exit([str(error)], code_of(error))
+    except (ServiceError, ServiceUnreachable, CommandError) as error:
+        _exit(lines_of(error.problem) if isinstance(error, ServiceError) else [str(error)], code_of(error))
     except (GaplabError, ValueError) as error:
         _exit([str(error)], Exit.NOT_FOUND if isinstance(error, NotFound) else Exit.FAILED)
     except OSError as error:

@@ -58,11 +58,10 @@ def run(folder: Path, console: Console, specs_from: Path = SPECS) -> None:
     (folder / "demo.json").unlink()
     minutes, seconds = divmod(round(time.monotonic() - started_at), 60)
     _print(f"\nDone in {minutes} min {seconds} s; the service has ended. Results are in {folder}/:", console)
-    for name in STUDIES:
-        _print(f"  {folder / name}.html", console, style="bold")
+    _print("\n".join(f"  {folder / name}.html" for name in STUDIES), console, style="bold")
     _print("To explore them, start the service on the same database:", console)
-    _print(f"  GAPLAB_DATABASE_URL={quote(database)} gaplab serve", console, style="bold")
-    _print("  gaplab list; gaplab curve ID; http://127.0.0.1:8000/docs", console, style="bold")
+    serve = f"  GAPLAB_DATABASE_URL={quote(database)} gaplab serve"
+    _print(f"{serve}\n  gaplab list; gaplab curve ID; http://127.0.0.1:8000/docs", console, style="bold")
 
 
 def _run_study(name: str, spec: dict[str, Any], client: Client, folder: Path, console: Console) -> None:
@@ -98,8 +97,9 @@ def _submitted(name: str, spec: dict[str, Any], client: Client, console: Console
 
 def _show(name: str, study: StudyRead, client: Client, folder: Path, console: Console) -> None:
     curves = client.curves([study.id])
-    unit = curves[0].unit
-    console.print(f"\nFitness in reality ({unit}) by number of real-world evaluations, mean±SD over repetitions")
+    console.print(
+        f"\nFitness in reality ({curves[0].unit}) by number of real-world evaluations, mean±SD over repetitions"
+    )
     console.print(tables.curves(curves), *tables.baselines(curves))
     for line in findings(client, curves):
         console.print(escape(line))

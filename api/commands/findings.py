@@ -18,8 +18,7 @@ def findings(client: Client, curves: Sequence[Curve]) -> Iterator[str]:
     learned = [curve for curve in curves if not curve.direct]
     names = {curve.experiment: curve.name.replace("_", " ") for curve in learned}
     last = max((point.evaluations for curve in curves for point in curve.points), default=0)
-    ranges = ((1, 1), (3, last), (6, last))  # Source: the caption of the paper's Fig. 4
-    for first, final in ranges:
+    for first, final in ((1, 1), (3, last), (6, last)):  # Source: the caption of the paper's Fig. 4
         if len(names) > 1 and first <= final <= last:
             yield _sentence(client.compare(list(names), first, final), names, first, final)
     level = next((point.mean for curve in curves if curve.direct for point in curve.points), None)
@@ -35,8 +34,7 @@ def findings(client: Client, curves: Sequence[Curve]) -> Iterator[str]:
 
 def _sentence(pairs: Sequence[Comparison], names: Mapping[str, str], first: int, final: int) -> str:
     differing = sorted((pair for pair in pairs if _p(pair) < SIGNIFICANT), key=_p)
-    counts = f"{first}" if first == final else f"{first}-{final}"
-    where = f"At {counts} real-world evaluation{'' if final == 1 else 's'}"
+    where = f"At {first if first == final else f'{first}-{final}'} real-world evaluation{'' if final == 1 else 's'}"
     start = f"{where}, {len(differing)} of {len(pairs)} pairs differ (p < {SIGNIFICANT}, Student's t, Holm)"
     shown = [_words(pair, names) for pair in differing[:MOST]]
     more = [f"and {len(differing) - MOST} more"] if len(differing) > MOST else []

@@ -1,7 +1,6 @@
 """Help on topics other than single commands."""
 
-from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -10,16 +9,12 @@ from gaplab.api.commands.exit_codes import Exit
 from gaplab.api.commands.json_output import print_json
 
 
-class Topic(StrEnum):
-    """Help topics."""
-
-    EXIT_CODES = "exit-codes"
-
-
 @app.command("help")
 def help_(
     context: typer.Context,
-    topic: Annotated[Topic | None, typer.Argument(help="left out: the commands", show_default=False)] = None,
+    topic: Annotated[
+        Literal["exit-codes"] | None, typer.Argument(help="left out: the commands", show_default=False)
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Explain the exit codes, or list the commands."""

@@ -235,7 +235,7 @@ def test_all_about_one_plug_in(gaplab: Gaplab) -> None:
     said = gaplab("catalogue", "simulated_fit_and_informative")
 
     assert "informative_weight" in said.out
-    assert "of their weighted standard deviation" in said.out
+    assert "weight of the standard deviation of simulated fitness" in said.out
     assert "did you mean 'random'" in gaplab("catalogue", "randon").err
 
 
