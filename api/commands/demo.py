@@ -97,9 +97,7 @@ def _submitted(name: str, spec: dict[str, Any], client: Client, console: Console
 
 def _show(name: str, study: StudyRead, client: Client, folder: Path, console: Console) -> None:
     curves = client.curves([study.id])
-    console.print(
-        f"\nFitness in reality ({curves[0].unit}) by number of real-world evaluations, mean±SD over repetitions"
-    )
+    console.print(f"\nFitness in reality ({curves[0].unit}), mean±SD, by number of real-world evaluations")
     console.print(tables.curves(curves), *tables.baselines(curves))
     for line in findings(client, curves):
         console.print(escape(line))
