@@ -69,7 +69,7 @@ class Pool:
         return max(1, int(cores * CHECK_S / (self._rollout_s * across))) if self._rollout_s else 1
 
     def _least(self, across: int) -> int:
-        """Return the rows that a part must have to be worth lending."""
+        """Return the smallest number of rows that is worth lending."""
         return ceil(max(LEAST_S / self._rollout_s, self._per_call) / across) if self._rollout_s else 1
 
     def _done(self, parts: list[Part], helpers: list[Handle]) -> list[Fitnesses]:

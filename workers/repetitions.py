@@ -1,4 +1,4 @@
-"""Repetitions at Ray: the task that computes one, and the supervisor's hold on those that it has claimed."""
+"""Repetitions at Ray: the task that computes one, and the supervisor's hold on its claimed repetitions."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -158,7 +158,7 @@ class Repetitions:
             log.info("on from step %d", len(claim.log), extra=self.runs[-1].place)
 
     def receive(self) -> None:
-        """Wait shortly for deliveries, and take those that are ready."""
+        """Wait shortly for deliveries, and take the ready ones."""
         streams = {run.stream: run for run in self.runs if not run.over}
         if not streams:
             Event().wait(WAIT_S)
@@ -208,7 +208,7 @@ class Repetitions:
             try:
                 execution.hand_back(self._store, run.claim)
             except StoreUnavailable as error:
-                log.warning("its lease will run out: %s", error, extra=run.place)
+                log.warning("not handed back, so its lease must expire: %s", error, extra=run.place)
             else:
                 log.info("handed back", extra=run.place)
 

@@ -113,7 +113,7 @@ class Supervisor:
         self._beat = monotonic()
 
     def _wind_down(self) -> None:
-        """Hand each repetition back after one more delivery; those that wait for a core, now."""
+        """Hand each repetition back after one more delivery, or at once if it waits for a core."""
         repetitions, until = self._repetitions, monotonic() + GRACE_S
         repetitions.hand_back([run for run in repetitions.runs if not run.begun])
         while repetitions.runs and monotonic() < until:

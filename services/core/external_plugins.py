@@ -35,7 +35,7 @@ def folders() -> tuple[Path, ...]:
     named = tuple(Path(path) for path in sys.modules[PACKAGE].__path__) if PACKAGE in sys.modules else ()
     for folder in named:
         if not folder.is_dir():
-            raise PluginBroken(f"there is no folder {folder} to find plug-ins in")
+            raise PluginBroken(f"there is no plug-in folder {folder}")
     return named
 
 

@@ -87,7 +87,7 @@ def queue(session: Session, spec: Checked) -> SensitivityRow:
 
 
 def queue_for(session: Session, experiments: Iterable[ExperimentRow]) -> None:
-    """Queue the one check of what these experiments tune; those that tune nothing have none."""
+    """Queue the one check of what these experiments tune; an experiment that tunes nothing has none."""
     tuning = [row for row in experiments if row.iterations > 1]
     if not tuning:
         return
@@ -143,8 +143,8 @@ def id_of(spec: Checked, external: Mapping[str, str] | None = None) -> str:
 
     Args:
         spec: what is checked.
-        external: versions of external plug-ins by kind and name, so that an edited one is checked again; those of this
-            process if left out.
+        external: versions of external plug-ins by kind and name, so that an edited one is checked again; left out, this
+            process's.
     """
     versions = external_plugins() if external is None else external
     names = (f"robot {spec.robot.name}", f"engine {spec.engine.name}", *(f"tunable {t.name}" for t in spec.tunables))

@@ -59,7 +59,7 @@ def settle(session: Session, experiments: Iterable[str], requested: State | None
     Args:
         session: of a transaction that has locked these experiments.
         experiments: their ids.
-        requested: the state that a person asks for, to be entered or passed through; None if nobody does.
+        requested: the state that a person asks for, to be entered or passed through; None without a request.
 
     Raises:
         Conflict: the experiment may not move to the state that follows.

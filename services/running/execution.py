@@ -7,7 +7,6 @@ All functions raise StoreUnavailable while the database cannot be used; each may
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 from sqlalchemy import ColumnElement, func, select, update
 from sqlalchemy.orm import Session
@@ -20,7 +19,7 @@ from gaplab.services.core.types import Step
 from gaplab.services.experiments.states import settle
 from gaplab.services.running import provenance
 from gaplab.services.running.leases import STALE_AFTER_S as STALE_AFTER_S
-from gaplab.services.running.leases import Leases
+from gaplab.services.running.leases import Change, Leases
 from gaplab.services.running.turns import ahead, next_repetitions
 from gaplab.services.running.versions import provenance as present_provenance
 from gaplab.services.store.clock import now
@@ -42,16 +41,7 @@ class _Repetitions(Leases[Claim]):
 
     table = RepetitionRow
 
-    def end(
-        self,
-        session: Session,
-        /,
-        which: ColumnElement[bool],
-        to: State,
-        ending: Ending,
-        reason: str | None = None,
-        **values: Any,  # noqa: ANN401 - columns of any type
-    ) -> list[int]:
+    def end(self, session: Session, which: ColumnElement[bool], change: Change) -> list[int]:
         """End leases as the base does; a hand-back to an experiment that is being paused or stopped is told as such.
 
         Raises:
@@ -63,14 +53,14 @@ class _Repetitions(Leases[Claim]):
         if not owners:
             return []
         states = lock(session, sorted(set(owners.values())))
-        if to is State.COMPLETED:
+        if change.to is State.COMPLETED:
             _refuse_unfinished(session, which)
-        ended: list[int] = super().end(session, which & row.id.in_(owners), to, ending, reason, **values)
-        endings = {id_: _ending(ending, states[owners[id_]]) for id_ in ended}
+        ended: list[int] = super().end(session, which & row.id.in_(owners), change)
+        endings = {id_: _ending(change.ending, states[owners[id_]]) for id_ in ended}
         for each in Ending:
             if ids := [id_ for id_ in ended if endings[id_] is each]:
-                attempts.end(session, ids, each, reason)
-        if to is State.FAILED:
+                attempts.end(session, ids, each, change.reason)
+        if change.to is State.FAILED:
             checkpoints.forget(session, ended)
         settle(session, states)
         return ended
@@ -194,8 +184,9 @@ def _record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -
         row = RepetitionRow
         iterations = select(ExperimentRow.iterations).where(ExperimentRow.id == row.experiment_id).correlate(row)
         done = row.id.in_(leaving) & (row.iterations_done >= iterations.scalar_subquery())
-        _LEASES.end(session, done, State.COMPLETED, Ending.COMPLETED, owner=None)
-        _LEASES.end(session, row.id.in_(leaving), State.QUEUED, Ending.HANDED_BACK, owner=None)
+        _LEASES.end(session, done, Change(State.COMPLETED, Ending.COMPLETED, values={"owner": None}))
+        handed_back = Change(State.QUEUED, Ending.HANDED_BACK, values={"owner": None})
+        _LEASES.end(session, row.id.in_(leaving), handed_back)
     return tuple(claim for claim in held if claim.id not in leaving)
 
 

@@ -7,7 +7,8 @@ answer, and drops the work. Work that was lost is queued again, and fails after 
 All use cases raise StoreUnavailable while the database cannot be used; each may then be tried again.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import timedelta
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -28,6 +29,23 @@ MAX_LOSSES = 5
 """Work that loses as many workers in a row without getting on is what kills them."""
 
 L = TypeVar("L", bound=Lease)
+
+
+@dataclass(frozen=True)
+class Change:
+    """What becomes of a row whose lease ends.
+
+    Attributes:
+        to: its next state.
+        ending: how the lease ends, for the history.
+        reason: why it ends, for the history.
+        values: further columns to set.
+    """
+
+    to: State
+    ending: Ending
+    reason: str | None = None
+    values: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Leases(Generic[L]):
@@ -54,15 +72,15 @@ class Leases(Generic[L]):
         """
         if not leases:
             return ()
-        ended = store.write(
-            self.end, self._of(leases), State.COMPLETED, Ending.COMPLETED, **(results | {"error": None})
-        )
+        change = Change(State.COMPLETED, Ending.COMPLETED, values={"error": None} | results)
+        ended = store.write(self.end, self._of(leases), change)
         return tuple(lease for lease in leases if lease.id in ended)
 
     def fail(self, store: Store, lease: L, reason: str) -> bool:
         """End work as FAILED; return False if the lease no longer holds."""
         why = storable(reason)
-        return bool(store.write(self.end, self._of([lease]), State.FAILED, Ending.FAILED, why, error=why))
+        change = Change(State.FAILED, Ending.FAILED, why, {"error": why})
+        return bool(store.write(self.end, self._of([lease]), change))
 
     def release(self, store: Store, lease: L, reason: str) -> bool:
         """Queue work again whose worker was lost; return False if the lease no longer holds."""
@@ -103,28 +121,15 @@ class Leases(Generic[L]):
             started_at=func.coalesce(row.started_at, now()),
         )
 
-    def end(
-        self,
-        session: Session,
-        /,
-        which: ColumnElement[bool],
-        to: State,
-        ending: Ending,
-        reason: str | None = None,
-        **values: Any,  # noqa: ANN401 - columns of any type
-    ) -> list[Any]:
+    def end(self, session: Session, which: ColumnElement[bool], change: Change) -> list[Any]:
         """End leases that hold, and return the ids of their rows.
 
         Args:
             session: of a transaction that writes.
-            which: condition on the rows; rows that nobody holds are left alone.
-            to: their next state.
-            ending: how the leases end.
-            reason: why they end, for the history.
-            values: further columns to set.
+            which: condition on the rows; rows without a lease that holds are left alone.
+            change: what becomes of them.
         """
-        del ending, reason  # for subclasses that keep a history
-        return move(session, self.table, which & (self.table.state == State.RUNNING), to, **values)
+        return move(session, self.table, which & (self.table.state == State.RUNNING), change.to, **change.values)
 
     def _heartbeat(self, session: Session, leases: Sequence[L]) -> tuple[L, ...]:
         row = self.table
@@ -134,16 +139,16 @@ class Leases(Generic[L]):
 
     def _release(self, session: Session, which: ColumnElement[bool], reason: str) -> list[Any]:
         losses = self.table.losses + 1
-        changes = {"losses": losses, "owner": None}
+        values = {"losses": losses, "owner": None}
         last = f"lost {MAX_LOSSES} times without progress; the last time {reason}"
-        hopeless = which & (losses >= MAX_LOSSES)
-        failed = self.end(session, hopeless, State.FAILED, Ending.LOST, reason, error=last, **changes)
-        queued = self.end(session, which, State.QUEUED, Ending.LOST, reason, error=reason, **changes)
+        give_up = Change(State.FAILED, Ending.LOST, reason, values | {"error": last})
+        failed = self.end(session, which & (losses >= MAX_LOSSES), give_up)
+        queued = self.end(session, which, Change(State.QUEUED, Ending.LOST, reason, values | {"error": reason}))
         return failed + queued
 
     def _hand_back(self, session: Session, which: ColumnElement[bool]) -> list[Any]:
-        attempts = self.table.attempts - 1
-        return self.end(session, which, State.QUEUED, Ending.HANDED_BACK, owner=None, attempts=attempts)
+        values = {"owner": None, "attempts": self.table.attempts - 1}
+        return self.end(session, which, Change(State.QUEUED, Ending.HANDED_BACK, values=values))
 
     def _requeue_lost(self, session: Session, stale_after_s: float) -> list[Any]:
         stale = self.table.heartbeat_at < moment(session) - timedelta(seconds=stale_after_s)

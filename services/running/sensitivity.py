@@ -4,15 +4,14 @@ All functions raise StoreUnavailable while the database cannot be used; each may
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
-from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.lifecycle import State
 from gaplab.schemas.sensitivity import Checked, Sensitivity
 from gaplab.services.experiments import checks
-from gaplab.services.running.leases import Leases
+from gaplab.services.running.leases import Change, Leases
 from gaplab.services.store.lease import CheckClaim as CheckClaim
 from gaplab.services.store.models import ExperimentRow, SensitivityRow
 from gaplab.services.store.session import Store, transaction
@@ -23,20 +22,11 @@ class _Checks(Leases[CheckClaim]):
 
     table = SensitivityRow
 
-    def end(
-        self,
-        session: Session,
-        /,
-        which: ColumnElement[bool],
-        to: State,
-        ending: Ending,
-        reason: str | None = None,
-        **values: Any,  # noqa: ANN401 - columns of any type
-    ) -> list[str]:
+    def end(self, session: Session, which: ColumnElement[bool], change: Change) -> list[str]:
         """End leases as the base does."""
-        ended: list[str] = super().end(session, which, to, ending, reason, **values)
+        ended: list[str] = super().end(session, which, change)
         row = ExperimentRow
-        for id_ in ended if to.ended else ():
+        for id_ in ended if change.to.ended else ():
             experiments = session.scalars(select(row.id).where(row.sensitivity_id == id_).order_by(row.id))
             checks.tell(session, checks.get(session, id_), experiments)
         return ended

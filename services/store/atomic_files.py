@@ -11,7 +11,7 @@ from secrets import token_hex
 def appearing(file: Path, mode: int = 0o666) -> Iterator[Path]:
     """Open a part file to write into; it gets its name when the context ends well, once it is on the disk.
 
-    A killed process leaves a part file whose random name is in nobody's way.
+    A killed process leaves a part file, whose random name blocks no later one.
 
     Args:
         file: its name, which must be free.

@@ -21,7 +21,7 @@ def backup(url: str, file: Path) -> int:
     the disk. Only its owner may read it.
 
     Args:
-        url: of the database, at whatever revision it is.
+        url: of the database, at any revision.
         file: that must not be there yet.
 
     Raises:

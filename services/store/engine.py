@@ -52,9 +52,7 @@ def _parse(url: str) -> URL:
     try:
         parsed = make_url(url)
     except ArgumentError as error:
-        msg = (
-            "the database URL is not one of SQLAlchemy; it looks like sqlite:///gaplab.db or postgresql://user@host/db"
-        )
+        msg = "the database URL is not valid; write one like sqlite:///gaplab.db or postgresql://user@host/db"
         raise StoreUnavailable(msg) from error
     if parsed.drivername in {"postgres", "postgresql"}:
         return parsed.set(drivername="postgresql+psycopg")
@@ -67,7 +65,7 @@ def _parse(url: str) -> URL:
 def _prepare_sqlite(engine: Engine, *, enforce_foreign_keys: bool) -> None:
     """Make SQLite durable, and let writers wait for each other.
 
-    The driver's own BEGIN is deferred: a read that turns into a write would fail at once, whatever the patience. So the
+    The driver's own BEGIN is deferred: a read that turns into a write would fail at once, without patience. So the
     driver begins nothing, and a transaction that will write begins IMMEDIATE.
     """
     journal = "WAL" if sqlite3.sqlite_version_info >= _WAL_IS_SOUND else "PERSIST"

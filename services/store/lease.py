@@ -15,7 +15,7 @@ class Checkpoint:
     Attributes:
         step: the place of the step in the log.
         part: its number within the step, from 0.
-        answers: as `gaplab.services.core.recall` packs them.
+        answers: as `gaplab.services.core.answers` packs them.
         seconds: of work that they took.
     """
 

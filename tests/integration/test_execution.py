@@ -315,7 +315,7 @@ def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(st
 
     def called_off(experiment: str) -> str:
         try:
-            cancel(store, experiment)  # type: ignore[call-arg]
+            cancel(store, experiment)
         except Conflict:
             return "ended before"
         return "cancelled"

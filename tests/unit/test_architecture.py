@@ -3,6 +3,7 @@
 import ast
 import sys
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +71,11 @@ def imports(path: Any) -> Iterator[Any]:
             yield node.module
 
 
+def name_of(path: Path) -> str:
+    """Return the dotted name of a file's module, without `gaplab`."""
+    return ".".join(path.with_suffix("").parts).removesuffix(".__init__")
+
+
 def rule(path: Any) -> Any:
     return next(rule for prefix, rule in ARROWS.items() if f"{path.as_posix()}/".startswith(f"{prefix}/"))
 
@@ -117,6 +123,19 @@ def test_states_are_written_in_one_place() -> None:
                         named = [ast.unparse(value) for key, value in pairs if getattr(key, "value", None) == "state"]
                         writers |= {path.as_posix() for each in named if each.startswith("State.")}
     assert writers == {"services/experiments/states.py"}
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    names = {name_of(path) for path in MODULES}
+    graph: dict[str, set[str]] = {}
+    for path in MODULES:
+        for node in ast.walk(ast.parse((ROOT / path).read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                package = node.module.removeprefix("gaplab.")
+                found = {f"{package}.{alias.name}" for alias in node.names} & names or {package} & names
+                graph[name_of(path)] = graph.get(name_of(path), set()) | found
+
+    TopologicalSorter(graph).prepare()  # raises CycleError with the circle
 
 
 @pytest.mark.parametrize("path", [each for each in MODULES if each.as_posix().startswith("services/core/")], ids=str)

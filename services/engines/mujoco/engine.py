@@ -22,7 +22,7 @@ class MuJoCoOptions(Frozen):
     """Options of the engine `mujoco`."""
 
     threads: Annotated[int, Field(ge=1, le=256)] = Field(
-        default=1, description="that share the rollouts of a call; the numbers do not depend on it"
+        default=1, description="threads that share the rollouts of a call; the numbers do not depend on it"
     )
 
 

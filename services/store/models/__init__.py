@@ -8,7 +8,7 @@
     provenance, named after its facts, which many experiments have in common: experiment_provenance
     event, numbered by event_counter
     supervisor
-    token, who may ask;  idempotency, which requests were answered already
+    token, of a caller;  idempotency, a request with its answer
 
 What is plotted or filtered is a column; vectors are JSON arrays, in which floats round-trip exactly. Neither a database
 nor JSON has nan or infinity: a fitness of nan and a squared error of infinity are NULL.

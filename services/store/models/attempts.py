@@ -1,4 +1,4 @@
-"""Who had a repetition, and what became of it."""
+"""Attempts at repetitions: their supervisors, times and endings."""
 
 from datetime import datetime
 

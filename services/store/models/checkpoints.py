@@ -12,7 +12,7 @@ class CheckpointRow(Base):
     Attributes:
         step: its place in the log of its repetition.
         part: its number within the step.
-        answers: digests and fitnesses, as `gaplab.services.core.recall` packs them; nobody else reads them.
+        answers: digests and fitnesses, as `gaplab.services.core.answers` packs them; no other module reads them.
         seconds: of work that they took.
     """
 

@@ -18,7 +18,7 @@ class EventRow(Base):
     """One thing that happened to an experiment, written in the transaction that made it so.
 
     There is no foreign key to the experiment: on Postgres it would lock the experiment's row after the counter's, and
-    whoever has locked the experiment waits for the counter.
+    a transaction that has locked the experiment waits for the counter.
 
     Attributes:
         number: without holes, in the order of commits.
@@ -38,7 +38,7 @@ class EventRow(Base):
 
 
 class EventCounterRow(Base):
-    """The number of the latest event, in the only row; who writes events holds it until the commit."""
+    """The number of the latest event, in the only row, which a transaction with events locks until its commit."""
 
     __tablename__ = "event_counter"
 

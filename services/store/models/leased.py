@@ -1,4 +1,4 @@
-"""Work under a lease: what a repetition, a sensitivity check and whatever supervisors run next have in common."""
+"""Work under a lease: columns that repetitions, sensitivity checks and later kinds of work share."""
 
 from datetime import datetime
 from typing import Any
@@ -17,7 +17,7 @@ class LeasedRow(Base):
         owner: the supervisor that holds the lease, or held it last.
         epoch: of the lease; every write of a holder carries it, and a write with an old one changes nothing.
         heartbeat_at: the holder's latest sign of life.
-        attempts: number of claims, those that were handed back left out.
+        attempts: number of claims that were not handed back.
         losses: number of workers lost since the work last got on.
         error: why it FAILED or was last queued again.
     """

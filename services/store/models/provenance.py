@@ -1,4 +1,4 @@
-"""Under what experiments were computed, and who computes."""
+"""Provenances of experiments, and the supervisors at work."""
 
 from datetime import datetime
 from typing import Any

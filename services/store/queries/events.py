@@ -1,7 +1,7 @@
 """Events: noted during a transaction, then numbered and written right before its commit.
 
 Numbers come from one row, which is locked from then on until the commit: a number is visible only with all smaller
-ones, and a transaction that is rolled back takes none. Nothing is locked after that row: nobody waits in a circle.
+ones, and a transaction that is rolled back takes none. Nothing is locked after that row, so no deadlock comes of it.
 """
 
 import json

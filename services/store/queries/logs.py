@@ -1,4 +1,4 @@
-"""Logs of repetitions, read: the steps equal those that were recorded, number by number."""
+"""Logs of repetitions, read: the steps equal the recorded ones to the last bit."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence

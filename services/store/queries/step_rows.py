@@ -1,4 +1,4 @@
-"""Rows of steps: those of many steps of many repetitions are written by a few statements."""
+"""Rows of steps: a few statements write those of many repetitions."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
