@@ -40,7 +40,7 @@ declare namespace Api {
   interface Checked {
     robot: PluginRef;
     engine: PluginRef;
-    tunables: Array<TunableRef>;
+    tunables: Array<ResolvedTunable>;
     points: number;
     evaluations: number;
   }
@@ -321,6 +321,7 @@ declare namespace Api {
     speeds_m_s: Array<number>;
     contacts: Array<Array<[number, number]>>;
   }
+  type ResolvedTunable = string | Record<string, any>;
   interface SampleRead {
     repetition: number;
     iteration: number;
