@@ -1,4 +1,8 @@
-"""Poses of a world's bodies, given its base and joint angles. Quaternions are x, y, z, w."""
+"""Poses of a world's bodies, given its base and joint angles. Quaternions are x, y, z, w.
+
+They are used as the engine returns them. scipy's `Rotation` would normalise the single precision of PhysX, which moves
+bodies by 1e-8, and refuses the nan of failed physics.
+"""
 
 import numpy as np
 

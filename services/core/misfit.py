@@ -1,8 +1,8 @@
-"""Misfit after tuning: what error remains, how far simulators agree when tuning is repeated, what is stuck at a bound.
+"""Misfit after tuning: the remaining error, the agreement between repetitions, and tunables at their bounds.
 
-An error that remains in every repetition, though its spread over them is small, is not bad luck in tuning: no setting
-of the tunables fits. A coefficient whose spread is as wide as that of random simulators has not been found; one at its
-bound may want to go further, or make up for something that no tunable says.
+An error that remains in every repetition with a small spread is not bad luck: no setting of the tunables fits. A
+tunable that varies over repetitions as much as a random one was not identified. A tunable at its bound may need wider
+bounds, or it compensates for an effect that no tunable has.
 
 Source: gaplab.
 """
@@ -18,10 +18,10 @@ from gaplab.services.core.curves import known
 from gaplab.services.core.types import Space
 
 AT_BOUND = 0.01
-"""So near a bound, in units of the bounds' distance, is at it."""
+"""Largest distance from a bound, as a share of the distance between the bounds, that counts as at the bound."""
 
 OFTEN = 0.5
-"""A coefficient that is at one bound in this share of repetitions is remarked on."""
+"""Share of repetitions at a bound from which a remark says so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +29,11 @@ class Tuning:
     """The best simulator of one iteration of one repetition.
 
     Attributes:
-        parameters: `(p,)`.
-        squared_error: over its samples; inf where the physics failed on one.
-        samples: that it was tuned on.
-        simulated: fitness, in it, of the controller evolved in it; nan if there is none yet.
-        real: fitness of the same in reality; nan if there is none yet.
+        parameters: `(p,)`, its tunables.
+        squared_error: Σe² over its samples; inf if the physics failed on one.
+        samples: number of samples that it was tuned on.
+        simulated: simulated fitness of the controller that evolved in it; nan if there is none yet.
+        real: fitness of that controller in reality; nan if there is none yet.
     """
 
     parameters: FloatArray
@@ -44,20 +44,20 @@ class Tuning:
 
     @property
     def error(self) -> float:
-        """√(Σe² / samples); nan without samples, or where the physics failed."""
+        """Root mean square error, √(Σe² / samples); nan without samples, or if the physics failed."""
         if not self.samples or not np.isfinite(self.squared_error):
             return float("nan")
         return float(np.sqrt(self.squared_error / self.samples))
 
 
 def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str], space: Space) -> MisfitPoint:
-    """What the repetitions that got to an iteration have found there.
+    """Return the misfit of an iteration, over the repetitions that have reached it.
 
     Args:
         iteration: its number.
-        tunings: of these repetitions; none may be there.
-        names: `(p,)` of the tunables.
-        space: of the tunables.
+        tunings: one for each of these repetitions; may be empty.
+        names: names of the p tunables.
+        space: bounds of the tunables.
     """
     parameters = np.array([each.parameters for each in tunings]).reshape(-1, space.size)
     return MisfitPoint(
@@ -72,7 +72,7 @@ def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str]
 
 
 def remarks(points: Sequence[MisfitPoint], unit: str) -> tuple[str, ...]:
-    """The latest point that has an error, in sentences; nothing before the first sample."""
+    """Return the latest point that has an error in sentences; none before the first sample."""
     with_error = [each for each in points if each.error.n]
     if not with_error:
         return ()

@@ -1,19 +1,19 @@
-"""The sensitivity check: does a tunable change fitness at all, how much, and how smoothly.
+"""The sensitivity check: whether a tunable changes fitness, how much, and how smoothly.
 
-A tunable is looked at along a *profile*: the fitness of controllers while it goes through its bounds and the others
-stay in the middle of theirs. In the middle, not where the robot has them: that is reality, unless a spec says
-otherwise, and must not be told. A profile says as much as its controllers, and most genomes hardly move a robot; so
-some were evolved for a short while, each in a random simulator of its own, beside the known one and random ones.
+The *profile* of a tunable is the fitness of some controllers at evenly spaced values between its bounds, with the other
+tunables in the middle of theirs. The robot's values would be reality, unless a spec states another, and must stay
+hidden. Most genomes hardly move a robot and would show little. So the controllers are the known one, random ones, and
+others from short evolutions, each in another random simulator.
 
-With f the fitness of controller c at the k-th of K evenly spaced values, and everything pooled over controllers, so
-that those on which the tunable acts count by how much it does:
+f is the fitness of controller c at the k-th of K values. Variances are pooled over controllers, so a controller on
+which the tunable acts more counts more:
 
     effect²      mean over c of the variance of f along k
     noise²       mean over c and k of 2/3 · (½ f(k−1) + ½ f(k+1) − f(k))²
-    roughness    noise / effect: 0 for what is smooth at the distance of two values, 1 for independent values
+    roughness    noise / effect: 0 for a profile that is smooth at this distance of values, 1 for independent values
 
-Source: the estimate of noise is that of Gasser, Sroka and Jennen-Steinmetz 1986; a profile for each controller is what
-Goldstein et al. 2015 call individual conditional expectation; what is made of them is gaplab's.
+Source: the estimate of noise is by Gasser, Sroka and Jennen-Steinmetz 1986. A profile for each controller is an
+individual conditional expectation (Goldstein et al. 2015). The verdicts are gaplab's.
 """
 
 from dataclasses import dataclass
@@ -30,48 +30,48 @@ from gaplab.services.core.streams import stream
 from gaplab.services.core.types import Space
 
 RANDOM, EVOLVED = 3, 4
-"""Controllers of a check, beside the known one."""
+"""Numbers of random and of evolved controllers, beside the known one."""
 
 NOTHING = 0.01
-"""A relative effect up to this is none: chaotic physics alone has as much. Source: docs/decisions/sensitivity.md."""
+"""Largest relative effect that counts as none: chaotic physics alone has it. Source: docs/decisions/sensitivity.md."""
 
 ROUGH = 0.5
-"""A roughness above this is rough: tuning finds it little better than chance. Source: docs/decisions/sensitivity.md."""
+"""Roughness above which tuning does little better than chance. Source: docs/decisions/sensitivity.md."""
 
 VERSION = 1
-"""Of all that is here: what is found by another version is another check."""
+"""Version of this module; a result of another version is another check."""
 
 SEED = 0
-"""Of every check: what it finds belongs to robot, engine and tunables, not to an experiment."""
+"""Seed of every check, because the result belongs to robot, engine and tunables, not to an experiment."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much a check simulates.
+    """The size of a check.
 
     Attributes:
-        points: values of each tunable.
-        evaluations: of each short evolution.
+        points: number of values of each tunable.
+        evaluations: evaluations of each short evolution.
     """
 
     points: int
     evaluations: int
 
     def rollouts(self, tunables: int) -> int:
-        """At most, for so many tunables."""
+        """Return the largest number of rollouts for this number of tunables."""
         return (1 + RANDOM + EVOLVED) * tunables * self.points + EVOLVED * self.evaluations
 
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """What is checked.
+    """The subject of a check.
 
     Attributes:
         simulate: fitness in simulation.
         genomes: the space of controllers.
         known: `(g,)`, the hand-designed genome.
         parameters: the space of simulators.
-        names: of the tunables, in its order.
+        names: names of the tunables, in the order of that space.
     """
 
     simulate: Simulate
@@ -82,12 +82,12 @@ class Subject:
 
 
 def check(subject: Subject, optimizer: Optimizer, effort: Effort) -> tuple[Sensitivity, ...]:
-    """What each tunable does to fitness, in their order; the same whenever and wherever it is asked.
+    """Return the effect of each tunable on fitness, in their order. Repeated checks give the same numbers.
 
     Args:
-        subject: that is checked.
-        optimizer: of the short evolutions.
-        effort: how much is simulated.
+        subject: the simulation and its tunables.
+        optimizer: optimizer of the short evolutions.
+        effort: the size of the check.
     """
     genomes = controllers(subject, optimizer, effort.evaluations)
     values = np.linspace(subject.parameters.lower, subject.parameters.upper, effort.points)
@@ -100,7 +100,7 @@ def check(subject: Subject, optimizer: Optimizer, effort: Effort) -> tuple[Sensi
 
 
 def controllers(subject: Subject, optimizer: Optimizer, evaluations: int) -> Genomes:
-    """`(c, g)`: the known genome, random ones, and the fittest of short searches, each in a random simulator."""
+    """Return the known genome, random ones, and the fittest of short searches in random simulators, `(c, g)`."""
     drawn = subject.genomes.draw(RANDOM, stream(SEED, "sensitivity", "draw"))
     evolved = [_evolved(subject, optimizer, evaluations, number) for number in range(EVOLVED)]
     return np.array([subject.known, *drawn, *evolved])
@@ -121,7 +121,7 @@ def _evolved(subject: Subject, optimizer: Optimizer, evaluations: int, number: i
 
 
 def profile(subject: Subject, genomes: Genomes, tunable: int, values: FloatArray) -> Fitnesses:
-    """`(c, k)`: each controller's fitness at each value of one tunable, the others in the middle of their bounds."""
+    """Return the profile of one tunable at values `(k,)`: the fitness of each controller at each value, `(c, k)`."""
     space = subject.parameters
     parameters = np.tile(space.lower + space.extent / 2, (len(values), 1))
     parameters[:, tunable] = values
@@ -129,13 +129,13 @@ def profile(subject: Subject, genomes: Genomes, tunable: int, values: FloatArray
 
 
 def spread_between(fitness: Fitnesses) -> float:
-    """The standard deviation of the mean fitness of controllers `(c, ...)`; nan if less than two have one."""
+    """Return the standard deviation between the mean fitnesses of controllers `(c, ...)`; nan if fewer than two."""
     means = [row[np.isfinite(row)].mean() for row in fitness if np.isfinite(row).any()]
     return float(np.std(means, ddof=1)) if len(means) > 1 else float("nan")
 
 
 def sensitivity(name: str, values: FloatArray, fitness: Fitnesses, spread: float) -> Sensitivity:
-    """What a profile `(c, k)` at values `(k,)` shows, against the spread of fitness between controllers."""
+    """Return the result of a profile `(c, k)` at values `(k,)`, relative to the spread between controllers."""
     effect, roughness = effect_and_roughness(fitness)
     relative = _relative(effect, spread)
     return Sensitivity(
@@ -151,9 +151,9 @@ def sensitivity(name: str, values: FloatArray, fitness: Fitnesses, spread: float
 
 
 def effect_and_roughness(fitness: Fitnesses) -> tuple[float, float]:
-    """Both as this module defines them, of a profile `(c, k)`; roughness is 0 where there is no effect.
+    """Return effect and roughness of a profile `(c, k)`; roughness is 0 without an effect.
 
-    A controller counts where physics did not fail at three neighbouring values; both are nan if none does.
+    A controller counts if its physics succeeded at three neighbouring values. Both are nan if none does.
     """
     deviations = (fitness[:, :-2] + fitness[:, 2:]) / 2 - fitness[:, 1:-1]
     counting = np.isfinite(deviations).any(axis=1)
@@ -166,7 +166,7 @@ def effect_and_roughness(fitness: Fitnesses) -> tuple[float, float]:
 
 
 def verdict(relative_effect: float, roughness: float) -> Verdict:
-    """Nothing, or else rough, or else smooth; unknown if one of the two is nan."""
+    """Return the verdict; unknown if one of the two numbers is nan."""
     if isnan(relative_effect) or isnan(roughness):
         return Verdict.UNKNOWN
     if relative_effect <= NOTHING:
@@ -175,7 +175,7 @@ def verdict(relative_effect: float, roughness: float) -> Verdict:
 
 
 def warning(found: Sensitivity) -> str | None:
-    """What a person who is about to tune this should know, in a sentence; None if nothing."""
+    """Return a warning about tuning this parameter, in one sentence; None if it is smooth."""
     lower, upper = found.values[0], found.values[-1]
     where = f"{found.name} over {lower:g} to {upper:g}"
     match found.verdict:
@@ -192,7 +192,7 @@ def warning(found: Sensitivity) -> str | None:
 
 
 def _relative(effect: float, spread: float) -> float:
-    """The effect over the spread: 0 without an effect, infinite without a spread."""
+    """Return effect over spread: 0 without an effect, infinite without a spread."""
     if effect == 0:
         return 0.0
     return effect / spread if spread != 0 else inf

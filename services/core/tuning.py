@@ -12,14 +12,13 @@ from gaplab.services.core.search import Question, maximise
 from gaplab.services.core.types import Sample, Simulator, Space
 
 ROUNDING = 1e-9
-"""By how much a partial sum must exceed a limit, relatively, for the whole to exceed it whatever the rounding."""
+"""Relative excess of a partial sum over a limit from which the whole sum exceeds it in spite of rounding."""
 
 
 def squared_errors(fitnesses: Fitnesses, measured: FloatArray) -> FloatArray:
-    """Σ over samples of (f_sim − f_real)², `(m,)`; inf where the physics failed on one.
+    """Return Σ (f_sim − f_real)² over samples for each simulator, `(m,)`; inf where the physics failed on one.
 
-    The samples are added one after the other, so that a simulator's error does not depend on how many others are asked
-    for at once.
+    The samples are added one by one, so that the error of a simulator does not depend on the others in the call.
 
     Source: paper, section 2: the denominator of f(sim).
 
@@ -34,26 +33,25 @@ def squared_errors(fitnesses: Fitnesses, measured: FloatArray) -> FloatArray:
 
 
 def simulator_fitness(squared_error: FloatArray) -> FloatArray:
-    """f(sim) = 1 / Σ e²; infinite at a perfect fit. Source: paper, section 2."""
+    """Return f(sim) = 1 / Σe²; infinite at a perfect fit. Source: paper, section 2."""
     with np.errstate(divide="ignore"):
         return 1.0 / squared_error
 
 
 def draw_simulators(space: Space, count: int, rng: Generator) -> tuple[Simulator, ...]:
-    """Randomly configured simulators, which is what there is before the first sample. Source: paper, section 2."""
+    """Return simulators drawn uniformly, for use before the first sample. Source: paper, section 2."""
     return tuple(Simulator(parameters) for parameters in space.draw(count, rng))
 
 
 class Misfit:
     """−Σe² of simulators on samples; the sum stops as soon as it is certain to be below a threshold.
 
-    The samples on which simulators have erred most so far come first. The sum itself is in the samples' own order, and
-    only the rollouts that were needed count. So no number, not even a count, depends on how many rollouts are
-    simulated at once.
+    The samples with the largest errors so far come first. The sum itself is in the order of the samples, and only the
+    rollouts that were needed count. So no number, not even a count, depends on how many rollouts run at once.
 
     Args:
-        answers: of simulators.
-        samples: at least one, whose measurement succeeded.
+        answers: of the simulators.
+        samples: at least one; all measurements succeeded.
     """
 
     def __init__(self, answers: Answers, samples: Sequence[Sample]) -> None:
@@ -99,15 +97,15 @@ def _first_of(genomes: Genomes) -> Following:
 
 
 def tune(misfit: Misfit, space: Space, optimizer: Optimizer, evaluations: int, rng: Generator) -> tuple[Simulator, ...]:
-    """The final population of simulators, best first, after a search from scratch.
+    """Return the final population of simulators, best first, after a search from scratch.
 
-    −Σe² is what the optimizer maximises: it ranks simulators as f(sim) = 1/Σe² does, and is finite at a perfect fit.
+    The optimizer maximises −Σe². It ranks simulators as f(sim) = 1/Σe² does, and is finite at a perfect fit.
 
     Args:
         misfit: to the samples so far.
-        space: of the tunables.
-        optimizer: that searches; a diverse one keeps an ensemble.
-        evaluations: simulators to evaluate.
+        space: bounds of the tunables.
+        optimizer: of the search; a diverse one keeps an ensemble.
+        evaluations: number of simulators to evaluate.
         rng: all randomness of the search.
     """
     found = maximise(optimizer, space, misfit, evaluations, rng)

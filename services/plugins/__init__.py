@@ -1,1 +1,1 @@
-"""Plug-ins of one's own, and the catalogue of all plug-ins."""
+"""External plug-ins, and the catalogue of all plug-ins."""

@@ -1,4 +1,4 @@
-"""Everything that this service can be asked to run."""
+"""The catalogue: everything that specs can name."""
 
 from dataclasses import asdict
 
@@ -13,7 +13,7 @@ from gaplab.services.specs.presets import PRESETS
 
 
 def catalogue() -> Catalogue:
-    """Every plug-in of every kind, by name."""
+    """Return every plug-in of every kind, by name, and the named budgets."""
     return Catalogue(
         strategies=strategies.describe(),
         robots=robots.describe(),

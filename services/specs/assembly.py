@@ -1,4 +1,4 @@
-"""Assembly: robot, world, tunables and engine become a Simulate; a hidden world becomes a Reality."""
+"""Assembly: from a resolved spec to the simulation and the reality of its repetitions."""
 
 from collections.abc import Iterable, Sequence
 from functools import cache, lru_cache, partial
@@ -28,7 +28,7 @@ WORLDS_KEPT = 4096
 
 
 class Simulation:
-    """A Simulate: rollouts of one robot on one engine, in worlds edited by tunables."""
+    """A Simulate of one robot on one engine, in worlds that tunables edit."""
 
     def __init__(self, robot: Robot, engine: Engine, edits: Sequence[Tunable]) -> None:
         self._robot = robot
@@ -37,9 +37,9 @@ class Simulation:
         self._world = lru_cache(maxsize=WORLDS_KEPT)(self._edited)
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
-        """`(n, g)` genomes × `(m, p)` parameters -> `(n, m)` fitnesses; nan where the physics failed.
+        """Return the `(n, m)` fitnesses of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed.
 
-        A fitness that is infinite is no physics either, whatever a robot makes of it.
+        An infinite fitness counts as failed physics.
         """
         worlds = [self._world(tuple(row)) for row in parameters.tolist()]
         motions = [self._robot.motion(genome) for genome in genomes]
@@ -47,7 +47,7 @@ class Simulation:
         return np.where(np.isfinite(fitnesses), fitnesses, np.nan)
 
     def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:
-        """The rollout of one genome in one simulator, looked at at these times besides, and the world it was in."""
+        """Return the world of a simulator `(p,)`, and the rollout of a genome in it, recorded at times `(k,)` too."""
         world = self._world(tuple(parameters.tolist()))
         return world, self._engine.record(world, self._robot.motion(genome), times_s)
 
@@ -62,8 +62,8 @@ class HiddenReality:
     """A Reality that is a simulation with hidden parameters.
 
     Args:
-        simulate: the engine and robot of reality.
-        parameters: `(p,)`, the truth.
+        simulate: the simulation on reality's engine.
+        parameters: `(p,)`, the hidden parameters.
     """
 
     def __init__(self, simulate: Simulate, parameters: FloatArray) -> None:
@@ -71,28 +71,28 @@ class HiddenReality:
         self._parameters = parameters[None, :]
 
     def __call__(self, genome: Genome) -> float:
-        """The fitness of the genome `(g,)` in reality; nan if the physics failed."""
+        """Return the fitness of a genome `(g,)` in reality; nan if the physics failed."""
         return float(self._simulate(genome[None, :], self._parameters)[0, 0])
 
 
 class EvolutionInReality:
-    """A Simulate whose every simulator is reality: what the direct baseline evolves in."""
+    """A Simulate for the direct baseline: every simulator is reality."""
 
     def __init__(self, simulate: Simulate, parameters: FloatArray) -> None:
         self._simulate = simulate
         self._parameters = parameters[None, :]
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
-        """`(n, g)` genomes × `(m, p)` parameters that do not matter -> `(n, m)` fitnesses in reality."""
+        """Return the fitnesses of genomes `(n, g)` in reality, `(n, m)`; the m simulators do not matter."""
         return np.repeat(self._simulate(genomes, self._parameters), len(parameters), axis=1)
 
 
 def setting(spec: ResolvedSpec, repetition: int) -> Setting:
-    """Everything that one repetition of a resolved spec depends on.
+    """Return everything that one repetition depends on.
 
     Args:
-        spec: as `gaplab.services.specs.resolution` completes it.
-        repetition: its number, from 0.
+        spec: of the experiment.
+        repetition: the number of the repetition, from 0.
     """
     robot = robots.create(spec.robot)
     strategy = strategies.create(spec.strategy)
@@ -119,7 +119,7 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
 
 
 def subject(checked: Checked) -> Subject:
-    """What a sensitivity check simulates."""
+    """Return what a sensitivity check simulates."""
     robot = robots.create(checked.robot)
     edits = edits_of(ref.name for ref in checked.tunables)
     return Subject(
@@ -132,14 +132,14 @@ def subject(checked: Checked) -> Subject:
 
 
 def reality_of(spec: ResolvedSpec, robot: Robot) -> tuple[FloatArray, Simulation]:
-    """The hidden parameters of a resolved spec, and the simulation that they belong in."""
+    """Return the hidden parameters `(p,)` of reality, and the simulation on its engine."""
     edits = edits_of(spec.reality.parameters)
     truth = np.array(list(spec.reality.parameters.values()))
     return truth, Simulation(robot, engine_of(spec.reality.engine), edits)
 
 
 def edits_of(names: Iterable[str]) -> list[Tunable]:
-    """The tunables of these names.
+    """Return the tunables of these names.
 
     Raises:
         InvalidSpec: one is not installed here.
@@ -148,10 +148,14 @@ def edits_of(names: Iterable[str]) -> list[Tunable]:
 
 
 def refuse_missing(spec: ResolvedSpec, *, reality: bool = False) -> None:
-    """Do nothing if what a stored spec simulates with, and reality if it is asked for, is installed here.
+    """Check that the plug-ins that a stored spec simulates with are installed here.
+
+    Args:
+        spec: of the experiment.
+        reality: also check the plug-ins of reality.
 
     Raises:
-        InvalidSpec: something is not; a plug-in's file may be gone.
+        InvalidSpec: one is not; perhaps its file was removed.
     """
     needed = [(spec.engine, "/engine"), *([(spec.reality.engine, "/reality/engine")] if reality else [])]
     names = [*(ref.name for ref in spec.tunables), *(spec.reality.parameters if reality else ())]

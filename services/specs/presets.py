@@ -1,7 +1,7 @@
-"""The named budgets: how much of the paper's computation an experiment spends.
+"""The named budgets, each a share of the paper's computation.
 
-Where a transfer has more evaluations than a selection, *simulated fit* selects from a larger search than other
-strategies do, unless `reuse_transfer` is off: docs/decisions/no-wasted-rollout.md.
+With the smoke and desk budgets, *simulated fit* selects from a larger search than the other strategies, unless
+`reuse_transfer` is off: docs/decisions/no-wasted-rollout.md.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""From what a user wrote to what is run: every default filled in, every impossibility refused, all of them at once."""
+"""Resolution: from a submitted spec to a resolved one, with every default; all violations are raised together."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -88,7 +88,7 @@ def resolve_study(spec: StudySpec) -> tuple[ResolvedSpec, ...]:
 
 
 def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
-    """What a sensitivity check looks at, with nothing left out.
+    """Return the complete subject of a sensitivity check.
 
     Raises:
         InvalidSpec: with every violation, as an experiment with these settings would have.
@@ -105,26 +105,26 @@ def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
 
 
 def spec_of(stored: Mapping[str, Any]) -> ResolvedSpec:
-    """The spec that is stored, to be read and not to be run: what is not known of its reality is left out."""
+    """Return a stored spec to read from, not to run: it lacks the parameters of reality that are unknown here."""
     reality = stored["reality"]
     known = {name: value for name, value in reality["parameters"].items() if value is not None}
     return ResolvedSpec.model_validate({**stored, "reality": {**reality, "parameters": known}})
 
 
 def is_direct(spec: ExperimentSpec) -> bool:
-    """Whether the experiment is the direct baseline: evolution in reality itself."""
+    """Return whether the experiment is the direct baseline, evolution in reality itself."""
     return spec.strategy.name in strategies and strategies[spec.strategy.name].in_reality
 
 
 def unit(spec: ExperimentSpec | Checked) -> str:
-    """The unit of fitness; "" if the robot's file is gone, so that nobody knows."""
+    """Return the unit of fitness; "" if the robot is not installed."""
     return robots[spec.robot.name].unit if spec.robot.name in robots else ""
 
 
 def expected_rollouts(spec: ResolvedSpec) -> int:
-    """The rollouts in simulation of one repetition of a resolved spec; real-world evaluations do not count.
+    """Return the number of simulated rollouts in one repetition; real-world evaluations do not count.
 
-    The direct baseline's evaluations would be real ones; they count, for they are its whole cost.
+    The evaluations of the direct baseline would be real ones. They count, because they are its whole cost.
     """
     strategy = strategies.create(spec.strategy)
     budget, iterations = spec.budget, spec.iterations
@@ -136,7 +136,7 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
 
 
 def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
-    """The engine, checked to be installed and to run the robot."""
+    """Return the engine if it is installed and can run the robot."""
     engine, _ = engines.check(ref, pointer)
     able = [name for name, each in engines.items() if each.runs(robot.world)]
     if not engine.runs(robot.world):
@@ -149,13 +149,13 @@ def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
 
 
 def _completed(registry: Registry[Any], ref: PluginRef) -> PluginRef:
-    """The reference with every option written out."""
+    """Return the reference with every option."""
     _, options = registry.check(ref)
     return PluginRef(name=ref.name, options=options.model_dump(mode="json"))
 
 
 def _label(strategy: Strategy) -> str:
-    """The strategy's name, with those of its options that are not the defaults."""
+    """Return the name of the strategy with all options that differ from their defaults."""
     defaults = type(strategy).Options().model_dump(mode="json")
     chosen = strategy.options.model_dump(mode="json")
     changed = [f"{name} {value}" for name, value in chosen.items() if value != defaults[name]]
@@ -168,7 +168,7 @@ def _with_bounds(ref: TunableRef) -> ResolvedTunable:
 
 
 def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str, float]:
-    """Reality's parameters: those given, and the robot's own for what is tuned and reality's engine honours."""
+    """Return the given parameters of reality, and the robot's for other tunables that reality's engine honours."""
     nominal = {
         ref.name: tunables[ref.name]().read(robot.world)
         for ref in spec.tunables
@@ -178,7 +178,7 @@ def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str
 
 
 def _budget(spec: ExperimentSpec) -> ResolvedBudget:
-    """Return the budget with every number written out."""
+    """Return the budget with every number."""
     preset = PRESETS[spec.budget.preset]
     return ResolvedBudget(
         preset=spec.budget.preset,

@@ -1,4 +1,4 @@
-"""What is wrong with a spec: every violation, with its pointer into the spec and the permitted values."""
+"""The violations of a spec, each with its pointer into the spec and the permitted values."""
 
 from collections import Counter
 from collections.abc import Iterator

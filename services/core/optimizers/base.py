@@ -1,4 +1,4 @@
-"""The contract of an optimizer: pure functions on a population, which is a value."""
+"""The contract of an optimizer: ask and tell, as pure functions of a population."""
 
 from abc import abstractmethod
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from gaplab.services.core.types import Space
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """Genomes with their fitness: all that an optimizer remembers.
+    """Genomes with their fitness: the whole state of an optimizer.
 
     Attributes:
-        space: that the genomes live in.
-        genomes: `(n, g)`.
-        fitness: `(n,)`; -inf for what has none.
+        space: the space of the genomes.
+        genomes: `(n, g)`, the members from the oldest to the newest.
+        fitness: `(n,)`; -inf for a member that has none.
     """
 
     space: Space
@@ -27,38 +27,38 @@ class Population:
 
     @property
     def size(self) -> int:
-        """How many members there are."""
+        """The number of members."""
         return len(self.fitness)
 
     def ranked(self) -> "Population":
-        """The members from the fittest to the least fit; of equals, the older first."""
+        """Return the members from the fittest to the least fit; of equals, the older first."""
         order = np.argsort(-self.fitness, kind="stable")
         return Population(self.space, self.genomes[order], self.fitness[order])
 
 
 class Optimizer(Plugin):
-    """Maximises a fitness by asking for genomes and being told their fitness.
+    """Maximises a fitness: it asks for genomes and is told their fitness.
 
-    It compares fitnesses by rank alone, so any monotone transform of them gives the same search.
+    It compares fitnesses by rank, so any monotone transform of the fitness gives the same search.
     """
 
     def init(self, space: Space) -> Population:
-        """An empty population in the space."""
+        """Return an empty population in the space."""
         return Population(space, np.empty((0, space.size)), np.empty(0))
 
     @property
     @abstractmethod
     def least_evaluations(self) -> int:
-        """The smallest budget that makes sense: one full population."""
+        """The smallest sensible budget: evaluations of one full population."""
 
     @abstractmethod
     def ask(self, state: Population, rng: Generator) -> Genomes:
-        """`(n, g)` genomes to evaluate next, n ≥ 1."""
+        """Return the genomes to evaluate next, `(n, g)` with n ≥ 1."""
 
     @abstractmethod
     def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> Population:
-        """The population after learning the fitness `(n,)` of genomes `(n, g)`."""
+        """Return the population after learning the fitness `(n,)` of genomes `(n, g)`."""
 
     @abstractmethod
     def diverse(self, size: int) -> "Optimizer":
-        """The same optimizer, but it keeps `size` members that differ from each other."""
+        """Return the same optimizer, except that it keeps `size` members that differ from each other."""

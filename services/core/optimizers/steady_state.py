@@ -1,4 +1,4 @@
-"""The paper's evolutionary algorithm: one newcomer at a time, and one member leaves for it."""
+"""The paper's evolutionary algorithm: one newcomer joins, and one member leaves."""
 
 from typing import Annotated, Literal
 
@@ -72,11 +72,11 @@ class SteadyState(Optimizer):
 
     @property
     def least_evaluations(self) -> int:
-        """One population."""
+        """The size of the population."""
         return self.options.population
 
     def ask(self, state: Population, rng: Generator) -> Genomes:
-        """The members still missing from the first population, drawn uniformly; then newcomers."""
+        """Return the missing members of the first population, drawn uniformly; later, newcomers."""
         missing = self.options.population - state.size
         if missing > 0:
             return state.space.draw(missing, rng)
@@ -84,7 +84,7 @@ class SteadyState(Optimizer):
         return np.array([self._mutate(state, self._recombine(state, rng), rng) for _ in newcomers])
 
     def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> Population:
-        """The population with each newcomer added in turn, and a member dropped for each beyond its size."""
+        """Return the population with each newcomer added in turn, and a member dropped for each beyond its size."""
         rule, _ = REPLACEMENTS[self.options.replacement]
         return insert(state, genomes, fitness, self.options.population, rule)
 
@@ -100,7 +100,7 @@ class SteadyState(Optimizer):
         return np.array([bound(state, genome) for genome in genomes])
 
     def diverse(self, size: int) -> "SteadyState":
-        """This evolution with `size` members, where the less fit of the most similar pair leaves."""
+        """Return this evolution with `size` members, in which the less fit of the most similar pair leaves."""
         changed = {"population": size, "replacement": "less_fit_of_most_similar"}
         return SteadyState(self.options.model_copy(update=changed))
 
