@@ -76,8 +76,7 @@ def _imported(name: str, folder: str) -> ModuleType:
     try:
         return import_module(f"{PACKAGE}.{name}")
     except Exception as error:  # a plug-in file may raise anything
-        msg = f"{folder}/{name}.py cannot be imported: {type(error).__name__}: {error}"
-        raise PluginBroken(msg) from error
+        raise PluginBroken(f"{folder}/{name}.py cannot be imported: {type(error).__name__}: {error}") from error
 
 
 def _is_of(module: ModuleType, found: object) -> TypeGuard[type]:
@@ -90,16 +89,13 @@ def _is_of(module: ModuleType, found: object) -> TypeGuard[type]:
 def _check(plugin: type) -> None:
     where = f"{plugin.__name__} in {file_of(plugin)}"
     if missing := [name for name in dir(plugin) if _is_abstract(plugin, name)]:
-        msg = f"{where} does not define {', '.join(missing)}"
-        raise PluginBroken(msg)
+        raise PluginBroken(f"{where} does not define {', '.join(missing)}")
     if not isinstance(getattr(plugin, "name", None), str):
-        msg = f"{where} has no name, by which specs would call it: add name = '…'"
-        raise PluginBroken(msg)
+        raise PluginBroken(f"{where} has no name, by which specs would call it: add name = '…'")
     try:
         plugin.describe()  # type: ignore[attr-defined]
     except Exception as error:
-        msg = f"{where} cannot be described: {type(error).__name__}: {error}"
-        raise PluginBroken(msg) from error
+        raise PluginBroken(f"{where} cannot be described: {type(error).__name__}: {error}") from error
 
 
 def _is_abstract(plugin: type, name: str) -> bool:

@@ -164,8 +164,7 @@ def _search(setting: Setting, answers: Answers, parameters: Parameters, rng: Gen
         nonlocal left
         if not left:
             wrong = "searches twice in one selection" if setting.strategy.searches else "says that it does not search"
-            msg = f"strategy {name!r} {wrong}, so that no budget is left for this search"
-            raise PluginBroken(msg)
+            raise PluginBroken(f"strategy {name!r} {wrong}, so that no budget is left for this search")
         left -= 1
         found = maximise(
             setting.optimizer,

@@ -27,12 +27,14 @@ class Space:
 
     def __post_init__(self) -> None:
         if not (self.lower.shape == self.upper.shape == self.periodic.shape) or self.lower.ndim != 1:
-            msg = f"lower, upper and periodic are vectors of one length, not {self.lower.shape}, {self.upper.shape}"
-            raise ValueError(msg)
+            raise ValueError(
+                f"lower, upper and periodic are vectors of one length, not {self.lower.shape}, {self.upper.shape}"
+            )
         if not np.all(self.lower < self.upper):
             where = int(np.argmin(self.lower < self.upper))
-            msg = f"lower must be below upper: coordinate {where} has {self.lower[where]} and {self.upper[where]}"
-            raise ValueError(msg)
+            raise ValueError(
+                f"lower must be below upper: coordinate {where} has {self.lower[where]} and {self.upper[where]}"
+            )
 
     @classmethod
     def box(cls, lower: Sequence[float], upper: Sequence[float], periodic: Sequence[bool] | None = None) -> "Space":

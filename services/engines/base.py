@@ -8,8 +8,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from gaplab.schemas.base import Frozen
 from gaplab.schemas.plugin import PluginRead
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.errors import EngineUnavailable
 from gaplab.services.core.registry import Plugin
 from gaplab.services.core.world import Motion, Recording, Trajectory, World
 
@@ -51,6 +53,11 @@ class Engine(Plugin):
     honours: ClassVar[frozenset[str]]
     batch: ClassVar[int] = 1
     usual_rollout_s: ClassVar[float] = 0.02
+
+    def __init__(self, options: Frozen | None = None) -> None:
+        super().__init__(options)
+        if not self.available():
+            raise EngineUnavailable(f"the engine {self.name!r} needs a library: {self.install}")
 
     @classmethod
     @abstractmethod

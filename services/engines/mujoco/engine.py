@@ -11,7 +11,6 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.errors import EngineUnavailable
 from gaplab.services.core.world import Material, Motion, Recording, Trajectory, World
 from gaplab.services.engines.base import ALL_FIELDS, Engine
 from gaplab.services.engines.mujoco.scene import MuJoCoScene
@@ -44,9 +43,6 @@ class MuJoCo(Engine):
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)
-        if not self.available():
-            msg = f"the engine {self.name!r} needs a library: {self.install}"
-            raise EngineUnavailable(msg)
         mujoco = import_module("mujoco")
         self._scenes = WarmScenes(lambda world: MuJoCoScene(mujoco, world, self.options.threads))
         self._latest: MuJoCoScene | None = None

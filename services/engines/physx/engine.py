@@ -10,7 +10,6 @@ import numpy as np
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.errors import EngineUnavailable
 from gaplab.services.core.world import Material, Motion, Recording, Trajectory, World
 from gaplab.services.engines.base import ALL_FIELDS, Engine
 from gaplab.services.engines.physx.scene import PhysXScene
@@ -32,9 +31,6 @@ class PhysX(Engine):
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)
-        if not self.available():
-            msg = f"the engine {self.name!r} needs a library: {self.install}"
-            raise EngineUnavailable(msg)
         self._scenes = WarmScenes(partial(PhysXScene, _sapien()))
 
     @classmethod
