@@ -90,7 +90,7 @@ class Helpers:
         del self._ready[max(before, self._idle) :]  # Ray counts a core as taken for a moment now and then
         useful = len(genomes) * len(parameters) - 1
         for _ in range(min(self._idle, useful) - len(self._ready) - len(self._starting)):
-            helper = Helper.remote(self._spec, self._versions)
+            helper = Helper.remote(self._spec, self._versions)  # type: ignore[attr-defined]  # Ray adds it
             self._starting[helper.part.remote(genomes[:1], parameters[:1])] = helper
 
     def _meet(self, answer: "ray.ObjectRef[Fitnesses]") -> None:

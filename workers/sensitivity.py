@@ -93,7 +93,8 @@ class Checks:
         if not ray.wait([result], timeout=0)[0]:
             return
         try:
-            sensitivity.complete(self._store, claim, ray.get(result))
+            tunables: tuple[Sensitivity, ...] = ray.get(result)
+            sensitivity.complete(self._store, claim, tunables)
         except RayTaskError as error:
             if isinstance(error.cause, ClusterUnusable):
                 raise error.cause from error

@@ -9,7 +9,7 @@ from it. But the search rejects most newcomers at once, and then the next one is
 they simulate those next ones too. No number changes: a prefetched answer is used only for a question that comes.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from hashlib import blake2b
 from itertools import groupby
 from math import ceil
@@ -43,7 +43,7 @@ class Recorder(Protocol):
         """Return how many genomes to simulate in the next call, in so many simulators; at least 1."""
         ...
 
-    def record(self, answers: Iterable[Answer]) -> None:
+    def record(self, answers: Sequence[Answer]) -> None:
         """Take the answers of that call."""
         ...
 
