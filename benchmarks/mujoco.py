@@ -11,7 +11,7 @@ from benchmarks.physics import SWITCHING, genomes, simulation, through_simulate
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.mujoco import MuJoCo
-from gaplab.services.engines.mujoco.scene import Scene, _in_force
+from gaplab.services.engines.mujoco.scene import MuJoCoScene, _in_force
 
 ROBOT = Quadruped()
 MANY = 96
@@ -43,7 +43,7 @@ def at_once(engine: Engine) -> Callable[[], int]:
 def bare(threads: int) -> Callable[[], int]:
     """Return work: `mujoco.rollout` of the same motions, model and contact law, with precomputed inputs."""
     engine = MuJoCo(MuJoCo.Options(threads=threads))
-    scene: Scene = engine._scene(ROBOT.world)
+    scene: MuJoCoScene = engine._scene(ROBOT.world)
     motions = [ROBOT.motion(genome) for genome in genomes(MANY)]
     steps = int(scene._steps(motions[0].observe_s)[-1])
     controls = scene._controls(motions, steps)

@@ -15,7 +15,7 @@ from gaplab.services.core.tunables import tunables
 from gaplab.services.core.world import Motion
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.pybullet import PyBullet
-from gaplab.services.engines.pybullet.scene import Scene
+from gaplab.services.engines.pybullet.scene import PyBulletScene
 from gaplab.services.specs.assembly import Simulation
 
 TUNED = ("static_friction", "dynamic_friction", "restitution")
@@ -51,7 +51,7 @@ def through_simulate(parameters: Parameters, engine: Engine | None = None, count
 def bare() -> Callable[[], int]:
     """Return work: `stepSimulation` in a loop, with motor commands at pulse edges only."""
     robot = Quadruped()
-    scene = Scene(pybullet, robot.world)
+    scene = PyBulletScene(pybullet, robot.world)
     motions = [robot.motion(genome) for genome in genomes()]
 
     def work() -> int:

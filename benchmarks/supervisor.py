@@ -1,4 +1,4 @@
-"""Steps that the supervisor stores per second, from 1 000 repetitions whose workers cost nothing: SQLite, Postgres."""
+"""Steps per second that the supervisor stores on SQLite and Postgres, from 1 000 repetitions with free workers."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,7 +23,7 @@ from gaplab.workers.supervisor import Supervisor
 from tests.postgres import running
 
 AT_ONCE = 200
-"""Repetitions under way: what a hundred cores are given."""
+"""Simultaneous repetitions: as many as for a hundred cores."""
 
 SPEC = ExperimentSpec.model_validate(
     {
@@ -34,13 +34,13 @@ SPEC = ExperimentSpec.model_validate(
         "budget": {"controller_evaluations": 20, "selection_evaluations": 20, "simulator_evaluations": 20},
     }
 )
-"""Every kind of step, with the largest to store: 20 simulators in each tuning."""
+"""A spec with every kind of step, and with the largest ones to store: 20 simulators in each tuning."""
 
 Batches = tuple[tuple[Delivered, ...], ...]
 
 
 def simulated() -> Batches:
-    """One repetition's steps, in the batches in which they travel; every simulated repetition has the same."""
+    """Return the batches of steps of one repetition, which every simulated repetition delivers."""
     return tuple(batches(recorded(setting(resolve_experiment(SPEC), 0), (), ())))
 
 
@@ -64,24 +64,24 @@ class WithoutRay(Repetitions):
 
 
 class ThroughRay(Repetitions):
-    """Repetitions as tasks that stream what was computed beforehand."""
+    """Repetitions as Ray tasks that stream precomputed batches."""
 
     def __init__(self, store: Store, delivered: Batches) -> None:
         super().__init__(store, "benchmark", {})
         self._delivered = ray.put(delivered)
 
     def launch(self, claim: Claim) -> Run:
-        """Let Ray stream what was computed beforehand."""
+        """Stream precomputed batches through Ray."""
         return Run(claim, _deliver.remote(self._delivered))
 
 
 @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
 def _deliver(delivered: Batches) -> Iterator[tuple[Delivered, ...]]:
-    yield from (batch for batch in delivered)  # a generator, as Ray wants it
+    yield from (batch for batch in delivered)  # Ray requires a generator
 
 
 def steps_per_second(url: str, kind: type[WithoutRay] | type[ThroughRay], delivered: Batches) -> float:
-    """From a queued experiment to its end."""
+    """Run a queued experiment to its end; return steps per second."""
     migrations.upgrade(url)
     store = Store(url)
     experiment = submission.submit_experiment(store, SPEC).id
@@ -89,7 +89,7 @@ def steps_per_second(url: str, kind: type[WithoutRay] | type[ThroughRay], delive
     ours._repetitions = kind(store, delivered)
     begun = perf_counter()
     idle = 0
-    while idle < 2:  # the round that ends the last repetition, and one that finds no more
+    while idle < 2:  # one round ends the last repetition, another finds no more work
         ours.step()
         idle = 0 if ours.busy else idle + 1
     seconds = perf_counter() - begun
@@ -99,7 +99,7 @@ def steps_per_second(url: str, kind: type[WithoutRay] | type[ThroughRay], delive
 
 
 def rows() -> list[Row]:
-    """The storing alone, and with Ray in the loop."""
+    """Measure storing alone, and with Ray in the loop."""
     delivered = simulated()
     measured = []
     for name, kind in (("storing alone", WithoutRay), ("with Ray in the loop", ThroughRay)):

@@ -113,7 +113,7 @@ def authenticate(store: Store, shown: str | None, *, required: bool) -> Caller:
         with store.reading() as session:
             required = session.scalar(select(TokenRow.id).limit(1)) is not None
     if required:
-        msg = "this service wants a token, as in `Authorization: Bearer …`; the `gaplab` command sends GAPLAB_TOKEN"
+        msg = "this service requires a token: `Authorization: Bearer …`, or GAPLAB_TOKEN for the `gaplab` command"
         raise Unauthenticated(msg)
     return ANYONE
 
@@ -126,7 +126,7 @@ def demand(caller: Caller, role: Role, what: str) -> None:
     """
     if not caller.role.permits(role):
         held = f"this token is a {caller.role.value}'s" if caller.token else "none was shown"
-        msg = f"{what} wants the token of {_article(role)}; {held}"
+        msg = f"{what} requires the token of {_article(role)}; {held}"
         raise Forbidden(msg)
 
 
@@ -160,7 +160,7 @@ def _known(store: Store, shown: str) -> Caller:
         token, present = session.get(TokenRow, parts[1]) if parts else None, moment(session)
     genuine = hmac.compare_digest(_digest(parts[2] if parts else ""), token.digest if token else _NO_DIGEST)
     if token is None or not genuine or token.revoked_at is not None:
-        msg = "this token admits nobody: it is unknown here, or was revoked"
+        msg = "this token is not valid: it is unknown here, or was revoked"
         raise Unauthenticated(msg)
     if token.last_used_at is None or present - token.last_used_at > NOTED_EVERY:
         with suppress(StoreUnavailable):  # the note of its use is welcome, but no reason to refuse

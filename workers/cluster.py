@@ -79,7 +79,7 @@ def _refuse_dead_node() -> None:
 
 def _start(cores: int | None) -> None:
     if os.environ.get("RAY_AUTH_MODE") == "disabled":  # Ray reads it when it is imported
-        msg = "RAY_AUTH_MODE is 'disabled': who reaches a Ray without a token can run any code; leave it out"
+        msg = "RAY_AUTH_MODE is 'disabled': anyone who reaches a Ray without a token can run any code; unset it"
         raise ClusterUnusable(msg)
     with _on_loopback():
         ray.init(

@@ -1,4 +1,4 @@
-"""One repetition on many cores: while cores are idle, the rollouts of a call are spread over them."""
+"""One repetition on many cores: its calls are shared with the cores that are idle."""
 
 from math import ceil
 from time import perf_counter
@@ -10,24 +10,24 @@ from numpy.typing import NDArray
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
 from gaplab.services.core.ports import Simulate
-from gaplab.workers.helpers import LOOK_S, Handle, Helpers
+from gaplab.workers.helper_actors import CHECK_S, Handle, Helpers
+from gaplab.workers.lending import Part, SharedCall, sizes
 from gaplab.workers.nodes import Versions
-from gaplab.workers.spread import Part, Spread, sizes
 
 Rows: TypeAlias = NDArray[np.intp]
 
 LEAST_S = 0.005
-"""A part that is lent to another core is worth at least this much work; lending costs about a tenth of it."""
+"""Least work, in seconds, of a part for another core; lending costs about a tenth of it."""
 
 
 class Pool:
-    """A Simulate that spreads its rollouts over the idle cores of the cluster, with the same numbers.
+    """A Simulate that shares its rollouts with the idle cores of the cluster; the numbers stay the same.
 
     Args:
-        spec: of the experiment, from which the other cores make the same Simulate.
+        spec: of the experiment, from which helpers build the same Simulate.
         here: that Simulate, on this core.
         per_call: rollouts that one call should ask of it at least.
-        versions: that another node must have.
+        versions: that the node of a helper must have.
     """
 
     def __init__(self, spec: ResolvedSpec, here: Simulate, per_call: int, versions: Versions | None = None) -> None:
@@ -38,16 +38,16 @@ class Pool:
         self._last: Part | None = None
 
     def batch_size(self) -> int:
-        """Rollouts that one call should ask for, if there is a choice: as many as keep all cores busy.
+        """Return how many rollouts one call should ask for to keep all cores busy.
 
-        Those of a fast engine are not worth lending a few at a time.
+        A few rollouts of a fast engine are not worth lending.
         """
         if self._last is None or self._rollout_s * self._per_call < LEAST_S:
             return self._per_call
         return self._per_call * (1 + len(self._helpers.ready(*self._last)))
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
-        """`(n, g)` genomes × `(m, p)` parameters -> `(n, m)` fitnesses; nan where the physics failed."""
+        """Return the `(n, m)` fitnesses of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed."""
         self._last = genomes, parameters
         by_genome = len(genomes) >= len(parameters)
         rows, across = (len(genomes), len(parameters)) if by_genome else (len(parameters), len(genomes))
@@ -59,28 +59,28 @@ class Pool:
         left = np.arange(rows)
         while left.size:
             helpers = self._helpers.ready(genomes, parameters)
-            now, left = np.split(left, [self._until_next_look(1 + len(helpers), across)])
+            now, left = np.split(left, [self._until_next_check(1 + len(helpers), across)])
             ends = np.cumsum(sizes(len(now), 1 + len(helpers), self._least(across)))[:-1]
             fitnesses += self._done([part(some) for some in np.split(now, ends)], helpers)
         return np.concatenate(fitnesses, axis=0 if by_genome else 1)
 
-    def _until_next_look(self, cores: int, across: int) -> int:
-        """Rows to do before it is worth looking for idle cores again; one, to learn how long it takes."""
-        return max(1, int(cores * LOOK_S / (self._rollout_s * across))) if self._rollout_s else 1
+    def _until_next_check(self, cores: int, across: int) -> int:
+        """Return the rows to simulate before the next check for idle cores; one while their time is unknown."""
+        return max(1, int(cores * CHECK_S / (self._rollout_s * across))) if self._rollout_s else 1
 
     def _least(self, across: int) -> int:
-        """Rows of a part that is worth lending."""
+        """Return the smallest number of rows that is worth lending."""
         return ceil(max(LEAST_S / self._rollout_s, self._per_call) / across) if self._rollout_s else 1
 
     def _done(self, parts: list[Part], helpers: list[Handle]) -> list[Fitnesses]:
         if not helpers or len(parts) == 1:
             return [self._here(*part) for part in parts]
-        spread = Spread(parts, self._here, helpers, self._rollout_s)
-        fitnesses = spread.run()
-        if spread.lost > spread.gained:
+        call = SharedCall(parts, self._here, helpers, self._rollout_s)
+        fitnesses = call.run()
+        if call.lost > call.gained:
             self._helpers.failed()
         else:
-            self._helpers.helped(but_for=spread.dead)
+            self._helpers.helped(but_for=call.dead)
         return fitnesses
 
     def _here(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:

@@ -208,7 +208,7 @@ class Repetitions:
             try:
                 execution.hand_back(self._store, run.claim)
             except StoreUnavailable as error:
-                log.warning("its lease will run out: %s", error, extra=run.place)
+                log.warning("not handed back, so its lease must expire: %s", error, extra=run.place)
             else:
                 log.info("handed back", extra=run.place)
 

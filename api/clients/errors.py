@@ -59,5 +59,5 @@ def problem_of(answer: httpx2.Response) -> Problem:
     try:
         return Problem.model_validate_json(answer.content)
     except ValidationError:
-        detail = f"{answer.url} answers {answer.status_code} and no problem; is it a gaplab?"
+        detail = f"{answer.url} answers {answer.status_code} without a problem document; is it a gaplab service?"
         return Problem(type="about:blank", title="Not understood", status=answer.status_code, detail=detail)

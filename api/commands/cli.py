@@ -12,7 +12,7 @@ from gaplab.api.commands import service, submission, records, figures, life_cycl
 from gaplab.api.commands import catalogue, archives, tokens, help  # noqa: A004, F401
 
 # isort: on
-from gaplab.api.commands.app import app
+from gaplab.api.commands.app import app as app
 from gaplab.api.commands.exit_codes import CommandError, Exit, code_of
 from gaplab.services.core.errors import GaplabError, NotFound
 

@@ -8,6 +8,7 @@ from rich.table import Table
 
 from gaplab.api.clients.progress.text import colored, percent
 from gaplab.api.clients.records import Record
+from gaplab.api.commands.completion import KINDS
 from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.schemas.misfit import MisfitRead, TunableDistribution
 from gaplab.schemas.plugin import Catalogue, PluginRead
@@ -54,8 +55,7 @@ def baselines(found: Sequence[Curve]) -> list[str]:
 
 def catalogue(plugins: Catalogue) -> list[Table]:
     """Return a table for each kind of plug-in."""
-    kinds = [kind for kind in type(plugins).model_fields if kind != "budgets"]
-    return [table((kind, "summary", "options"), map(_plugin, getattr(plugins, kind))) for kind in kinds]
+    return [table((kind, "summary", "options"), map(_plugin, getattr(plugins, kind))) for kind in KINDS]
 
 
 def plugin(found: PluginRead) -> list[Table | str]:

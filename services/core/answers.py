@@ -6,7 +6,7 @@ checkpoint of any other step holds no answer to this one, and never a wrong one.
 
 Answers are also prefetched. A steady-state search asks about one newcomer at a time, because the next one may descend
 from it. But the search rejects most newcomers at once, and then the next one is known beforehand. While cores are idle
-they simulate those next ones too. No number changes: a prefetched answer is used only for a question that comes.
+they simulate the next ones too. No number changes: a prefetched answer is used only if the search asks for it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -29,7 +29,7 @@ Following: TypeAlias = Callable[[int], Genomes]
 """Returns up to n genomes that will probably be asked about next, `(≤ n, g)`."""
 
 BLOCK = 100
-"""Simulators in one call at most: the smallest part of a question that a checkpoint can hold."""
+"""Most simulators in one call. It is the smallest part of a question that a checkpoint can hold."""
 
 _DIGEST_BYTES = 16
 _HEADER = Struct("<II")
@@ -40,7 +40,7 @@ class Recorder(Protocol):
     """Records new answers, for checkpoints."""
 
     def genomes_per_call(self, simulators: int) -> int:
-        """Return how many genomes to simulate in the next call, in so many simulators; at least 1."""
+        """Return how many genomes to simulate in the next call, in this number of simulators; at least 1."""
         ...
 
     def record(self, answers: Sequence[Answer]) -> None:
@@ -97,7 +97,7 @@ class Answers:
         return fitnesses
 
     def cost_of(self, budget: int) -> Cost:
-        """Return what the step has cost so far, out of a budget of so many rollouts."""
+        """Return the cost of the step so far; `budget` is the number of rollouts that it was given."""
         return Cost(self._rollouts, self._failures, budget - self._rollouts)
 
     def _fetched(self, genomes: Genomes, blocks: list[Parameters], following: Following) -> dict[bytes, FloatArray]:

@@ -9,7 +9,7 @@
     ├── KeyReused            an idempotency key was used for another request
     ├── LimitReached         too much work is in progress
     ├── Unauthenticated      no token, or an invalid one
-    ├── Forbidden            the token's role does not permit it
+    ├── Forbidden            the role of the token does not permit the request
     ├── StoreUnavailable     the database is unreachable, or has another schema
     ├── InvalidArchive       a file is not an archive of gaplab, or is damaged or malicious
     ├── Unsupported          the request needs another kind of database
@@ -118,7 +118,7 @@ class Unsupported(GaplabError):
 
 
 class ClusterUnusable(GaplabError):
-    """Ray is unreachable, or one of its nodes would compute other numbers, or none."""
+    """Ray is unreachable, or one of its nodes would compute other numbers or fail."""
 
 
 class PluginBroken(GaplabError):
@@ -149,7 +149,7 @@ def gather(*checks: Callable[[], Any]) -> tuple[Any, ...]:
     """Run all checks and return their results in order; if any fails, raise all violations together.
 
     Raises:
-        InvalidSpec: with the violations of every check, each once.
+        InvalidSpec: with every violation, each once.
     """
     results, violations = [], []
     for check in checks:

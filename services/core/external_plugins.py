@@ -35,7 +35,7 @@ def folders() -> tuple[Path, ...]:
     named = tuple(Path(path) for path in sys.modules[PACKAGE].__path__) if PACKAGE in sys.modules else ()
     for folder in named:
         if not folder.is_dir():
-            raise PluginBroken(f"there is no folder {folder} to find plug-ins in")
+            raise PluginBroken(f"there is no plug-in folder {folder}")
     return named
 
 
@@ -43,7 +43,7 @@ def classes(base: type[P]) -> Iterator[type[P]]:
     """Return the external plug-ins of one kind.
 
     Raises:
-        PluginBroken: a file cannot be imported, or a class of this kind lacks something.
+        PluginBroken: a module cannot be imported, or a class is not a valid plug-in.
     """
     for module in _modules():
         for each in vars(module).values():
@@ -67,8 +67,7 @@ def _modules() -> list[ModuleType]:
     for folder in folders():
         for name in sorted(info.name for info in iter_modules([str(folder)])):
             if name in found:
-                msg = f"{name}.py is in {found[name]} and in {folder}; a plug-in's file has a name of its own"
-                raise PluginBroken(msg)
+                raise PluginBroken(f"{name}.py is in {found[name]} and in {folder}; rename one of them")
             found[name] = str(folder)
     return [_imported(name, folder) for name, folder in found.items() if not name.startswith("_")]
 

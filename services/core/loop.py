@@ -1,4 +1,4 @@
-"""The algorithm of the paper's Fig. 2: select a sample, measure it, tune simulators, transfer a controller, look at it.
+"""The algorithm of the paper's Fig. 2: select a sample, measure it, tune simulators, transfer a controller, probe it.
 
 A repetition is a generator of steps. Each step follows from the steps before it and from random streams with an
 address, so the stored steps are the whole checkpoint: `repetition(setting, log)` goes on after any log as if it had
@@ -38,11 +38,11 @@ from gaplab.services.core.types import (
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Everything that one repetition depends on.
+    """Everything that a repetition depends on.
 
     Attributes:
         simulate: fitness in simulation.
-        reality: fitness in reality; called once for each sample and each probe.
+        reality: fitness in reality, evaluated once for each sample and each probe.
         strategy: selects the samples.
         optimizer: searches for controllers and simulators.
         genomes: the space of controllers.
@@ -51,8 +51,8 @@ class Setting:
         budget: evaluations of each search.
         iterations: real-world evaluations to spend; 0 for the direct baseline.
         seed: of the experiment.
-        repetition: its number.
-        batch_size: returns how many rollouts one call of `simulate` should ask for now; no number depends on it.
+        repetition: the number of the repetition, from 0.
+        batch_size: returns how many rollouts a call of `simulate` should have at present; it changes no number.
     """
 
     simulate: Simulate
@@ -73,13 +73,13 @@ class Setting:
         return stream(self.seed, self.strategy.name, self.repetition, iteration, phase)
 
     def answers(self) -> Answers:
-        """Return what counts and prefetches the rollouts of one step."""
+        """Return the answers of one step, which count and prefetch its rollouts."""
         return Answers(self.simulate, self.batch_size)
 
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """What the steps so far add up to.
+    """The result of the steps so far.
 
     Attributes:
         last: the latest step; None at the very start.
@@ -94,7 +94,7 @@ class History:
     transferred: Genome | None = None
 
     def after(self, step: Step) -> "History":
-        """The history with one more step."""
+        """Return the history with one more step."""
         match step:
             case Measured(sample=sample):
                 return replace(self, last=step, samples=(*self.samples, sample))
@@ -113,7 +113,7 @@ def repetition(
     Args:
         setting: of the repetition.
         log: its steps so far.
-        answers: makes the answers of the next step; those of the setting if left out.
+        answers: returns the answers of the next step; default: those of the setting.
     """
     history = History()
     for step in log:
@@ -124,7 +124,7 @@ def repetition(
 
 
 def next_step(setting: Setting, history: History, answers: Answers) -> Step | None:  # noqa: PLR0911 - one a kind of step
-    """Return the one step that follows, whose rollouts `answers` simulates; None at the end."""
+    """Return the next step, whose rollouts come from `answers`; None at the end."""
     match history.last:
         case None:
             return _draw(setting)
@@ -142,7 +142,7 @@ def next_step(setting: Setting, history: History, answers: Answers) -> Step | No
 
 
 def _draw(setting: Setting) -> Tuned:
-    """Randomly configured simulators: iteration 0 tunes nothing."""
+    """Return random simulators, because iteration 0 tunes nothing."""
     return Tuned(0, draw_simulators(setting.parameters, setting.strategy.ensemble, setting.stream(0, "tune")))
 
 
@@ -181,9 +181,9 @@ def _search(setting: Setting, answers: Answers, parameters: Parameters, rng: Gen
 
 
 def _tune(setting: Setting, history: History, iteration: int, answers: Answers) -> Tuned:
-    """New simulators fitted to every sample that was measured; random ones while none was.
+    """Return simulators tuned on all samples whose measurement succeeded; random ones if there are none.
 
-    The budget counts samples before they are measured: what it had for one that failed is saved.
+    The budget includes samples whose measurement failed; their rollouts count as saved.
     """
     ensemble, evaluations = setting.strategy.ensemble, setting.budget.simulator_evaluations
     budget = evaluations * len(history.samples)
@@ -197,7 +197,7 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
 
 
 def _transfer(setting: Setting, history: History, iteration: int, answers: Answers) -> Transferred:
-    """A controller evolved in the best simulator."""
+    """Return a controller evolved in the best simulator."""
     best = history.simulators[0].parameters[None, :]
     found = maximise(
         setting.optimizer,
@@ -217,9 +217,9 @@ def _probe(setting: Setting, history: History, iteration: int, genome: Genome) -
 
 
 def recorded_fitness(probe: float, samples: Iterable[Sample]) -> float:
-    """The larger of the probe's fitness and the best sample's; nan if every measurement failed.
+    """Return the larger fitness of the probe and the best sample; nan if every measurement failed.
 
-    It can fall from one iteration to the next; only its floor, the best sample so far, cannot.
+    It can fall from one iteration to the next. Only its floor, the best sample so far, cannot.
 
     Source: paper, section 3.
     """

@@ -85,7 +85,7 @@ class Registry(Mapping[str, type[P]], Generic[P]):
         for each in external_plugins.classes(self._base):
             if each.name in found:
                 file, other = (external_plugins.file_of(plugin) for plugin in (each, found[each.name]))
-                msg = f"{file} has a {self.kind} called {each.name!r}, as {other or 'gaplab itself'} has: rename it"
+                msg = f"{file} has a {self.kind} called {each.name!r}, but so has {other or 'gaplab'}: rename it"
                 raise PluginBroken(msg)
             found[each.name] = each
         return dict(sorted(found.items()))

@@ -14,7 +14,7 @@ from gaplab.services.core.optimizers.base import Optimizer, Population
 from gaplab.services.core.types import Space
 
 FARTHEST = 32
-"""Genomes to evaluate at once at most; about one newcomer in ten stays, so that later ones are hardly ever used."""
+"""Most genomes to evaluate at once. About one newcomer in ten stays, so later ones are hardly ever used."""
 
 
 class Question(NamedTuple):

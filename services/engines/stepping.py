@@ -29,7 +29,7 @@ class Warm(Protocol):
         """Release the engine's resources."""
 
 
-class Scene(Warm, Protocol):
+class SteppedScene(Warm, Protocol):
     """A world that advances step by step."""
 
     @property
@@ -77,7 +77,7 @@ class WarmScenes(Generic[S]):
             self._scenes.popitem()[1].close()
 
 
-def watch(scene: Scene, advance: Callable[[int], None], motion: Motion) -> FloatArray:
+def watch(scene: SteppedScene, advance: Callable[[int], None], motion: Motion) -> FloatArray:
     """Run a motion; return `(t, 7)`: position and quaternion of the base at each observation, in whole time steps.
 
     Args:
@@ -89,7 +89,7 @@ def watch(scene: Scene, advance: Callable[[int], None], motion: Motion) -> Float
 
 
 def record(
-    scene: Scene, advance: Callable[[int], None], motion: Motion, times_s: FloatArray
+    scene: SteppedScene, advance: Callable[[int], None], motion: Motion, times_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Run a motion; return the result of `watch`, `(t, 7)`, and base and joints at other times, `(k, 7 + joints)`.
 
@@ -101,8 +101,8 @@ def record(
     """
     often = replace(motion, observe_s=np.union1d(motion.observe_s, times_s))
     seen = _watch(scene, advance, often, lambda: np.append(scene.pose(), scene.angles()))
-    observed, looked = (np.searchsorted(often.observe_s, each) for each in (motion.observe_s, times_s))
-    return seen[observed, :7], seen[looked]
+    observed, recorded = (np.searchsorted(often.observe_s, times) for times in (motion.observe_s, times_s))
+    return seen[observed, :7], seen[recorded]
 
 
 def recording(motion: Motion, times_s: FloatArray, poses: FloatArray, seen: FloatArray) -> Recording:
@@ -113,7 +113,9 @@ def recording(motion: Motion, times_s: FloatArray, poses: FloatArray, seen: Floa
     return Recording(trajectory, times_s, seen[:, :7], seen[:, 7:])
 
 
-def _watch(scene: Scene, advance: Callable[[int], None], motion: Motion, look: Callable[[], FloatArray]) -> FloatArray:
+def _watch(
+    scene: SteppedScene, advance: Callable[[int], None], motion: Motion, look: Callable[[], FloatArray]
+) -> FloatArray:
     commands = _commands(motion, scene.world.time_step_s)
     observed = _steps(motion.observe_s, scene.world.time_step_s)
     poses: dict[int, FloatArray] = {}

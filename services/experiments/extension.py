@@ -78,5 +78,5 @@ def _violations(spec: ResolvedSpec, extension: ExtensionSpec) -> Iterator[Violat
     for name, total in totals.items():
         present = getattr(spec, name)
         if total < present:
-            message = f"it has {present} {name} already, and {total} is a total, not what is added"
+            message = f"it has {present} {name} already; {total} is a total, which must not be smaller"
             yield Violation(f"/{name}", total, message, f"at least {present}")

@@ -110,8 +110,7 @@ def _check(name: str, present: int, more: int, limits: Limits) -> None:
         noun, _, per_token = name.partition("_")
         whose = "of this token " if per_token else ""
         msg = (
-            f"{present:,} {noun} {whose}are under way, and with {more:,} more there would be over {limit:,} "
-            f"({variable_of(name)})"
+            f"{present:,} {noun} {whose}are in progress, and {more:,} more would exceed {limit:,} ({variable_of(name)})"
         )
         raise LimitReached(msg, RETRY_AFTER_S)
 

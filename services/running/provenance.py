@@ -53,7 +53,7 @@ def accept_versions(session: Session, experiment_id: str) -> ExperimentRead:
     session.refresh(experiment)
     if experiment.state.ended or experiment.computed_with is None:
         why = f"has ended: it is {experiment.state}" if experiment.state.ended else "has not begun under any versions"
-        msg = f"experiment {experiment_id!r} {why}; nothing is to accept"
+        msg = f"experiment {experiment_id!r} {why}; there is nothing to accept"
         raise Conflict(msg)
     told = {"computed_with": experiment.computed_with, "refused_by": experiment.refused_by}
     note(session, EventKind.VERSIONS_ACCEPTED, experiment_id, **told)

@@ -32,11 +32,11 @@ def decode(cursor: str, columns: Sequence[Column], bound_to: str = "") -> Tuple:
     try:
         bound, *parts = json.loads(urlsafe_b64decode(cursor[:_LONGEST] + "=" * (-len(cursor) % 4)))
         if bound != bound_to:
-            message = "this cursor is of a list with other filters or another order; leave it out for the first page"
+            message = "this cursor belongs to a list with other filters or order; leave it out for the first page"
             raise InvalidSpec([Violation("cursor", cursor, message)])
         return tuple_(*(_part(part, column) for part, column in zip(parts, columns, strict=True)))
     except (ValueError, TypeError, OverflowError, RecursionError) as error:
-        message = "this is no cursor that the service gave out; leave it out for the first page"
+        message = "this is not a cursor of this service; leave it out for the first page"
         raise InvalidSpec([Violation("cursor", cursor, message)]) from error
 
 

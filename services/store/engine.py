@@ -52,9 +52,7 @@ def _parse(url: str) -> URL:
     try:
         parsed = make_url(url)
     except ArgumentError as error:
-        msg = (
-            "the database URL is not one of SQLAlchemy; it looks like sqlite:///gaplab.db or postgresql://user@host/db"
-        )
+        msg = "the database URL is not valid; write one like sqlite:///gaplab.db or postgresql://user@host/db"
         raise StoreUnavailable(msg) from error
     if parsed.drivername in {"postgres", "postgresql"}:
         return parsed.set(drivername="postgresql+psycopg")

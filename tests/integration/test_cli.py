@@ -17,6 +17,7 @@ from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
+from gaplab.services.experiments import listing
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import subject
 from gaplab.services.store.session import Store
@@ -33,6 +34,13 @@ def finish(store: Store) -> None:
         for number, claim in enumerate(claims):
             iterations = 0 if claim.spec.strategy.name == "direct" else claim.spec.iterations
             run(store, claim, some_log(iterations, recorded=1 + number / 10))
+
+
+def wait_for_submission(store: Store) -> None:
+    """Wait until an experiment is queued, and its watcher has printed a line."""
+    while not listing.list_experiments(store).items:
+        time.sleep(0.05)
+    time.sleep(0.5)
 
 
 def submitted(gaplab: Gaplab, spec: str = SMOKE) -> str:
@@ -57,7 +65,7 @@ def test_an_edit_that_is_none_is_a_sentence(gaplab: Gaplab) -> None:
     nothing, nameless = gaplab("edit", id), gaplab("edit", id, "--name", "")
 
     assert (nothing.code, nameless.code) == (Exit.INVALID, Exit.INVALID)
-    assert nothing.err == "gaplab: give a name, notes, or both\n"
+    assert nothing.err == "gaplab: nothing to change: give a name, notes, or both\n"
     assert nameless.err == "gaplab: --name: String should have at least 1 character\n"
 
 
@@ -96,7 +104,7 @@ def test_a_spec_comes_from_standard_input_too(gaplab: Gaplab) -> None:
 
 def test_watching_shows_progress_line_by_line_where_there_is_no_terminal(gaplab: Gaplab, sqlite_store: Store) -> None:
     def work() -> None:
-        time.sleep(0.5)
+        wait_for_submission(sqlite_store)
         finish(sqlite_store)
 
     worker = threading.Thread(target=work)
@@ -112,7 +120,7 @@ def test_watching_shows_progress_line_by_line_where_there_is_no_terminal(gaplab:
 
 def test_watching_what_fails_says_why_and_ends_with_1(gaplab: Gaplab, sqlite_store: Store) -> None:
     def work() -> None:
-        time.sleep(0.5)
+        wait_for_submission(sqlite_store)
         for claim in execution.claim(sqlite_store, "test", limit=10):
             execution.fail(sqlite_store, claim, "ValueError: the robot fell apart")
 

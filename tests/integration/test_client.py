@@ -5,7 +5,7 @@ import sys
 import threading
 import time
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from datetime import UTC, datetime
 from types import SimpleNamespace
 from typing import Any
@@ -19,6 +19,7 @@ from gaplab import Client, ExperimentFailed, ExtraMissing, ServiceError, Service
 from gaplab.api.app import create_app
 from gaplab.api.clients import events as stream
 from gaplab.api.clients import results, tables
+from gaplab.api.clients.records import experiments_of
 from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind, EventRead
 from gaplab.services import access
@@ -35,10 +36,13 @@ class InProcess(httpx2.BaseTransport):
     def __init__(self, store: Store) -> None:
         app = create_app(store)
         self._client = TestClient(app, raise_server_exceptions=False)
-        self.close = app.state.rollout_process.close  # type: ignore[method-assign]
+        self._process = app.state.rollout_process
         self.asked: list[str] = []
         self.lost = 0
         self.busy = 0
+
+    def close(self) -> None:
+        self._process.close()
 
     def handle_request(self, request: httpx2.Request) -> httpx2.Response:
         self.asked.append(f"{request.method} {request.url.path}")
@@ -73,7 +77,7 @@ def test_a_curve_is_a_frame_of_its_points_or_of_its_repetitions(client: Client, 
     points, values = client.curve(study.id), client.curve(study.id, each=True)
 
     (curve, direct) = client.curves([study.id])
-    assert list(points["experiment"].unique()) == [each.id for each in study.experiments]  # type: ignore[union-attr]
+    assert list(points["experiment"].unique()) == [each.id for each in experiments_of(study)]
     assert len(points) == len(curve.points) + len(direct.points)
     assert points["mean"].iloc[0] == curve.points[0].mean
     assert points["evaluations"].dtype.kind == "i"
@@ -120,7 +124,7 @@ def test_curves_are_asked_for_in_parts_that_the_service_takes_and_come_in_order(
     study = client.submit(BOTH)
     finish()
     whole = client.curves_csv([study.id])
-    first, second = (each.id for each in study.experiments)  # type: ignore[union-attr]
+    first, second = (each.id for each in experiments_of(study))
     many = [first] * 70 + [second] * 70
     network.asked.clear()
 
@@ -394,9 +398,9 @@ def test_the_service_of_the_environment_is_the_one_that_is_meant(monkeypatch: py
 def test_events_and_lists_are_values_that_json_can_hold(client: Client) -> None:
     study = client.submit(BOTH)
 
-    kinds = [each.kind for each in client.events(follow=False, study=study.id, after=None)]
+    kinds = [each.kind.value for each in client.events(follow=False, study=study.id, after=None)]
 
-    assert kinds.count("submitted") == 2  # type: ignore[arg-type]
+    assert kinds.count("submitted") == 2
     assert [each.number for each in client.events(follow=False, after=1)] == [2]
     assert json.dumps([each.model_dump(mode="json") for each in client.studies().items])
 
@@ -443,9 +447,9 @@ def test_a_stream_that_had_nothing_to_tell_for_long_is_resumed_when_it_breaks(mo
         msg = "it broke"
         raise httpx2.ReadError(msg)
 
-    bodies = [quiet(), f"data: {event.model_dump_json()}\n\n".encode()]
+    bodies: list[Iterable[bytes]] = [quiet(), f"data: {event.model_dump_json()}\n\n".encode().splitlines(keepends=True)]
     network = httpx2.MockTransport(
-        lambda _: httpx2.Response(200, headers={"Content-Type": "text/event-stream"}, content=bodies.pop(0))  # type: ignore[arg-type]
+        lambda _: httpx2.Response(200, headers={"Content-Type": "text/event-stream"}, content=bodies.pop(0))
     )
 
     with Client("http://gaplab.example", transport=network) as client:

@@ -306,7 +306,8 @@ def test_in_a_log_watching_is_lines(gaplab: Gaplab, study: str, finish: Callable
 
 
 def test_in_a_terminal_it_is_a_view_of_curves_and_repetitions(url: str, study: str, finish: Callable[[], None]) -> None:
-    screen = Console(force_terminal=True, width=140, file=io.StringIO(), highlight=False)
+    shown_on = io.StringIO()
+    screen = Console(force_terminal=True, width=140, file=shown_on, highlight=False)
 
     def finishing(snapshots: Iterator[Snapshot]) -> Iterator[Snapshot]:
         yield next(snapshots)
@@ -317,7 +318,7 @@ def test_in_a_terminal_it_is_a_view_of_curves_and_repetitions(url: str, study: s
         snapshots = Snapshots(client.records, client.results).of(study, every_s=0.1, patience_s=60)
         ended = terminal.show(finishing(snapshots), screen, keep=True)
 
-    shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", screen.file.getvalue())  # type: ignore[attr-defined]
+    shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown_on.getvalue())
     assert ended.state == "COMPLETED"
     assert "QUEUED" in shown
     assert "fitness in reality, m/s" in shown
@@ -345,13 +346,14 @@ class Shaky(httpx2.HTTPTransport):
 
 
 def test_the_view_survives_a_service_that_is_away_and_says_so(url: str, study: str, finish: Callable[[], None]) -> None:
-    screen = Console(force_terminal=True, width=140, file=io.StringIO(), highlight=False)
+    shown_on = io.StringIO()
+    screen = Console(force_terminal=True, width=140, file=shown_on, highlight=False)
 
     with Client(url, transport=Shaky(2, finish)) as client:
         ended = client.watcher.show(study, screen, curves=True, every_s=0.1, patience_s=60)
 
     assert ended.state == "COMPLETED"
-    assert "the service has not answered for" in screen.file.getvalue()  # type: ignore[attr-defined]
+    assert "the service has not answered for" in shown_on.getvalue()
 
 
 def test_it_is_waited_for_only_so_long_and_a_refusal_not_at_all(url: str, study: str) -> None:

@@ -333,7 +333,7 @@ def test_repetitions_of_the_direct_baseline_can_be_extended_but_it_has_no_iterat
 def test_totals_below_what_is_there_are_refused(store: Store, totals: Any) -> None:
     experiment = in_state(store, State.COMPLETED)
 
-    with pytest.raises(InvalidSpec, match=r"a total, not what is added|name the total"):
+    with pytest.raises(InvalidSpec, match=r"is a total, which must not be smaller|name the total"):
         extension.extend_experiment(store, experiment, ExtensionSpec(**totals))
 
     assert state(store, experiment) is State.COMPLETED

@@ -16,7 +16,7 @@ from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Motor
 from gaplab.services.engines.mujoco import MuJoCo
 from gaplab.services.engines.mujoco.callback import callbacks
 from gaplab.services.engines.mujoco.layout import layout
-from gaplab.services.engines.mujoco.scene import ROWS, Scene, _in_force
+from gaplab.services.engines.mujoco.scene import ROWS, MuJoCoScene, _in_force
 from gaplab.services.engines.stepping import WARM_SCENES
 
 mujoco = pytest.importorskip("mujoco")
@@ -56,7 +56,7 @@ class Sliding:
     """Something of 2 kg at rest on the ground, to be thrown, and followed step by step."""
 
     def __init__(self, world: World, material: Material) -> None:
-        self.scene = Scene(mujoco, world, threads=1)
+        self.scene = MuJoCoScene(mujoco, world, threads=1)
         (self.model,) = self.scene._painted([material])
         self.data = self.scene._data()
         self.step(30)
@@ -117,7 +117,7 @@ def test_a_ball_leaves_with_the_restitutions_share_of_the_speed_at_which_it_came
 
 def test_its_fields_are_where_mujocos_description_of_itself_says() -> None:
     data = Sliding(BOX, Material()).data
-    mujoco.mj_forward(Scene(mujoco, BOX, threads=1).model, data)
+    mujoco.mj_forward(MuJoCoScene(mujoco, BOX, threads=1).model, data)
     offsets, _ = layout(structs, "mjData")
     contact, size = layout(structs, "mjContact")
 
@@ -285,7 +285,7 @@ class Turning:
             gravity_m_s2=0.0,
             time_step_s=STEP_S,
         )
-        self.scene = Scene(mujoco, world, threads=1)
+        self.scene = MuJoCoScene(mujoco, world, threads=1)
         self.data = self.scene._data()
 
     def step(self, target: float, count: int) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, Vector, World
 from gaplab.services.engines.physx import PhysX
-from gaplab.services.engines.physx.scene import Scene
+from gaplab.services.engines.physx.scene import PhysXScene
 from gaplab.services.engines.stepping import WARM_SCENES
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
@@ -52,7 +52,7 @@ def wheel(motor: Motor, axis: Vector = (0.0, 0.0, 1.0)) -> World:
     )
 
 
-def turned(engine: PhysX, world: World, target: float, steps: int) -> Scene:
+def turned(engine: PhysX, world: World, target: float, steps: int) -> PhysXScene:
     scene = engine._scenes[world]
     scene.start(Material())
     scene.command(0, target)

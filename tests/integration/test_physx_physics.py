@@ -10,7 +10,7 @@ import pytest
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Sphere, World
 from gaplab.services.engines.physx import PhysX
-from gaplab.services.engines.physx.scene import Scene
+from gaplab.services.engines.physx.scene import PhysXScene
 
 if not PhysX.available():
     pytest.skip(PhysX.install, allow_module_level=True)
@@ -36,7 +36,7 @@ STEPS = 20
 class Sledge(NamedTuple):
     """Something of 2 kg at rest on the ground, to be pushed about."""
 
-    scene: Scene
+    scene: PhysXScene
     material: Material
     ahead: FloatArray
 

@@ -19,8 +19,8 @@ from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.workers import repetitions as task
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.cluster import cluster
+from gaplab.workers.lending import SharedCall, sizes
 from gaplab.workers.pool import Pool
-from gaplab.workers.spread import Spread, sizes
 from tests.processes import processes_of_ray
 
 SPEC = resolve_experiment(ExperimentSpec.model_validate({"strategy": "informative", "budget": "smoke"}))
@@ -57,8 +57,8 @@ def pool(alone: Any) -> Any:
 def spreads(monkeypatch: pytest.MonkeyPatch) -> Any:
     """What was spread over cores."""
     spread = []
-    run = Spread.run
-    monkeypatch.setattr(Spread, "run", lambda self: spread.append(self) or run(self))  # type: ignore[func-returns-value]
+    run = SharedCall.run
+    monkeypatch.setattr(SharedCall, "run", lambda self: spread.append(self) or run(self))  # type: ignore[func-returns-value]
     return spread
 
 
@@ -124,7 +124,7 @@ def test_one_of_several_helpers_that_dies_is_asked_no_more(alone: Any, pool: Any
     live, dead = pool._helpers.ready(*question)
     ray.kill(dead)
 
-    spread = Spread([question] * 6, alone.simulate, [live, dead], rollout_s=10.0)
+    spread = SharedCall([question] * 6, alone.simulate, [live, dead], rollout_s=10.0)
     spread.run()
     pool._helpers.helped(but_for=spread.dead)
 

@@ -11,7 +11,7 @@ import pytest
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Sphere, World
 from gaplab.services.engines.pybullet import PyBullet
-from gaplab.services.engines.pybullet.scene import Scene
+from gaplab.services.engines.pybullet.scene import PyBulletScene
 from gaplab.services.engines.pybullet.stick_slip import StickSlip
 
 pybullet: ModuleType = pytest.importorskip("pybullet")
@@ -42,7 +42,7 @@ WEIGHT_N = 2.0 * G
 class Sledge(NamedTuple):
     """A wide board on one foot, too inert to roll or tip in a second, at rest on the ground, to be pushed about."""
 
-    scene: Scene
+    scene: PyBulletScene
     advance: StickSlip
 
     def speed(self) -> float:
@@ -62,7 +62,7 @@ class Sledge(NamedTuple):
 
 
 def at_rest(world: World, material: Material) -> Sledge:
-    scene = Scene(pybullet, world)
+    scene = PyBulletScene(pybullet, world)
     scene.start(material, max(material.static_friction, material.dynamic_friction))
     advance = StickSlip(scene, material)
     advance.step(30)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from gaplab.schemas.lifecycle import State
+from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
 from tests.soak.evidence import undisturbed
@@ -76,7 +77,7 @@ def _as_submitted(record: Any, found: Any, studies: Any, extended: Any) -> Itera
 
 
 def _unlike(experiment: Any, spec: Any, larger: Any) -> Iterator[Any]:
-    there = ExperimentSpec.model_validate(experiment.spec)
+    there = ResolvedSpec.model_validate(experiment.spec)
     if larger:
         spec = spec.model_copy(update={"iterations": there.iterations, "repetitions": there.repetitions})
     if there != spec:

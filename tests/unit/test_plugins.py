@@ -106,7 +106,7 @@ def test_folders_are_several_but_a_file_has_one_place(put: Put) -> None:
         ("def (", r"broken\.py cannot be imported: SyntaxError"),
         ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"),
         ("1 / 0", "ZeroDivisionError"),
-        (CAREFUL.replace('"careful"', '"random"'), "has a strategy called 'random', as gaplab itself has"),
+        (CAREFUL.replace('"careful"', '"random"'), "has a strategy called 'random', but so has gaplab"),
         (CAREFUL.replace("def select", "def choose"), r"Careful in broken\.py does not define select"),
         (CAREFUL.replace('    name = "careful"\n', ""), "has no name, by which specs would call it"),
         (CAREFUL.replace("searches = False", "Options = 7"), "cannot be described: AttributeError"),
@@ -122,7 +122,7 @@ def test_a_broken_file_is_a_sentence(put: Put, text: str, says: str) -> None:
 def test_a_folder_that_is_not_there_is_a_sentence(tmp_path: Path) -> None:
     external_plugins.set_folders((tmp_path / "nowhere",))
     try:
-        with pytest.raises(PluginBroken, match=r"there is no folder .*nowhere"):
+        with pytest.raises(PluginBroken, match=r"there is no plug-in folder .*nowhere"):
             list(strategies())
     finally:
         external_plugins.set_folders(())

@@ -35,7 +35,7 @@ class CmaEsOptions(Frozen):
 
 
 @dataclass(frozen=True, eq=False)
-class Search(Population):
+class CmaEsState(Population):
     """The members, and the distribution that the next generation is drawn from.
 
     Attributes:
@@ -57,9 +57,9 @@ class CmaEs(Optimizer):
     Options = CmaEsOptions
     options: CmaEsOptions
 
-    def init(self, space: Space) -> Search:
+    def init(self, space: Space) -> CmaEsState:
         """Return a state without members or distribution."""
-        return Search(space, np.empty((0, space.size)), np.empty(0))
+        return CmaEsState(space, np.empty((0, space.size)), np.empty(0))
 
     @property
     def least_evaluations(self) -> int:
@@ -68,26 +68,26 @@ class CmaEs(Optimizer):
 
     def ask(self, state: Population, rng: Generator) -> Genomes:
         """Return a generation: uniform at a start, else drawn from the distribution."""
-        assert isinstance(state, Search)
+        assert isinstance(state, CmaEsState)
         if state.distribution is None:
             return state.space.draw(self._size(state.space), rng)
         distribution = deepcopy(state.distribution)
         distribution.opts["randn"].rng = rng
         return state.space.contain(_genomes(state.space, np.array(distribution.ask())))
 
-    def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> Search:
+    def tell(self, state: Population, genomes: Genomes, fitness: FloatArray) -> CmaEsState:
         """Return the state with the newcomers among the members, and the updated distribution."""
-        assert isinstance(state, Search)
+        assert isinstance(state, CmaEsState)
         rule = less_fit_of_most_similar if self.options.diverse else least_fit
         kept = insert(state, genomes, fitness, self.options.members, rule)
         learned = self._learned(state, genomes, fitness)
-        return Search(state.space, kept.genomes, kept.fitness, learned)
+        return CmaEsState(state.space, kept.genomes, kept.fitness, learned)
 
     def diverse(self, size: int) -> "CmaEs":
         """Return this optimizer with a diverse set of `size` members."""
         return CmaEs(self.options.model_copy(update={"members": size, "diverse": True}))
 
-    def _learned(self, state: Search, genomes: Genomes, fitness: FloatArray) -> Any:  # noqa: ANN401 - of the library
+    def _learned(self, state: CmaEsState, genomes: Genomes, fitness: FloatArray) -> Any:  # noqa: ANN401 - of the library
         if len(genomes) < self._size(state.space):
             return state.distribution  # the budget ended within the generation
         if state.distribution is None:

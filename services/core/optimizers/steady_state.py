@@ -32,28 +32,29 @@ class SteadyStateOptions(Frozen):
     """
 
     population: Annotated[int, Field(strict=True, ge=2, le=10_000)] = Field(
-        default=20, description="members; as many as the paper's diverse simulators"
+        default=20, description="number of members; as many as the paper's diverse simulators"
     )
     tournament: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(
-        default=3, description="members drawn for each parent, of which the fittest becomes it"
+        default=3, description="number of members drawn for each parent; the fittest of them is chosen"
     )
     crossover: Annotated[float, Field(strict=True, ge=0, le=1)] = Field(
-        default=0.5, description="probability that a newcomer has two parents; each gene is then either one's"
+        default=0.5, description="probability that a newcomer has two parents, with each gene from either of them"
     )
     mutation: Annotated[float, Field(strict=True, gt=0, le=1)] | None = Field(
-        default=None, description="probability of each gene to mutate; left out: 2 over the number of genes"
+        default=None, description="probability that a gene mutates; default: 2 divided by the number of genes"
     )
     mutation_scale: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
-        default=0.3, description="greatest standard deviation of a mutation, as a share of the gene's extent"
+        default=0.3, description="largest standard deviation of a mutation, as a share of the gene's extent"
     )
     finest_scale: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
-        default=0.003, description="least such deviation: each newcomer draws its own between the two, log-uniformly"
+        default=0.003,
+        description="smallest standard deviation of a mutation; each newcomer draws one log-uniformly between the two",
     )
     replacement: Literal["least_fit", "less_fit_of_most_similar"] = Field(
-        default="least_fit", description="who leaves; tuning an ensemble of simulators always takes the second"
+        default="least_fit", description="rule for the member that leaves; tuning an ensemble always uses the second"
     )
     offspring: Annotated[int, Field(strict=True, ge=1, le=10_000)] = Field(
-        default=1, description="newcomers that are evaluated at a time, to keep many cores busy; the paper: 1"
+        default=1, description="newcomers evaluated at once, to use many cores; the paper: 1"
     )
 
 

@@ -14,7 +14,7 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import EngineUnavailable
 from gaplab.services.core.world import Material, Motion, Recording, Trajectory, World
 from gaplab.services.engines.base import ALL_FIELDS, Engine
-from gaplab.services.engines.mujoco.scene import Scene
+from gaplab.services.engines.mujoco.scene import MuJoCoScene
 from gaplab.services.engines.stepping import WarmScenes, recording
 
 
@@ -22,7 +22,7 @@ class MuJoCoOptions(Frozen):
     """Options of the engine `mujoco`."""
 
     threads: Annotated[int, Field(ge=1, le=256)] = Field(
-        default=1, description="that share the rollouts of a call; the numbers do not depend on it"
+        default=1, description="threads that share the rollouts of a call; the numbers do not depend on it"
     )
 
 
@@ -48,8 +48,8 @@ class MuJoCo(Engine):
             msg = f"the engine {self.name!r} needs a library: {self.install}"
             raise EngineUnavailable(msg)
         mujoco = import_module("mujoco")
-        self._scenes = WarmScenes(lambda world: Scene(mujoco, world, self.options.threads))
-        self._latest: Scene | None = None
+        self._scenes = WarmScenes(lambda world: MuJoCoScene(mujoco, world, self.options.threads))
+        self._latest: MuJoCoScene | None = None
 
     @classmethod
     def runs(cls, world: World) -> bool:
@@ -87,7 +87,7 @@ class MuJoCo(Engine):
         self._latest = None
         self._scenes.close()
 
-    def _scene(self, kind: World) -> Scene:
+    def _scene(self, kind: World) -> MuJoCoScene:
         """Return the cached scene of a world, found by equality: a hash would take 25 µs."""
         if self._latest is None or self._latest.world != kind:
             self._latest = self._scenes[kind]

@@ -27,7 +27,7 @@ TURNED = np.array((0, 1, 2, 4, 5, 6, 3))
 """Order of a pose: MuJoCo's quaternions have w first, a Trajectory's last."""
 
 
-class Scene:
+class MuJoCoScene:
     """A world in any material.
 
     Rollouts are independent: each sets the whole state, and the solver starts from zero in each step.

@@ -13,7 +13,7 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import EngineUnavailable
 from gaplab.services.core.world import Material, Motion, Recording, Trajectory, World
 from gaplab.services.engines.base import ALL_FIELDS, Engine
-from gaplab.services.engines.physx.scene import Scene
+from gaplab.services.engines.physx.scene import PhysXScene
 from gaplab.services.engines.stepping import WarmScenes, plausible, record, recording, watch
 
 
@@ -35,7 +35,7 @@ class PhysX(Engine):
         if not self.available():
             msg = f"the engine {self.name!r} needs a library: {self.install}"
             raise EngineUnavailable(msg)
-        self._scenes = WarmScenes(partial(Scene, _sapien()))
+        self._scenes = WarmScenes(partial(PhysXScene, _sapien()))
 
     @classmethod
     def runs(cls, world: World) -> bool:

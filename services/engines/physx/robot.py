@@ -34,7 +34,7 @@ MOST_ITERATIONS = 255
 
 
 @dataclass(frozen=True)
-class Robot:
+class PhysXRobot:
     """A World's robot in PhysX.
 
     Attributes:
@@ -50,7 +50,7 @@ class Robot:
     motors: tuple[Handle, ...]
 
 
-def build_robot(sapien: ModuleType, world: World, material: Handle) -> Robot:
+def build_robot(sapien: ModuleType, world: World, material: Handle) -> PhysXRobot:
     """Build the robot of a world at its start, with one material, without adding it to a scene."""
     bodies = {body.name: body for body in world.bodies}
     base = world.bodies[0]
@@ -64,7 +64,7 @@ def build_robot(sapien: ModuleType, world: World, material: Handle) -> Robot:
     articulation.solver_position_iterations = min(world.solver_iterations, MOST_ITERATIONS)
     articulation.solver_velocity_iterations = 1  # removes the speed that separating overlapping bodies adds
     articulation.sleep_threshold = 0.0
-    return Robot(links, entities, articulation, tuple(links[joint.child].joint for joint in world.actuators))
+    return PhysXRobot(links, entities, articulation, tuple(links[joint.child].joint for joint in world.actuators))
 
 
 def _outwards(world: World) -> Iterator[Joint]:

@@ -15,7 +15,7 @@ LARGEST = float(np.finfo(np.float32).max)
 """Largest number in single precision, in which PhysX computes."""
 
 
-class Scene:
+class PhysXScene:
     """One world in one scene, with its saved state at time 0.
 
     Robot and ground share one material, as in the paper: PhysX averages the coefficients of two surfaces, so equal

@@ -12,7 +12,7 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import EngineUnavailable
 from gaplab.services.core.world import Material, Motion, Recording, Trajectory, World
 from gaplab.services.engines.base import ALL_FIELDS, Engine
-from gaplab.services.engines.pybullet.scene import Scene
+from gaplab.services.engines.pybullet.scene import PyBulletScene
 from gaplab.services.engines.pybullet.stick_slip import StickSlip
 from gaplab.services.engines.stepping import WarmScenes, plausible, record, recording, watch
 
@@ -36,7 +36,7 @@ class PyBullet(Engine):
             msg = f"the engine {self.name!r} needs a library: {self.install}"
             raise EngineUnavailable(msg)
         self._bullet = import_module("pybullet")
-        self._scenes = WarmScenes(partial(Scene, self._bullet))
+        self._scenes = WarmScenes(partial(PyBulletScene, self._bullet))
 
     @classmethod
     def runs(cls, world: World) -> bool:
@@ -74,7 +74,7 @@ class PyBullet(Engine):
         self._scenes.close()
 
 
-def _started(scene: Scene, material: Material) -> Callable[[int], None]:
+def _started(scene: PyBulletScene, material: Material) -> Callable[[int], None]:
     """Return a scene at time 0 in a material, and the function that advances it by time steps."""
     scene.start(material, max(material.static_friction, material.dynamic_friction))
     switches = material.dynamic_friction < material.static_friction

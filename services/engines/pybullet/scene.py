@@ -13,7 +13,7 @@ BASE = -1
 """Bullet's index of the base. Links count from 0, and link i belongs to joint i."""
 
 
-class Scene:
+class PyBulletScene:
     """One world in one server, with its saved state at time 0.
 
     Source: the PyBullet Quickstart Guide. `restoreState` resets positions, speeds and contacts, but neither motors nor

@@ -4,7 +4,7 @@ from math import hypot
 from typing import Any
 
 from gaplab.services.core.world import Material
-from gaplab.services.engines.pybullet.scene import Scene
+from gaplab.services.engines.pybullet.scene import PyBulletScene
 
 SLIDES = 0.999
 """Share of the largest static friction above which a sticking link slides."""
@@ -26,7 +26,7 @@ class StickSlip:
     For a link with several contact points, their sums count.
     """
 
-    def __init__(self, scene: Scene, material: Material) -> None:
+    def __init__(self, scene: PyBulletScene, material: Material) -> None:
         self._scene = scene
         self._material = material
         self._slides_from = SLIDES * material.static_friction

@@ -1,4 +1,4 @@
-"""Who may ask, and which requests were answered already."""
+"""Tables of tokens and of answered idempotent requests."""
 
 from datetime import datetime
 from typing import Any
@@ -17,7 +17,7 @@ class TokenRow(Base):
         id: the public part of the token, by which it is found, listed and revoked.
         digest: SHA-256 of the secret part, in hexadecimal.
         last_used_at: to the minute.
-        revoked_at: it admits nobody since; the row stays, so that revoking the last token opens nothing.
+        revoked_at: time since which it is invalid; the row stays, so revoking the last token does not open the service.
     """
 
     __tablename__ = "token"

@@ -1,4 +1,4 @@
-"""The parts of one call, done by this core and by others: who is slow gets less of them, and nobody is waited for."""
+"""The parts of one call, shared between this core and helpers: a slow helper gets fewer, and none is waited for."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -11,32 +11,32 @@ from ray.exceptions import RayError
 
 from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
 from gaplab.services.core.ports import Simulate
-from gaplab.workers.helpers import Handle
+from gaplab.workers.helper_actors import Handle
 
 Part: TypeAlias = tuple[Genomes, Parameters]
 
-AHEAD = 2
-"""Parts that a helper is lent at a time: while it does one, the next one waits for it."""
+QUEUED = 2
+"""Parts that a helper has at a time: one that it simulates, and one that waits for it."""
 
 SLOWEST = 2.0
-"""What takes so many times as long as expected is not waited for."""
+"""A part is taken back after this multiple of its expected time."""
 
 SHARE = 0.8
-"""Of what is left, what is dealt at once: the rest evens out how fast cores are."""
+"""Share of the remaining rows in one deal; later deals even out differences in speed."""
 
 
 def sizes(rows: int, cores: int, least: int) -> list[int]:
-    """How many rows each part has: large ones at both ends, where work begins, and small ones where it meets.
+    """Return the number of rows of each part: large parts at both ends, where work begins, small ones in the middle.
 
-    Every core is dealt most of its fair share at first, then most of what is left, and so on: equal cores end together
-    after few parts, and of unequal ones the faster does more of the small ones.
+    Each core first gets most of its fair share, then most of its share of the rest, and so on. Equal cores end together
+    after few parts; of unequal cores, the faster one simulates more of the small parts.
 
     Source: "factoring", Hummel, Schonberg and Flynn 1992.
 
     Args:
-        rows: to be divided.
-        cores: this one included.
-        least: rows of a part, but for the last one.
+        rows: number of all rows.
+        cores: number of cores, including this one.
+        least: rows of a part at least, except for the last part.
     """
     ours: list[int] = []
     theirs: list[int] = []
@@ -51,29 +51,29 @@ def sizes(rows: int, cores: int, least: int) -> list[int]:
 
 @dataclass(frozen=True)
 class Loan:
-    """A part that is with a helper, and until when it should be back."""
+    """A part that a helper simulates, and the time by which it should answer."""
 
     part: int
     helper: Handle
     until: float
 
 
-class Spread:
-    """Does the first part here and lends the last ones, then the next here, and so on until both meet.
+class SharedCall:
+    """One call: this core simulates parts from the front, helpers from the back, until they meet.
 
-    A part that is lent and has not come back in its time when nothing else is left is done here as well. A core that is
-    slow, dead, or taken by somebody else therefore costs little more than the time of a part.
+    Once no other part is left, this core also simulates a part whose helper is late. So a core that is slow, dead or
+    used by another program costs little more time than that of one part.
 
     Args:
         parts: of the call.
-        here: does a part on this core.
-        helpers: do parts on other cores.
-        rollout_s: what a rollout should take, in seconds.
+        here: simulates a part on this core.
+        helpers: simulate parts on other cores.
+        rollout_s: expected seconds of a rollout.
 
     Attributes:
-        gained: rollouts that others did.
-        lost: rollouts that were lent, and had to be done here after all.
-        dead: helpers that answer nothing any more.
+        gained: rollouts that helpers simulated.
+        lost: rollouts that were lent and then taken back.
+        dead: helpers that no longer answer.
     """
 
     def __init__(self, parts: Sequence[Part], here: Simulate, helpers: Sequence[Handle], rollout_s: float) -> None:
@@ -83,12 +83,12 @@ class Spread:
         self._here = here
         self._rollout_s = rollout_s
         self._left = deque(range(len(parts)))
-        self._room = deque(helper for _ in range(AHEAD) for helper in helpers)
+        self._room = deque(helper for _ in range(QUEUED) for helper in helpers)
         self._lent: dict[ray.ObjectRef[Fitnesses], Loan] = {}
         self._done: dict[int, Fitnesses] = {}
 
     def run(self) -> list[Fitnesses]:
-        """What came of the parts, in their order."""
+        """Return the fitnesses of each part, in their order."""
         while self._left or self._lent:
             self._collect(patient=not self._left)
             while len(self._left) > 1 and self._room:
@@ -104,7 +104,7 @@ class Spread:
         self._lent[helper.part.remote(*self._parts[index])] = Loan(index, helper, until)
 
     def _collect(self, *, patient: bool) -> None:
-        """Take what has come back; if there is nothing else to do and nothing has in its time, take back the latest."""
+        """Take the answers that have come; if patient, wait for one, and take back the latest part if it is late."""
         if not self._lent:
             return
         until = next(reversed(self._lent.values())).until if patient else 0.0

@@ -1,4 +1,4 @@
-"""Processes on idle cores that do parts of one repetition's calls."""
+"""Helpers: Ray actors on idle cores that simulate parts of a repetition's calls."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -14,21 +14,21 @@ from gaplab.services.core.ports import Simulate
 from gaplab.services.specs.assembly import setting
 from gaplab.workers.nodes import Versions, check_here
 
-LOOK_S = 1.0
-"""How often it is looked which cores are idle."""
+CHECK_S = 1.0
+"""Interval between checks for idle cores."""
 
 LONGEST_PAUSE_S = 30.0
-"""Cores that were no help are tried again after a pause that doubles each time, up to this."""
+"""Longest pause before helpers that cost time are tried again; the pause doubles each time."""
 
 Handle: TypeAlias = Any
-"""Of an actor; Ray types it no further."""
+"""A handle of a Helper actor, which Ray does not type."""
 
 
 @ray.remote(max_restarts=0)
 class Helper:
-    """A process that simulates what it is asked to.
+    """A process that simulates on request.
 
-    Ray places it where a core is idle, and counts that core as idle still: a repetition that comes next gets it.
+    Ray places it where a core is idle and still counts that core as idle, so the next repetition can take it.
     """
 
     def __init__(self, spec: str, expected: Versions) -> None:
@@ -36,7 +36,7 @@ class Helper:
         self._simulate = _simulation(spec)
 
     def part(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
-        """`(n, g)` genomes × `(m, p)` parameters -> `(n, m)` fitnesses; nan where the physics failed."""
+        """Return the `(n, m)` fitnesses of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed."""
         return self._simulate(genomes, parameters)
 
 
@@ -46,10 +46,17 @@ def _simulation(spec: str) -> Simulate:
 
 
 class Helpers:
-    """As many as there are idle cores; they end with this object.
+<<<<<<< HEAD:workers/helpers.py
+    """Helper processes, one for each idle core; they end with this object.
 
-    A process has to start and to load an engine, and its core may be taken by what Ray knows nothing of. So each is
-    first asked for what nobody waits for, and counts once it has answered.
+    A process must start and load an engine, and other programs may use its core. Therefore each first computes a test
+    call that nobody waits for, and is used once it has answered.
+=======
+    """The helpers of a repetition, one for each idle core; they end with this object.
+
+    A helper has to start and load an engine, and a program that Ray does not know may use its core. So each helper
+    first gets a rollout that nothing waits for, and is ready once it has answered.
+>>>>>>> core:workers/helper_actors.py
     """
 
     def __init__(self, spec: ResolvedSpec, versions: Versions) -> None:
@@ -58,42 +65,42 @@ class Helpers:
         self._starting: dict[ray.ObjectRef[Fitnesses], Handle] = {}
         self._ready: list[Handle] = []
         self._idle = 0
-        self._looked = -LOOK_S
-        self._pause_s = LOOK_S
+        self._checked = -CHECK_S
+        self._pause_s = CHECK_S
 
     def ready(self, genomes: Genomes, parameters: Parameters) -> list[Handle]:
-        """Those that would help with rollouts of these genomes and parameters now."""
-        if monotonic() - self._looked > self._pause_s:
-            self._look(genomes, parameters)
+        """Return the helpers that can simulate now; new ones warm up with these genomes and parameters."""
+        if monotonic() - self._checked > self._pause_s:
+            self._check(genomes, parameters)
         if self._starting:
             answered, _ = ray.wait(list(self._starting), num_returns=len(self._starting), timeout=0)
             for answer in answered:
-                self._meet(answer)
+                self._admit(answer)
         return self._ready
 
     def helped(self, but_for: Sequence[Handle] = ()) -> None:
-        """They were worth asking, but for these: others take their places at the next look."""
-        self._ready = [each for each in self._ready if each not in but_for]
-        self._pause_s = LOOK_S
+        """Keep the helpers, except for these: the next check replaces them."""
+        self._ready = [helper for helper in self._ready if helper not in but_for]
+        self._pause_s = CHECK_S
 
     def failed(self) -> None:
-        """What they were asked for took longer than it would have taken here: they are ended."""
+        """End all helpers, because their parts took longer than they would have taken here."""
         for helper in (*self._ready, *self._starting.values()):
             ray.kill(helper)
         self._ready, self._starting = [], {}
-        self._looked = monotonic()
+        self._checked = monotonic()
         self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
 
-    def _look(self, genomes: Genomes, parameters: Parameters) -> None:
-        self._looked = monotonic()
+    def _check(self, genomes: Genomes, parameters: Parameters) -> None:
+        self._checked = monotonic()
         before, self._idle = self._idle, int(ray.available_resources().get("CPU", 0))
-        del self._ready[max(before, self._idle) :]  # Ray counts a core as taken for a moment now and then
+        del self._ready[max(before, self._idle) :]  # one check may miss an idle core
         useful = len(genomes) * len(parameters) - 1
         for _ in range(min(self._idle, useful) - len(self._ready) - len(self._starting)):
             helper = Helper.remote(self._spec, self._versions)  # type: ignore[attr-defined]  # Ray adds it
             self._starting[helper.part.remote(genomes[:1], parameters[:1])] = helper
 
-    def _meet(self, answer: "ray.ObjectRef[Fitnesses]") -> None:
+    def _admit(self, answer: "ray.ObjectRef[Fitnesses]") -> None:
         helper = self._starting.pop(answer)
         try:
             ray.get(answer)
