@@ -88,10 +88,13 @@ class Answers:
         keys = [_keys(genomes, block) for block in blocks]
         answers = self._ahead
         if not all(key in answers for column in keys for key in column):
-            answers = self._fetched(genomes, blocks, following)
-            asked = {key for column in keys for key in column}
-            self._ahead = {key: row for key, row in answers.items() if key not in asked}
-        fitnesses = np.hstack([np.array([answers[key] for key in column]) for column in keys])
+            answers = self._fetched(genomes, blocks, keys, following)
+        columns = [np.array([answers[key] for key in column]) for column in keys]
+        if answers is not self._ahead:
+            self._ahead = answers
+            for key in (key for column in keys for key in column):
+                answers.pop(key, None)
+        fitnesses = columns[0] if len(columns) == 1 else np.hstack(columns)
         self._rollouts += fitnesses.size
         self._failures += int(np.isnan(fitnesses).sum())
         return fitnesses
@@ -100,17 +103,19 @@ class Answers:
         """Return the cost of the step so far; `budget` is the number of rollouts that it was given."""
         return Cost(self._rollouts, self._failures, budget - self._rollouts)
 
-    def _fetched(self, genomes: Genomes, blocks: list[Parameters], following: Following) -> dict[bytes, FloatArray]:
+    def _fetched(
+        self, genomes: Genomes, blocks: list[Parameters], keys: list[list[bytes]], following: Following
+    ) -> dict[bytes, FloatArray]:
         """Return the answers about the genomes, and about as many of the following ones as idle cores can simulate."""
         room = ceil(self._batch_size() / sum(map(len, blocks))) - len(genomes)
-        if room > 0 and len(more := following(room)):
-            genomes = np.vstack([genomes, more])
+        more = following(room) if room > 0 else genomes[:0]
+        together = np.vstack([genomes, more]) if len(more) else genomes
         answers: dict[bytes, FloatArray] = {}
-        for block in blocks:
-            keys = _keys(genomes, block)
-            answers.update((key, self._ahead[key]) for key in keys if key in self._ahead)
-            missing = [index for index, key in enumerate(keys) if key not in answers]
-            answers.update(self._simulated(genomes[missing], block, [keys[index] for index in missing]))
+        for block, asked in zip(blocks, keys, strict=True):
+            wanted = asked + _keys(more, block)
+            answers.update((key, self._ahead[key]) for key in wanted if key in self._ahead)
+            missing = [index for index, key in enumerate(wanted) if key not in answers]
+            answers.update(self._simulated(together[missing], block, [wanted[index] for index in missing]))
         return answers
 
     def _simulated(self, genomes: Genomes, parameters: Parameters, keys: list[bytes]) -> Iterator[Answer]:

@@ -85,7 +85,8 @@ def _following(
     optimizer: Optimizer, state: Population, thresholds: FloatArray, rng: Generator, left: int, count: int
 ) -> Genomes:
     """Return up to `count` genomes that the optimizer asks for next if its state stays as it is; none if it cannot."""
+    wanted = min(count, FARTHEST - 1, left) if thresholds.max() > -np.inf else 0
     rng, genomes = deepcopy(rng), np.empty((0, state.space.size))
-    while len(genomes) < min(count, FARTHEST, left) and thresholds.max() > -np.inf:
+    while len(genomes) < wanted:
         genomes = np.vstack([genomes, optimizer.ask(state, rng)])
     return genomes
