@@ -81,7 +81,7 @@ def commands(folder: Path) -> Path:
     """A folder for the path of a reader's shell, with the commands that an installation has."""
     found = folder / "commands"
     found.mkdir()
-    for name, call in {"gaplab": "-m api.cli", "python": "", "ray": "-m tests.e2e.loopback_ray"}.items():
+    for name, call in {"gaplab": "-m gaplab", "python": "", "ray": "-m tests.e2e.loopback_ray"}.items():
         (found / name).write_text(f'#!/bin/sh\nexec "{sys.executable}" {call} "$@"\n')
         (found / name).chmod(0o755)
     return found
