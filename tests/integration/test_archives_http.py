@@ -2,14 +2,14 @@
 
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import IO
 from zipfile import ZipFile
 
 import pytest
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
-from gaplab.api.clients.client import Client
+from gaplab.api.clients.archives import Archives
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
@@ -77,7 +77,7 @@ def test_the_command_writes_an_archive_and_reads_it(gaplab: Gaplab, submitted: s
 
     assert (written.code, read.code) == (0, 0)
     assert str(file) in written.out
-    assert f"{submitted} was taken here" in read.err
+    assert f"{submitted} is taken here" in read.err
     assert gaplab("show", read.out.strip()).code == 0
 
 
@@ -95,13 +95,14 @@ def test_the_command_overwrites_no_file_and_leaves_no_half(gaplab: Gaplab, submi
 def test_an_archive_that_is_being_written_has_not_its_name_yet(
     gaplab: Gaplab, submitted: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    meanwhile, export = [], Client.export  # type: ignore[misc, var-annotated]
+    meanwhile: list[str] = []
+    export = Archives.export
 
-    def watched(self, id_: Any, file: Any) -> None:  # type: ignore[no-untyped-def]
-        export(self, id_, file)  # type: ignore[call-arg]
+    def watched(self: Archives, id: str, file: IO[bytes]) -> None:
+        export(self, id, file)
         meanwhile.extend(each.name for each in tmp_path.iterdir())
 
-    monkeypatch.setattr(Client, "export", watched)
+    monkeypatch.setattr(Archives, "export", watched)
     written = gaplab("export", submitted, "--to", str(tmp_path / "archive.zip"))
 
     assert written.code == 0, written.err
