@@ -13,12 +13,12 @@ from gaplab.services.running import execution
 from gaplab.services.specs.hardware import hardware_of
 from gaplab.services.store.lease import Claim, Failure
 from gaplab.services.store.session import Store
+from gaplab.workers import task
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.nodes import Versions
 from gaplab.workers.patience import Patience
 from gaplab.workers.permits import SHARE, Handle, Permits
 from gaplab.workers.run import Run
-from gaplab.workers.task import run as run_repetition
 
 WAIT_S = 0.2
 """Longest wait for a delivery, and shortest time between two looks for queued work."""
@@ -67,7 +67,7 @@ class Repetitions:
         if hardware and self._permits is None:
             self._permits = Permits.remote()  # type: ignore[attr-defined]  # Ray adds it
         permits = self._permits if hardware else None
-        return Run(claim, run_repetition.remote(claim, self._versions, self._checkpoint_s, permits), permits)
+        return Run(claim, task.run.remote(claim, self._versions, self._checkpoint_s, permits), permits)
 
     def heartbeat(self) -> None:
         """Prolong the claims, stop the runs whose claim no longer holds, and end those that hang."""

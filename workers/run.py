@@ -8,11 +8,10 @@ from ray import ObjectRefGenerator
 from ray.exceptions import RayError, RayTaskError
 
 from gaplab.services.core.errors import ClusterUnusable
-from gaplab.services.plugins.blame import describe
 from gaplab.services.store.lease import Claim, Delivered, Failure, Pulse
 from gaplab.workers.patience import Patience
 from gaplab.workers.permits import Handle
-from gaplab.workers.task import Batch
+from gaplab.workers.task import Batch, told
 
 
 @dataclass(eq=False)
@@ -54,7 +53,7 @@ class Run:
         except RayTaskError as error:
             if isinstance(error.cause, ClusterUnusable):
                 raise error.cause from error
-            self.failed = Failure(describe(error.cause if isinstance(error.cause, Exception) else error))
+            self.failed = Failure(told(error))
         except RayError as error:
             self.lost = f"the worker was lost: {type(error).__name__}"
 

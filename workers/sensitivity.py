@@ -22,6 +22,7 @@ from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from gaplab.workers.nodes import Versions, check_here
 from gaplab.workers.patience import Patience
+from gaplab.workers.task import told
 
 LOOK_S = 0.2
 """Shortest time between two looks for a queued check."""
@@ -119,7 +120,7 @@ class Checks:
         except RayTaskError as error:
             if isinstance(error.cause, ClusterUnusable):
                 raise error.cause from error
-            self._fail(claim, describe(error))
+            self._fail(claim, told(error))
         except RayError as error:
             sensitivity.release(self._store, claim, f"the worker was lost: {type(error).__name__}")
             log.warning("sensitivity check %s: queued again: %s", claim.id, type(error).__name__)

@@ -1,14 +1,16 @@
 """The Ray task that runs one repetition on one core, and what it delivers."""
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from time import perf_counter
 from typing import TypeAlias
 
 import ray
+from ray.exceptions import RayTaskError
 
 from gaplab.services.core.errors import RealityFailed
+from gaplab.services.core.loop import Setting
 from gaplab.services.core.ports import Reality
 from gaplab.services.core.types import Measured, Probed
 from gaplab.services.plugins.blame import describe, raised
@@ -40,15 +42,29 @@ def run(claim: Claim, expected: Versions, checkpoint_s: float, permits: Handle |
     """
     check_here(expected)
     yield ()
+    yield from delivered(lambda: _prepared(claim, expected, permits), claim, checkpoint_s)
+
+
+def delivered(prepare: Callable[[], Setting], claim: Claim, checkpoint_s: float) -> Iterator[Batch]:
+    """Yield what follows the claim's log, in batches; if anything raises, the last batch is the failure.
+
+    Args:
+        prepare: returns the setting of the repetition.
+        claim: with the log and checkpoints to go on from.
+        checkpoint_s: seconds between the checkpoints of a step.
+    """
     try:
-        alone = setting(claim.spec, claim.number)
-        if permits is not None:
-            alone = replace(alone, reality=_permitted(alone.reality, claim, permits))
-        pool = Pool(claim.spec, alone.simulate, alone.batch_size(), expected)
-        spread = replace(alone, simulate=pool, batch_size=pool.batch_size)
-        yield from batches(recorded(spread, claim.log, claim.checkpoints, checkpoint_s))
+        yield from batches(recorded(prepare(), claim.log, claim.checkpoints, checkpoint_s))
     except (Exception, SystemExit) as error:  # noqa: BLE001 - a plug-in may raise anything
         yield (failure_of(error),)
+
+
+def _prepared(claim: Claim, expected: Versions, permits: Handle | None) -> Setting:
+    alone = setting(claim.spec, claim.number)
+    if permits is not None:
+        alone = replace(alone, reality=_permitted(alone.reality, claim, permits))
+    pool = Pool(claim.spec, alone.simulate, alone.batch_size(), expected)
+    return replace(alone, simulate=pool, batch_size=pool.batch_size)
 
 
 def _permitted(reality: Reality, claim: Claim, permits: Handle) -> PermittedReality:
@@ -63,6 +79,11 @@ def failure_of(error: BaseException) -> Failure:
         return Failure(describe(error))
     cause = error.__cause__ or error
     return Failure(f"reality failed: {raised(cause)}", f"reality failed: {describe(cause)}", of_reality=True)
+
+
+def told(error: RayTaskError) -> str:
+    """Return the sentence of an error that a task raised; one that could not be sent is a text already."""
+    return describe(error.cause if isinstance(error.cause, Exception) else error)
 
 
 def batches(deliveries: Iterator[Delivered | Pulse]) -> Iterator[Batch]:

@@ -13,6 +13,7 @@ from gaplab.schemas.lifecycle import PERMITTED, Ending, State, Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.schedule import ScheduleChange
 from gaplab.services.core.errors import Conflict
+from gaplab.services.experiments.checks import cancel_unneeded
 from gaplab.services.experiments.states import move, settle
 from gaplab.services.experiments.views import view_experiments, view_studies
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
@@ -135,6 +136,8 @@ def _obey(session: Session, experiment: ExperimentRow, verb: Verb) -> None:
         move(session, row, failed, State.QUEUED, losses=0, error=None, hidden_error=None)
     settle(session, [experiment.id], _REQUESTED[verb](experiment))
     session.refresh(experiment)
+    if verb is Verb.CANCEL:
+        cancel_unneeded(session, experiment.sensitivity_id)
 
 
 def _end_repetitions(session: Session, experiment: str) -> None:

@@ -26,8 +26,7 @@ from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from gaplab.workers import repetitions, supervisor
 from gaplab.workers import sensitivity as checking
-from gaplab.workers.checkpoints import recorded
-from gaplab.workers.task import batches
+from gaplab.workers.task import delivered
 from tests.fakes import flat
 from tests.without_ray import OPEN, SPEC, Here, HereRepetitions, HereRun, Stop
 
@@ -63,7 +62,7 @@ class TryingRepetitions(HereRepetitions):
     """Everything that may happen to a repetition: the second of the first experiment loses its first worker."""
 
     def launch(self, claim: Any) -> Any:
-        stream = batches(recorded(setting(claim.spec, claim.number), claim.log, claim.checkpoints, 0.0))
+        stream = delivered(lambda: setting(claim.spec, claim.number), claim, 0.0)
         if claim.spec.name == "broken":
             return Troubled(claim, stream, "failed")
         if claim.number == 1 and not Trying.lost:

@@ -11,7 +11,7 @@ from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.store.clock import UtcDateTime
 
-REVISION = "0008"
+REVISION = "0009"
 """The migration that makes these tables; a database at any other revision is not ours to touch."""
 
 SPEC_VERSION = 1
