@@ -1,4 +1,4 @@
-"""Repetitions that deliver checkpoints of a step while it is under way."""
+"""Repetitions that deliver checkpoints of a running step."""
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -14,10 +14,10 @@ from gaplab.services.running.execution import Checkpoint, Delivered, TimedStep
 CHECKPOINT_S = 10.0
 """Seconds between the checkpoints of a step; shorter steps have none.
 
-They bound what a crash costs, and how long a repetition that is told to stop goes on."""
+It limits the work that a crash loses, and the time that a repetition needs to stop."""
 
 SHARE = 4
-"""Calls that would take longer than the time between checkpoints divided by this are split."""
+"""Number of calls between two checkpoints, at least; longer calls are split."""
 
 Emit = Callable[[Delivered], None]
 
@@ -25,12 +25,12 @@ Emit = Callable[[Delivered], None]
 def recorded(
     setting: Setting, log: Sequence[Step], checkpoints: Sequence[Checkpoint], every_s: float = CHECKPOINT_S
 ) -> Iterator[Delivered]:
-    """Yield the steps that follow the log, and checkpoints of those that take long, as they come about.
+    """Yield the steps that follow the log, and checkpoints of long steps, as soon as they exist.
 
     Args:
-        setting: of the repetition.
+        setting: setting of the repetition.
         log: its steps so far.
-        checkpoints: of the step that comes next.
+        checkpoints: checkpoints of the next step.
         every_s: seconds between checkpoints of a step.
     """
 
@@ -49,7 +49,7 @@ class StepRecorder:
         emit: takes steps and checkpoints.
         every_s: seconds between checkpoints.
         step: the place in the log of the step under way.
-        checkpoints: of it, from before an interruption.
+        checkpoints: its checkpoints from before an interruption.
     """
 
     def __init__(self, emit: Emit, every_s: float, step: int, checkpoints: Sequence[Checkpoint] = ()) -> None:
@@ -68,7 +68,7 @@ class StepRecorder:
         return Answers(setting.simulate, setting.batch_size, checkpoints, self)
 
     def genomes_per_call(self, simulators: int) -> int:
-        """Return as many genomes as take a part of the time between checkpoints; one while that is unknown."""
+        """Return the number of genomes of a call that is short enough; 1 while durations are unknown."""
         self._called = perf_counter()
         if not self._rollout_s:
             return 1
@@ -83,7 +83,7 @@ class StepRecorder:
             self._checkpoint(now)
 
     def end(self, step: Step) -> None:
-        """Emit the step, which has come to its end, and begin the next."""
+        """Emit the completed step, and begin the next."""
         now = perf_counter()
         self._emit(TimedStep(step, self._before_s + now - self._begun))
         self._step, self._part, self._before = self._step + 1, 0, ()
@@ -96,11 +96,11 @@ class StepRecorder:
 
 
 class _Unwanted(Exception):
-    """The consumer has closed the iterator, so that nothing takes further items."""
+    """The consumer has closed the iterator, and takes no further items."""
 
 
 def _in_a_thread(compute: Callable[[Emit], None]) -> Iterator[Delivered]:
-    """Yield what a thread of its own emits: a checkpoint comes from the depths of a step, where nothing can yield.
+    """Yield the items that `compute` emits in a thread, even from deep inside a step, where nothing can yield.
 
     Once the iterator is closed, the thread ends at the next item that it emits.
     """

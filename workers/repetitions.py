@@ -1,4 +1,4 @@
-"""Repetitions at Ray: the task that computes one, and the supervisor's hold on its claimed repetitions."""
+"""Repetitions in Ray: the task that computes one, and the supervisor's claimed repetitions."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -21,20 +21,20 @@ from gaplab.workers.nodes import Versions, check_here
 from gaplab.workers.pool import Pool
 
 BATCH_S = 0.2
-"""Steps shorter than this travel together; what reality answered never waits."""
+"""Shorter steps are delivered in batches; an answer of reality is delivered at once."""
 
 WAIT_S = 0.2
-"""Longest wait for a delivery, and shortest time between two looks for queued work."""
+"""Longest wait for a delivery, and shortest interval between checks for queued work."""
 
 log = logging.getLogger("gaplab.supervisor")
 
 
 @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
 def run(claim: Claim, expected: Versions, checkpoint_s: float) -> Iterator[tuple[Delivered, ...]]:
-    """Yield the steps that follow the claim's log, in batches; the first, empty batch says that the task has begun.
+    """Yield the steps that follow the claim's log, in batches; the first batch is empty, and shows that the task runs.
 
-    Ray never retries it: a repetition goes on from its stored log, not from its beginning. The engine stays warm in
-    the worker process from one task to the next.
+    Ray never retries the task: a repetition continues from its stored log, not from its beginning. The worker process
+    keeps the engine loaded from one task to the next.
 
     Raises:
         ClusterUnusable: this node lacks the expected versions.
@@ -64,16 +64,16 @@ def batches(deliveries: Iterator[Delivered]) -> Iterator[tuple[Delivered, ...]]:
 
 @dataclass(eq=False)
 class Run:
-    """A claimed repetition on its way.
+    """A claimed repetition that was submitted to Ray.
 
     Attributes:
-        claim: the right to it.
+        claim: claim of the repetition.
         stream: batches of steps and checkpoints from the task.
         received: deliveries that are not stored yet.
-        begun: the task no longer waits for a core.
-        ended: the task has come to its end.
-        failed: why its code raised.
-        lost: why another worker must go on: its worker is gone, or its log refused a delivery.
+        begun: true once the task has a core.
+        ended: true once the task has ended.
+        failed: error of the task's code, if any.
+        lost: reason why another worker must continue: the worker is gone, or the log refused a delivery.
     """
 
     claim: Claim
@@ -85,7 +85,7 @@ class Run:
     lost: str | None = None
 
     def receive(self) -> None:
-        """Take a batch that the stream has ready, its end, or the reason why there is none."""
+        """Take the next batch if the stream has one, or its end, or its error."""
         try:
             self.received += ray.get(next(self.stream))
             self.begun = True
@@ -104,7 +104,7 @@ class Run:
 
     @property
     def over(self) -> bool:
-        """Whether the stream has nothing more to give."""
+        """Whether the stream has ended, with or without an error."""
         return self.ended or self.failed is not None or self.lost is not None
 
     @property
@@ -114,12 +114,12 @@ class Run:
 
 
 class Repetitions:
-    """The repetitions that one supervisor has claimed. All methods raise StoreUnavailable; nothing is lost by it.
+    """The claimed repetitions of one supervisor. All methods raise StoreUnavailable; no delivery is lost then.
 
     Args:
         store: the database.
         owner: the supervisor's name in it.
-        versions: that a node must have to run them.
+        versions: versions that a node must have to run them.
         checkpoint_s: seconds between the checkpoints of a step.
     """
 
@@ -137,11 +137,11 @@ class Repetitions:
         return Run(claim, run.remote(claim, self._versions, self._checkpoint_s))
 
     def heartbeat(self) -> None:
-        """Prolong the claims, and stop the runs whose claim no longer holds."""
+        """Renew the claims, and stop the runs whose claim is no longer valid."""
         self._drop_all_but(execution.heartbeat(self._store, [run.claim for run in self.runs]))
 
     def claim(self, capacity: Callable[[], int]) -> None:
-        """Hand back what should not begin now, and claim up to the capacity."""
+        """Hand back repetitions that should not start now, and claim up to the capacity."""
         if monotonic() - self._looked < WAIT_S:
             return
         self._looked = monotonic()
@@ -155,7 +155,7 @@ class Repetitions:
         self._unsure = False
         for claim in claims:
             self.runs.append(self.launch(claim))
-            log.info("on from step %d", len(claim.log), extra=self.runs[-1].place)
+            log.info("continues from step %d", len(claim.log), extra=self.runs[-1].place)
 
     def receive(self) -> None:
         """Wait shortly for deliveries, and take the ready ones."""
@@ -170,7 +170,7 @@ class Repetitions:
             streams[stream].receive()
 
     def store_received(self) -> None:
-        """Record what was received, and stop the runs whose claim no longer holds."""
+        """Record the received deliveries, and stop the runs whose claim is no longer valid."""
         filled = [run for run in self.runs if run.received]
         if not filled:
             return
@@ -201,7 +201,7 @@ class Repetitions:
         self._looked = -WAIT_S  # cores are free: look for work at once
 
     def hand_back(self, runs: list[Run]) -> None:
-        """Stop these runs, and let others go on with them; what the database does not hear, a lease's end tells it."""
+        """Stop these runs, and return their leases; without the database, the leases expire."""
         for run in list(runs):
             run.cancel()
             self.runs.remove(run)
@@ -213,7 +213,7 @@ class Repetitions:
                 log.info("handed back", extra=run.place)
 
     def _record_each(self, runs: list[Run]) -> tuple[Claim, ...]:
-        """Record each run's deliveries by themselves, and give up the runs whose log refuses them."""
+        """Record each run's deliveries separately, and give up the runs whose log refuses them."""
         held: list[Claim] = []
         for run in runs:
             try:
@@ -235,9 +235,9 @@ class Repetitions:
                     run.lost = f"it ended too early: {error}"
 
     def _drop_all_but(self, held: list[Claim] | tuple[Claim, ...]) -> None:
-        """Stop the runs whose claim no longer holds: cancelled, paused, stopped, handed back, or taken over."""
+        """Stop the runs whose claim is no longer valid: cancelled, paused, stopped, handed back, or taken over."""
         claims = set(held)
         for run in [run for run in self.runs if run.claim not in claims]:
             run.cancel()
             self.runs.remove(run)
-            log.info("dropped, it is no longer ours", extra=run.place)
+            log.info("dropped: this supervisor no longer holds its lease", extra=run.place)

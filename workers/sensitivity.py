@@ -1,4 +1,4 @@
-"""Sensitivity checks at Ray: one at a time, beside the repetitions."""
+"""Sensitivity checks in Ray: one at a time, beside the repetitions."""
 
 import logging
 from time import monotonic
@@ -20,7 +20,7 @@ from gaplab.services.store.session import Store
 from gaplab.workers.nodes import Versions, check_here
 
 LOOK_S = 0.2
-"""Shortest time between two looks for a queued check."""
+"""Shortest interval between checks of the queue."""
 
 log = logging.getLogger("gaplab.supervisor")
 
@@ -44,10 +44,10 @@ class Checks:
     Args:
         store: the database.
         owner: the supervisor's name in it.
-        lease_s: silence after which the holder of a check loses it to others.
-        versions: that a node must have to run them.
+        lease_s: seconds without a heartbeat after which the holder of a check loses it.
+        versions: versions that a node must have to run them.
 
-    All methods raise StoreUnavailable; nothing is lost by it.
+    All methods raise StoreUnavailable; no result is lost then.
     """
 
     def __init__(
@@ -61,10 +61,10 @@ class Checks:
         self._looked = -LOOK_S
 
     def step(self) -> None:
-        """Store the check that has ended, or start one that is queued.
+        """Store the result of the running check if it has ended, or start a queued check.
 
         Raises:
-            ClusterUnusable: the node that ran it has other versions; nothing of it is stored.
+            ClusterUnusable: the check's node has other versions; its result is not stored.
         """
         if self._run is not None:
             self._end(*self._run)
@@ -73,14 +73,14 @@ class Checks:
             self._claim()
 
     def heartbeat(self) -> None:
-        """Prolong the claim on the running check, or stop the check if it no longer holds; requeue lost checks."""
+        """Renew the claim on the running check, or stop the check if its claim is invalid; requeue lost checks."""
         if self._run is not None and not sensitivity.heartbeat(self._store, [self._run[0]]):
             ray.cancel(self._run[1], force=True)
             self._run = None
         sensitivity.requeue_lost(self._store, stale_after_s=self._lease_s)
 
     def hand_back(self) -> None:
-        """Hand the unfinished check back to other supervisors."""
+        """Hand back the unfinished check."""
         if self._run is not None:
             sensitivity.hand_back(self._store, self._run[0])
             self._run = None

@@ -42,7 +42,9 @@ class ExperimentFilter(Paging):
     strategy: str | None = Field(
         default=None, max_length=100, pattern=r"^\w+$", description="only experiments with this strategy"
     )
-    text: str | None = Field(default=None, max_length=200, description="only experiments with this in the name or id")
+    text: str | None = Field(
+        default=None, max_length=200, description="only experiments whose name or id contains this text"
+    )
     sort: Literal["created_at", "-created_at", "name", "-name", "strategy", "-strategy", "state", "-state"] = Field(
         default="-created_at", description="field to sort by; a minus reverses the order"
     )

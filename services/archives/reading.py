@@ -89,7 +89,7 @@ def _store(session: Session, opened: OpenedArchive, experiments: Mapping[str, Ro
         for table in EXPORTED:
             archives.insert_rows(session, table, (_arriving(table, row, arrival) for row in opened.rows(table)))
     except (*archives.Refused, KeyError) as error:
-        msg = "its rows contradict each other: one is there twice, or belongs to a row that is missing"
+        msg = "its rows contradict each other: one occurs twice, or belongs to a missing row"
         raise InvalidArchive(msg) from error
     check_logs(session, ids.values())
     for id_ in ids.values():

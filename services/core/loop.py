@@ -163,8 +163,10 @@ def _search(setting: Setting, answers: Answers, parameters: Parameters, rng: Gen
     def search(score: Score) -> Genome:
         nonlocal left
         if not left:
-            wrong = "searches twice in one selection" if setting.strategy.searches else "says that it does not search"
-            raise PluginBroken(f"strategy {name!r} {wrong}, so that no budget is left for this search")
+            permitted = (
+                "one search a selection is permitted" if setting.strategy.searches else "it has searches = False"
+            )
+            raise PluginBroken(f"strategy {name!r} has no budget left for this search: {permitted}")
         left -= 1
         found = maximise(
             setting.optimizer,

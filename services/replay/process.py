@@ -132,7 +132,7 @@ class RolloutProcess:
             late = isinstance(error, TimeoutError)
             what = f"took more than {self._longest_s:g} s in" if late else "ended"
             log.warning("%s %s the process for rollouts; the next call starts another", function.__name__, what)
-            raise EngineInterrupted(f"the physics {what} its process; nothing else was harmed") from error
+            raise EngineInterrupted(f"the physics {what} its process; nothing else is affected") from error
         if succeeded:
             return answer  # type: ignore[no-any-return]
         kind, text = answer

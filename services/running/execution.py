@@ -1,7 +1,7 @@
-"""Running repetitions: claim them in the order of turns, record their steps, end them.
+"""Execution of repetitions: claims in the order of turns, records of steps, and ends.
 
-The lease mechanism is that of `gaplab.services.running.leases`. Requests of people are obeyed here, so that no holder
-can forget them: the first new step after a pause or a stop is stored, and is the last of its lease.
+The lease mechanism is that of `gaplab.services.running.leases`. People's requests are handled here, so they do not
+depend on the holder: the first new step after a pause or stop is stored, and ends the lease.
 
 All functions raise StoreUnavailable while the database cannot be used; each may then be tried again.
 """
@@ -37,15 +37,15 @@ _REQUESTED_ENDINGS = {State.PAUSING: Ending.PAUSED, State.STOPPING: Ending.STOPP
 
 
 class _Repetitions(Leases[Claim]):
-    """Leases of repetitions: an end is told to the history and to the experiment."""
+    """Leases of repetitions. When one ends, its attempt and its experiment are updated."""
 
     table = RepetitionRow
 
     def end(self, session: Session, which: ColumnElement[bool], change: Change) -> list[int]:
-        """End leases as the base does; a hand-back to an experiment that is being paused or stopped is told as such.
+        """End leases as the base does; if the experiment is being paused or stopped, a hand-back is recorded as that.
 
         Raises:
-            Conflict: a repetition is to be COMPLETED and iterations of it are missing.
+            Conflict: a repetition that should become COMPLETED lacks iterations.
         """
         row = RepetitionRow
         held = select(row.id, row.experiment_id).where(which, row.state == State.RUNNING)
@@ -98,9 +98,9 @@ def claim(store: Store, owner: str, limit: int, under: Provenance | None = None)
     """Claim up to `limit` queued repetitions in the order of turns, and return them with their logs.
 
     Args:
-        store: where they are queued.
-        owner: the supervisor that runs them.
-        limit: most repetitions.
+        store: the database.
+        owner: the supervisor.
+        limit: largest number of repetitions.
         under: provenance of the supervisor; this process's if left out. An experiment that was begun under another
             engine, plug-in, architecture or version of the spec is left alone, and says so.
     """
@@ -120,7 +120,7 @@ def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[Delivere
     is written.
 
     Raises:
-        Conflict: steps before a delivered one are missing; nothing at all was written.
+        Conflict: steps before a delivered one are missing; nothing was written.
     """
     by_claim: dict[Claim, list[Delivered]] = {}
     for claim, delivered in deliveries:
@@ -129,12 +129,14 @@ def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[Delivere
 
 
 def give_way(store: Store, waiting: Iterable[Claim], under: Provenance | None = None) -> tuple[Claim, ...]:
-    """Hand back claims that should not begin now, and return them: a request to pause or stop, or another's turn.
+    """Hand back claims of repetitions that should not start now, and return them.
+
+    The reason is a request to pause or stop, or another experiment's turn.
 
     Args:
-        store: of the claims.
+        store: the database.
         waiting: claims whose repetition waits for a core; a running one is never interrupted for another.
-        under: as of `claim`.
+        under: as in `claim`.
     """
     claims = tuple(waiting)
     if not claims:
@@ -191,9 +193,9 @@ def _record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -
 
 
 def _locked_requests(session: Session, claims: Iterable[Claim]) -> dict[str, State]:
-    """Lock the experiments of these claims that are being paused or stopped, and return their states.
+    """Lock the experiments of these claims that people are pausing or stopping, and return their states.
 
-    An experiment is always locked before its repetitions; hence the first look without a lock.
+    An experiment is always locked before its repetitions, so they are first read without a lock.
     """
     row = ExperimentRow
     requested = select(row.id).where(row.id.in_({claim.experiment_id for claim in claims}), row.state.in_(ASKED))

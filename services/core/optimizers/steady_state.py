@@ -51,7 +51,8 @@ class SteadyStateOptions(Frozen):
         description="smallest standard deviation of a mutation; each newcomer draws one log-uniformly between the two",
     )
     replacement: Literal["least_fit", "less_fit_of_most_similar"] = Field(
-        default="least_fit", description="rule for the member that leaves; tuning an ensemble always uses the second"
+        default="least_fit",
+        description="rule for the member that leaves; tuning an ensemble always uses `less_fit_of_most_similar`",
     )
     offspring: Annotated[int, Field(strict=True, ge=1, le=10_000)] = Field(
         default=1, description="newcomers evaluated at once, to use many cores; the paper: 1"
