@@ -43,8 +43,8 @@ def run(claim: Claim, expected: Versions, checkpoint_s: float) -> Iterator[tuple
     yield ()
     alone = setting(claim.spec, claim.number)
     pool = Pool(claim.spec, alone.simulate, alone.batch_size(), expected)
-    spread = replace(alone, simulate=pool, batch_size=pool.batch_size)
-    yield from batches(recorded(spread, claim.log, claim.checkpoints, checkpoint_s))
+    parallel = replace(alone, simulate=pool, batch_size=pool.batch_size)
+    yield from batches(recorded(parallel, claim.log, claim.checkpoints, checkpoint_s))
 
 
 def batches(deliveries: Iterator[Delivered]) -> Iterator[tuple[Delivered, ...]]:

@@ -65,7 +65,7 @@ class EventFeed:
                         yield event
 
     def close(self) -> None:
-        """End every stream, now and from now on."""
+        """End all streams, and refuse later ones."""
         self._closed = True
         self._news.set()
 

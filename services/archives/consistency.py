@@ -75,7 +75,7 @@ def _check_provenance(row: Row) -> None:
 
 
 def _checked_spec(row: Row) -> Row:
-    """Return the spec as it is stored: with the fields that were given, and unknown parameters of reality as null."""
+    """Return the spec to store, with the archive's fields; unknown parameters of reality are null."""
     place, given = f"the spec of experiment {row['id']!r}", row["spec"]
     if row.get("spec_version", SPEC_VERSION) > SPEC_VERSION:
         raise InvalidArchive(f"{place} has version {row['spec_version']}; this gaplab reads up to {SPEC_VERSION}")

@@ -1,4 +1,4 @@
-"""Archives are unpacked within limits, and checked against their manifest.
+"""Unpacking of archives, within limits, and comparison with their manifest.
 
 Nothing in them is trusted: members with unknown names are refused, sizes are counted while unpacking, and a subprocess
 reads Parquet.
@@ -38,8 +38,8 @@ class OpenedArchive:
     """An archive that was unpacked.
 
     Attributes:
-        manifest: what it states about itself.
-        files: by table, the rows as JSON Lines.
+        manifest: manifest of the archive.
+        files: files of the tables' rows, as JSON Lines.
     """
 
     manifest: Manifest

@@ -17,7 +17,7 @@ P = TypeVar("P")
 
 
 def set_folders(folders: tuple[Path, ...]) -> None:
-    """Set the plug-in folders; registries that were used before do not notice."""
+    """Set the plug-in folders; registries that were used before keep their plug-ins."""
     for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
         del sys.modules[name]
     package = ModuleType(PACKAGE, "External plug-ins.")

@@ -57,7 +57,7 @@ def settle(session: Session, experiments: Iterable[str], requested: State | None
     over. A STOPPING one keeps no queued repetition. Only this function keeps the counts that turns depend on.
 
     Args:
-        session: of a transaction that has locked these experiments.
+        session: session of a transaction that has locked these experiments.
         experiments: their ids.
         requested: a state that a person requests; None without a request.
 

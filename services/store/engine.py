@@ -32,7 +32,7 @@ def open_engine(url: str, *, enforce_foreign_keys: bool = True) -> Engine:
 
     Args:
         url: SQLAlchemy URL; Postgres without a driver gets psycopg 3.
-        enforce_foreign_keys: in SQLite; False in a migration that rebuilds tables.
+        enforce_foreign_keys: enforce them in SQLite; False in a migration that rebuilds tables.
 
     Raises:
         StoreUnavailable: no such kind of database.

@@ -274,7 +274,7 @@ def test_a_number_or_a_value_that_json_has_not(sqlite_store: Store, good: Any, t
         (b"5\n", "not a JSON object"),
         (b"\xff\n", "not JSON"),
         (b'{"id": "a", "password": 1}\n', "does not know: password"),
-        (b"", "its experiment is not"),
+        (b"", "another experiment than"),
     ],
 )
 def test_rows_that_are_none(sqlite_store: Store, good: Any, content: Any, said: Any, unpacked_here: Any) -> None:
