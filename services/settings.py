@@ -74,8 +74,8 @@ class Limits(_Environment):
         repetitions: repetitions of one submission, over all experiments of a study.
         experiments_per_token: experiments of one token that have not ended.
         experiments: experiments of all tokens that have not ended.
-        rollouts_per_token: remaining rollouts of such experiments of one token.
-        rollouts: remaining rollouts of such experiments of all tokens.
+        rollouts_per_token: remaining rollouts of one token, in experiments that have not ended.
+        rollouts: remaining rollouts of all tokens, in experiments that have not ended.
         streams_per_token: open event streams of one token in one API process, including requests that wait for events.
         streams: open event streams of all tokens in one API process.
     """

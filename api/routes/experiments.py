@@ -185,5 +185,5 @@ def read_misfit(id: Id, store: StoreDep) -> MisfitRead:
     responses=documented(404, 422),
 )
 def list_attempts(id: Id, number: Annotated[int, Path(ge=0, le=1_000_000)], store: StoreDep) -> tuple[AttemptRead, ...]:
-    """List the attempts at a repetition: supervisor, start, end, outcome and reason. A lost one is queued again."""
+    """List the attempts at a repetition: supervisor, start, end, outcome, reason. A lost repetition is queued again."""
     return reading.list_attempts(store, id, number)

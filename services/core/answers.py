@@ -54,7 +54,7 @@ def nothing(_: int) -> Genomes:
 
 
 class Answers:
-    """A Simulate for one step: it counts rollouts, prefetches answers and reads those of checkpoints.
+    """A Simulate for one step, which counts rollouts, prefetches answers, and reads answers from checkpoints.
 
     Args:
         simulate: the simulation.

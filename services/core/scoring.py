@@ -76,5 +76,5 @@ def simulator_weights(squared_errors: FloatArray, floor: float) -> FloatArray:
 
 
 def _weighty(fitnesses: Fitnesses, weights: FloatArray) -> Fitnesses:
-    """Return the fitnesses with 0 for simulators of weight 0: a nan of theirs would make a sum nan."""
+    """Return the fitnesses, with 0 for simulators of weight 0, because 0 times nan would be nan."""
     return fitnesses if np.all(weights > 0) else np.where(weights > 0, fitnesses, 0.0)

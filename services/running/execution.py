@@ -108,15 +108,15 @@ def claim(store: Store, owner: str, limit: int, under: Provenance | None = None)
 
 
 def record(store: Store, claim: Claim, step: Step, *, seconds: float = 0.0) -> bool:
-    """Append a step to the repetition's log, as `record_all` does, and return whether the claim still holds."""
+    """Append a step to the repetition's log, as `record_all` does, and return whether the claim is still valid."""
     return bool(record_all(store, [(claim, (TimedStep(step, seconds),))]))
 
 
 def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[Delivered]]]) -> tuple[Claim, ...]:
-    """Append steps to the logs of repetitions in one transaction, and return the claims that still hold.
+    """Append steps to the logs of repetitions in one transaction, and return the claims that are still valid.
 
     A second delivery of a step changes nothing. A checkpoint is kept until its step is recorded. Nothing is written for
-    a claim that does not hold. A claim whose experiment is being paused or stopped ends with its first new step, which
+    an invalid claim. A claim whose experiment is being paused or stopped ends with its first new step, which
     is written.
 
     Raises:

@@ -80,7 +80,7 @@ def _version(module: str) -> str:
 
 @cache
 def _distributions() -> Mapping[str, list[str]]:
-    """Return the distributions of each module; their names often differ. The look-up takes a quarter of a second."""
+    """Return the distributions of each module, whose name may differ from its own; this takes a quarter of a second."""
     return packages_distributions()
 
 

@@ -292,7 +292,7 @@ def test_a_row_without_an_end(
 @pytest.mark.parametrize(
     ("table", "change", "said"),
     [
-        ("measurement", lambda rows: [*rows, rows[0]], "there twice"),
+        ("measurement", lambda rows: [*rows, rows[0]], "occurs twice"),
         ("measurement", lambda rows: rows[1:], "not a log of 13 steps"),
         ("measurement", lambda rows: set_in(rows, 0, fitness=float("nan")), "measurement.parquet"),
         ("measurement", lambda rows: set_in(rows, 0, fitness=float("inf")), "measurement.parquet"),

@@ -81,7 +81,7 @@ class StepRows:
         return _named(key, "number") | self._columns[key]
 
     def _measured(self, connection: Connection) -> list[Row]:
-        """Return the measurements with their genomes; that of a probe may be stored with an earlier transfer."""
+        """Return the measurements with their genomes; a probe's genome may be stored with an earlier transfer."""
         probed = [key for key, kind in self._measurements if kind is MeasurementKind.PROBE]
         known = {key: self._columns[key].get("transferred_genome") for key in probed}
         known |= _transferred(connection, [key for key in probed if known[key] is None])
