@@ -2,7 +2,6 @@
 
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise
 from typing import Generic, Protocol, TypeVar
 
@@ -77,45 +76,25 @@ class WarmScenes(Generic[S]):
             self._scenes.popitem()[1].close()
 
 
-def watch(scene: SteppedScene, advance: Callable[[int], None], motion: Motion) -> FloatArray:
-    """Run a motion; return `(t, 7)`: position and quaternion of the base at each observation, in whole time steps.
-
-    Args:
-        scene: scene at time 0.
-        advance: function that advances the scene by a number of time steps.
-        motion: motion to run; a target is commanded only when it changes.
-    """
-    return _watch(scene, advance, motion, scene.pose)
-
-
-def record(
-    scene: SteppedScene, advance: Callable[[int], None], motion: Motion, times_s: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Run a motion; return the result of `watch`, `(t, 7)`, and base and joints at other times, `(k, 7 + joints)`.
-
-    Args:
-        scene: as in `watch`.
-        advance: as in `watch`.
-        motion: as in `watch`.
-        times_s: `(k,)`, ascending, up to the last observation.
-    """
-    often = replace(motion, observe_s=np.union1d(motion.observe_s, times_s))
-    seen = _watch(scene, advance, often, lambda: np.append(scene.pose(), scene.angles()))
-    observed, recorded = (np.searchsorted(often.observe_s, times) for times in (motion.observe_s, times_s))
-    return seen[observed, :7], seen[recorded]
-
-
 def recording(motion: Motion, times_s: FloatArray, poses: FloatArray, seen: FloatArray) -> Recording:
-    """Return a Recording of the poses from `record`; all nan if they are implausible."""
+    """Return a Recording of poses `(t, 7)` and of base and joints `(k, 7 + joints)`; all nan if implausible."""
     if not plausible(poses):
         poses, seen = np.full_like(poses, np.nan), np.full_like(seen, np.nan)
     trajectory = Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
     return Recording(trajectory, times_s, seen[:, :7], seen[:, 7:])
 
 
-def _watch(
+def watch(
     scene: SteppedScene, advance: Callable[[int], None], motion: Motion, look: Callable[[], FloatArray]
 ) -> FloatArray:
+    """Run a motion; return what `look` returns at each observation, `(t, ...)`, in whole time steps.
+
+    Args:
+        scene: scene at time 0.
+        advance: function that advances the scene by a number of time steps.
+        motion: motion to run; a target is commanded only when it changes.
+        look: function that returns the poses of the scene.
+    """
     commands = _commands(motion, scene.world.time_step_s)
     observed = _steps(motion.observe_s, scene.world.time_step_s)
     poses: dict[int, FloatArray] = {}

@@ -1,0 +1,78 @@
+"""Base of engines that advance a scene step by step."""
+
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaplab.schemas.base import Frozen
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.world import Material, Motion, Recording, Trajectory, World
+from gaplab.services.engines.base import ALL_FIELDS, Engine
+from gaplab.services.engines.stepping import SteppedScene, WarmScenes, plausible, recording, watch
+
+Rows = NDArray[np.intp]
+S = TypeVar("S", bound=SteppedScene)
+
+
+class SteppedEngine(Engine, Generic[S]):
+    """An engine with one cached scene for each kind of world; a scene whose poses were implausible is dropped.
+
+    A subclass builds scenes and starts them.
+
+    Attributes:
+        failures: exceptions of the library that mean a numerical failure; such a rollout is nan.
+    """
+
+    honours = ALL_FIELDS
+    failures: tuple[type[Exception], ...] = ()
+
+    def __init__(self, options: Frozen | None = None) -> None:
+        super().__init__(options)
+        self._scenes = WarmScenes(self._build)
+
+    @abstractmethod
+    def _build(self, world: World) -> S:
+        """Build the scene of a world."""
+
+    @abstractmethod
+    def _start(self, scene: S, material: Material) -> Callable[[int], None]:
+        """Set a scene to time 0 in a material; return the function that advances it by a number of time steps."""
+
+    @classmethod
+    def runs(cls, world: World) -> bool:
+        """Return whether the world has bodies."""
+        return bool(world.bodies)
+
+    def rollout(self, world: World, motion: Motion) -> Trajectory:
+        """Return the trajectory of the base, `(t, 3)`; times are rounded to whole time steps."""
+        poses = self._run(world, motion, slice(None), with_angles=False)
+        return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
+
+    def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
+        """Return the same rollout with joint angles."""
+        often = replace(motion, observe_s=np.union1d(motion.observe_s, times_s))
+        observed, recorded = (np.searchsorted(often.observe_s, times) for times in (motion.observe_s, times_s))
+        seen = self._run(world, often, observed, with_angles=True)
+        return recording(motion, times_s, seen[observed, :7], seen[recorded])
+
+    def close(self) -> None:
+        """Close all scenes."""
+        self._scenes.close()
+
+    def _run(self, world: World, motion: Motion, checked: slice | Rows, *, with_angles: bool) -> FloatArray:
+        """Return `(t, 7)`, or `(t, 7 + joints)` with angles; nan if the poses of the checked rows are implausible."""
+        bare = replace(world, material=Material())
+        scene = self._scenes[bare]
+        look = (lambda: np.append(scene.pose(), scene.angles())) if with_angles else scene.pose
+        try:
+            seen = watch(scene, self._start(scene, world.material), motion, look)
+        except self.failures:
+            seen = np.full((len(motion.observe_s), 7 + with_angles * len(world.joints)), np.nan)
+        if not plausible(seen[checked, :7]):
+            self._scenes.drop(bare)  # nan persists in a PhysX scene; Bullet drops bodies that are too far away
+            return np.full_like(seen, np.nan)
+        return seen
