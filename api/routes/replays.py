@@ -27,8 +27,8 @@ class ReplayQuery(Parameters):
         default=None,
         ge=0,
         le=1_000_000,
-        description="iteration whose best simulator replays the controller; left out: the one that the controller was "
-        "evolved in, which for a sample is that of the previous iteration",
+        description="iteration whose best simulator replays the controller; left out: the same iteration for a "
+        "transferred controller, the one before for a sample",
     )
 
 

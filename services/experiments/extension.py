@@ -49,7 +49,7 @@ def extend_experiment(
     unfinished = (row.experiment_id == experiment_id) & (row.iterations_done < extent.iterations)
     if not move(session, row, unfinished, State.QUEUED, losses=0) and total == present:
         msg = f"experiment {experiment_id!r} has {spec.iterations} iterations and {total} repetitions already"
-        raise Conflict(f"{msg}, and all are complete: ask for larger totals")
+        raise Conflict(f"{msg}, and none of these is left to run: ask for larger totals")
     insert_repetitions(session, experiment_id, range(present, total))
     experiment.spec = experiment.spec | {"iterations": spec.iterations, "repetitions": total}
     experiment.iterations, experiment.rollouts = extent.iterations, extent.rollouts
