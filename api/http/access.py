@@ -66,8 +66,8 @@ class Access:
         caller = authenticate(request.app.state.store, token, required=self._required)
         if caller.token is None and self._checks_host:
             _refuse_other_sites(request)
-        reads = request.method in READING or request.scope["path"] in ASKING
-        demand(caller, Role.READER if reads else Role.RUNNER, f"{request.method} here")
+        only_reads = request.method in READING or request.scope["path"] in ASKING
+        demand(caller, Role.READER if only_reads else Role.RUNNER, f"{request.method} here")
         return caller
 
 

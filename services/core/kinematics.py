@@ -65,8 +65,8 @@ def product(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.concatenate([w * u + s * v + np.cross(v, u), w * s - np.sum(v * u, axis=-1, keepdims=True)], axis=-1)
 
 
-def rotated(turns: FloatArray, vector: FloatArray) -> FloatArray:
+def rotated(rotations: FloatArray, vector: FloatArray) -> FloatArray:
     """Return `(..., 3)`: the vector `(3,)` rotated by `(..., 4)`."""
-    v, w = turns[..., :3], turns[..., 3:]
+    v, w = rotations[..., :3], rotations[..., 3:]
     across = 2 * np.cross(v, vector)
     return np.asarray(vector + w * across + np.cross(v, across))
