@@ -78,5 +78,37 @@ class TimedStep:
     seconds: float
 
 
+@dataclass(frozen=True)
+class Pulse:
+    """A sign of life of a worker, while it has nothing else to deliver.
+
+    Attributes:
+        step: place of the running step in the log.
+        measuring: whether reality is being asked.
+        idle_s: seconds since a rollout or a step ended.
+        step_s: seconds of work in this step so far.
+    """
+
+    step: int
+    measuring: bool
+    idle_s: float
+    step_s: float
+
+
+@dataclass(frozen=True)
+class Failure:
+    """The reason why a worker cannot continue a repetition.
+
+    Attributes:
+        reason: text that everybody may see at any time.
+        hidden: the reason with the message of reality's code, which may name hidden parameters.
+        of_reality: whether the code of reality raised it.
+    """
+
+    reason: str
+    hidden: str | None = None
+    of_reality: bool = False
+
+
 Delivered: TypeAlias = TimedStep | Checkpoint
-"""A delivery of a worker."""
+"""A delivery of a worker, to be stored."""

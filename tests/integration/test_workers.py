@@ -26,8 +26,8 @@ from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import CheckpointRow, RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
-from gaplab.workers import repetitions as task
 from gaplab.workers import sensitivity as checking
+from gaplab.workers import task
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
