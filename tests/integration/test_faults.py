@@ -138,7 +138,9 @@ def computed(spec: ExperimentSpec) -> dict[int, Any]:
         (Unsendable(), "its message cannot be shown"),
     ],
 )
-def test_a_strategy_that_lies_fails_alone_and_is_named(store: Store, monkeypatch: Any, answer: Any, reason: str) -> None:
+def test_a_strategy_that_lies_fails_alone_and_is_named(
+    store: Store, monkeypatch: Any, answer: Any, reason: str
+) -> None:
     monkeypatch.setattr(Liar, "answer", staticmethod(answer) if callable(answer) else answer)
     lying = submission.submit_experiment(store, small(strategy="liar")).id
     honest = submission.submit_experiment(store, small()).id
