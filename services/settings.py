@@ -78,6 +78,7 @@ class Limits(_Environment):
         rollouts: the same, of all tokens.
         streams_per_token: of events, open at once at one API process; a request that waits for events is one.
         streams: the same, of all tokens.
+        requests: served at once by one API process; fewer if it may open fewer than twice as many files.
     """
 
     model_config = SettingsConfigDict(env_prefix="GAPLAB_MAX_")
@@ -91,6 +92,7 @@ class Limits(_Environment):
     rollouts: PositiveInt = 1_000_000_000_000
     streams_per_token: PositiveInt = 20
     streams: PositiveInt = 200
+    requests: PositiveInt = 1_000
 
 
 def address(host: str, port: int) -> str:
