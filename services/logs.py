@@ -20,6 +20,7 @@ _NAME = r"(?<![\w-])(?=[\w-]*(?:token|password|passwd|secret|api_?key))[\w-]*+"
 """Matched once a word, and then takes the whole word: a request's address may be one very long word."""
 
 _SECRETS = (
+    (re.compile(r"(?i)\bgaplab_[a-z0-9]{1,32}_[0-9a-f]{8,}"), f"gaplab_{HIDDEN}"),
     (re.compile(r"(?i)(authorization\W{1,6})(?:(?:bearer|basic|token)\s+)?[^\s'\",;)}\]]+"), rf"\1{HIDDEN}"),
     (re.compile(r"(?i)\b(bearer|basic)\s+[\w.~+/=-]{6,}"), rf"\1 {HIDDEN}"),
     (re.compile(rf"(?i)({_NAME}['\"]?\s?[=:]\s?['\"]?)[^\s&'\",;)}}\]]+"), rf"\1{HIDDEN}"),
