@@ -32,6 +32,7 @@ _REQUEST = ("method", "path", "status")
 
 _ACCESS = "uvicorn.access"
 _REPEATING, _MOST_ALIKE, _WINDOW_S = {"asyncio", "uvicorn.error"}, 5, 60.0
+_LONGEST = 1_000_000
 _PROBES = {"/livez", "/readyz", "/metrics"}
 _EXPERIMENT = re.compile(r"^/experiments/([\w-]{1,64})")
 
@@ -57,7 +58,9 @@ def adopt(name: str) -> None:
 
 
 def without_secrets(text: str) -> str:
-    """Return the text without what looks like a secret."""
+    """Return the text without what looks like a secret; a very long text is cut, which would take minutes to search."""
+    if len(text) > _LONGEST:
+        text = f"{text[:_LONGEST]}… ({len(text) - _LONGEST:,} more characters were not logged)"
     for pattern, replacement in _SECRETS:
         text = pattern.sub(replacement, text)
     return text

@@ -30,6 +30,7 @@ from gaplab.services.core.errors import (
     Unauthenticated,
     Violation,
 )
+from gaplab.services.store.texts import brief
 
 Responses = dict[int | str, dict[str, Any]]
 """Documented responses of an endpoint, by status, as FastAPI takes them."""
@@ -89,7 +90,7 @@ def response(problem: Problem, headers: dict[str, str] | None = None) -> JSONRes
 def problem(status: int, kind: str, title: str, detail: str, errors: Sequence[SpecError] = ()) -> Problem:
     """Return a problem with at most `MOST_ERRORS` errors."""
     name = f"urn:gaplab:problem:{kind}"
-    return Problem(type=name, title=title, status=status, detail=detail, errors=tuple(errors[:MOST_ERRORS]))
+    return Problem(type=name, title=title, status=status, detail=brief(detail), errors=tuple(errors[:MOST_ERRORS]))
 
 
 def documented(*statuses: int) -> Responses:
@@ -132,7 +133,7 @@ def _spec_error(violation: Violation) -> SpecError:
     return SpecError(
         pointer=violation.pointer,
         value=finite(violation.value),
-        message=violation.message,
+        message=brief(violation.message),
         permitted=permitted if isinstance(permitted, str | None) else tuple(permitted),
         nearest=violation.nearest,
     )

@@ -8,7 +8,6 @@ import uvicorn
 from fastapi import FastAPI
 
 from gaplab.api.app import create_app
-from gaplab.api.http.limits import SPARE, most_requests
 from gaplab.api.process.connections import TimedConnection
 from gaplab.api.process.errors import CommandError
 from gaplab.services.access import demand_token_beyond_loopback
@@ -80,7 +79,7 @@ class Server(uvicorn.Server):
         config = uvicorn.Config(
             app,
             http=TimedConnection,
-            limit_concurrency=most_requests(app.state.limits) + SPARE,
+            limit_concurrency=app.state.connections,
             backlog=BACKLOG,
             log_config=None,
             server_header=False,

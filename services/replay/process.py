@@ -13,16 +13,14 @@ from typing import Any, TypeAlias, TypeVar
 
 from cachetools import LRUCache
 
-from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
+from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable
 from gaplab.services.plugins import folders
+from gaplab.services.waiting_line import WaitingLine
 
 T = TypeVar("T")
 
 LONGEST_S = 120.0
 """Time limit of one call, after which its process is killed. The first call of a process loads all libraries."""
-
-QUEUE_S = 20.0
-"""Time limit of the wait for earlier calls."""
 
 NICENESS = 10
 """Replays and predictions yield the processor to the service."""
@@ -65,16 +63,16 @@ class RolloutProcess:
 
     Args:
         longest_s: time limit of one call.
-        queue_s: time limit of the wait for earlier calls.
+        line: of callers.
 
     Attributes:
         answers: a cache for the callers.
     """
 
-    def __init__(self, longest_s: float = LONGEST_S, queue_s: float = QUEUE_S) -> None:
+    def __init__(self, longest_s: float = LONGEST_S, line: WaitingLine | None = None) -> None:
         self.answers = AnswerCache()
-        self._longest_s, self._queue_s = longest_s, queue_s
-        self._lock = Lock()
+        self._longest_s = longest_s
+        self._line = line or WaitingLine("replays and predictions")
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
         self._closed = False
@@ -94,23 +92,18 @@ class RolloutProcess:
         Raises:
             EngineInterrupted: the process died or took too long, or `close` was called.
             EngineUnavailable: the library of an engine is not installed.
-            LimitReached: earlier calls took too long.
+            LimitReached: too many callers wait, or earlier calls took too long.
             RuntimeError: the function raised another error; the message quotes it.
         """
-        if not self._lock.acquire(timeout=self._queue_s):
-            msg = f"other replays and predictions have been computed for {self._queue_s:g} s; try again soon"
-            raise LimitReached(msg, retry_after_s=5)
-        try:
+        with self._line.turn():
             return self._call(function, arguments)
-        finally:
-            self._lock.release()
 
     def close(self) -> None:
         """Kill the process, even in the middle of a call; later calls are refused."""
         self._closed = True
         if (process := self._process) is not None:
             process.kill()
-        with self._lock:
+        with self._line.lock:
             self._discard()
 
     def _discard(self) -> None:

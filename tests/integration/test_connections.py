@@ -18,7 +18,7 @@ import pytest
 from fastapi import FastAPI, Request
 
 from gaplab.api.http.limits import SPARE, RequestLimit, most_requests
-from gaplab.api.process import connections, server
+from gaplab.api.process import connections
 from gaplab.api.process.server import Server, listen
 from gaplab.services.logs import Repeats
 from gaplab.services.settings import Limits
@@ -97,14 +97,15 @@ def test_more_half_sent_requests_than_files_leave_the_service_alive_and_its_log_
 
 
 @contextmanager
-def serving(app: FastAPI) -> Iterator[int]:
+def serving(app: FastAPI, most: int = 100) -> Iterator[int]:
     """The port of a service of this app in a thread."""
 
     class Feed:
         def close(self) -> None:
             """Close nothing."""
 
-    app.state.limits, app.state.feed, app.state.rollout_process = Limits(), Feed(), Feed()
+    app.state.feed = app.state.rollout_process = Feed()
+    app.state.connections = most
     listener = listen("127.0.0.1", 0)
     served = Server(app)
     thread = threading.Thread(target=served.run, args=([listener],))
@@ -181,11 +182,8 @@ def test_a_client_that_takes_no_answer_is_disconnected(app: FastAPI, monkeypatch
         assert 0 < len(rest(connection)) < 50_000_000
 
 
-def test_a_new_connection_takes_the_place_of_the_one_that_waited_longest(
-    app: FastAPI, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(server, "most_requests", lambda _: 3 - SPARE)
-    with serving(app) as port, ExitStack() as stack:
+def test_a_new_connection_takes_the_place_of_the_one_that_waited_longest(app: FastAPI) -> None:
+    with serving(app, most=3) as port, ExitStack() as stack:
         waiting = [stack.enter_context(sent(port, HALF)) for _ in range(4)]
 
         assert rest(waiting[0]) == b""

@@ -122,6 +122,13 @@ def test_a_very_long_word_is_looked_through_in_no_time(word: str) -> None:
     assert SECRET not in found
 
 
+def test_a_message_of_any_length_is_logged_in_little_time_and_space() -> None:
+    said = logs.without_secrets("unstable; " * 6_000_000 + SECRET)
+
+    assert 1_000_000 < len(said) < 1_000_100
+    assert said.endswith("(59,000,016 more characters were not logged)")
+
+
 def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_carry_to_itself(tmp_path: Path) -> None:
     """The real process: every line of it is JSON, probes are left out, and no secret that it was given is in any."""
     log = tmp_path / "log"
