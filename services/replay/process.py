@@ -8,13 +8,14 @@ from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from threading import Lock
+from threading import Lock, Thread
 from typing import Any, TypeAlias, TypeVar
 
 from cachetools import LRUCache
 
 from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable
 from gaplab.services.plugins import folders
+from gaplab.services.store.texts import brief
 from gaplab.services.waiting_line import WaitingLine
 
 T = TypeVar("T")
@@ -27,6 +28,9 @@ NICENESS = 10
 
 MOST_BYTES = 50_000_000
 """Memory for cached answers."""
+
+MOST_OUTPUT = 10_000
+"""Bytes of what a call prints that are logged: a plug-in may print without end."""
 
 Key: TypeAlias = tuple[str | int | None, ...]
 
@@ -76,6 +80,7 @@ class RolloutProcess:
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
         self._closed = False
+        self._unlogged = 0
 
     @property
     def pid(self) -> int | None:
@@ -116,6 +121,7 @@ class RolloutProcess:
     def _call(self, function: Callable[..., T], arguments: tuple[Any, ...]) -> T:
         try:
             pipe = self._started()
+            self._unlogged = MOST_OUTPUT
             pipe.send((function, arguments))
             if not pipe.poll(self._longest_s):
                 raise TimeoutError
@@ -139,15 +145,29 @@ class RolloutProcess:
         if self._pipe is None:
             context = get_context("spawn")
             ours, theirs = context.Pipe()
-            process = context.Process(target=_serve, args=(theirs,), name="rollouts", daemon=True)
+            printed, output = context.Pipe(duplex=False)
+            process = context.Process(target=_serve, args=(theirs, output), name="rollouts", daemon=True)
             process.start()  # if this raises, the next call tries again
             theirs.close()
+            output.close()
+            Thread(target=self._log_output, args=(printed,), name="output of rollouts", daemon=True).start()
             self._process, self._pipe = process, ours
         return self._pipe
 
+    def _log_output(self, printed: Connection) -> None:
+        """Log the beginning of what each call prints, until the process ends."""
+        with printed:
+            while part := os.read(printed.fileno(), 2**16):
+                kept, self._unlogged = part[: self._unlogged], max(0, self._unlogged - len(part))
+                if kept:
+                    rest = "" if self._unlogged else " (no more of this call is logged)"
+                    log.info("printed by a rollout: %s%s", kept.decode(errors="replace"), rest)
 
-def _serve(pipe: Connection) -> None:
-    """Execute calls until the other end of the pipe closes."""
+
+def _serve(pipe: Connection, output: Connection) -> None:
+    """Execute calls until the other end of the pipe closes, and write what they print to `output`."""
+    for descriptor in (1, 2):
+        os.dup2(output.fileno(), descriptor)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which closes the pipe
     os.nice(NICENESS)
     folders.find()
@@ -157,5 +177,6 @@ def _serve(pipe: Connection) -> None:
             try:
                 answer = (True, function(*arguments))
             except Exception as error:  # noqa: BLE001 - the caller raises it
-                answer = (False, (type(error).__name__, str(error)))
+                answer = (False, (type(error).__name__, brief(str(error))))
+            print(end="", flush=True)  # noqa: T201 - what the call printed
             pipe.send(answer)

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
-from gaplab.services.replay.process import NICENESS, AnswerCache, RolloutProcess
+from gaplab.services.replay.process import MOST_OUTPUT, NICENESS, AnswerCache, RolloutProcess
 from gaplab.services.waiting_line import WaitingLine
 
 DEADLINE_S = 120.0
@@ -109,6 +109,26 @@ def test_an_error_of_the_function_reaches_the_caller_and_the_process_goes_on(rol
 
 def _unavailable() -> None:
     raise EngineUnavailable("pip install it")
+
+
+def test_of_what_a_call_prints_the_beginning_is_logged(rollouts: Any, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO")
+
+    for word in ("first", "second"):
+        assert rollouts.call(_print, word) == word
+        wait_until(lambda word=word: f"{word} to stderr" in caplog.text)
+    assert rollouts.call(os.write, 1, b"x" * 10_000_000) == 10_000_000
+    wait_until(lambda: "no more of this call is logged" in caplog.text)
+
+    assert "first to stdout" in caplog.text
+    assert len(caplog.text) < 3 * MOST_OUTPUT
+
+
+def _print(word: str) -> str:
+    sys.stdout.write(f"{word} to stdout\n")
+    sys.stdout.flush()
+    sys.stderr.write(f"{word} to stderr\n")
+    return word
 
 
 def test_a_call_that_waits_too_long_for_others_is_refused() -> None:
