@@ -66,7 +66,9 @@ class ExperimentRead(Frozen):
     best_fitness: Statistic = Field(
         default=None, description="best recorded fitness of each repetition so far, averaged over repetitions"
     )
-    reasons: tuple[str, ...] = Field(default=(), description="distinct reasons of failed repetitions")
+    reasons: tuple[str, ...] = Field(
+        default=(), description="why it was paused, if not by a person; then the distinct reasons of failed repetitions"
+    )
     sensitivity: Id | None = Field(default=None, description="id of the sensitivity check")
     warnings: tuple[str, ...] = Field(
         default=(), description="findings of the sensitivity check, and versions that prevent continuing"
@@ -98,6 +100,7 @@ class RepetitionRead(Frozen):
     rollouts_done: int
     attempts: int
     error: str | None = Field(default=None, examples=["the engine pybullet is not installed"])
+    measuring_at: Moment | None = Field(default=None, description="since when it waits for reality's answer")
     started_at: Moment | None = None
     ended_at: Moment | None = None
 

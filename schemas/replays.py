@@ -74,4 +74,6 @@ class Replay(Frozen):
     times_s: tuple[float, ...] = Field(description="times of the frames, up to 20 s", examples=[(0.0, 0.02)])
     counted_s: Interval = Field(description="interval in which movement counts for fitness", examples=[(0.5, 3.0)])
     simulation: ReplayWorld | None = Field(description="null: the controller evolved in reality itself")
-    reality: ReplayWorld | None = Field(description="null: reality's parameters are unknown here")
+    reality: ReplayWorld | None = Field(
+        description="null: reality's parameters are unknown here, or reality is hardware, which no replay moves"
+    )

@@ -47,6 +47,9 @@ class Settings(_Environment):
         ray_address: of an existing cluster; None starts Ray on this machine. `GAPLAB_RAY_ADDRESS`.
         workers: cores of gaplab's own Ray, or repetitions at once on a cluster; None is all cores. `GAPLAB_WORKERS`.
         lease_s: seconds of silence after which a supervisor's work goes to others. `GAPLAB_LEASE_S`; 30.
+        rollout_limit_s: seconds that a rollout may take before its process is ended; a measurement by hardware has no
+            limit. `GAPLAB_ROLLOUT_LIMIT_S`; 60.
+        step_limit_s: seconds of work that a step may take before its process is ended. `GAPLAB_STEP_LIMIT_S`; a week.
         host: that the API binds. `GAPLAB_HOST`; loopback.
         port: that the API binds. `GAPLAB_PORT`; 8000.
         url: where the command finds the service. `GAPLAB_URL`; host and port.
@@ -57,6 +60,8 @@ class Settings(_Environment):
     ray_address: str | None = None
     workers: PositiveInt | None = None
     lease_s: PositiveInt = 30
+    rollout_limit_s: PositiveInt = 60
+    step_limit_s: PositiveInt = 604_800
     host: str = "127.0.0.1"
     port: PositiveInt = 8000
     url: str = Field(default_factory=lambda given: address(given["host"], given["port"]))

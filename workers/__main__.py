@@ -19,6 +19,7 @@ def serve(settings: Settings) -> int:
     """Work until SIGTERM or SIGINT; return 1 if there is no cluster to work on."""
     choose_authentication(settings)
     from gaplab.workers.cluster import cluster  # Ray takes a second to import
+    from gaplab.workers.patience import Patience
     from gaplab.workers.supervisor import Supervisor
 
     logs.adopt("ray")
@@ -29,7 +30,11 @@ def serve(settings: Settings) -> int:
             for signum in (signal.SIGTERM, signal.SIGINT):  # only now, for Ray has put handlers of its own in place
                 signal.signal(signum, lambda *_: stop.set())
             logging.getLogger("gaplab.supervisor").info("ready for %d repetitions at once", joined.capacity())
-            Supervisor(store, joined.capacity, joined.versions, lease_s=settings.lease_s).serve(stop)
+            patience = Patience(settings.rollout_limit_s, settings.step_limit_s)
+            supervisor = Supervisor(
+                store, joined.capacity, joined.versions, lease_s=settings.lease_s, patience=patience
+            )
+            supervisor.serve(stop)
     except ClusterUnusable as error:
         sys.stderr.write(f"{error}\n")
         return 1

@@ -5,10 +5,10 @@ import sys
 from typing import TextIO
 
 ROTATION = {"RAY_ROTATION_MAX_BYTES": "1000000", "RAY_ROTATION_BACKUP_COUNT": "1"}
-"""Settings of a Ray of our own: for each process and stream it keeps the last one to two million bytes."""
+"""Settings of a Ray of our own: for each process and stream it keeps the last million bytes or two."""
 
-LONGEST = 10_000
-"""Characters of one call of `print`: Ray never cuts a line."""
+LONGEST = 1_000_000
+"""Characters of what is printed at once: Ray never cuts a line."""
 
 
 def limit_files() -> None:

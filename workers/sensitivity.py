@@ -2,6 +2,7 @@
 
 import logging
 from time import monotonic
+from typing import TypeAlias
 
 import ray
 from ray import ObjectRef
@@ -12,22 +13,28 @@ from gaplab.services.core.errors import ClusterUnusable
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort
 from gaplab.services.core.sensitivity import check as check_tunables
+from gaplab.services.plugins.blame import describe
 from gaplab.services.running import sensitivity
 from gaplab.services.running.execution import STALE_AFTER_S
 from gaplab.services.running.sensitivity import CheckClaim
 from gaplab.services.specs.assembly import subject
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from gaplab.workers.nodes import Versions, check_here
+from gaplab.workers.patience import Patience
+from gaplab.workers.task import told
 
 LOOK_S = 0.2
 """Shortest time between two looks for a queued check."""
+
+Result: TypeAlias = "ObjectRef[tuple[Sensitivity, ...] | Failure]"
 
 log = logging.getLogger("gaplab.supervisor")
 
 
 @ray.remote(num_cpus=0, max_retries=0)
-def check(checked: Checked, expected: Versions) -> tuple[Sensitivity, ...]:
-    """Return the effect of each tunable on fitness.
+def check(checked: Checked, expected: Versions) -> tuple[Sensitivity, ...] | Failure:
+    """Return the effect of each tunable on fitness, or why it cannot be told.
 
     The task reserves no core: it takes seconds, and its result is useful before hours of physics, not after them.
 
@@ -35,7 +42,10 @@ def check(checked: Checked, expected: Versions) -> tuple[Sensitivity, ...]:
         ClusterUnusable: this node lacks the expected versions.
     """
     check_here(expected)
-    return check_tunables(subject(checked), SteadyState(), Effort(checked.points, checked.evaluations))
+    try:
+        return check_tunables(subject(checked), SteadyState(), Effort(checked.points, checked.evaluations))
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - a plug-in may raise anything
+        return Failure(describe(error))
 
 
 class Checks:
@@ -46,18 +56,26 @@ class Checks:
         owner: the supervisor's name in it.
         lease_s: silence after which the holder of a check loses it to others.
         versions: that a node must have to run them.
+        patience: how long work may take.
 
     All methods raise StoreUnavailable; nothing is lost by it.
     """
 
     def __init__(
-        self, store: Store, owner: str, lease_s: float = STALE_AFTER_S, versions: Versions | None = None
+        self,
+        store: Store,
+        owner: str,
+        lease_s: float = STALE_AFTER_S,
+        versions: Versions | None = None,
+        patience: Patience | None = None,
     ) -> None:
         self._store = store
         self._owner = owner
         self._lease_s = lease_s
         self._versions = versions or {}
-        self._run: tuple[CheckClaim, ObjectRef[tuple[Sensitivity, ...]]] | None = None
+        self._patience = patience or Patience()
+        self._run: tuple[CheckClaim, Result] | None = None
+        self._begun = 0.0
         self._looked = -LOOK_S
 
     def step(self) -> None:
@@ -87,20 +105,33 @@ class Checks:
 
     def _claim(self) -> None:
         if (claim := sensitivity.claim(self._store, self._owner)) is not None:
-            self._run = claim, check.remote(claim.spec, self._versions)
+            self._run, self._begun = (claim, check.remote(claim.spec, self._versions)), monotonic()
 
-    def _end(self, claim: CheckClaim, result: "ObjectRef[tuple[Sensitivity, ...]]") -> None:
+    def _end(self, claim: CheckClaim, result: Result) -> None:
         if not ray.wait([result], timeout=0)[0]:
+            self._end_hung(claim, result)
             return
         try:
-            tunables: tuple[Sensitivity, ...] = ray.get(result)
-            sensitivity.complete(self._store, claim, tunables)
+            found: tuple[Sensitivity, ...] | Failure = ray.get(result)
+            if isinstance(found, Failure):
+                self._fail(claim, found.reason)
+            else:
+                sensitivity.complete(self._store, claim, found)
         except RayTaskError as error:
             if isinstance(error.cause, ClusterUnusable):
                 raise error.cause from error
-            sensitivity.fail(self._store, claim, f"{type(error.cause).__name__}: {error.cause}")
-            log.error("sensitivity check %s: failed: %s", claim.id, error.cause)
+            self._fail(claim, told(error))
         except RayError as error:
             sensitivity.release(self._store, claim, f"the worker was lost: {type(error).__name__}")
             log.warning("sensitivity check %s: queued again: %s", claim.id, type(error).__name__)
         self._run = None
+
+    def _end_hung(self, claim: CheckClaim, result: Result) -> None:
+        if monotonic() - self._begun > self._patience.check_s:
+            ray.cancel(result, force=True)
+            self._fail(claim, f"it took more than {self._patience.check_s:g} s; its rollouts hang, or are very slow")
+            self._run = None
+
+    def _fail(self, claim: CheckClaim, reason: str) -> None:
+        sensitivity.fail(self._store, claim, reason)
+        log.error("sensitivity check %s: failed: %s", claim.id, reason)

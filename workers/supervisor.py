@@ -17,6 +17,7 @@ from gaplab.services.running import execution, supervisors
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.nodes import Versions
+from gaplab.workers.patience import Patience
 from gaplab.workers.repetitions import Repetitions
 from gaplab.workers.sensitivity import Checks
 
@@ -41,6 +42,7 @@ class Supervisor:
         versions: that a node must have to run them.
         checkpoint_s: seconds between the checkpoints of a long step.
         lease_s: silence after which a supervisor's work goes to others; the same for all supervisors.
+        patience: how long work may take; default: that of the default settings.
     """
 
     def __init__(
@@ -51,12 +53,13 @@ class Supervisor:
         *,
         checkpoint_s: float = CHECKPOINT_S,
         lease_s: float = execution.STALE_AFTER_S,
+        patience: Patience | None = None,
     ) -> None:
         self._store = store
         self._capacity = capacity
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
-        self._repetitions = Repetitions(store, self._owner, versions or {}, checkpoint_s)
-        self._checks = Checks(store, self._owner, lease_s, versions)
+        self._repetitions = Repetitions(store, self._owner, versions or {}, checkpoint_s, patience, lease_s)
+        self._checks = Checks(store, self._owner, lease_s, versions, patience)
         self._lease_s = lease_s
         self._beat = -lease_s
 

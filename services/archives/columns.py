@@ -44,12 +44,18 @@ COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
         "sensitivity_id": "names a check of one service",
         "running": "counts leases, and an archive has none",
         "claimable": "follows from the states of repetitions",
+        "paused_because": "is about work that goes on, and an archive has none",
+        "hardware": "names hardware of one laboratory; it follows from the spec",
     },
     "repetition": {
         "checkpoints": "counts checkpoints, which are left out",
         "owner": "names a machine and a process there",
         "heartbeat_at": "belongs to a lease, and an archive has none",
+        "hardware": "belongs to a lease, and an archive has none",
+        "measuring_at": "belongs to a lease, and an archive has none",
+        "hidden_error": "may name hidden parameters",
     },
+    "attempt": {"hidden_reason": "may name hidden parameters"},
 }
 """Columns of exported tables, each with the reason."""
 

@@ -22,6 +22,8 @@ from gaplab.services.archives.logs import check_logs
 from gaplab.services.archives.opening import OpenedArchive, open_archive
 from gaplab.services.core.errors import Conflict, InvalidArchive
 from gaplab.services.experiments.states import settle
+from gaplab.services.specs.hardware import hardware_of
+from gaplab.services.specs.resolution import spec_of
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import archives
 from gaplab.services.store.queries.events import note
@@ -110,6 +112,7 @@ def _arriving(table: str, row: Row, arrival: Arrival) -> Row:
         return row | {"id": arrival.study}
     if table == "experiment":
         row |= {"spec": arrival.specs[row["id"]], "id": arrival.ids[row["id"]], "study_id": arrival.study}
+        row["hardware"] = hardware_of(spec_of(row["spec"]))
     for name in {EXPERIMENT, "experiment_id"} & set(row):
         row[name] = arrival.ids[row[name]]
     if table in {"experiment", "repetition"} and not State(row["state"]).ended:

@@ -14,7 +14,9 @@
     ├── InvalidArchive       a file is not an archive of gaplab, or is damaged or malicious
     ├── Unsupported          the request needs another kind of database
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
-    ├── PluginBroken         an external plug-in file is unusable
+    ├── PluginBroken         an external plug-in file is unusable, or a plug-in breaks its contract
+    ├── RealityFailed        the code of reality raised an error
+    ├── TryAgain             a fault that may pass: the step is repeated after a pause
     └── EngineError
         ├── EngineUnavailable    the engine's library is not installed
         └── EngineInterrupted    the process died, or exceeded its time
@@ -123,6 +125,14 @@ class ClusterUnusable(GaplabError):
 
 class PluginBroken(GaplabError):
     """A plug-in file is unusable; the message says which, and why."""
+
+
+class RealityFailed(GaplabError):
+    """The code of reality raised the error that is this one's cause; its message may name hidden parameters."""
+
+
+class TryAgain(GaplabError):
+    """A plug-in raises it for a fault that may pass by itself, like a lost connection; the step is then repeated."""
 
 
 class EngineError(GaplabError):

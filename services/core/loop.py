@@ -152,7 +152,8 @@ def _select(setting: Setting, history: History, iteration: int, answers: Answers
         return Selected(iteration, history.transferred, Cost(saved=searched))
     belief = Belief(setting.genomes, setting.known, history.samples, history.simulators)
     search = _search(setting, answers, belief.parameters, setting.stream(iteration, "search"))
-    genome = setting.strategy.select(belief, search, setting.stream(iteration, "select"))
+    selected = setting.strategy.select(belief, search, setting.stream(iteration, "select"))
+    genome = setting.genomes.check(selected, f"strategy {setting.strategy.name!r}")
     return Selected(iteration, genome, answers.cost_of(searched))
 
 
@@ -192,6 +193,8 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
         return Tuned(iteration, draw_simulators(setting.parameters, ensemble, rng), Cost(saved=budget))
     optimizer = setting.optimizer.diverse(ensemble) if ensemble > 1 else setting.optimizer
     found = tune(Misfit(answers, samples), setting.parameters, optimizer, evaluations, rng)
+    for simulator in found[:ensemble]:
+        setting.parameters.check(simulator.parameters, f"optimizer {setting.optimizer.name!r}")
     return Tuned(iteration, found[:ensemble], answers.cost_of(budget))
 
 
@@ -207,7 +210,8 @@ def _transfer(setting: Setting, history: History, iteration: int, answers: Answe
     )
     fitness = float(found.fitness[0]) if np.isfinite(found.fitness[0]) else float("nan")
     cost = answers.cost_of(setting.budget.controller_evaluations)
-    return Transferred(iteration, found.genomes[0], fitness, cost)
+    genome = setting.genomes.check(found.genomes[0], f"optimizer {setting.optimizer.name!r}")
+    return Transferred(iteration, genome, fitness, cost)
 
 
 def _probe(setting: Setting, history: History, iteration: int, genome: Genome) -> Probed:

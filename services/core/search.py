@@ -10,6 +10,7 @@ from numpy.random import Generator
 
 from gaplab.services.core.answers import Following
 from gaplab.services.core.arrays import FloatArray, Genomes
+from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.optimizers.base import Optimizer, Population
 from gaplab.services.core.types import Space
 
@@ -63,6 +64,8 @@ def maximise(optimizer: Optimizer, space: Space, evaluate: Evaluate, evaluations
     known: dict[bytes, float] = {}
     while evaluations > 0:
         genomes = optimizer.ask(state, rng)[:evaluations]
+        if not len(genomes):
+            raise PluginBroken(f"optimizer {optimizer.name!r} asks for no genome although {evaluations} are left")
         keys = [genome.tobytes() for genome in genomes]
         new = [index for index, key in enumerate(keys) if key not in known]
         fitness = np.array([known.get(key, np.nan) for key in keys])

@@ -13,7 +13,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.lifecycle import State
+from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.schemas.sensitivity import Checked, Sensitivity, SensitivityRead, SensitivitySpec
 from gaplab.services.core.errors import NotFound
 from gaplab.services.core.sensitivity import VERSION, Effort, warning
@@ -74,7 +74,7 @@ def read(session: Session, id: str) -> SensitivityRead:
 
 
 def queue(session: Session, spec: Checked) -> SensitivityRow:
-    """Return the check of this spec, QUEUED if it is new or had FAILED.
+    """Return the check of this spec, QUEUED if it is new, had FAILED or was CANCELLED.
 
     The row stays locked until the transaction ends: a check that ended meanwhile would not tell the experiments that
     are being submitted with it.
@@ -82,7 +82,8 @@ def queue(session: Session, spec: Checked) -> SensitivityRow:
     row, id_ = SensitivityRow, id_of(spec)
     values = {"id": id_, "spec": spec.model_dump(mode="json"), "created_at": moment(session)}
     session.execute(insert_new(session, row).values(values))
-    move(session, row, (row.id == id_) & (row.state == State.FAILED), State.QUEUED, losses=0, error=None)
+    again = (row.id == id_) & row.state.in_((State.FAILED, State.CANCELLED))
+    move(session, row, again, State.QUEUED, losses=0, error=None)
     return session.get_one(row, id_, populate_existing=True, with_for_update={"read": True})
 
 
@@ -97,6 +98,13 @@ def queue_for(session: Session, experiments: Iterable[ExperimentRow]) -> None:
     session.flush()
     if check.state.ended:
         tell(session, check, [row.id for row in tuning])
+
+
+def cancel_unneeded(session: Session, check: str | None) -> None:
+    """Cancel a check that has not ended if every experiment that it belongs to has."""
+    row, experiment = SensitivityRow, ExperimentRow
+    needed = select(experiment.sensitivity_id).where(experiment.sensitivity_id == check, experiment.state.in_(OPEN))
+    move(session, row, (row.id == check) & row.id.not_in(needed), State.CANCELLED)
 
 
 def get(session: Session, id_: str) -> SensitivityRow:

@@ -46,7 +46,8 @@ def extend_experiment(
     check_load(session, [spec], admitted, done=tally.rollouts_done + tally.rollouts_saved)
     extent, total = extent_of(spec), spec.repetitions
     present = len(repetitions_of(session, experiment_id))
-    unfinished = (row.experiment_id == experiment_id) & (row.iterations_done < extent.iterations)
+    extendable = (row.experiment_id == experiment_id) & (row.state != State.FAILED)
+    unfinished = extendable & (row.iterations_done < extent.iterations)
     if not move(session, row, unfinished, State.QUEUED, losses=0) and total == present:
         msg = f"experiment {experiment_id!r} has {spec.iterations} iterations and {total} repetitions already"
         raise Conflict(f"{msg}, and none of them is left to run; larger totals extend it")

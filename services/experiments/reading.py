@@ -13,6 +13,7 @@ from gaplab.schemas.records import (
     SimulatorRead,
     StudyRead,
 )
+from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view_experiments, view_repetition, view_studies
 from gaplab.services.store.queries import attempts, results
 from gaplab.services.store.queries.experiments import get_experiment, get_study, repetitions_of
@@ -48,8 +49,8 @@ def list_repetitions(session: Session, experiment_id: str) -> tuple[RepetitionRe
     Raises:
         NotFound: no such experiment.
     """
-    get_experiment(session, experiment_id)
-    return tuple(map(view_repetition, repetitions_of(session, experiment_id)))
+    secret = bool(hidden(session, [get_experiment(session, experiment_id)]))
+    return tuple(view_repetition(row, secret=secret) for row in repetitions_of(session, experiment_id))
 
 
 @snapshot
@@ -105,8 +106,8 @@ def list_attempts(session: Session, experiment_id: str, repetition: int) -> tupl
     Raises:
         NotFound: no such experiment, or no such repetition of it.
     """
-    get_experiment(session, experiment_id)
-    return attempts.attempts_of(session, experiment_id, repetition)
+    secret = bool(hidden(session, [get_experiment(session, experiment_id)]))
+    return attempts.attempts_of(session, experiment_id, repetition, secret=secret)
 
 
 def _next(rows: Sequence[R], limit: int, cursor_of: Callable[[R], str]) -> str | None:

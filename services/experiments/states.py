@@ -7,10 +7,10 @@ from sqlalchemy import ColumnElement, func, select, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.lifecycle import CHECK_MOVES, MOVES, State
+from gaplab.schemas.lifecycle import MOVES, State
 from gaplab.services.core.errors import Conflict
 from gaplab.services.store.clock import now
-from gaplab.services.store.models import ExperimentRow, LeasedRow, RepetitionRow, SensitivityRow
+from gaplab.services.store.models import ExperimentRow, LeasedRow, RepetitionRow
 from gaplab.services.store.queries.events import note
 
 _CLAIMABLE = (State.QUEUED, State.RUNNING)
@@ -43,8 +43,7 @@ def move(
         to: their new state.
         values: further columns to set.
     """
-    moves = CHECK_MOVES if table is SensitivityRow else MOVES
-    sources = [state for state, targets in moves.items() if to in targets]
+    sources = [state for state, targets in MOVES.items() if to in targets]
     ended_at = now() if to.ended else None
     moved = update(table).where(which, table.state.in_(sources)).values(state=to, ended_at=ended_at, **values)
     return list(session.scalars(moved.returning(table.id)))

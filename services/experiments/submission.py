@@ -10,7 +10,9 @@ from gaplab.services.experiments.checks import queue_for
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
 from gaplab.services.experiments.views import view_experiments, view_studies
+from gaplab.services.specs.hardware import hardware_of
 from gaplab.services.specs.resolution import expected_rollouts, is_direct, resolve_experiment, resolve_study
+from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries.experiments import Extent, insert_experiment, insert_study
 from gaplab.services.store.session import Session, Store
 
@@ -37,7 +39,7 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
 
     def create(session: Session) -> ExperimentRead:
         check_load(session, [resolved], admitted)
-        row = insert_experiment(session, resolved, extent_of(resolved), token=admitted.token)
+        row = _insert(session, resolved, admitted)
         queue_for(session, [row])
         return view_experiments(session, [row])[0]
 
@@ -67,14 +69,19 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
     def create(session: Session) -> StudyRead:
         check_load(session, resolved, admitted)
         study = insert_study(session, spec.name or "study")
-        rows = [
-            insert_experiment(session, each, extent_of(each), study=study, position=position, token=admitted.token)
-            for position, each in enumerate(resolved)
-        ]
+        rows = [_insert(session, each, admitted, study, position) for position, each in enumerate(resolved)]
         queue_for(session, rows)
         return view_studies(session, [study])[0]
 
     return once(store, admitted, spec, StudyRead, create)
+
+
+def _insert(
+    session: Session, spec: ResolvedSpec, admitted: Admission, study: StudyRow | None = None, position: int = 0
+) -> ExperimentRow:
+    row = insert_experiment(session, spec, extent_of(spec), study=study, position=position, token=admitted.token)
+    row.hardware = hardware_of(spec)
+    return row
 
 
 def extent_of(spec: ResolvedSpec) -> Extent:

@@ -40,9 +40,15 @@ def view_studies(session: Session, rows: Sequence[StudyRow], *, reveal: bool = F
     return tuple(_study(row, by_study[row.id], progress) for row in rows)
 
 
-def view_repetition(row: RepetitionRow) -> RepetitionRead:
-    """Return the repetition."""
-    return RepetitionRead(**{name: getattr(row, name) for name in RepetitionRead.model_fields})
+def view_repetition(row: RepetitionRow, *, secret: bool) -> RepetitionRead:
+    """Return the repetition.
+
+    Args:
+        row: the repetition.
+        secret: keep what reality's code said about an error to itself.
+    """
+    shown = RepetitionRead(**{name: getattr(row, name) for name in RepetitionRead.model_fields})
+    return shown if secret or row.hidden_error is None else shown.model_copy(update={"error": row.hidden_error})
 
 
 def state_of(states: Collection[State]) -> State:
@@ -103,7 +109,7 @@ def _experiment(
         max_parallel=row.max_parallel,
         progress=progress_of(tally),
         best_fitness=best,
-        reasons=failures,
+        reasons=(*([row.paused_because] if row.paused_because else []), *failures),
         sensitivity=check.id,
         warnings=(*check.warnings, *_version_warnings(row, tally)),
         created_at=row.created_at,

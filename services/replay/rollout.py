@@ -53,7 +53,7 @@ class ReplayRequest:
         parameters: the simulator's.
         simulated: the stored fitness in the simulator, if there is one.
         real: the stored fitness in reality.
-        known: whether the spec has the parameters of reality.
+        known: whether reality can be shown: the spec has its parameters, and it is no hardware.
     """
 
     experiment: str

@@ -8,90 +8,66 @@ All functions raise StoreUnavailable while the database cannot be used; each may
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from sqlalchemy import ColumnElement, func, select, update
+from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import ASKED, Ending, State
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.core.errors import Conflict
 from gaplab.services.core.types import Step
 from gaplab.services.experiments.states import settle
 from gaplab.services.running import provenance
 from gaplab.services.running.leases import STALE_AFTER_S as STALE_AFTER_S
-from gaplab.services.running.leases import Change, Leases
-from gaplab.services.running.turns import ahead, next_repetitions
+from gaplab.services.running.leases import Change
+from gaplab.services.running.repetition_leases import RepetitionLeases, pause
+from gaplab.services.running.turns import FREE_HARDWARE, ahead, next_repetitions
 from gaplab.services.running.versions import provenance as present_provenance
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Checkpoint as Checkpoint
 from gaplab.services.store.lease import Claim as Claim
 from gaplab.services.store.lease import Delivered as Delivered
+from gaplab.services.store.lease import Failure as Failure
 from gaplab.services.store.lease import TimedStep as TimedStep
-from gaplab.services.store.models import ExperimentRow, RepetitionRow
+from gaplab.services.store.models import AttemptRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import attempts, checkpoints, steps
 from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.queries.logs import logs
-from gaplab.services.store.session import Store
+from gaplab.services.store.session import Store, transaction
+from gaplab.services.store.statements import storable
 
-_REQUESTED_ENDINGS = {State.PAUSING: Ending.PAUSED, State.STOPPING: Ending.STOPPED}
-
-
-class _Repetitions(Leases[Claim]):
-    """Leases of repetitions: an end is told to the history and to the experiment."""
-
-    table = RepetitionRow
-
-    def end(self, session: Session, which: ColumnElement[bool], change: Change) -> list[int]:
-        """End leases as the base does; a hand-back to an experiment that is being paused or stopped is told as such.
-
-        Raises:
-            Conflict: a repetition is to be COMPLETED and iterations of it are missing.
-        """
-        row = RepetitionRow
-        held = select(row.id, row.experiment_id).where(which, row.state == State.RUNNING)
-        owners = dict(session.execute(held).all())
-        if not owners:
-            return []
-        states = lock(session, sorted(set(owners.values())))
-        if change.to is State.COMPLETED:
-            _refuse_unfinished(session, which)
-        ended: list[int] = super().end(session, which & row.id.in_(owners), change)
-        endings = {id_: _ending(change.ending, states[owners[id_]]) for id_ in ended}
-        for each in Ending:
-            if ids := [id_ for id_ in ended if endings[id_] is each]:
-                attempts.end(session, ids, each, change.reason)
-        if change.to is State.FAILED:
-            checkpoints.forget(session, ended)
-        settle(session, states)
-        return ended
-
-
-def _ending(ending: Ending, state: State) -> Ending:
-    return _REQUESTED_ENDINGS.get(state, ending) if ending is Ending.HANDED_BACK else ending
-
-
-def _refuse_unfinished(session: Session, which: ColumnElement[bool]) -> None:
-    row = RepetitionRow
-    unfinished = session.execute(
-        select(row.number, row.experiment_id, ExperimentRow.iterations - row.iterations_done)
-        .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
-        .where(which, row.state == State.RUNNING, ExperimentRow.iterations != row.iterations_done)
-    ).first()
-    if unfinished is not None:
-        number, experiment, missing = unfinished
-        msg = f"repetition {number} of {experiment!r} is not complete: {missing} iterations are missing"
-        raise Conflict(msg)
-
-
-_LEASES = _Repetitions()
+_LEASES = RepetitionLeases()
 
 heartbeat = _LEASES.heartbeat
 complete = _LEASES.complete
-fail = _LEASES.fail
 release = _LEASES.release
 hand_back = _LEASES.hand_back
 hand_back_unheard = _LEASES.hand_back_unheard
 requeue_lost = _LEASES.requeue_lost
+
+
+def fail(store: Store, claim: Claim, failure: Failure) -> bool:
+    """End a repetition as FAILED; return False if the claim no longer holds.
+
+    If reality failed, queue the repetition instead and pause its experiment: a person has to look, and then resumes.
+    """
+    return store.write(_fail, claim, failure)
+
+
+@transaction
+def note_measuring(session: Session, claims: Sequence[Claim]) -> tuple[Claim, ...]:
+    """Note that these repetitions wait for reality's answer, and return the claims that still hold."""
+    row = RepetitionRow
+    holds = update(row).where(_LEASES.of(claims), row.state == State.RUNNING)
+    noted = session.execute(holds.values(measuring_at=now(), heartbeat_at=now()).returning(row.id, row.epoch))
+    held = {(id_, epoch) for id_, epoch in noted}
+    return tuple(claim for claim in claims if (claim.id, claim.epoch) in held)
+
+
+@transaction
+def free_hardware(session: Session, claims: Sequence[Claim]) -> None:
+    """Note that the workers of these ended claims have stopped, so that others may use their hardware."""
+    row = RepetitionRow
+    session.execute(update(row).where(_LEASES.of(claims), row.state != State.RUNNING).values(hardware=None))
 
 
 def claim(store: Store, owner: str, limit: int, under: Provenance | None = None) -> tuple[Claim, ...]:
@@ -144,8 +120,22 @@ def give_way(store: Store, waiting: Iterable[Claim], under: Provenance | None = 
     return hand_back(store, *unwanted)
 
 
+def _fail(session: Session, claim: Claim, failure: Failure) -> bool:
+    why, hidden = storable(failure.reason), storable(failure.hidden) if failure.hidden else None
+    to = State.QUEUED if failure.of_reality else State.FAILED
+    values = {"error": why, "hidden_error": hidden} | ({"owner": None} if failure.of_reality else {})
+    if not _LEASES.end(session, _LEASES.of([claim]), Change(to, Ending.FAILED, why, values)):
+        return False
+    attempt = AttemptRow
+    latest = (attempt.repetition_id == claim.id) & (attempt.epoch == claim.epoch)
+    session.execute(update(attempt).where(latest).values(hidden_reason=hidden))
+    if failure.of_reality:
+        pause(session, claim.experiment_id, f"repetition {claim.number}: {why}")
+    return True
+
+
 def _claim(session: Session, owner: str, limit: int, under: Provenance) -> tuple[Claim, ...]:
-    ids = next_repetitions(session, limit, provenance.permitted(session, under))
+    ids = next_repetitions(session, limit, provenance.permitted(session, under) & FREE_HARDWARE)
     if len(ids) < limit:
         provenance.refuse(session, under)
     if not ids:
@@ -204,5 +194,5 @@ def _locked_requests(session: Session, claims: Iterable[Claim]) -> dict[str, Sta
 def _unwanted(session: Session, waiting: Sequence[Claim], under: Provenance) -> tuple[Claim, ...]:
     row, experiments = ExperimentRow, sorted({claim.experiment_id for claim in waiting})
     requested = session.scalars(select(row.id).where(row.id.in_(experiments), row.state.in_(ASKED))).all()
-    gone = {*requested, *ahead(session, experiments, provenance.permitted(session, under))}
+    gone = {*requested, *ahead(session, experiments, provenance.permitted(session, under) & FREE_HARDWARE)}
     return tuple(claim for claim in waiting if claim.experiment_id in gone)

@@ -73,22 +73,22 @@ class Leases(Generic[L]):
         if not leases:
             return ()
         change = Change(State.COMPLETED, Ending.COMPLETED, values={"error": None} | results)
-        ended = store.write(self.end, self._of(leases), change)
+        ended = store.write(self.end, self.of(leases), change)
         return tuple(lease for lease in leases if lease.id in ended)
 
     def fail(self, store: Store, lease: L, reason: str) -> bool:
         """End work as FAILED; return False if the lease no longer holds."""
         why = storable(reason)
         change = Change(State.FAILED, Ending.FAILED, why, {"error": why})
-        return bool(store.write(self.end, self._of([lease]), change))
+        return bool(store.write(self.end, self.of([lease]), change))
 
     def release(self, store: Store, lease: L, reason: str) -> bool:
         """Queue work again whose worker was lost; return False if the lease no longer holds."""
-        return bool(store.write(self._release, self._of([lease]), storable(reason)))
+        return bool(store.write(self.lose, self.of([lease]), storable(reason)))
 
     def hand_back(self, store: Store, *leases: L) -> tuple[L, ...]:
         """Queue work again as if it had not been claimed, and return the leases that held."""
-        given = store.write(self._hand_back, self._of(leases)) if leases else ()
+        given = store.write(self._hand_back, self.of(leases)) if leases else ()
         return tuple(lease for lease in leases if lease.id in given)
 
     def hand_back_unheard(self, store: Store, owner: str, known: Iterable[L]) -> int:
@@ -119,7 +119,15 @@ class Leases(Generic[L]):
             attempts=row.attempts + 1,
             heartbeat_at=now(),
             started_at=func.coalesce(row.started_at, now()),
+            **self.taken(),
         )
+
+    def taken(self) -> Mapping[str, Any]:
+        """Return further columns that a claim sets."""
+        return {}
+
+    def free_lost(self, session: Session, stale: ColumnElement[bool]) -> None:
+        """Free what an ended lease still holds once its holder is silent; nothing by default."""
 
     def end(self, session: Session, which: ColumnElement[bool], change: Change) -> list[Any]:
         """End leases that hold, and return the ids of their rows.
@@ -133,11 +141,12 @@ class Leases(Generic[L]):
 
     def _heartbeat(self, session: Session, leases: Sequence[L]) -> tuple[L, ...]:
         row = self.table
-        beaten = update(row).where(self._of(leases), row.state == State.RUNNING).values(heartbeat_at=now())
+        beaten = update(row).where(self.of(leases), row.state == State.RUNNING).values(heartbeat_at=now())
         held = {(id_, epoch) for id_, epoch in session.execute(beaten.returning(row.id, row.epoch))}
         return tuple(lease for lease in leases if (lease.id, lease.epoch) in held)
 
-    def _release(self, session: Session, which: ColumnElement[bool], reason: str) -> list[Any]:
+    def lose(self, session: Session, which: ColumnElement[bool], reason: str) -> list[Any]:
+        """Queue work again whose worker was lost, or end it as FAILED after too many losses; return the ids."""
         losses = self.table.losses + 1
         values = {"losses": losses, "owner": None}
         last = f"lost {MAX_LOSSES} times without progress; the last time {reason}"
@@ -152,8 +161,9 @@ class Leases(Generic[L]):
 
     def _requeue_lost(self, session: Session, stale_after_s: float) -> list[Any]:
         stale = self.table.heartbeat_at < moment(session) - timedelta(seconds=stale_after_s)
-        return self._release(session, stale, f"its worker was not heard of for {stale_after_s:g} s")
+        self.free_lost(session, stale)
+        return self.lose(session, stale, f"its worker was not heard of for {stale_after_s:g} s")
 
-    def _of(self, leases: Sequence[L]) -> ColumnElement[bool]:
+    def of(self, leases: Sequence[L]) -> ColumnElement[bool]:
         """Return the condition that a row's lease is one of these."""
         return tuple_(self.table.id, self.table.epoch).in_([(lease.id, lease.epoch) for lease in leases])

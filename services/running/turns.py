@@ -16,6 +16,11 @@ from gaplab.services.store.queries.experiments import lock
 _ROW = ExperimentRow
 _ORDER = (_ROW.precedence, _ROW.running, _ROW.created_at, _ROW.position, _ROW.id)
 
+_HELD = select(RepetitionRow.hardware).where(RepetitionRow.hardware.is_not(None))
+
+FREE_HARDWARE = _ROW.hardware.is_(None) | _ROW.hardware.not_in(_HELD)
+"""That an experiment needs no hardware, or some that no repetition holds."""
+
 
 def next_repetitions(session: Session, limit: int, permitted: ColumnElement[bool]) -> tuple[int, ...]:
     """Lock the experiments whose turn it is, and return up to `limit` of their queued repetitions in order."""
@@ -60,20 +65,25 @@ def _turns(session: Session, experiments: Sequence[str], limit: int, permitted: 
         .subquery()
     )
     candidates = session.execute(
-        select(_ROW.id, _ROW.precedence, _ROW.running, _ROW.max_parallel, queued.c.queued)
+        select(_ROW.id, _ROW.precedence, _ROW.running, _ROW.max_parallel, queued.c.queued, _ROW.hardware)
         .join(queued, queued.c.experiment_id == _ROW.id)
         .where(_ROW.claimable.is_(True), permitted)
         .order_by(_ROW.created_at, _ROW.position, _ROW.id)
     ).all()
     heap = [
         (precedence, running, age, min(waiting, waiting if most is None else most - running))
-        for age, (_, precedence, running, most, waiting) in enumerate(candidates)
+        for age, (_, precedence, running, most, waiting, _) in enumerate(candidates)
     ]
     heapify(heap)
     turns: list[str] = []
+    used: set[str] = set()
     while heap and len(turns) < limit:
         precedence, running, age, room = heap[0]
+        if (hardware := candidates[age].hardware) in used:
+            heappop(heap)
+            continue
         turns.append(candidates[age].id)
+        used |= {hardware} - {None}
         if room > 1:
             heapreplace(heap, (precedence, running + 1, age, room - 1))
         else:

@@ -9,7 +9,7 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters
-from gaplab.services.core.errors import gather
+from gaplab.services.core.errors import PluginBroken, RealityFailed, gather
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.ports import Simulate
@@ -44,6 +44,9 @@ class Simulation:
         worlds = [self._world(tuple(row)) for row in parameters.tolist()]
         motions = [self._robot.motion(genome) for genome in genomes]
         fitnesses = self._robot.fitness(self._engine.rollouts(worlds, motions))
+        if np.shape(fitnesses) != (len(genomes), len(parameters)):
+            expected = f"the fitness of {len(genomes)} genomes in {len(parameters)} simulators"
+            raise PluginBroken(f"robot {self._robot.name!r} returned {np.shape(fitnesses)} numbers for {expected}")
         return np.where(np.isfinite(fitnesses), fitnesses, np.nan)
 
     def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:
@@ -59,7 +62,7 @@ class Simulation:
 
 
 class HiddenReality:
-    """A Reality that is a simulation with hidden parameters.
+    """A simulation with hidden parameters.
 
     Args:
         simulate: the simulation on reality's engine.
@@ -70,21 +73,32 @@ class HiddenReality:
         self._simulate = simulate
         self._parameters = parameters[None, :]
 
+    def fitnesses(self, genomes: Genomes) -> FloatArray:
+        """Return the fitnesses `(n,)` of genomes `(n, g)` in reality; nan where the physics failed.
+
+        Raises:
+            RealityFailed: its code raised an error.
+        """
+        try:
+            return self._simulate(genomes, self._parameters)[:, 0]
+        except (Exception, SystemExit) as error:
+            raise RealityFailed("reality failed") from error
+
+
+class MeasuredReality(HiddenReality):
+    """A Reality that is a simulation with hidden parameters."""
+
     def __call__(self, genome: Genome) -> float:
         """Return the fitness of a genome `(g,)` in reality; nan if the physics failed."""
-        return float(self._simulate(genome[None, :], self._parameters)[0, 0])
+        return float(self.fitnesses(genome[None, :])[0])
 
 
-class EvolutionInReality:
+class EvolutionInReality(HiddenReality):
     """A Simulate for the direct baseline: every simulator is reality."""
-
-    def __init__(self, simulate: Simulate, parameters: FloatArray) -> None:
-        self._simulate = simulate
-        self._parameters = parameters[None, :]
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
         """Return the fitnesses of genomes `(n, g)` in reality, `(n, m)`; the m simulators do not matter."""
-        return np.repeat(self._simulate(genomes, self._parameters), len(parameters), axis=1)
+        return np.repeat(self.fitnesses(genomes)[:, None], len(parameters), axis=1)
 
 
 def setting(spec: ResolvedSpec, repetition: int) -> Setting:
@@ -104,7 +118,7 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
         simulate = EvolutionInReality(real, truth)
     return Setting(
         simulate=simulate,
-        reality=HiddenReality(real, truth),
+        reality=MeasuredReality(real, truth),
         strategy=strategy,
         optimizer=optimizers.create(spec.optimizer),
         genomes=robot.space,

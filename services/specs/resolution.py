@@ -41,7 +41,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     budget = _budget(spec)
     violations = [
         *tunable_violations(spec, engine),
-        *reality_violations(spec, reality_engine),
+        *reality_violations(spec, strategy, engine, reality_engine),
         *budget_violations(budget, strategy, optimizer),
     ]
     if violations:

@@ -78,5 +78,37 @@ class TimedStep:
     seconds: float
 
 
+@dataclass(frozen=True)
+class Pulse:
+    """A sign of life of a worker, while it has nothing else to deliver.
+
+    Attributes:
+        step: the place in the log of the step under way.
+        measuring: whether reality is being asked.
+        idle_s: seconds since a rollout or a step ended.
+        step_s: seconds of work in this step so far.
+    """
+
+    step: int
+    measuring: bool
+    idle_s: float
+    step_s: float
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a worker cannot go on with a repetition.
+
+    Attributes:
+        reason: for everybody, at any time.
+        hidden: the reason with the message of reality's code, which may name hidden parameters.
+        of_reality: whether the code of reality raised it.
+    """
+
+    reason: str
+    hidden: str | None = None
+    of_reality: bool = False
+
+
 Delivered: TypeAlias = TimedStep | Checkpoint
-"""What a worker delivers."""
+"""What a worker delivers, to be stored."""

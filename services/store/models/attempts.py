@@ -16,6 +16,7 @@ class AttemptRow(Base):
         epoch: of the lease, which numbers the attempts of a repetition from 1.
         ended_at, ending: NULL while it holds.
         reason: why it failed or was lost.
+        hidden_reason: as `hidden_error` of a repetition.
     """
 
     __tablename__ = "attempt"
@@ -27,3 +28,4 @@ class AttemptRow(Base):
     ended_at: Mapped[datetime | None]
     ending: Mapped[Ending | None]
     reason: Mapped[str | None] = mapped_column(Reason)
+    hidden_reason: Mapped[str | None] = mapped_column(Reason)

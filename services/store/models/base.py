@@ -12,7 +12,7 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.services.store.clock import UtcDateTime
 from gaplab.services.store.texts import brief, storable
 
-REVISION = "0008"
+REVISION = "0009"
 """The migration that makes these tables; a database at any other revision is not ours to touch."""
 
 SPEC_VERSION = 1

@@ -7,7 +7,7 @@ from sqlalchemy import BigInteger, ForeignKey, Index, String, Text, UniqueConstr
 from sqlalchemy.orm import Mapped, mapped_column
 
 from gaplab.schemas.lifecycle import State
-from gaplab.services.store.models.base import SPEC_VERSION, Base
+from gaplab.services.store.models.base import SPEC_VERSION, Base, Reason
 from gaplab.services.store.models.leased import LeasedRow
 
 
@@ -42,6 +42,8 @@ class ExperimentRow(Base):
         claimable: whether one more may be claimed now. `services/experiments/states.py` keeps it and `running`.
         computed_with: engines, machine, version of the spec and external plug-ins that computed its first steps.
         refused_by: the same of a supervisor that left it alone because they differ.
+        paused_because: why a supervisor paused it; NULL if a person did, and once a person decides what follows.
+        hardware: name of the hardware that is its reality; NULL if reality is only computed.
         sensitivity_id: of the check of what it tunes.
         token_id: of the token that submitted it; NULL where none is needed.
         notes: written by people.
@@ -75,6 +77,8 @@ class ExperimentRow(Base):
     claimable: Mapped[bool] = mapped_column(default=True)
     computed_with: Mapped[str | None] = mapped_column(Text)
     refused_by: Mapped[str | None] = mapped_column(Text)
+    paused_because: Mapped[str | None] = mapped_column(Reason)
+    hardware: Mapped[str | None] = mapped_column(String(32), index=True)
     sensitivity_id: Mapped[str | None] = mapped_column(String(32), index=True)
     token_id: Mapped[str | None] = mapped_column(String(32))
     notes: Mapped[str | None] = mapped_column(Text)
@@ -93,11 +97,15 @@ class RepetitionRow(LeasedRow):
         checkpoints: stored parts of the next step.
         seconds: of work in the recorded steps.
         provenance_id: of its latest claim.
+        measuring_at: since when it waits for reality's answer; NULL if it does not.
+        hidden_error: the error with the message of reality's code, to be shown when hidden parameters may be.
+        hardware: name of the hardware that it holds; unique, so hardware has one holder at a time.
     """
 
     __tablename__ = "repetition"
     __table_args__ = (
         UniqueConstraint("experiment_id", "number"),
+        UniqueConstraint("hardware"),
         Index(None, "state", "heartbeat_at"),
         Index(None, "experiment_id", "state", "number"),
     )
@@ -113,3 +121,6 @@ class RepetitionRow(LeasedRow):
     rollouts_saved: Mapped[int] = mapped_column(BigInteger, default=0)
     seconds: Mapped[float] = mapped_column(default=0.0)
     provenance_id: Mapped[str | None] = mapped_column(String(32))
+    measuring_at: Mapped[datetime | None]
+    hidden_error: Mapped[str | None] = mapped_column(Reason)
+    hardware: Mapped[str | None] = mapped_column(String(32))

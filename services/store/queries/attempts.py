@@ -56,8 +56,14 @@ def latest(session: Session, experiment: str) -> dict[int, int]:
     return dict(session.execute(found).all())
 
 
-def attempts_of(session: Session, experiment: str, number: int) -> tuple[AttemptRead, ...]:
+def attempts_of(session: Session, experiment: str, number: int, *, secret: bool = True) -> tuple[AttemptRead, ...]:
     """Return the attempts at a repetition, by number.
+
+    Args:
+        session: of a transaction.
+        experiment: its id.
+        number: of the repetition.
+        secret: keep what reality's code said about an error to itself.
 
     Raises:
         NotFound: the experiment has no such repetition.
@@ -74,7 +80,7 @@ def attempts_of(session: Session, experiment: str, number: int) -> tuple[Attempt
             started_at=each.started_at,
             ended_at=each.ended_at,
             ending=each.ending,
-            reason=each.reason,
+            reason=each.reason if secret else each.hidden_reason or each.reason,
         )
         for each in session.scalars(select(row).where(row.repetition_id == id_).order_by(row.epoch))
     )

@@ -151,6 +151,13 @@ def repetitions_of(session: Session, experiment_id: str) -> tuple[RepetitionRow,
     return tuple(session.scalars(select(row).where(row.experiment_id == experiment_id).order_by(row.number)))
 
 
+def with_failures(session: Session, experiments: Sequence[str]) -> frozenset[str]:
+    """Return the ids of the experiments of which a repetition FAILED."""
+    row = RepetitionRow
+    failed = select(row.experiment_id).where(row.experiment_id.in_(experiments), row.state == State.FAILED)
+    return frozenset(session.scalars(failed.distinct()))
+
+
 def lock(session: Session, experiments: Sequence[str]) -> dict[str, State]:
     """Lock experiments until the transaction ends, and return their states.
 

@@ -29,6 +29,7 @@ _ADVANCE = (
         steps=bindparam("to_steps"),
         checkpoints=0,
         losses=0,
+        measuring_at=None,
         heartbeat_at=now(),
         iterations_done=_REPETITION.c.iterations_done + bindparam("more_iterations"),
         rollouts_done=_REPETITION.c.rollouts_done + bindparam("more_rollouts"),
