@@ -83,6 +83,7 @@ class Limits(_Environment):
         rollouts: the same, of all tokens.
         streams_per_token: of events, open at once at one API process; a request that waits for events is one.
         streams: the same, of all tokens.
+        imported_rows: of one archive. On SQLite other writers wait while they are stored, some seconds for the default.
         requests: served at once by one API process; fewer if it may open fewer than twice as many files.
     """
 
@@ -97,6 +98,7 @@ class Limits(_Environment):
     rollouts: PositiveInt = 1_000_000_000_000
     streams_per_token: PositiveInt = 20
     streams: PositiveInt = 200
+    imported_rows: PositiveInt = 250_000
     requests: PositiveInt = 1_000
 
 

@@ -54,7 +54,9 @@ def cancel_experiment(id: Id, store: StoreDep) -> ExperimentRead:
     return lifecycle.ask_experiment(store, id, Verb.CANCEL)
 
 
-@_experiment.post("/retry", summary="Retry an experiment", response_description=_RETRIED, responses=documented(404, 409))
+@_experiment.post(
+    "/retry", summary="Retry an experiment", response_description=_RETRIED, responses=documented(404, 409)
+)
 def retry_experiment(id: Id, store: StoreDep) -> ExperimentRead:
     """Queue the repetitions that FAILED once more; each goes on from its stored steps."""
     return lifecycle.ask_experiment(store, id, Verb.RETRY)
