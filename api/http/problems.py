@@ -10,6 +10,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from gaplab.api.http.violations import MOST_ERRORS, explain, finite, without_consequences
 from gaplab.schemas.problems import Problem, SpecError
@@ -77,6 +78,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(GaplabError, of_gaplab)
     app.add_exception_handler(RequestValidationError, _of_validation)
     app.add_exception_handler(HTTPException, _of_framework)
+    app.add_exception_handler(ClientDisconnect, _of_absent_client)
     app.add_exception_handler(Exception, _of_bug)
 
 
@@ -170,6 +172,11 @@ def _of_framework(request: Request, error: Exception) -> JSONResponse:
     template = DETAILS.get(error.status_code, str(error.detail).replace("{", "{{").replace("}", "}}"))
     detail = template.format(path=finite(request.url.path), method=request.method)
     return response(problem(*kind, detail), dict(error.headers or {}))
+
+
+def _of_absent_client(request: Request, error: Exception) -> JSONResponse:  # noqa: ARG001 - a handler's signature
+    """Return what the client no longer receives; that it left in the middle of its request is no incident."""
+    return response(problem(*FRAMEWORK[400], "The request ended before its body did."))
 
 
 def _of_bug(request: Request, error: Exception) -> JSONResponse:

@@ -17,11 +17,13 @@ import httpx2
 import pytest
 from fastapi import FastAPI, Request
 
+from gaplab.api.app import create_app
 from gaplab.api.http.limits import SPARE, RequestLimit, most_requests
 from gaplab.api.process import connections
 from gaplab.api.process.server import Server, listen
 from gaplab.services.logs import Repeats
 from gaplab.services.settings import Limits
+from gaplab.services.store.session import Store
 
 DEADLINE_S = 120.0
 HALF = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: "
@@ -158,6 +160,18 @@ def test_half_a_request_ends_its_connection(
     monkeypatch.setattr(connections, "REQUEST_S", 0.3)
     with serving(app) as port, sent(port, content) as connection:
         assert rest(connection).startswith(answer)
+
+
+def test_half_an_archive_is_no_incident(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(connections, "REQUEST_S", 0.3)
+    head = b"POST /import HTTP/1.1\r\nHost: x\r\nContent-Type: application/zip\r\nContent-Length: 99\r\n\r\n"
+    with serving(create_app(sqlite_store)) as port, sent(port, head + b"PK") as connection:
+        assert rest(connection) == b""
+
+    assert "incident" not in caplog.text
+    assert "Exception" not in caplog.text
 
 
 def test_requests_that_go_on_are_served_however_slow_the_service(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
