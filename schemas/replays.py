@@ -62,7 +62,7 @@ class Replay(Frozen):
     repetition: int
     iteration: int
     kind: ControllerKind
-    simulator: int | None = Field(description="iteration of the simulator, its best; null: no simulator")
+    simulator: int | None = Field(description="iteration whose best simulator was used; null: no simulator")
     robot: RobotName
     unit: Unit = Field(description="unit of fitness")
     bodies: tuple[str, ...] = Field(

@@ -1,4 +1,4 @@
-"""`python -m workers serve`: run what is queued until told to stop. `python -m workers check`: could it?"""
+"""`python -m workers serve`: run queued work until told to stop. `python -m workers check`: test whether it could."""
 
 import logging
 import os
@@ -44,7 +44,7 @@ def serve(settings: Settings) -> int:
 
 
 def choose_authentication(settings: Settings) -> None:
-    """Make a Ray that this process starts ask for a token, and send one to a cluster unless the environment forbids it.
+    """Require a token of clients of our own Ray, and send one to a cluster unless the environment forbids it.
 
     Ray reads these variables when it is imported. By default it sends its token only to a cluster that it started, and
     keeps the token in a file of the home folder that other users may read.

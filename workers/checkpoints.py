@@ -1,4 +1,4 @@
-"""Repetitions that deliver checkpoints of a step while it is under way, and signs of life."""
+"""Repetitions that deliver steps, checkpoints of the running step, and signs of life."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -18,16 +18,16 @@ from gaplab.workers.permits import PermittedReality
 CHECKPOINT_S = 10.0
 """Seconds between the checkpoints of a step; shorter steps have none.
 
-They bound what a crash costs, and how long a repetition that is told to stop goes on."""
+It limits the work that a crash loses, and the time that a repetition needs to stop."""
 
 SHARE = 4
-"""Calls that would take longer than the time between checkpoints divided by this are split."""
+"""Number of calls between two checkpoints, at least; longer calls are split."""
 
 PULSE_S = 5.0
 """Seconds without a delivery after which a worker gives a sign of life."""
 
 PAUSES_S = (1.0, 10.0, 60.0)
-"""Pauses before a step is repeated whose error may pass; after the last, the error counts."""
+"""Pauses before each repetition of a step whose error may pass; after the last, the error counts."""
 
 PASSING = (TryAgain, ConnectionError, TimeoutError, BlockingIOError, InterruptedError, MemoryError)
 """Errors that may pass by themselves."""
@@ -42,14 +42,14 @@ def recorded(
     every_s: float = CHECKPOINT_S,
     pauses_s: Sequence[float] = PAUSES_S,
 ) -> Iterator[Delivered | Pulse]:
-    """Yield the steps that follow the log, checkpoints of long ones as they come about, and signs of life.
+    """Yield the steps that follow the log, checkpoints of long steps as soon as they exist, and signs of life.
 
     Args:
-        setting: of the repetition.
+        setting: setting of the repetition.
         log: its steps so far.
-        checkpoints: of the step that comes next.
+        checkpoints: checkpoints of the next step.
         every_s: seconds between checkpoints of a step.
-        pauses_s: before each attempt to repeat a step whose error may pass.
+        pauses_s: pauses before each repetition of a step whose error may pass.
     """
     items: SimpleQueue[Delivered | Pulse | None] = SimpleQueue()
     unwanted = Event()
@@ -77,8 +77,8 @@ class StepRecorder:
     Args:
         emit: takes steps and checkpoints.
         every_s: seconds between checkpoints.
-        log: the steps before the step under way.
-        checkpoints: of it, from before an interruption.
+        log: the steps before the running step.
+        checkpoints: its checkpoints from before an interruption.
     """
 
     def __init__(self, emit: Emit, every_s: float, log: Sequence[Step], checkpoints: Sequence[Checkpoint] = ()) -> None:
@@ -116,7 +116,7 @@ class StepRecorder:
         return Answers(setting.simulate, setting.batch_size, checkpoints, self)
 
     def genomes_per_call(self, simulators: int) -> int:
-        """Return as many genomes as take a part of the time between checkpoints; one while that is unknown."""
+        """Return the number of genomes of a call that is short enough; 1 while durations are unknown."""
         self._called = perf_counter()
         if not self._rollout_s:
             return 1
@@ -131,7 +131,7 @@ class StepRecorder:
             self._checkpoint(now)
 
     def end(self, step: Step) -> None:
-        """Emit the step, which has come to its end, and begin the next."""
+        """Emit the completed step, and begin the next."""
         now = perf_counter()
         self._emit(TimedStep(step, self._before_s + now - self._begun))
         self._log.append(step)
@@ -166,11 +166,11 @@ def may_pass(error: BaseException) -> bool:
 
 
 class _Unwanted(Exception):
-    """The consumer has closed the iterator, so that nothing takes further items."""
+    """The consumer has closed the iterator, and takes no further items."""
 
 
 class _Computation(Thread):
-    """A thread that computes: a checkpoint comes from the depths of a step, where nothing can yield.
+    """A thread that computes, because checkpoints are emitted deep inside a step, where nothing can yield.
 
     Attributes:
         raised: the error that ended it, even SystemExit, which would end a thread silently.
@@ -182,7 +182,7 @@ class _Computation(Thread):
         self._compute, self._ended = compute, ended
 
     def run(self) -> None:
-        """Compute, keep the error if there is one, and tell of the end."""
+        """Compute, keep the error if there is one, and emit the end."""
         try:
             self._compute()
         except _Unwanted:

@@ -1,4 +1,4 @@
-"""Limits of time: when a worker that does not get on counts as hung."""
+"""Limits of time, after which a worker without progress counts as hung."""
 
 from dataclasses import dataclass
 
@@ -13,11 +13,11 @@ CHECK_ROLLOUTS = 60
 
 @dataclass(frozen=True)
 class Patience:
-    """How long work may take.
+    """Longest durations of work.
 
     Attributes:
-        rollout_s: seconds for a rollout.
-        step_s: seconds for a step.
+        rollout_s: most seconds of a rollout.
+        step_s: most seconds of a step.
     """
 
     rollout_s: float = 60.0

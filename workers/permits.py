@@ -28,7 +28,7 @@ Handle: TypeAlias = Any
 
 @ray.remote(num_cpus=0, max_restarts=0)
 class Permits:
-    """The permits of one supervisor, in a process of their own: they run out although the supervisor is stopped."""
+    """The permits of one supervisor, in a separate process: they expire even if the supervisor is stopped."""
 
     def __init__(self) -> None:
         self._until: dict[Key, float] = {}
@@ -38,17 +38,17 @@ class Permits:
         self._until = dict.fromkeys(keys, monotonic() + seconds)
 
     def left(self, key: Key) -> float:
-        """Return for how many seconds the repetition may still move hardware; not above 0 if it may not."""
+        """Return the seconds for which the repetition may still move hardware; 0 or less if it may not."""
         return self._until.get(key, 0.0) - monotonic()
 
 
 class PermittedReality:
-    """A Reality that moves hardware only with a permit; if the permit runs out, it stops the hardware and its process.
+    """A Reality that moves hardware only with a permit; if the permit expires, it stops the hardware and its process.
 
     Args:
         reality: the hardware.
         stop: stops the hardware at once; called from another thread.
-        left: returns the seconds that the permit still holds.
+        left: returns the seconds until the permit expires.
         end: ends this process.
     """
 

@@ -1,4 +1,4 @@
-"""The repetitions that a supervisor has claimed: launched, received, stored, ended."""
+"""The repetitions that a supervisor has claimed: it launches them, receives and stores steps, and ends them."""
 
 import logging
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from gaplab.workers.permits import SHARE, Handle, Permits
 from gaplab.workers.run import Run
 
 WAIT_S = 0.2
-"""Longest wait for a delivery, and shortest time between two looks for queued work."""
+"""Longest wait for a delivery, and shortest interval between checks for queued work."""
 
 STOP_S = 5.0
 """Longest wait for a task to stop its hardware."""
@@ -30,15 +30,15 @@ log = logging.getLogger("gaplab.supervisor")
 
 
 class Repetitions:
-    """The repetitions that one supervisor has claimed. All methods raise StoreUnavailable; nothing is lost by it.
+    """The claimed repetitions of one supervisor. All methods raise StoreUnavailable; no delivery is lost then.
 
     Args:
         store: the database.
         owner: the supervisor's name in it.
-        versions: that a node must have to run them.
+        versions: versions that a node must have to run them.
         checkpoint_s: seconds between the checkpoints of a step.
         patience: how long work may take.
-        lease_s: silence after which others may take the claims.
+        lease_s: seconds without a heartbeat after which others may take the claims.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Repetitions:
         return Run(claim, task.run.remote(claim, self._versions, self._checkpoint_s, permits), permits)
 
     def heartbeat(self) -> None:
-        """Prolong the claims, stop the runs whose claim no longer holds, and end those that hang."""
+        """Renew the claims, stop the runs whose claim is no longer valid, and end those that hang."""
         begun = monotonic()
         self._drop_all_but(execution.heartbeat(self._store, [run.claim for run in self.runs]))
         self._permit(begun)
@@ -80,7 +80,7 @@ class Repetitions:
                 run.failed = Failure(reason, of_reality=bool(run.pulse and run.pulse.measuring))
 
     def claim(self, capacity: Callable[[], int]) -> None:
-        """Hand back what should not begin now, and claim up to the capacity."""
+        """Hand back repetitions that should not start now, and claim up to the capacity."""
         if monotonic() - self._looked < WAIT_S:
             return
         self._looked = monotonic()
@@ -94,7 +94,7 @@ class Repetitions:
         self._unsure = False
         for claim in claims:
             self.runs.append(self.launch(claim))
-            log.info("on from step %d", len(claim.log), extra=self.runs[-1].place)
+            log.info("continues from step %d", len(claim.log), extra=self.runs[-1].place)
 
     def receive(self) -> None:
         """Wait shortly for deliveries, and take the ready ones."""
@@ -110,7 +110,7 @@ class Repetitions:
         self._note_measuring()
 
     def store_received(self) -> None:
-        """Record what was received, and stop the runs whose claim no longer holds."""
+        """Record the received deliveries, and stop the runs whose claim is no longer valid."""
         filled = [run for run in self.runs if run.received]
         if not filled:
             return
@@ -143,7 +143,7 @@ class Repetitions:
         self._looked = -WAIT_S  # cores are free: look for work at once
 
     def hand_back(self, runs: list[Run]) -> None:
-        """Stop these runs, and let others go on with them; what the database does not hear, a lease's end tells it."""
+        """Stop these runs, and return their leases; without the database, the leases expire."""
         for run in list(runs):
             self._stop(run)
             self.runs.remove(run)
@@ -155,7 +155,7 @@ class Repetitions:
                 log.info("handed back", extra=run.place)
 
     def _record_each(self, runs: list[Run]) -> tuple[Claim, ...]:
-        """Record each run's deliveries by themselves, and give up the runs whose log refuses them."""
+        """Record each run's deliveries separately, and give up the runs whose log refuses them."""
         held: list[Claim] = []
         for run in runs:
             try:
@@ -174,7 +174,7 @@ class Repetitions:
         return tuple(held)
 
     def _note_measuring(self) -> None:
-        """Store for each run whether reality is being asked, once a measurement."""
+        """Store for each run, once per measurement, that it waits for reality."""
         noted = [run for run in self.runs if run.pulse and run.pulse.measuring and run.pulse.step != run.measuring]
         begun = monotonic()
         if noted:
@@ -192,7 +192,7 @@ class Repetitions:
             self._permits.renew.remote(keys, begun + SHARE * self._lease_s - monotonic())
 
     def _stop(self, run: Run) -> None:
-        """End a run's task; one that moves hardware may first stop it."""
+        """End a run's task; a task that moves hardware may stop it first."""
         if run.permits is not None:
             self._permit(monotonic(), but=run)
             run.wait_for_end(STOP_S)
@@ -209,12 +209,12 @@ class Repetitions:
                     run.lost = f"it ended too early: {error}"
 
     def _drop_all_but(self, held: list[Claim] | tuple[Claim, ...]) -> None:
-        """Stop the runs whose claim no longer holds: cancelled, paused, stopped, handed back, or taken over."""
+        """Stop the runs whose claim is no longer valid: cancelled, paused, stopped, handed back, or taken over."""
         claims = set(held)
         dropped = [run for run in self.runs if run.claim not in claims]
         for run in dropped:
             self._stop(run)
             self.runs.remove(run)
-            log.info("dropped, it is no longer ours", extra=run.place)
+            log.info("dropped: this supervisor no longer holds its lease", extra=run.place)
         if dropped:
             execution.free_hardware(self._store, [run.claim for run in dropped])

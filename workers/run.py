@@ -1,4 +1,4 @@
-"""A claimed repetition on its way: its task, and what came from it."""
+"""A claimed repetition in Ray: its task and its deliveries."""
 
 from dataclasses import dataclass, field
 from time import monotonic
@@ -16,20 +16,20 @@ from gaplab.workers.task import Batch, told
 
 @dataclass(eq=False)
 class Run:
-    """A claimed repetition on its way.
+    """A claimed repetition that was submitted to Ray.
 
     Attributes:
-        claim: the right to it.
+        claim: claim of the repetition.
         stream: batches of steps and checkpoints from the task.
-        permits: where it asks for the permit to move hardware; None if reality is only computed.
+        permits: actor that gives the permit to move hardware; None if reality is only computed.
         received: deliveries that are not stored yet.
-        begun: the task no longer waits for a core.
-        ended: the task has come to its end.
-        failed: why its code raised, or took too long.
-        pulse: the last sign of life, if no delivery came since.
-        heard_at: when something last came from the task.
+        begun: true once the task has a core.
+        ended: true once the task has ended.
+        failed: reason of a failure: an error of its code, or a limit of time.
+        pulse: the last sign of life, if no delivery has followed it.
+        heard_at: time of the last delivery or sign of life.
         measuring: the place in the log of the step whose measurement the database knows of.
-        lost: why another worker must go on: its worker is gone, or its log refused a delivery.
+        lost: reason why another worker must continue: the worker is gone, or the log refused a delivery.
     """
 
     claim: Claim
@@ -45,7 +45,7 @@ class Run:
     measuring: int | None = None
 
     def receive(self) -> None:
-        """Take a batch that the stream has ready, its end, or the reason why there is none."""
+        """Take the next batch if the stream has one, or its end, or its error."""
         try:
             self.take(ray.get(next(self.stream)))
         except StopIteration:
@@ -58,7 +58,7 @@ class Run:
             self.lost = f"the worker was lost: {type(error).__name__}"
 
     def take(self, batch: Batch) -> None:
-        """Take what the task delivered: steps and checkpoints to store, a sign of life, or why it failed."""
+        """Take a delivery: steps and checkpoints to store, a sign of life, or the reason of a failure."""
         self.begun, self.heard_at, self.pulse = True, monotonic(), None
         for item in batch:
             if isinstance(item, Pulse):
@@ -73,14 +73,14 @@ class Run:
         ray.cancel(self.stream, force=True)
 
     def wait_for_end(self, longest_s: float) -> None:
-        """Wait until the task has ended, and take what it still delivers."""
+        """Wait until the task has ended, and take its last deliveries."""
         until = monotonic() + longest_s
         while not self.over and (left := until - monotonic()) > 0:
             if ray.wait([self.stream], timeout=left)[0]:
                 self.receive()
 
     def overdue(self, patience: Patience) -> str | None:
-        """Return why the task counts as hung; None if it does not. Hardware takes as long as it takes."""
+        """Return why the task counts as hung; None if it does not. Measurements by hardware have no limit."""
         since_s, pulse = monotonic() - self.heard_at, self.pulse
         by_hardware = pulse is not None and pulse.measuring and self.permits is not None
         if not self.begun or by_hardware:
@@ -96,7 +96,7 @@ class Run:
 
     @property
     def over(self) -> bool:
-        """Whether the stream has nothing more to give."""
+        """Whether the stream has ended, with or without an error."""
         return self.ended or self.failed is not None or self.lost is not None
 
     @property

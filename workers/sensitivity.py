@@ -1,4 +1,4 @@
-"""Sensitivity checks at Ray: one at a time, beside the repetitions."""
+"""Sensitivity checks in Ray: one at a time, beside the repetitions."""
 
 import logging
 from time import monotonic
@@ -25,7 +25,7 @@ from gaplab.workers.patience import Patience
 from gaplab.workers.task import told
 
 LOOK_S = 0.2
-"""Shortest time between two looks for a queued check."""
+"""Shortest interval between checks of the queue."""
 
 Result: TypeAlias = "ObjectRef[tuple[Sensitivity, ...] | Failure]"
 
@@ -34,7 +34,7 @@ log = logging.getLogger("gaplab.supervisor")
 
 @ray.remote(num_cpus=0, max_retries=0)
 def check(checked: Checked, expected: Versions) -> tuple[Sensitivity, ...] | Failure:
-    """Return the effect of each tunable on fitness, or why it cannot be told.
+    """Return the effect of each tunable on fitness, or the reason of a failure.
 
     The task reserves no core: it takes seconds, and its result is useful before hours of physics, not after them.
 
@@ -54,11 +54,11 @@ class Checks:
     Args:
         store: the database.
         owner: the supervisor's name in it.
-        lease_s: silence after which the holder of a check loses it to others.
-        versions: that a node must have to run them.
+        lease_s: seconds without a heartbeat after which the holder of a check loses it.
+        versions: versions that a node must have to run them.
         patience: how long work may take.
 
-    All methods raise StoreUnavailable; nothing is lost by it.
+    All methods raise StoreUnavailable; no result is lost then.
     """
 
     def __init__(
@@ -79,10 +79,10 @@ class Checks:
         self._looked = -LOOK_S
 
     def step(self) -> None:
-        """Store the check that has ended, or start one that is queued.
+        """Store the result of the running check if it has ended, or start a queued check.
 
         Raises:
-            ClusterUnusable: the node that ran it has other versions; nothing of it is stored.
+            ClusterUnusable: the check's node has other versions; its result is not stored.
         """
         if self._run is not None:
             self._end(*self._run)
@@ -91,14 +91,14 @@ class Checks:
             self._claim()
 
     def heartbeat(self) -> None:
-        """Prolong the claim on the running check, or stop the check if it no longer holds; requeue lost checks."""
+        """Renew the claim on the running check, or stop the check if its claim is invalid; requeue lost checks."""
         if self._run is not None and not sensitivity.heartbeat(self._store, [self._run[0]]):
             ray.cancel(self._run[1], force=True)
             self._run = None
         sensitivity.requeue_lost(self._store, stale_after_s=self._lease_s)
 
     def hand_back(self) -> None:
-        """Hand the unfinished check back to other supervisors."""
+        """Hand back the unfinished check."""
         if self._run is not None:
             sensitivity.hand_back(self._store, self._run[0])
             self._run = None

@@ -1,4 +1,4 @@
-"""The Ray task that runs one repetition on one core, and what it delivers."""
+"""The Ray task that runs one repetition on one core, and its deliveries."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -22,20 +22,20 @@ from gaplab.workers.permits import Handle, PermittedReality
 from gaplab.workers.pool import Pool
 
 BATCH_S = 0.2
-"""Steps shorter than this travel together; what reality answered never waits."""
+"""Shorter steps are delivered in batches; an answer of reality is delivered at once."""
 
 Batch: TypeAlias = tuple[Delivered | Pulse | Failure, ...]
-"""What a worker sends at a time."""
+"""The items that a worker sends at once."""
 
 log = logging.getLogger("gaplab.worker")
 
 
 @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
 def run(claim: Claim, expected: Versions, checkpoint_s: float, permits: Handle | None) -> Iterator[Batch]:
-    """Yield the steps that follow the claim's log, in batches; the first, empty batch says that the task has begun.
+    """Yield the steps that follow the claim's log, in batches; the first batch is empty, and shows that the task runs.
 
-    Ray never retries it: a repetition goes on from its stored log, not from its beginning. The engine stays warm in
-    the worker process from one task to the next. An error is delivered as a text, because not every error can be sent.
+    Ray never retries the task: a repetition continues from its stored log, not from its beginning. The worker process
+    keeps the engine loaded from task to task. An error is delivered as a text, because not every error can be sent.
 
     Raises:
         ClusterUnusable: this node lacks the expected versions.
@@ -73,7 +73,7 @@ def _permitted(reality: Reality, claim: Claim, permits: Handle) -> PermittedReal
 
 
 def failure_of(error: BaseException) -> Failure:
-    """Return the failure that an error is; the message of reality's code stays hidden."""
+    """Return the failure for an error; the message of reality's code stays hidden."""
     if not isinstance(error, RealityFailed):
         log.error("failed", exc_info=error)
         return Failure(describe(error))

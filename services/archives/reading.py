@@ -1,9 +1,9 @@
-"""Import: an archive is stored as a whole or not at all, and nothing in it is run.
+"""Import of archives. An archive is stored as a whole or not at all, and nothing in it is run.
 
 It is checked in a private database first, and then copied: SQLite has one writer, so the copy must be quick.
 
-An experiment that had not ended is CANCELLED on arrival, since its archive hides the parameters of reality. All that
-had ended arrives as it was, to the last bit.
+An experiment that had not ended is CANCELLED on arrival, since its archive hides the parameters of reality. One that
+had ended arrives unchanged, to the last bit.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -55,12 +55,12 @@ class Checked:
 
 
 def import_archive(store: Store, file: IO[bytes], *, most_rows: int | None = None) -> ImportRead:
-    """Store the content of an archive, under its own ids, or new ones where those are taken.
+    """Store the content of an archive under its own ids; ids that are taken are replaced.
 
     Args:
-        store: at the latest revision.
-        file: seekable, at its beginning.
-        most_rows: rows of all tables together; left out: the default of the setting.
+        store: database at the latest revision.
+        file: seekable file, at its beginning.
+        most_rows: most rows of all tables together; left out: the default of the setting.
 
     Raises:
         InvalidArchive: the file is damaged, harmful, too large or not an archive; nothing was stored.
@@ -123,7 +123,7 @@ def _insert(session: Session, table: str, rows: Iterable[Row]) -> None:
     try:
         archives.insert_rows(session, table, rows)
     except (*archives.Refused, KeyError) as error:
-        msg = "its rows contradict each other: one is there twice, or belongs to a row that is missing"
+        msg = "its rows contradict each other: one occurs twice, or belongs to a missing row"
         raise InvalidArchive(msg) from error
 
 

@@ -151,7 +151,7 @@ def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -
     """Return the violation of an unknown name, with the nearest permitted one."""
     nearest = next(iter(get_close_matches(name, permitted, n=1, cutoff=0.5)), None)
     hint = f" (did you mean {nearest!r}?)" if nearest else ""
-    message = f"there is no {kind} called {name!r}{hint}; there is {', '.join(permitted)}"
+    message = f"unknown {kind} {name!r}{hint}; permitted: {', '.join(permitted)}"
     return Violation(pointer, name, message, tuple(permitted), nearest)
 
 

@@ -1,4 +1,4 @@
-"""Sensitivity checks as people ask for them: submitted, read, and summed up for the experiments that they belong to.
+"""Sensitivity checks as people use them: submitted, read, and summarised for their experiments.
 
 Supervisors run them by `gaplab.services.running.sensitivity`. Use cases raise StoreUnavailable while the database
 cannot be used.
@@ -35,8 +35,8 @@ class CheckSummary:
     """What an experiment shows of its check.
 
     Attributes:
-        id: of the check; None if there is none.
-        warnings: as sentences; none before the check has ended.
+        id: id of the check; None if there is none.
+        warnings: warnings as sentences; empty before the check has ended.
     """
 
     id: str | None = None
@@ -44,10 +44,10 @@ class CheckSummary:
 
 
 def submit(store: Store, spec: SensitivitySpec) -> SensitivityRead:
-    """Queue the check of these settings, unless it is there already and has not FAILED.
+    """Queue the check of these settings, unless it exists and has not FAILED.
 
     Raises:
-        InvalidSpec: with everything that is wrong with them.
+        InvalidSpec: they are invalid; the error has every violation.
     """
     return admit(store, spec, FREELY).answer
 
@@ -56,8 +56,8 @@ def admit(store: Store, spec: SensitivitySpec, admitted: Admission) -> Once[Sens
     """Submit the check, once for each idempotency key.
 
     Raises:
-        InvalidSpec: with everything that is wrong with them.
-        KeyReused: the key stands for another request.
+        InvalidSpec: they are invalid; the error has every violation.
+        KeyReused: the key was used for another request.
     """
     resolved = resolve_sensitivity(spec)
     return once(store, admitted, spec, SensitivityRead, lambda session: _view(queue(session, resolved)))
@@ -65,7 +65,7 @@ def admit(store: Store, spec: SensitivitySpec, admitted: Admission) -> Once[Sens
 
 @snapshot
 def read(session: Session, id: str) -> SensitivityRead:
-    """Return the check, with its findings once it is COMPLETED.
+    """Return the check; it has results once it is COMPLETED.
 
     Raises:
         NotFound: no such check.
@@ -76,7 +76,7 @@ def read(session: Session, id: str) -> SensitivityRead:
 def queue(session: Session, spec: Checked) -> SensitivityRow:
     """Return the check of this spec, QUEUED if it is new, had FAILED or was CANCELLED.
 
-    The row stays locked until the transaction ends: a check that ended meanwhile would not tell the experiments that
+    The row stays locked until the transaction ends. A check that ended earlier would not warn the experiments that
     are being submitted with it.
     """
     row, id_ = SensitivityRow, id_of(spec)
@@ -88,7 +88,7 @@ def queue(session: Session, spec: Checked) -> SensitivityRow:
 
 
 def queue_for(session: Session, experiments: Iterable[ExperimentRow]) -> None:
-    """Queue the one check of what these experiments tune; an experiment that tunes nothing has none."""
+    """Queue the check that these experiments share; an experiment without tunables has none."""
     tuning = [row for row in experiments if row.iterations > 1]
     if not tuning:
         return
@@ -108,7 +108,7 @@ def cancel_unneeded(session: Session, check: str | None) -> None:
 
 
 def get(session: Session, id_: str) -> SensitivityRow:
-    """Return the check of that id.
+    """Return the check with this id.
 
     Raises:
         NotFound: there is none.
@@ -120,7 +120,7 @@ def get(session: Session, id_: str) -> SensitivityRow:
 
 
 def tell(session: Session, check: SensitivityRow, experiments: Iterable[str]) -> None:
-    """Note for these experiments that their check has ended, and what it warns of."""
+    """Record for these experiments that their check has ended, with its warnings."""
     body = {"sensitivity": check.id, "state": check.state.value, "warnings": list(warnings(check))}
     for experiment in experiments:
         note(session, EventKind.SENSITIVITY_ENDED, experiment, **body)
@@ -140,19 +140,19 @@ def summaries(session: Session, experiments: Iterable[ExperimentRow]) -> dict[st
 
 
 def warnings(check: SensitivityRow) -> tuple[str, ...]:
-    """Return what a person who tunes this should know, as sentences."""
+    """Return warnings about these tunables, as sentences."""
     if check.state is State.FAILED:
         return (f"the sensitivity check failed, so that nothing is known of the tunables: {check.error}",)
     return tuple(sentence for finding in _findings(check) if (sentence := warning(finding)))
 
 
 def id_of(spec: Checked, external: Mapping[str, str] | None = None) -> str:
-    """Return the id of the check: it follows from the spec, the version of the method, and external plug-ins.
+    """Return the id of the check: a hash of the spec, the version of the method, and the external plug-ins.
 
     Args:
-        spec: what is checked.
-        external: versions of external plug-ins by kind and name, so that an edited one is checked again; left out, this
-            process's.
+        spec: subject of the check.
+        external: versions of external plug-ins by kind and name, so that an edited one is checked again; left out:
+            this process's.
     """
     versions = external_plugins() if external is None else external
     names = (f"robot {spec.robot.name}", f"engine {spec.engine.name}", *(f"tunable {t.name}" for t in spec.tunables))

@@ -1,4 +1,4 @@
-"""What people ask of experiments and studies: pause, resume, stop, cancel and another schedule.
+"""Requests that change the state of experiments and studies: pause, resume, stop, cancel, schedule.
 
 `gaplab.schemas.lifecycle` says what each verb means and which states permit it. Each function is one transaction, and
 raises StoreUnavailable while the database cannot be used.
@@ -77,7 +77,7 @@ def ask_study(session: Session, study_id: str, verb: Verb) -> StudyRead:
         states = ", ".join(sorted({experiment.state for experiment in experiments}))
         permitted = ", ".join(PERMITTED[verb])
         msg = f"no experiment of study {study_id!r} can be {_PARTICIPLES[verb]}: "
-        raise Conflict(msg + f"they are {states}; permitted is {permitted}")
+        raise Conflict(msg + f"they are {states}; permitted: {permitted}")
     for experiment in permitting:
         _obey(session, experiment, verb)
     return view_studies(session, [study])[0]
@@ -85,7 +85,7 @@ def ask_study(session: Session, study_id: str, verb: Verb) -> StudyRead:
 
 @transaction
 def schedule_experiment(session: Session, experiment_id: str, change: ScheduleChange) -> ExperimentRead:
-    """Change the priority or the number of repetitions that run at once; what is not named stays.
+    """Change the priority or the number of repetitions that run at once; a missing field stays unchanged.
 
     Raises:
         NotFound: no such experiment.
@@ -116,7 +116,7 @@ def get_permitting(session: Session, experiment_id: str, verb: Verb) -> Experime
         able = [other.value for other in Verb if experiment.state in PERMITTED[other]]
         msg = (
             f"experiment {experiment_id!r} is {experiment.state} and cannot be {_PARTICIPLES[verb]}; "
-            f"what can be done with it: {', '.join(able) or 'nothing'}"
+            f"permitted: {', '.join(able) or 'nothing'}"
         )
         raise Conflict(msg)
     return experiment

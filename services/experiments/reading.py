@@ -24,7 +24,7 @@ R = TypeVar("R")
 
 @snapshot
 def read_experiment(session: Session, experiment_id: str, *, reveal: bool = False) -> ExperimentRead:
-    """Return the experiment with its progress; `reveal` shows reality's parameters although they are hidden.
+    """Return the experiment with its progress; `reveal` includes hidden parameters of reality.
 
     Raises:
         NotFound: no such experiment.
@@ -34,7 +34,7 @@ def read_experiment(session: Session, experiment_id: str, *, reveal: bool = Fals
 
 @snapshot
 def read_study(session: Session, study_id: str, *, reveal: bool = False) -> StudyRead:
-    """Return the study with its experiments and their progress; `reveal` as of an experiment.
+    """Return the study with its experiments and their progress; `reveal` includes hidden parameters of reality.
 
     Raises:
         NotFound: no such study.
@@ -67,7 +67,7 @@ def list_samples(
 
     Raises:
         NotFound: no such experiment.
-        InvalidSpec: a cursor that no page gave.
+        InvalidSpec: the cursor is invalid, or of another list.
     """
     get_experiment(session, experiment_id)
     rows = results.page_of_samples(
@@ -90,7 +90,7 @@ def list_simulators(
 
     Raises:
         NotFound: no such experiment.
-        InvalidSpec: a cursor that no page gave.
+        InvalidSpec: the cursor is invalid, or of another list.
     """
     row = get_experiment(session, experiment_id)
     rows = results.page_of_simulators(
@@ -111,5 +111,5 @@ def list_attempts(session: Session, experiment_id: str, repetition: int) -> tupl
 
 
 def _next(rows: Sequence[R], limit: int, cursor_of: Callable[[R], str]) -> str | None:
-    """Return the cursor of the next page; `rows` has one row more than the page if there is one."""
+    """Return the cursor of the next page; `rows` has one row more than the page if a next page exists."""
     return cursor_of(rows[limit - 1]) if len(rows) > limit else None

@@ -1,4 +1,4 @@
-"""Submission of experiments and studies: resolved, admitted and stored in one transaction.
+"""Submission of experiments and studies: they are resolved, admitted and stored in one transaction.
 
 All functions raise StoreUnavailable while the database cannot be used.
 """
@@ -18,10 +18,10 @@ from gaplab.services.store.session import Session, Store
 
 
 def submit_experiment(store: Store, spec: ExperimentSpec) -> ExperimentRead:
-    """Store the resolved experiment, its repetitions QUEUED, and with it a sensitivity check unless there is one.
+    """Store the resolved experiment with QUEUED repetitions, and queue its sensitivity check unless it exists.
 
     Raises:
-        InvalidSpec: with everything that is wrong with it.
+        InvalidSpec: the spec is invalid; the error has every violation.
     """
     return admit_experiment(store, spec, FREELY).answer
 
@@ -30,9 +30,9 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
     """Submit it within limits, and once for each idempotency key.
 
     Raises:
-        InvalidSpec: with everything that is wrong with it.
-        LimitReached: there is no room for it now.
-        KeyReused: the key stands for another request.
+        InvalidSpec: the spec is invalid; the error has every violation.
+        LimitReached: too much work is in progress.
+        KeyReused: the key was used for another request.
     """
     resolved = resolve_experiment(spec)
     check_extent([resolved], admitted.limits)
@@ -47,10 +47,10 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
 
 
 def submit_study(store: Store, spec: StudySpec) -> StudyRead:
-    """Store the study, an experiment for each of its strategies, and a sensitivity check unless there is one.
+    """Store the study with an experiment for each strategy, and queue its sensitivity check unless it exists.
 
     Raises:
-        InvalidSpec: with everything that is wrong with it.
+        InvalidSpec: the spec is invalid; the error has every violation.
     """
     return admit_study(store, spec, FREELY).answer
 
@@ -59,9 +59,9 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
     """Submit it within limits, and once for each idempotency key.
 
     Raises:
-        InvalidSpec: with everything that is wrong with it.
-        LimitReached: there is no room for it now.
-        KeyReused: the key stands for another request.
+        InvalidSpec: the spec is invalid; the error has every violation.
+        LimitReached: too much work is in progress.
+        KeyReused: the key was used for another request.
     """
     resolved = resolve_study(spec)
     check_extent(resolved, admitted.limits)

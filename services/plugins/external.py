@@ -1,4 +1,4 @@
-"""Versions of external plug-ins: those that are files of GAPLAB_PLUGINS, and no part of gaplab."""
+"""Versions of external plug-ins, which are files in the folders of GAPLAB_PLUGINS."""
 
 from collections.abc import Mapping
 from functools import cache

@@ -1,7 +1,7 @@
-"""Running repetitions: claim them in the order of turns, record their steps, end them.
+"""Execution of repetitions: claims in the order of turns, records of steps, and ends.
 
-The lease mechanism is that of `gaplab.services.running.leases`. Requests of people are obeyed here, so that no holder
-can forget them: the first new step after a pause or a stop is stored, and is the last of its lease.
+The lease mechanism is that of `gaplab.services.running.leases`. People's requests are handled here, so they do not
+depend on the holder: the first new step after a pause or stop is stored, and ends the lease.
 
 All functions raise StoreUnavailable while the database cannot be used; each may then be tried again.
 """
@@ -9,6 +9,7 @@ All functions raise StoreUnavailable while the database cannot be used; each may
 from collections.abc import Iterable, Mapping, Sequence
 
 from sqlalchemy import func, select, update
+from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import ASKED, Ending, State
@@ -46,16 +47,16 @@ requeue_lost = _LEASES.requeue_lost
 
 
 def fail(store: Store, claim: Claim, failure: Failure) -> bool:
-    """End a repetition as FAILED; return False if the claim no longer holds.
+    """End a repetition as FAILED; return False if the claim is no longer valid.
 
-    If reality failed, queue the repetition instead and pause its experiment: a person has to look, and then resumes.
+    If reality failed, queue the repetition instead, and pause its experiment until a person resumes it.
     """
     return store.write(_fail, claim, failure)
 
 
 @transaction
 def note_measuring(session: Session, claims: Sequence[Claim]) -> tuple[Claim, ...]:
-    """Note that these repetitions wait for reality's answer, and return the claims that still hold."""
+    """Record that these repetitions wait for reality's answer, and return the claims that are still valid."""
     row = RepetitionRow
     holds = update(row).where(_LEASES.of(claims), row.state == State.RUNNING)
     noted = session.execute(holds.values(measuring_at=now(), heartbeat_at=now()).returning(row.id, row.epoch))
@@ -65,7 +66,7 @@ def note_measuring(session: Session, claims: Sequence[Claim]) -> tuple[Claim, ..
 
 @transaction
 def free_hardware(session: Session, claims: Sequence[Claim]) -> None:
-    """Note that the workers of these ended claims have stopped, so that others may use their hardware."""
+    """Record that the workers of these ended claims have stopped, so that others may use their hardware."""
     row = RepetitionRow
     session.execute(update(row).where(_LEASES.of(claims), row.state != State.RUNNING).values(hardware=None))
 
@@ -74,29 +75,34 @@ def claim(store: Store, owner: str, limit: int, under: Provenance | None = None)
     """Claim up to `limit` queued repetitions in the order of turns, and return them with their logs.
 
     Args:
-        store: where they are queued.
-        owner: the supervisor that runs them.
-        limit: most repetitions.
+        store: the database.
+        owner: the supervisor.
+        limit: largest number of repetitions.
         under: provenance of the supervisor; this process's if left out. An experiment that was begun under another
             engine, plug-in, architecture or version of the spec is left alone, and says so.
     """
-    return store.write(_claim, owner, limit, under or present_provenance()) if limit > 0 else ()
+    try:
+        return store.write(_claim, owner, limit, under or present_provenance()) if limit > 0 else ()
+    except IntegrityError as error:
+        if "hardware" not in str(error.orig):
+            raise
+        return ()  # another supervisor took the same hardware at the same moment
 
 
 def record(store: Store, claim: Claim, step: Step, *, seconds: float = 0.0) -> bool:
-    """Append a step to the repetition's log, as `record_all` does, and return whether the claim still holds."""
+    """Append a step to the repetition's log, as `record_all` does, and return whether the claim is still valid."""
     return bool(record_all(store, [(claim, (TimedStep(step, seconds),))]))
 
 
 def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[Delivered]]]) -> tuple[Claim, ...]:
-    """Append steps to the logs of repetitions in one transaction, and return the claims that still hold.
+    """Append steps to the logs of repetitions in one transaction, and return the claims that are still valid.
 
     A second delivery of a step changes nothing. A checkpoint is kept until its step is recorded. Nothing is written for
     a claim that does not hold. A claim whose experiment is being paused or stopped ends with its first new step, which
     is written.
 
     Raises:
-        Conflict: steps before a delivered one are missing; nothing at all was written.
+        Conflict: steps before a delivered one are missing; nothing was written.
     """
     by_claim: dict[Claim, list[Delivered]] = {}
     for claim, delivered in deliveries:
@@ -105,12 +111,14 @@ def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[Delivere
 
 
 def give_way(store: Store, waiting: Iterable[Claim], under: Provenance | None = None) -> tuple[Claim, ...]:
-    """Hand back claims that should not begin now, and return them: a request to pause or stop, or another's turn.
+    """Hand back claims of repetitions that should not start now, and return them.
+
+    The reason is a request to pause or stop, or another experiment's turn.
 
     Args:
-        store: of the claims.
+        store: the database.
         waiting: claims whose repetition waits for a core; a running one is never interrupted for another.
-        under: as of `claim`.
+        under: as in `claim`.
     """
     claims = tuple(waiting)
     if not claims:
@@ -181,9 +189,9 @@ def _record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -
 
 
 def _locked_requests(session: Session, claims: Iterable[Claim]) -> dict[str, State]:
-    """Lock the experiments of these claims that are being paused or stopped, and return their states.
+    """Lock the experiments of these claims that people are pausing or stopping, and return their states.
 
-    An experiment is always locked before its repetitions; hence the first look without a lock.
+    An experiment is always locked before its repetitions, so they are first read without a lock.
     """
     row = ExperimentRow
     requested = select(row.id).where(row.id.in_({claim.experiment_id for claim in claims}), row.state.in_(ASKED))

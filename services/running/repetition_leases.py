@@ -1,4 +1,4 @@
-"""The lease of a repetition: what its end means for the history, the experiment and the hardware."""
+"""The lease of a repetition: its end changes the attempt, the experiment and the hardware."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -24,7 +24,7 @@ _REQUESTED_ENDINGS = {State.PAUSING: Ending.PAUSED, State.STOPPING: Ending.STOPP
 
 
 class RepetitionLeases(Leases[Claim]):
-    """Leases of repetitions: an end is told to the history and to the experiment."""
+    """Leases of repetitions. When one ends, its attempt and its experiment are updated."""
 
     table = RepetitionRow
 
@@ -37,7 +37,7 @@ class RepetitionLeases(Leases[Claim]):
     def lose(self, session: Session, which: ColumnElement[bool], reason: str) -> list[Any]:
         """Queue lost work again as the base does, but do not blame a plug-in for a measurement that was cut off.
 
-        A measurement that is cut off time after time pauses the experiment, because a person has to look.
+        If measurements are cut off repeatedly, the experiment is paused, because a person must look.
         """
         row = self.table
         measuring = select(row.id, row.experiment_id, row.losses + 1).where(
@@ -53,17 +53,17 @@ class RepetitionLeases(Leases[Claim]):
         return queued + super().lose(session, which, reason)
 
     def free_lost(self, session: Session, stale: ColumnElement[bool]) -> None:
-        """Free the hardware of ended leases whose supervisor never said that its worker has stopped."""
+        """Free the hardware of ended leases whose supervisor never reported that its worker has stopped."""
         row = self.table
         session.execute(
             update(row).where(stale, row.state != State.RUNNING, row.hardware.is_not(None)).values(hardware=None)
         )
 
     def end(self, session: Session, which: ColumnElement[bool], change: Change) -> list[int]:
-        """End leases as the base does; a hand-back to an experiment that is being paused or stopped is told as such.
+        """End leases as the base does; if the experiment is being paused or stopped, a hand-back is recorded as that.
 
         Raises:
-            Conflict: a repetition is to be COMPLETED and iterations of it are missing.
+            Conflict: a repetition that should become COMPLETED lacks iterations.
         """
         row = RepetitionRow
         held = select(row.id, row.experiment_id).where(which, row.state == State.RUNNING)

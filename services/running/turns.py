@@ -34,12 +34,12 @@ def next_repetitions(session: Session, limit: int, permitted: ColumnElement[bool
 
 
 def next_experiments(limit: int) -> Select[str]:
-    """Select the experiments with the next turns off an index; no later one can have one of the `limit` turns."""
+    """Select the experiments with the next turns from an index; no other can have one of the `limit` turns."""
     return select(_ROW.id).where(_ROW.claimable.is_(True)).order_by(*_ORDER).limit(limit)
 
 
 def ahead(session: Session, experiments: Sequence[str], permitted: ColumnElement[bool]) -> frozenset[str]:
-    """Return the experiments that should give one claimed repetition up for another, permitted experiment's."""
+    """Return the experiments that should give up a claimed repetition for one of another permitted experiment."""
     waits = _ROW.claimable.is_(True) & permitted
     first = select(_ROW.precedence, _ROW.running).where(waits).order_by(*_ORDER).limit(1)
     if (waiting := session.execute(first).first()) is None:
@@ -53,9 +53,9 @@ def ahead(session: Session, experiments: Sequence[str], permitted: ColumnElement
 
 
 def _turns(session: Session, experiments: Sequence[str], limit: int, permitted: ColumnElement[bool]) -> list[str]:
-    """Return the experiment of each turn; an experiment has one more running after each of its turns.
+    """Return the experiment of each turn; each turn gives its experiment one more running repetition.
 
-    What is claimable and permitted is read again now that the experiments are locked.
+    The experiments are locked, so this reads again which of them are claimable and permitted.
     """
     row = RepetitionRow
     queued = (

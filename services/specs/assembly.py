@@ -102,10 +102,10 @@ class EvolutionInReality(HiddenReality):
 
 
 def setting(spec: ResolvedSpec, repetition: int) -> Setting:
-    """Return everything that one repetition depends on.
+    """Return the setting of one repetition.
 
     Args:
-        spec: of the experiment.
+        spec: spec of the experiment.
         repetition: the number of the repetition, from 0.
     """
     robot = robots.create(spec.robot)
@@ -156,7 +156,7 @@ def edits_of(names: Iterable[str]) -> list[Tunable]:
     """Return the tunables of these names.
 
     Raises:
-        InvalidSpec: one is not installed here.
+        InvalidSpec: a tunable is not installed here.
     """
     return [tunables.create(PluginRef(name=name), "/tunables") for name in names]
 
@@ -165,11 +165,11 @@ def refuse_missing(spec: ResolvedSpec, *, reality: bool = False) -> None:
     """Check that the plug-ins that a stored spec simulates with are installed here.
 
     Args:
-        spec: of the experiment.
+        spec: spec of the experiment.
         reality: also check the plug-ins of reality.
 
     Raises:
-        InvalidSpec: one is not; perhaps its file was removed.
+        InvalidSpec: a plug-in is missing; perhaps its file was removed.
     """
     needed = [(spec.engine, "/engine"), *([(spec.reality.engine, "/reality/engine")] if reality else [])]
     names = [*(ref.name for ref in spec.tunables), *(spec.reality.parameters if reality else ())]
@@ -181,7 +181,7 @@ def refuse_missing(spec: ResolvedSpec, *, reality: bool = False) -> None:
 
 
 def engine_of(ref: PluginRef) -> Engine:
-    """Return the engine: one instance in this process for equal options, warm from use to use."""
+    """Return the engine: one instance in this process for equal options, which keeps its worlds loaded."""
     return _warm_engine(ref.model_dump_json())
 
 

@@ -47,7 +47,7 @@ def _bound_violations(ref: TunableRef, pointer: str) -> Iterator[Violation]:
 def _range_violations(tunable: type[Tunable], value: float, pointer: str) -> Iterator[Violation]:
     if not tunable.least <= value <= tunable.greatest:
         permitted = f"{tunable.least:g} to {tunable.greatest:g}"
-        yield Violation(pointer, value, f"{tunable.name} is {permitted}, not {value:g}", permitted)
+        yield Violation(pointer, value, f"{tunable.name} must be from {permitted}, not {value:g}", permitted)
 
 
 def _honour_violations(name: str, engine: type[Engine], pointer: str) -> Iterator[Violation]:

@@ -1,4 +1,4 @@
-"""Statements and values that SQLite and Postgres want written differently."""
+"""Statements and values that differ between SQLite and Postgres."""
 
 from collections.abc import Callable
 
@@ -15,5 +15,5 @@ _INSERT: dict[str, Callable[..., postgresql.Insert | sqlite.Insert]] = {
 
 
 def insert_new(session: Session, table: type[Base]) -> postgresql.Insert | sqlite.Insert:
-    """Return an INSERT that leaves rows alone whose key is there already."""
+    """Return an INSERT that skips rows whose key exists already."""
     return _INSERT[session.get_bind().dialect.name](table).on_conflict_do_nothing()

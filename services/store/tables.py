@@ -36,7 +36,7 @@ class Column:
         nullable: null is permitted.
         required: an insert must give a value, since there is no default.
         generated: the database itself numbers the rows.
-        longest: characters of a text; None if a longer one is cut when it is stored.
+        longest: most characters of a text; None if a longer one is cut when it is stored.
         large: a whole number of 64 bits, rather than 32.
         choices: the only permitted texts; empty if all are.
     """

@@ -7,7 +7,7 @@ _BEGINNING = LONGEST_REASON - 100
 
 
 def storable(text: str) -> str:
-    """Return the text with a replacement for what a database refuses: NUL characters and halves of characters."""
+    """Return the text with NUL characters and lone surrogates replaced, which databases refuse."""
     return text.encode(errors="replace").decode().replace("\0", "\N{REPLACEMENT CHARACTER}")
 
 

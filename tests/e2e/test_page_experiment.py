@@ -68,7 +68,7 @@ def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api: Any, writ
     expect(page.locator(".state-now")).to_contain_text("completed")
     expect(happened.first).to_contain_text("Completed")
     page.get_by_role("tabpanel").scroll_into_view_if_needed()
-    expect(page.get_by_role("tabpanel").locator("tbody .pill.completed")).to_have_count(2)
+    expect(page.get_by_role("tabpanel").locator("tbody .state-badge.completed")).to_have_count(2)
     simulators = page.locator(".figure-simulators")
     simulators.scroll_into_view_if_needed()
     expect(simulators.locator(".legendtext").get_by_text("Reality", exact=True)).to_be_visible()

@@ -173,7 +173,7 @@ def test_the_verbs_say_what_it_is_now_and_forbidden_ones_are_a_sentence(gaplab: 
 
     assert [each.out.rpartition(" is ")[2].strip() for each in said] == ["PAUSED.", "QUEUED.", "", "QUEUED.", ""]
     assert [each.code for each in said] == [0, 0, Exit.CONFLICT, 0, Exit.CONFLICT]
-    assert said[2].err.endswith("is QUEUED and cannot be resumed; what can be done with it: pause, stop, cancel\n")
+    assert said[2].err.endswith("is QUEUED and cannot be resumed; permitted: pause, stop, cancel\n")
     assert gaplab("stop", id).out.endswith("is COMPLETED.\n")
 
 

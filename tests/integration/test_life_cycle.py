@@ -264,7 +264,7 @@ def test_a_verb_of_a_study_goes_to_all_of_its_experiments_that_permit_it(store: 
     ask(store, second, Verb.PAUSE)
 
     paused = lifecycle.ask_study(store, study.id, Verb.PAUSE)
-    with pytest.raises(Conflict, match="they are CANCELLED, PAUSED; permitted is QUEUED, RUNNING"):
+    with pytest.raises(Conflict, match="they are CANCELLED, PAUSED; permitted: QUEUED, RUNNING"):
         lifecycle.ask_study(store, study.id, Verb.PAUSE)
     resumed = lifecycle.ask_study(store, study.id, Verb.RESUME)
     cancelled = lifecycle.ask_study(store, study.id, Verb.CANCEL)
@@ -334,7 +334,7 @@ def test_repetitions_of_the_direct_baseline_can_be_extended_but_it_has_no_iterat
 def test_totals_below_what_is_there_are_refused(store: Store, totals: Any) -> None:
     experiment = in_state(store, State.COMPLETED)
 
-    with pytest.raises(InvalidSpec, match=r"is a total, which must not be smaller|name the total"):
+    with pytest.raises(InvalidSpec, match=r"that the experiment has; give a total|give a total of"):
         extension.extend_experiment(store, experiment, ExtensionSpec(**totals))
 
     assert state(store, experiment) is State.COMPLETED

@@ -53,7 +53,7 @@ export function permittedStates(action) {
  * @returns {Page.Updatable}
  */
 export function actionButtons(label, refusal, run, others = []) {
-  const message = h("p", { class: "said", role: "status" });
+  const message = h("p", { class: "outcome", role: "status" });
   const press = async (/** @type {Action} */ action) => {
     message.textContent = refusal(action);
     if (message.textContent) return;
@@ -83,5 +83,5 @@ export function actionButtons(label, refusal, run, others = []) {
     }
   };
   const group = h("div", { role: "group", "aria-label": label }, ...buttons.values(), ...otherButtons);
-  return { element: h("div", { class: "verbs" }, group, message), update };
+  return { element: h("div", { class: "life-cycle" }, group, message), update };
 }

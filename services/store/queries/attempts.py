@@ -32,7 +32,7 @@ def begin(session: Session, repetitions: Sequence[int]) -> None:
 
 
 def end(session: Session, repetitions: Sequence[int], ending: Ending, reason: str | None = None) -> None:
-    """End the open attempts at these repetitions, and note an event for each."""
+    """End the open attempts at these repetitions, and record an event for each."""
     row, repetition = AttemptRow, RepetitionRow
     ended = session.scalars(
         update(row)
@@ -49,7 +49,7 @@ def end(session: Session, repetitions: Sequence[int], ending: Ending, reason: st
 
 
 def latest(session: Session, experiment: str) -> dict[int, int]:
-    """Return the number of the latest attempt by repetition, for an experiment's repetitions that have had one."""
+    """Return the number of the latest attempt by repetition, for all repetitions of an experiment with attempts."""
     row, repetition = AttemptRow, RepetitionRow
     of_it = select(row.repetition_id, func.max(row.epoch)).join(repetition, repetition.id == row.repetition_id)
     found = of_it.where(repetition.experiment_id == experiment).group_by(row.repetition_id)
