@@ -133,7 +133,8 @@ def test_a_comparison_needs_two_experiments(sqlite_store: Store) -> None:
 @pytest.mark.parametrize("name", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "=cmd|' /C calc'!A0"])
 def test_a_name_in_the_csv_is_no_formula(sqlite_store: Store, name: str) -> None:
     id_ = submission.submit_experiment(sqlite_store, toy(name=name, repetitions=1)).id
-    run(sqlite_store, *execution.claim(sqlite_store, "me", 1), some_log(recorded=-2.0))  # type: ignore[misc]
+    (claim,) = execution.claim(sqlite_store, "me", 1)
+    run(sqlite_store, claim, some_log(recorded=-2.0))
 
     lines = list(csv.DictReader(io.StringIO(curves.curves_csv([curves.curve(sqlite_store, id_)]), newline="")))
 
