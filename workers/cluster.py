@@ -13,6 +13,7 @@ from ray.exceptions import RayError
 from gaplab.services.core.errors import ClusterUnusable
 from gaplab.services.settings import Settings
 from gaplab.workers.nodes import Versions, check_nodes, versions
+from gaplab.workers.output import limit_files
 
 OBJECT_STORE_BYTES = 100 * 2**20
 """Steps are small: nothing here needs a large object store."""
@@ -81,6 +82,7 @@ def _start(cores: int | None) -> None:
     if os.environ.get("RAY_AUTH_MODE") == "disabled":  # Ray reads it when it is imported
         msg = "RAY_AUTH_MODE is 'disabled': anyone who reaches a Ray without a token can run any code; unset it"
         raise ClusterUnusable(msg)
+    limit_files()
     with _on_loopback():
         ray.init(
             address="local",  # not another Ray on this machine

@@ -10,6 +10,7 @@ from gaplab.services.core.errors import ClusterUnusable, PluginBroken
 from gaplab.services.plugins import folders
 from gaplab.services.running.versions import Versions as Versions
 from gaplab.services.running.versions import versions as versions
+from gaplab.workers.output import limit_prints
 
 ANSWER_S = 60.0
 """Longest wait for a node to start a process and name its versions."""
@@ -21,6 +22,7 @@ def check_here(expected: Versions) -> None:
     Raises:
         ClusterUnusable: it lacks them, or an external plug-in is broken here; the message says which.
     """
+    limit_prints()
     try:
         found = _versions_here()
     except PluginBroken as error:

@@ -38,6 +38,7 @@ class EventFeed:
         self._every_s = every_s
         self._recent: deque[EventRead] = deque(maxlen=kept)
         self._head: int | None = None
+        self._databases = 0
         self._news = asyncio.Event()
         self._reader: asyncio.Task[None] | None = None
         self._open = 0
@@ -49,9 +50,13 @@ class EventFeed:
         return self._open
 
     async def follow(self, after: int, which: WantedEvents) -> AsyncIterator[EventRead]:
-        """Yield the selected events after that number, in order and each once, until the feed is closed."""
+        """Yield the selected events after that number, in order and each once, until the feed is closed.
+
+        It also ends if the database was replaced by one with fewer events: numbers then have another meaning.
+        """
         with self._counted():
-            while not (self._closed or self._reader is None or self._reader.done()):
+            databases = self._databases
+            while not (self._closed or self._reader is None or self._reader.done() or self._databases > databases):
                 news, recent = self._news, self._after(after)
                 if recent is None:
                     page = await self._page(after, which)
@@ -122,7 +127,12 @@ class EventFeed:
             self._wake()
         head = self._head
         page = await run_sync(lambda: events.page(self._store, head, WantedEvents(), limit=PAGE))
-        if page.items:
+        if page.latest < head:
+            self._databases += 1
+            self._head = None
+            self._recent.clear()
+            self._wake()
+        elif page.items:
             self._recent.extend(page.items)
             self._head = page.items[-1].number
             self._wake()

@@ -8,6 +8,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from gaplab.api.app import create_app
+from gaplab.api.process.connections import TimedConnection
 from gaplab.api.process.errors import CommandError
 from gaplab.services.access import demand_token_beyond_loopback
 from gaplab.services.plugins import folders
@@ -16,6 +17,9 @@ from gaplab.services.store.session import Store
 
 GRACE_S = 5
 """Time that requests under way have to finish when the service ends."""
+
+BACKLOG = 256
+"""Connections that are taken at once, before any of them counts."""
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -72,7 +76,15 @@ class Server(uvicorn.Server):
     """Uvicorn that ends event streams at shutdown, rather than waiting for them forever."""
 
     def __init__(self, app: FastAPI) -> None:
-        config = uvicorn.Config(app, log_config=None, server_header=False, timeout_graceful_shutdown=GRACE_S)
+        config = uvicorn.Config(
+            app,
+            http=TimedConnection,
+            limit_concurrency=app.state.connections,
+            backlog=BACKLOG,
+            log_config=None,
+            server_header=False,
+            timeout_graceful_shutdown=GRACE_S,
+        )
         super().__init__(config)
         self._app = app
 

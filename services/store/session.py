@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
+from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
 
 from sqlalchemy import event, text
@@ -14,7 +15,7 @@ from sqlalchemy.orm import sessionmaker
 from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.store import database_errors
 from gaplab.services.store.engine import WRITES, open_engine
-from gaplab.services.store.models import REVISION
+from gaplab.services.store.models import REVISION, Base
 from gaplab.services.store.queries import events
 
 P = ParamSpec("P")
@@ -108,6 +109,22 @@ class Store:
     def dispose(self) -> None:
         """Close the idle connections; the store may be used again."""
         self._engine.dispose()
+
+
+@contextmanager
+def private_store(file: Path) -> Iterator[Store]:
+    """Open a new SQLite database with the present tables, for a computation that no other process sees.
+
+    Args:
+        file: does not exist; the caller deletes it.
+    """
+    store = Store(f"sqlite:///{file}")
+    try:
+        with store.transaction() as session:
+            Base.metadata.create_all(session.connection())
+        yield store
+    finally:
+        store.dispose()
 
 
 def transaction(work: Callable[Concatenate[Session, P], T]) -> Callable[Concatenate[Store, P], T]:

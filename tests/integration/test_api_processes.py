@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from gaplab.api.clients.client import Client
-from gaplab.api.process import service
+from gaplab.api.process import local_service, service
 from gaplab.api.process.child_process import end, start
 from gaplab.api.process.errors import CommandError
 from gaplab.api.process.local_service import start_service
@@ -222,5 +222,7 @@ def test_the_token_of_another_service_is_not_shown_to_one_of_ones_own(
         found = client.studies()
 
     monkeypatch.setenv("GAPLAB_TOKEN", create_token(sqlite_store, Role.READER).secret)
+    monkeypatch.setattr(local_service, "LARGEST_LOG", 0)
     with start_service(sqlite_url, tmp_path / "log", workers=False) as client:
         assert client.studies() == found
+    assert (tmp_path / "log.old").exists()  # it was too large
