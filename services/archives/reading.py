@@ -40,7 +40,7 @@ _SLOTS = BoundedSemaphore(AT_ONCE)
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedArchive:
     """An archive in a private database, where every row has been checked.
 
     Attributes:
@@ -80,17 +80,17 @@ def import_archive(store: Store, file: IO[bytes], *, most_rows: int | None = Non
         _SLOTS.release()
 
 
-def _check(session: Session, private: Store, opened: OpenedArchive, now: datetime) -> Checked:
+def _check(session: Session, private: Store, opened: OpenedArchive, now: datetime) -> CheckedArchive:
     """Store the rows of an archive in the private database, each as it will arrive except for its ids."""
     experiments = checked_experiments(opened)
     for table in EXPORTED:
         rows = _fitting(table, opened.rows(table), experiments)
         _insert(session, table, (_arriving(table, row, experiments, now) for row in rows))
     check_logs(session, experiments)
-    return Checked(private, opened.manifest.id if opened.manifest.kind == "study" else None, experiments)
+    return CheckedArchive(private, opened.manifest.id if opened.manifest.kind == "study" else None, experiments)
 
 
-def _copy(session: Session, checked: Checked) -> ImportRead:
+def _copy(session: Session, checked: CheckedArchive) -> ImportRead:
     """Copy the rows of the private database into the service's, and begin the life of the experiments there."""
     studies = {checked.study} if checked.study else set()
     taken = archives.taken_ids(session, StudyRow, studies)
