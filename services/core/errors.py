@@ -10,7 +10,9 @@
     ├── LimitReached         too much work is in progress
     ├── Unauthenticated      no token, or an invalid one
     ├── Forbidden            the role of the token does not permit the request
-    ├── StoreUnavailable     the database is unreachable, or has another schema
+    ├── StoreUnavailable     the database is unreachable
+    │   ├── StoreChanged         it was replaced, restored or migrated under the process
+    │   └── StoreDamaged         its file is damaged
     ├── InvalidArchive       a file is not an archive of gaplab, or is damaged or malicious
     ├── Unsupported          the request needs another kind of database
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
@@ -107,6 +109,14 @@ class Forbidden(GaplabError):
 
 class StoreUnavailable(GaplabError):
     """The database is not usable now."""
+
+
+class StoreChanged(StoreUnavailable):
+    """The database is no longer the one that the process knows, or has another schema; only a new process may go on."""
+
+
+class StoreDamaged(StoreUnavailable):
+    """The file of the database is damaged; the message says what to do."""
 
 
 class InvalidArchive(GaplabError):

@@ -103,8 +103,15 @@ class Leases(Generic[L]):
         return len(store.write(self._hand_back, (self.table.owner == owner) & self.table.id.not_in(ids)))
 
     def requeue_lost(self, store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:
-        """Queue work again whose holder was silent for too long, and return how many pieces there were."""
+        """Queue work again whose holder was silent for too long, and return how many pieces there were.
+
+        A heartbeat from the future was sent before the clock was set back, and says nothing about the present.
+        """
         return len(store.write(self._requeue_lost, stale_after_s))
+
+    def release_all(self, store: Store, owner: str, reason: str) -> int:
+        """Queue all work of a supervisor again that has certainly ended, and return how many pieces there were."""
+        return len(store.write(self._release, self.table.owner == owner, storable(reason)))
 
     def take(self, session: Session, ids: Sequence[int | str], owner: str) -> list[Any]:
         """Begin a lease on each of these queued rows, and return the ids of those that were still free."""
@@ -151,9 +158,13 @@ class Leases(Generic[L]):
         return self.end(session, which, Change(State.QUEUED, Ending.HANDED_BACK, values=values))
 
     def _requeue_lost(self, session: Session, stale_after_s: float) -> list[Any]:
-        stale = self.table.heartbeat_at < moment(session) - timedelta(seconds=stale_after_s)
-        return self._release(session, stale, f"its worker was not heard of for {stale_after_s:g} s")
+        beat, present, patience = self.table.heartbeat_at, moment(session), timedelta(seconds=stale_after_s)
+        silent = self._release(
+            session, beat < present - patience, f"its worker was not heard of for {stale_after_s:g} s"
+        )
+        return silent + self._release(session, beat > present + patience, "the clock was set back since its heartbeat")
 
     def _of(self, leases: Sequence[L]) -> ColumnElement[bool]:
         """Return the condition that a row's lease is one of these."""
-        return tuple_(self.table.id, self.table.epoch).in_([(lease.id, lease.epoch) for lease in leases])
+        row = self.table
+        return tuple_(row.id, row.epoch, row.owner).in_([(lease.id, lease.epoch, lease.owner) for lease in leases])

@@ -8,6 +8,10 @@ from gaplab.services.store.models import SupervisorRow
 
 
 def ages(session: Session) -> tuple[float, ...]:
-    """Return the seconds since each supervisor's last sign of life; those that stopped in good order have no entry."""
+    """Return the seconds since each supervisor's last sign of life; those that stopped in good order have no entry.
+
+    A sign of life from the future was given before the clock was set back, and is as old as it is far away.
+    """
     present = moment(session)
-    return tuple((present - beat).total_seconds() for beat in session.scalars(select(SupervisorRow.heartbeat_at)))
+    beats = session.scalars(select(SupervisorRow.heartbeat_at))
+    return tuple(abs((present - beat).total_seconds()) for beat in beats)
