@@ -8,12 +8,14 @@ import os
 import socket
 from collections.abc import Callable
 from contextlib import suppress
+from datetime import datetime
 from secrets import token_hex
 from threading import Event
 from time import monotonic
 
-from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.core.errors import RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.running import execution, supervisors
+from gaplab.services.running.pulse import Pulse
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.nodes import Versions
@@ -41,6 +43,7 @@ class Supervisor:
         versions: that a node must have to run them.
         checkpoint_s: seconds between the checkpoints of a long step.
         lease_s: silence after which a supervisor's work goes to others; the same for all supervisors.
+        pulse: to the process that keeps this one; left out: none does.
     """
 
     def __init__(
@@ -51,6 +54,7 @@ class Supervisor:
         *,
         checkpoint_s: float = CHECKPOINT_S,
         lease_s: float = execution.STALE_AFTER_S,
+        pulse: Pulse | None = None,
     ) -> None:
         self._store = store
         self._capacity = capacity
@@ -59,6 +63,9 @@ class Supervisor:
         self._checks = Checks(store, self._owner, lease_s, versions)
         self._lease_s = lease_s
         self._beat = -lease_s
+        self._noted: datetime | None = None
+        self._pulse = pulse or Pulse()
+        self._pulse.name(self._owner)
 
     @property
     def busy(self) -> bool:
@@ -69,16 +76,22 @@ class Supervisor:
         """Work until told to stop; then hand unfinished repetitions back, each after one more delivery.
 
         Raises:
-            ClusterUnusable: a node would compute other numbers; this ends the work as well.
+            ClusterUnusable: a node would compute other numbers, or Ray died; this ends the work as well.
+            StoreChanged: the database was replaced, restored or migrated; nothing more is written to it.
         """
         try:
             while not stop.is_set():
                 try:
                     self.step()
+                except StoreChanged:
+                    raise
                 except StoreUnavailable as error:
                     log.warning("waiting: %s", error)
                     stop.wait(RETRY_S)
             self._wind_down()
+        except RayGone:
+            self._repetitions.runs.clear()  # nothing answers that could end them
+            raise
         finally:
             self._repetitions.hand_back(self._repetitions.runs)
             with suppress(StoreUnavailable):  # then their leases will run out
@@ -93,8 +106,10 @@ class Supervisor:
 
         Raises:
             StoreUnavailable: nothing is lost by it; what was received is stored in a later round.
+            StoreChanged: it is not the database that this supervisor knows; what was received is void.
             ClusterUnusable: a node that joined has other versions; nothing of it is stored.
         """
+        self._pulse.beat()
         self._heartbeat()
         self._checks.step()
         self._repetitions.claim(self._capacity)
@@ -105,7 +120,8 @@ class Supervisor:
     def _heartbeat(self) -> None:
         if monotonic() - self._beat < self._lease_s / HEARTBEATS:
             return
-        supervisors.heartbeat(self._store, self._owner)
+        self._store.check()
+        self._noted = supervisors.heartbeat(self._store, self._owner, self._noted)
         self._repetitions.heartbeat()
         self._checks.heartbeat()
         if requeued := execution.requeue_lost(self._store, stale_after_s=self._lease_s):
@@ -117,12 +133,15 @@ class Supervisor:
         repetitions, until = self._repetitions, monotonic() + GRACE_S
         repetitions.hand_back([run for run in repetitions.runs if not run.begun])
         while repetitions.runs and monotonic() < until:
+            self._pulse.beat()
             try:
                 self._heartbeat()
                 repetitions.receive()
                 delivered = [run for run in repetitions.runs if run.received]
                 repetitions.store_received()
                 repetitions.end()
+            except StoreChanged:
+                raise
             except StoreUnavailable as error:
                 log.warning("waiting: %s", error)
                 Event().wait(RETRY_S)

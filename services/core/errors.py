@@ -16,6 +16,7 @@
     ├── InvalidArchive       a file is not an archive of gaplab, or is damaged or malicious
     ├── Unsupported          the request needs another kind of database
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
+    │   └── RayGone              Ray died or stands still; only a new process gets another
     ├── PluginBroken         an external plug-in file is unusable
     └── EngineError
         ├── EngineUnavailable    the engine's library is not installed
@@ -129,6 +130,10 @@ class Unsupported(GaplabError):
 
 class ClusterUnusable(GaplabError):
     """Ray is unreachable, or one of its nodes would compute other numbers or fail."""
+
+
+class RayGone(ClusterUnusable):
+    """The Ray of this process died or does not answer; calls to it may never return."""
 
 
 class PluginBroken(GaplabError):

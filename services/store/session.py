@@ -17,6 +17,7 @@ from gaplab.services.store.engine import WRITES, open_engine
 from gaplab.services.store.guard import Guard
 from gaplab.services.store.models import REVISION
 from gaplab.services.store.queries import events
+from gaplab.services.store.sqlite_file import file_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -39,6 +40,7 @@ class Store:
             whose claims would be void; else the new file is opened.
 
     Attributes:
+        file: of a SQLite database; None for Postgres.
         errors: number of times that the database could not be used.
         retries: number of transactions that Postgres gave up for others, and that ran again.
     """
@@ -47,6 +49,7 @@ class Store:
         self.errors = self.retries = 0
         self._engine = open_engine(url, answer_s=answer_s)
         self._guard = Guard(self._engine, pinned=pinned)
+        self.file = file_of(self._engine.url)
         snapshot = {"isolation_level": "REPEATABLE READ"} if self._engine.name == "postgresql" else {}
         self._writer = sessionmaker(self._engine.execution_options(**{WRITES: True}), expire_on_commit=False)
         event.listen(self._writer, "before_commit", events.write)
