@@ -11,6 +11,7 @@ from gaplab.api.process.errors import CommandError
 from gaplab.services.access import authenticate
 from gaplab.services.core.errors import Unauthenticated
 from gaplab.services.plugins.folders import VARIABLE
+from gaplab.services.store.atomic_files import private
 from gaplab.services.store.session import Store
 
 START_WITHIN_S = 120.0
@@ -63,7 +64,7 @@ def start_service(
     environment = {"GAPLAB_DATABASE_URL": database_url, "GAPLAB_PORT": str(port), "GAPLAB_HOST": "127.0.0.1"}
     if plugins is not None:
         environment[VARIABLE] = str(Path(plugins).absolute())
-    with log.open("ab") as output:
+    with open(log, "ab", opener=private) as output:
         process = start(*(("gaplab", "serve") if workers else ("gaplab.api",)), environment=environment, log=output)
     try:
         _wait_until_ready(url, process, log)

@@ -13,6 +13,7 @@
     ├── StoreUnavailable     the database is unreachable
     │   ├── StoreChanged         it was replaced, restored or migrated under the process
     │   └── StoreDamaged         its file is damaged
+    ├── SupervisorUnavailable   the supervisor hangs, or ends again and again
     ├── InvalidArchive       a file is not an archive of gaplab, or is damaged or malicious
     ├── Unsupported          the request needs another kind of database
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
@@ -118,6 +119,10 @@ class StoreChanged(StoreUnavailable):
 
 class StoreDamaged(StoreUnavailable):
     """The file of the database is damaged; the message says what to do."""
+
+
+class SupervisorUnavailable(GaplabError):
+    """Experiments do not run; the message says why."""
 
 
 class InvalidArchive(GaplabError):

@@ -1,6 +1,5 @@
 """The one place where errors of a database become `StoreUnavailable`; programming errors pass through."""
 
-import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -8,14 +7,13 @@ from sqlalchemy.exc import DatabaseError, DBAPIError, InterfaceError, Operationa
 from sqlalchemy.exc import TimeoutError as PoolExhausted
 
 from gaplab.services.core.errors import StoreDamaged, StoreUnavailable
+from gaplab.services.store.sqlite_file import is_damage
 
 _CLASHES = {"40001", "40P01"}
 """Postgres gave up one of two transactions for the other: serialization failure, deadlock."""
 
 _NO_SCHEMA = {"42P01", "42703"}
 """Postgres knows no such table, or no such column."""
-
-_DAMAGED = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
 
 WRONG_SCHEMA = "the database lacks the schema of this version: run `python -m migrations`"
 
@@ -36,7 +34,7 @@ def named() -> Iterator[None]:
     except DBAPIError as error:
         if _lacks_schema(error):
             raise StoreUnavailable(WRONG_SCHEMA) from error
-        if _is_damaged(error):
+        if is_damage(error.orig):
             msg = f"the database is damaged: {_first_line(error)}"
             raise StoreDamaged(msg) from error
         unusable = isinstance(error, OperationalError | InterfaceError) or type(error) is DatabaseError
@@ -53,10 +51,6 @@ def is_clash(error: DBAPIError) -> bool:
 
 def _lacks_schema(error: DBAPIError) -> bool:
     return _sqlstate(error) in _NO_SCHEMA or str(error.orig).startswith(("no such table", "no such column"))
-
-
-def _is_damaged(error: DBAPIError) -> bool:
-    return getattr(error.orig, "sqlite_errorcode", 0) & 0xFF in _DAMAGED  # the low byte is the kind of error
 
 
 def _sqlstate(error: DBAPIError) -> str | None:

@@ -37,7 +37,7 @@ def open_engine(url: str, *, enforce_foreign_keys: bool = True, answer_s: float 
     Raises:
         StoreUnavailable: no such kind of database.
     """
-    parsed = _parse(url)
+    parsed = parse(url)
     if parsed.get_backend_name() == "postgresql":
         return postgres_engine(parsed, answer_s=answer_s)
     engine = create_engine(parsed, pool_pre_ping=True, connect_args={"timeout": PATIENCE_S}, hide_parameters=True)
@@ -45,7 +45,12 @@ def open_engine(url: str, *, enforce_foreign_keys: bool = True, answer_s: float 
     return engine
 
 
-def _parse(url: str) -> URL:
+def parse(url: str) -> URL:
+    """Return a database URL with its driver.
+
+    Raises:
+        StoreUnavailable: it is no URL, or of another kind of database.
+    """
     try:
         parsed = make_url(url)
     except ArgumentError as error:

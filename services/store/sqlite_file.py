@@ -21,6 +21,8 @@ HINT = "end the service and run `gaplab restore BACKUP`"
 PRIVATE = 0o600
 """Permissions of what holds results: the owner's alone."""
 
+_DAMAGED = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
+
 COMPANIONS = ("-journal", "-wal", "-shm")
 """Endings of the files that SQLite keeps beside a database; the first two hold transactions that are not in it yet."""
 
@@ -46,6 +48,11 @@ def create(file: Path) -> None:
     """Create an absent file for its owner alone; SQLite gives its companions the same permissions."""
     with suppress(OSError):  # SQLite says what is wrong
         os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, PRIVATE))
+
+
+def is_damage(error: BaseException | None) -> bool:
+    """Return whether SQLite found a file damaged, or no database at all."""
+    return getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED  # the low byte is the kind of error
 
 
 def is_open_to_others(file: Path) -> bool:
