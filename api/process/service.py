@@ -14,7 +14,9 @@ from gaplab.services import logs
 from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.plugins import folders
 from gaplab.services.settings import Settings, address
+from gaplab.services.store.engine import parse
 from gaplab.services.store.session import Store
+from gaplab.services.store.sqlite_file import file_of, is_open_to_others
 
 log = logging.getLogger("gaplab.service")
 
@@ -38,6 +40,7 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
     listener = listen(settings.host, settings.port)
     migrate(settings.database_url)
     require_token(settings)
+    warn_of_readers(settings.database_url)
     url = address(settings.host, settings.port)
     log.info("gaplab serves on %s (/docs documents the API; Ctrl-C ends the service)", url)
     if not workers:
@@ -77,6 +80,13 @@ def migrate(database_url: str) -> None:
         url = re.sub(r"(://[^:/@]*):[^@]*@", r"\1:…@", database_url)  # without the password
         msg = f"the database {url} cannot be migrated: {reason}"
         raise StoreUnavailable(msg) from error
+
+
+def warn_of_readers(database_url: str) -> None:
+    """Log a warning if other users of the machine may read the database; a new one is the owner's alone."""
+    file = file_of(parse(database_url))
+    if file and is_open_to_others(file):
+        log.warning("other users of this machine can open the database %s: `chmod 600 %s` keeps them out", file, file)
 
 
 def environment_of(settings: Settings) -> dict[str, str]:
