@@ -1,4 +1,4 @@
-"""`python -m workers serve`: run what is queued until told to stop. `python -m workers check`: could it?"""
+"""`python -m workers serve`: run queued work until told to stop. `python -m workers check`: test whether it could."""
 
 import logging
 import os
@@ -57,6 +57,7 @@ def _work(store: Store, settings: Settings, pulse: Pulse) -> None:
         StoreChanged: the database has another schema, or is another one than at the start.
     """
     from gaplab.workers.cluster import cluster  # Ray takes a second to import
+    from gaplab.workers.patience import Patience
     from gaplab.workers.supervisor import Supervisor
 
     _refuse_other_schema(store)
@@ -65,8 +66,9 @@ def _work(store: Store, settings: Settings, pulse: Pulse) -> None:
         for signum in (signal.SIGTERM, signal.SIGINT):  # only now, for Ray has put handlers of its own in place
             signal.signal(signum, lambda *_: stop.set())
         logging.getLogger("gaplab.supervisor").info("ready for %d repetitions at once", joined.capacity())
-        supervisor = Supervisor(store, joined.capacity, joined.versions, lease_s=settings.lease_s, pulse=pulse)
-        supervisor.serve(stop)
+        patience = Patience(settings.rollout_limit_s, settings.step_limit_s)
+        supervisor = Supervisor(store, joined.capacity, joined.versions, lease_s=settings.lease_s, patience=patience)
+        supervisor.serve(stop, pulse)
 
 
 def _refuse_other_schema(store: Store) -> None:
@@ -89,7 +91,7 @@ def _answer_s(lease_s: float) -> float:
 
 
 def choose_authentication(settings: Settings) -> None:
-    """Make a Ray that this process starts ask for a token, and send one to a cluster unless the environment forbids it.
+    """Require a token of clients of our own Ray, and send one to a cluster unless the environment forbids it.
 
     Ray reads these variables when it is imported. By default it sends its token only to a cluster that it started, and
     keeps the token in a file of the home folder that other users may read.

@@ -1,4 +1,4 @@
-"""Ray itself: started on this machine, or joined where it runs."""
+"""Ray: started on this machine, or joined as an existing cluster."""
 
 import logging
 import os
@@ -23,13 +23,13 @@ OBJECT_STORE_BYTES = 100 * 2**20
 
 @dataclass(frozen=True)
 class Cluster:
-    """Ray, as it was started or joined.
+    """A Ray that was started or joined.
 
     Attributes:
-        workers: most repetitions at once; None for as many as there are cores.
-        versions: that a process must have to run a repetition. Even a Ray on this machine starts processes later, and
-            files may be edited meanwhile.
-        watch: on Ray.
+        workers: largest number of repetitions at once; None for the number of cores.
+        versions: versions that a process must have to run a repetition. Even a Ray on this machine starts processes
+            later, and files may be edited meanwhile.
+        watch: watch on Ray.
     """
 
     workers: int | None
@@ -37,9 +37,9 @@ class Cluster:
     watch: Watch
 
     def capacity(self) -> int:
-        """Return the number of repetitions to have at Ray at once, which changes as nodes come and go.
+        """Return the number of repetitions to submit to Ray at once; it changes as nodes join or leave.
 
-        There are two for each core: while one runs, the next one waits at Ray, and no core idles between them.
+        There are two for each core: while one runs, the next one waits in Ray, so no core idles between them.
 
         Raises:
             RayGone: this process can run nothing any more.
@@ -60,7 +60,7 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
             repetitions run at once on a cluster.
 
     Raises:
-        ClusterUnusable: it cannot be joined, a node has other versions, or authentication is switched off.
+        ClusterUnusable: the cluster cannot be joined, a node has other versions, or authentication is switched off.
     """
     logging.getLogger("ray").setLevel(logging.ERROR)
     with _joined(settings.ray_address) if settings.ray_address else _started(settings.workers):
@@ -118,8 +118,8 @@ def _start(cores: int | None, folder: Path) -> None:
 def _on_loopback() -> Iterator[None]:
     """Let a Ray that starts within the context listen on loopback, as it does by itself on a Mac.
 
-    On Linux it replaces 127.0.0.1 by an address that other machines reach, and listens there: what it offers for that
-    is a setting, RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER, which it reads into this constant when it is imported.
+    On Linux, Ray replaces 127.0.0.1 by an address that other machines reach, and listens there. The only setting
+    against that is RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER, which Ray reads into this constant when it is imported.
     """
     before = ray_constants.ENABLE_RAY_CLUSTER
     ray_constants.ENABLE_RAY_CLUSTER = False

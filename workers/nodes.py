@@ -54,7 +54,7 @@ def _versions_of_node() -> Versions:
 
 
 def _versions_here() -> Versions:
-    """Return the versions of this process; one that Ray started has not found its plug-ins yet."""
+    """Return the versions of this process, after finding its plug-ins, which Ray's processes have not done yet."""
     folders.find()
     return versions()
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from gaplab.api.process.server import exit_on_signals, listen, require_token, serve_api
-from gaplab.api.process.supervisor_process import Patience, SupervisorProcess
+from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
 from gaplab.services import logs
 from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.plugins import folders
@@ -25,7 +25,7 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
     """Serve until SIGINT or SIGTERM, then end in order.
 
     Args:
-        settings: for the API and the supervisor.
+        settings: settings of the API and the supervisor.
         workers: whether to run experiments, or only accept and show them.
 
     Raises:
@@ -54,7 +54,7 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
 def _kept_supervisor(settings: Settings) -> Iterator[SupervisorProcess]:
     """Keep a supervisor for as long as the context lasts."""
     store = Store(settings.database_url)
-    supervisor = SupervisorProcess(environment_of(settings), patience=Patience.of(settings), store=store)
+    supervisor = SupervisorProcess(environment_of(settings), silence=Silence.of(settings), store=store)
     supervisor.start()
     try:
         yield supervisor

@@ -42,7 +42,7 @@ AGAIN_AND_AGAIN = 3
 
 
 @dataclass(frozen=True)
-class Patience:
+class Silence:
     """How long a supervisor may be silent.
 
     Attributes:
@@ -56,8 +56,8 @@ class Patience:
     start_s: float = START_S
 
     @classmethod
-    def of(cls, settings: Settings) -> "Patience":
-        """Return the patience for a length of lease."""
+    def of(cls, settings: Settings) -> "Silence":
+        """Return how long a supervisor with this length of lease may be silent."""
         return cls(told_s=settings.lease_s, killed_s=settings.lease_s + PATIENCE_S)
 
 
@@ -67,7 +67,7 @@ class SupervisorProcess:
     Args:
         environment: variables for the process.
         module: that runs as `python -m MODULE serve`.
-        patience: left out: that of the default lease.
+        silence: how long it may be silent; left out: as with the default lease.
         store: where the work of a supervisor that died is queued again; None leaves it until its lease ends.
     """
 
@@ -76,12 +76,12 @@ class SupervisorProcess:
         environment: Mapping[str, str],
         module: str = "gaplab.workers",
         *,
-        patience: Patience | None = None,
+        silence: Silence | None = None,
         store: Store | None = None,
     ) -> None:
         self._environment = environment
         self._module = module
-        self._patience = patience or Patience()
+        self._silence = silence or Silence()
         self._store = store
         self._stopping = Event()
         self._short_lives = 0
@@ -103,8 +103,8 @@ class SupervisorProcess:
         """Why nothing runs now; None if the supervisor is well, or is expected to be soon."""
         if self._short_lives >= AGAIN_AND_AGAIN:
             return f"the supervisor ended {self._short_lives} times in a row, and is started again: {self._end}"
-        if self._silence_s > self._patience.told_s:
-            left_s = self._patience.killed_s - self._silence_s
+        if self._silence_s > self._silence.told_s:
+            left_s = self._silence.killed_s - self._silence_s
             return (
                 f"the supervisor has not answered for {self._silence_s:.0f} s; if it stays silent, "
                 f"it is killed and started again in {max(left_s, 0):.0f} s"
@@ -153,7 +153,7 @@ class SupervisorProcess:
         self._silence_s = silence_s if heard.begun else 0.0
         if heard.begun and monotonic() - began > LONG_LIFE_S:
             self._short_lives, self._end = 0, None
-        if silence_s > (self._patience.killed_s if heard.begun else self._patience.start_s):
+        if silence_s > (self._silence.killed_s if heard.begun else self._silence.start_s):
             heard.reason = f"it did not answer for {silence_s:.0f} s, and was killed"
             kill(process)
 

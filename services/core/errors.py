@@ -18,7 +18,9 @@
     ├── Unsupported          the request needs another kind of database
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
     │   └── RayGone              Ray died or stands still; only a new process gets another
-    ├── PluginBroken         an external plug-in file is unusable
+    ├── PluginBroken         an external plug-in file is unusable, or a plug-in breaks its contract
+    ├── RealityFailed        the code of reality raised an error
+    ├── TryAgain             a fault that may pass: the step is repeated after a pause
     └── EngineError
         ├── EngineUnavailable    the engine's library is not installed
         └── EngineInterrupted    the process died, or exceeded its time
@@ -145,6 +147,14 @@ class PluginBroken(GaplabError):
     """A plug-in file is unusable; the message says which, and why."""
 
 
+class RealityFailed(GaplabError):
+    """The code of reality raised the error that is this one's cause; its message may name hidden parameters."""
+
+
+class TryAgain(GaplabError):
+    """A plug-in raises it for a fault that may pass by itself, like a lost connection; the step is then repeated."""
+
+
 class EngineError(GaplabError):
     """An engine failed."""
 
@@ -161,7 +171,7 @@ def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -
     """Return the violation of an unknown name, with the nearest permitted one."""
     nearest = next(iter(get_close_matches(name, permitted, n=1, cutoff=0.5)), None)
     hint = f" (did you mean {nearest!r}?)" if nearest else ""
-    message = f"there is no {kind} called {name!r}{hint}; there is {', '.join(permitted)}"
+    message = f"unknown {kind} {name!r}{hint}; permitted: {', '.join(permitted)}"
     return Violation(pointer, name, message, tuple(permitted), nearest)
 
 

@@ -17,7 +17,7 @@ P = TypeVar("P")
 
 
 def set_folders(folders: tuple[Path, ...]) -> None:
-    """Set the plug-in folders; registries that were used before do not notice."""
+    """Set the plug-in folders; registries that were used before keep their plug-ins."""
     for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
         del sys.modules[name]
     package = ModuleType(PACKAGE, "External plug-ins.")
@@ -91,7 +91,7 @@ def _check(plugin: type) -> None:
     if missing := [name for name in dir(plugin) if _is_abstract(plugin, name)]:
         raise PluginBroken(f"{where} does not define {', '.join(missing)}")
     if not isinstance(getattr(plugin, "name", None), str):
-        raise PluginBroken(f"{where} has no name, by which specs would call it: add name = '…'")
+        raise PluginBroken(f"{where} has no name for specs to use: add name = '…'")
     try:
         plugin.describe()  # type: ignore[attr-defined]
     except Exception as error:

@@ -1,4 +1,4 @@
-"""Versions of external plug-ins: those that are files of GAPLAB_PLUGINS, and no part of gaplab."""
+"""Versions of external plug-ins, which are files in the folders of GAPLAB_PLUGINS."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -14,13 +14,17 @@ from gaplab.services.engines import engines
 from gaplab.services.plugins.folders import digest_of
 
 
+def registries() -> tuple[Registry[Any], ...]:
+    """Return the registries of all kinds."""
+    return strategies, robots, engines, tunables, optimizers
+
+
 @cache
 def external_plugins() -> Mapping[str, str]:
     """Return the file and digest of each external plug-in, by its kind and name, as in `"robot hexapod"`."""
-    registries: tuple[Registry[Any], ...] = (strategies, robots, engines, tunables, optimizers)
     return {
         f"{registry.kind} {name}": f"{file} {digest_of(file)}"
-        for registry in registries
+        for registry in registries()
         for name, plugin in registry.items()
         if (file := file_of(plugin)) is not None
     }

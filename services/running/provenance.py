@@ -1,7 +1,7 @@
-"""Provenance: what experiments were computed with, and which supervisors may go on with them.
+"""Provenance: the versions that computed an experiment, and the supervisors that may continue it.
 
-An experiment keeps what computed its first steps: its engines with their libraries, the machine's architecture, the
-version of the spec, its external plug-ins. A supervisor that differs leaves it alone until a person accepts that.
+An experiment is bound to the versions that computed its first steps: its engines with their libraries, the machine's
+architecture, the version of the spec, its external plug-ins. A supervisor with others skips it until a person accepts.
 """
 
 import re
@@ -27,7 +27,7 @@ from gaplab.services.store.statements import insert_new
 
 @snapshot
 def read(session: Session, experiment_id: str) -> ProvenanceRead:
-    """Return what the experiment was computed with, and what a supervisor has that left it alone.
+    """Return the versions that computed the experiment, and those of a supervisor that skipped it.
 
     Raises:
         NotFound: no such experiment.
@@ -41,18 +41,22 @@ def read(session: Session, experiment_id: str) -> ProvenanceRead:
 
 @transaction
 def accept_versions(session: Session, experiment_id: str) -> ExperimentRead:
-    """Let the next supervisor go on with the experiment under any versions, which bind it from then on.
+    """Let the next supervisor continue the experiment under any versions; the experiment is then bound to those.
 
     Raises:
         NotFound: no such experiment.
-        Conflict: it has ended, or has not begun.
+        Conflict: it has ended, or has not started.
         StoreUnavailable: the database cannot be used now.
     """
     experiment = get_experiment(session, experiment_id)
     lock(session, [experiment_id])
     session.refresh(experiment)
     if experiment.state.ended or experiment.computed_with is None:
-        why = f"has ended: it is {experiment.state}" if experiment.state.ended else "has not begun under any versions"
+        why = (
+            f"has ended: it is {experiment.state}"
+            if experiment.state.ended
+            else "has not started, so it has no versions yet"
+        )
         msg = f"experiment {experiment_id!r} {why}; there is nothing to accept"
         raise Conflict(msg)
     told = {"computed_with": experiment.computed_with, "refused_by": experiment.refused_by}
@@ -70,7 +74,7 @@ def decisive(under: Provenance, spec: Mapping[str, Any]) -> str:
 
 
 def permitted(session: Session, under: Provenance) -> ColumnElement[bool]:
-    """SQL condition: the experiment has not started, or started with the same; and its spec can be read."""
+    """SQL condition: the experiment has not started, or started under the same provenance; its spec is readable."""
     row = ExperimentRow
     begun = row.claimable.is_(True) & row.computed_with.is_not(None)
     used = session.scalars(select(row.computed_with).where(begun).distinct())
@@ -79,7 +83,7 @@ def permitted(session: Session, under: Provenance) -> ColumnElement[bool]:
 
 
 def record(session: Session, under: Provenance, claims: Sequence[Claim]) -> None:
-    """Store the provenance of claims, and bind experiments that begin to it. The experiments are locked."""
+    """Store the provenance of claims, and bind starting experiments to it. The experiments must be locked."""
     id_, experiment = id_of(under), ExperimentRow
     specs = {claim.experiment_id: claim.spec.model_dump(mode="json") for claim in claims}
     insert_unless_there(session, [{"id": id_, "facts": under.model_dump(mode="json")}])
@@ -96,7 +100,7 @@ def record(session: Session, under: Provenance, claims: Sequence[Claim]) -> None
 
 
 def refuse(session: Session, under: Provenance) -> None:
-    """Note once, on each waiting experiment that may not be claimed with this provenance, why that is."""
+    """Record once, on each waiting experiment that this provenance may not claim, the reason."""
     row = ExperimentRow
     waiting = (
         row.claimable.is_(True) & row.refused_by.is_(None) & row.computed_with.is_not(None) & ~permitted(session, under)
@@ -129,7 +133,7 @@ def _uses(session: Session, experiment_id: str) -> tuple[ProvenanceUse, ...]:
 
 
 def _holds(text: str, under: Provenance) -> bool:
-    """Return whether each part of a `decisive` text is true of this provenance."""
+    """Return whether this provenance has each version in a `decisive` text."""
     true = [*(_engine(under, name) for name in under.engines), *_machine(under)]
     part = "|".join(map(re.escape, [*true, *(_external(under, plugin) for plugin in under.outside)]))
     return re.fullmatch(rf"(?:{part})(?:, (?:{part}))*", text) is not None
@@ -148,12 +152,12 @@ def _external(under: Provenance, plugin: str) -> str:
 
 
 def _engines(spec: Mapping[str, Any]) -> set[str]:
-    """Return the names of the simulators' engine and of reality's."""
+    """Return the names of the simulators' engine and of reality's engine."""
     chosen = (spec.get("engine"), spec["reality"].get("engine"))
     return {ref["name"] for ref in chosen if ref}
 
 
 def _plugins(spec: Mapping[str, Any]) -> list[str]:
-    """Return its plug-ins of other kinds, each by kind and name as in `Provenance.outside`."""
+    """Return the spec's plug-ins except engines, each by kind and name as in `Provenance.outside`."""
     single = [f"{kind} {spec[kind]['name']}" for kind in ("strategy", "robot", "optimizer")]
     return [*single, *(f"tunable {ref['name']}" for ref in spec["tunables"])]

@@ -1,4 +1,4 @@
-"""Signs of life of supervisors. Each function raises StoreUnavailable while the database cannot be used."""
+"""Heartbeats of supervisors. Each function raises StoreUnavailable while the database cannot be used."""
 
 from datetime import datetime, timedelta
 
@@ -11,20 +11,20 @@ from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Session, Store, transaction
 
 FORGET_AFTER = timedelta(days=1)
-"""Age of the last sign of life after which a supervisor is forgotten."""
+"""Age of the last heartbeat after which a supervisor is forgotten."""
 
 
 @transaction
 def heartbeat(session: Session, owner: str, last: datetime | None = None) -> datetime:
-    """Note that the supervisor works now, whether it has anything to do or not, and return the time of the note.
+    """Record that the supervisor is alive now, with or without work, and return the time of the record.
 
     Args:
-        session: of a transaction that writes.
+        session: session of a transaction that writes.
         owner: the supervisor.
-        last: time of its previous note; None for the first.
+        last: time of its previous heartbeat; None for the first.
 
     Raises:
-        StoreChanged: the previous note is missing, so this is not the database that it was written to.
+        StoreChanged: the previous heartbeat is missing, so this is not the database that it was written to.
     """
     row = SupervisorRow
     noted = update(row).where(row.owner == owner).values(heartbeat_at=now()).returning(row.heartbeat_at)
@@ -44,7 +44,7 @@ def heartbeat(session: Session, owner: str, last: datetime | None = None) -> dat
 
 @transaction
 def end(session: Session, owner: str) -> None:
-    """Forget a supervisor that has stopped in good order."""
+    """Forget a supervisor that has shut down in order."""
     session.execute(delete(SupervisorRow).where(SupervisorRow.owner == owner))
 
 

@@ -10,7 +10,7 @@ from gaplab.services.core.errors import StoreDamaged, StoreUnavailable
 from gaplab.services.store.sqlite_file import is_damage
 
 _CLASHES = {"40001", "40P01"}
-"""Postgres gave up one of two transactions for the other: serialization failure, deadlock."""
+"""Postgres aborted one of two conflicting transactions: serialization failure, deadlock."""
 
 _NO_SCHEMA = {"42P01", "42703"}
 """Postgres knows no such table, or no such column."""
@@ -23,8 +23,8 @@ def named() -> Iterator[None]:
     """Turn errors of the database into one sentence without its password.
 
     Raises:
-        StoreUnavailable: it is unreachable, locked for too long, or has another schema.
-        StoreDamaged: SQLite found its file damaged, or no database at all.
+        StoreUnavailable: the database is unreachable, locked for too long, or has another schema.
+        StoreDamaged: SQLite found the file damaged, or not a database.
     """
     try:
         yield
@@ -45,7 +45,7 @@ def named() -> Iterator[None]:
 
 
 def is_clash(error: DBAPIError) -> bool:
-    """Return whether the transaction was given up for another, and may succeed if it runs again."""
+    """Return whether the transaction was aborted for another one, and may succeed if it runs again."""
     return _sqlstate(error) in _CLASHES
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from sqlalchemy import select
 
-from gaplab.api.process.supervisor_process import Patience, SupervisorProcess
+from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
 from gaplab.services.core.errors import RayGone
 from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution
@@ -155,7 +155,7 @@ def test_a_supervisor_that_is_stopped_is_killed_and_another_goes_on(
     store = Store(sqlite_url)
     experiment = submission.submit_experiment(store, toy(repetitions=1)).id
     environment = {"GAPLAB_DATABASE_URL": sqlite_url, "GAPLAB_WORKERS": "1"}
-    kept = SupervisorProcess(environment, patience=Patience(told_s=1, killed_s=15), store=store)
+    kept = SupervisorProcess(environment, silence=Silence(told_s=1, killed_s=15), store=store)
     kept.start()
     try:
         wait(lambda: owners(store), tmp_path / "none")

@@ -14,7 +14,7 @@ from sqlalchemy import text
 
 from gaplab.api.app import create_app
 from gaplab.api.process import supervisor_process
-from gaplab.api.process.supervisor_process import Patience, SupervisorProcess
+from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
 from gaplab.schemas.lifecycle import Ending
 from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution, supervisors
@@ -22,7 +22,7 @@ from gaplab.services.store.session import Store
 from tests.experiments import toy
 from tests.integration.test_api_processes import within
 
-SOON = Patience(told_s=1, killed_s=3)
+SOON = Silence(told_s=1, killed_s=3)
 
 BEATING = """
 import os, signal, sys, time
@@ -68,7 +68,7 @@ def keep(tmp_path: Path, notes: Path, sqlite_store: Store) -> Iterator[Callable[
         root = Path(__file__).parents[2]
         environment = {"PYTHONPATH": f"{tmp_path}:{root}", "NOTES": str(notes)}
         environment["GAPLAB_DATABASE_URL"] = f"sqlite:///{sqlite_store.file}"
-        kept.append(SupervisorProcess(environment, module="scripted", patience=SOON, store=sqlite_store))
+        kept.append(SupervisorProcess(environment, module="scripted", silence=SOON, store=sqlite_store))
         kept[-1].start()
         return kept[-1]
 

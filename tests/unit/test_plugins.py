@@ -108,7 +108,7 @@ def test_folders_are_several_but_a_file_has_one_place(put: Put) -> None:
         ("1 / 0", "ZeroDivisionError"),
         (CAREFUL.replace('"careful"', '"random"'), "has a strategy called 'random', but so has gaplab"),
         (CAREFUL.replace("def select", "def choose"), r"Careful in broken\.py does not define select"),
-        (CAREFUL.replace('    name = "careful"\n', ""), "has no name, by which specs would call it"),
+        (CAREFUL.replace('    name = "careful"\n', ""), "has no name for specs to use"),
         (CAREFUL.replace("searches = False", "Options = 7"), "cannot be described: AttributeError"),
     ],
 )

@@ -8,9 +8,9 @@ from gaplab.services.store.models import SupervisorRow
 
 
 def ages(session: Session) -> tuple[float, ...]:
-    """Return the seconds since each supervisor's last sign of life; those that stopped in good order have no entry.
+    """Return the seconds since each supervisor's last heartbeat, without those that shut down in order.
 
-    A sign of life from the future was given before the clock was set back, and is as old as it is far away.
+    A heartbeat from the future was sent before the clock was set back. It counts as old as it is far away.
     """
     present = moment(session)
     beats = session.scalars(select(SupervisorRow.heartbeat_at))
