@@ -9,6 +9,7 @@ import socket
 from collections.abc import Callable
 from contextlib import suppress
 from datetime import datetime
+from functools import partial
 from secrets import token_hex
 from threading import Event
 from time import monotonic
@@ -85,6 +86,7 @@ class Supervisor:
         """
         self._pulse = pulse or self._pulse
         self._pulse.name(self._owner)
+        ending = self._hand_back
         try:
             while not stop.is_set():
                 try:
@@ -95,17 +97,27 @@ class Supervisor:
                     log.warning("waiting: %s", error)
                     stop.wait(RETRY_S)
             self._wind_down()
-        except RayGone:
-            self._repetitions.runs.clear()  # nothing answers that could end them
+        except RayGone as error:
+            ending = partial(self._abandon, str(error))
             raise
         finally:
-            self._repetitions.hand_back(self._repetitions.runs)
-            with suppress(StoreUnavailable):  # then their leases will run out
-                execution.hand_back_unheard(self._store, self._owner, ())
-            with suppress(StoreUnavailable):
-                self._checks.hand_back()
-            with suppress(StoreUnavailable):  # then it counts as lost, which it nearly is
-                supervisors.end(self._store, self._owner)
+            ending()
+
+    def _hand_back(self) -> None:
+        """Return all leases, and forget this supervisor."""
+        self._repetitions.hand_back(self._repetitions.runs)
+        with suppress(StoreUnavailable):  # then their leases will run out
+            execution.hand_back_unheard(self._store, self._owner, ())
+        with suppress(StoreUnavailable):
+            self._checks.hand_back()
+        with suppress(StoreUnavailable):  # then it counts as lost, which it nearly is
+            supervisors.end(self._store, self._owner)
+
+    def _abandon(self, reason: str) -> None:
+        """Queue the work again that a dead Ray held; its tasks cannot be ended, for nothing answers."""
+        self._repetitions.runs.clear()
+        with suppress(StoreUnavailable):  # then the leases will run out
+            supervisors.release(self._store, self._owner, reason)
 
     def step(self) -> None:
         """Do one round: heartbeat, claim, receive, store; sensitivity checks before repetitions.

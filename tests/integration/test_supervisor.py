@@ -127,9 +127,10 @@ def test_sockets_fit_into_a_folder_with_a_long_path(tmp_path: Path, monkeypatch:
 
 @pytest.mark.parametrize("how", ["migrated", "replaced", "restored in place"])
 def test_a_supervisor_whose_database_is_changed_under_it_writes_nothing_more_and_ends(
-    supervisor: Any, log: Path, sqlite_url: str, sqlite_template: Path, how: str
+    supervisor: Any, log: Path, sqlite_store: Store, sqlite_url: str, sqlite_template: Path, how: str
 ) -> None:
     file = Path(sqlite_url.removeprefix("sqlite:///"))
+    wait(lambda: owners(sqlite_store), log)
     if how == "migrated":
         with sqlite3.connect(file, timeout=60) as connection:
             connection.execute("UPDATE alembic_version SET version_num = '9999'")
