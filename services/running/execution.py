@@ -9,6 +9,7 @@ All functions raise StoreUnavailable while the database cannot be used; each may
 from collections.abc import Iterable, Mapping, Sequence
 
 from sqlalchemy import func, select, update
+from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import ASKED, Ending, State
@@ -81,7 +82,12 @@ def claim(store: Store, owner: str, limit: int, under: Provenance | None = None)
         under: provenance of the supervisor; this process's if left out. An experiment that was begun under another
             engine, plug-in, architecture or version of the spec is left alone, and says so.
     """
-    return store.write(_claim, owner, limit, under or present_provenance()) if limit > 0 else ()
+    try:
+        return store.write(_claim, owner, limit, under or present_provenance()) if limit > 0 else ()
+    except IntegrityError as error:
+        if "hardware" not in str(error.orig):
+            raise
+        return ()  # another supervisor took the same hardware at the same moment
 
 
 def record(store: Store, claim: Claim, step: Step, *, seconds: float = 0.0) -> bool:
