@@ -109,7 +109,8 @@ class EventFeed:
     async def _read(self) -> None:
         while not self._closed:
             try:
-                await self._read_once()
+                if not await self._read_once():
+                    return
                 await asyncio.sleep(self._every_s)
             except StoreUnavailable as error:
                 log.warning("event streams wait for the database: %s", error)
@@ -121,13 +122,15 @@ class EventFeed:
             log.error("event streams end: their reader failed", exc_info=error)
             self._wake()
 
-    async def _read_once(self) -> None:
+    async def _read_once(self) -> bool:
+        """Read what is new, and return whether the database is still the same; else the streams end."""
         if self._head is None:
             self._head = await run_sync(lambda: events.latest(self._store))
             self._wake()
         head = self._head
         page = await run_sync(lambda: events.page(self._store, head, WantedEvents(), limit=PAGE))
         if page.latest < head:
+            log.warning("event streams end: the database has fewer events than before, so it was replaced or restored")
             self._databases += 1
             self._head = None
             self._recent.clear()
@@ -136,6 +139,7 @@ class EventFeed:
             self._recent.extend(page.items)
             self._head = page.items[-1].number
             self._wake()
+        return True
 
     def _wake(self) -> None:
         """Wake all waiting streams once."""

@@ -28,6 +28,7 @@ from gaplab.services.core.errors import (
     LimitReached,
     NotFound,
     StoreUnavailable,
+    SupervisorUnavailable,
     Unauthenticated,
     Violation,
 )
@@ -50,6 +51,7 @@ KINDS: dict[type[GaplabError], tuple[int, str, str]] = {
     Forbidden: (403, "forbidden", "The token does not permit this"),
     InvalidArchive: (422, "invalid-archive", "The archive is invalid"),
     StoreUnavailable: (503, "store-unavailable", "The database is unavailable"),
+    SupervisorUnavailable: (503, "supervisor-unavailable", "Experiments do not run"),
     EngineUnavailable: (422, "engine-unavailable", "An engine is not installed here"),
     EngineInterrupted: (503, "engine-interrupted", "The simulation was interrupted"),
 }

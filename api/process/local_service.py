@@ -11,6 +11,7 @@ from gaplab.api.process.errors import CommandError
 from gaplab.services.access import authenticate
 from gaplab.services.core.errors import Unauthenticated
 from gaplab.services.plugins.folders import VARIABLE
+from gaplab.services.store.atomic_files import private
 from gaplab.services.store.session import Store
 
 START_WITHIN_S = 120.0
@@ -68,7 +69,7 @@ def start_service(
         environment[VARIABLE] = str(Path(plugins).absolute())
     if log.exists() and log.stat().st_size > LARGEST_LOG:
         log.replace(log.with_name(f"{log.name}.old"))
-    with log.open("ab") as output:
+    with open(log, "ab", opener=private) as output:
         process = start(*(("gaplab", "serve") if workers else ("gaplab.api",)), environment=environment, log=output)
     try:
         _wait_until_ready(url, process, log)

@@ -10,10 +10,12 @@ from fastapi import FastAPI
 from gaplab.api.app import create_app
 from gaplab.api.process.connections import TimedConnection
 from gaplab.api.process.errors import CommandError
+from gaplab.api.process.supervisor_process import SupervisorProcess
 from gaplab.services.access import demand_token_beyond_loopback
 from gaplab.services.plugins import folders
 from gaplab.services.settings import Limits, Settings
 from gaplab.services.store.session import Store
+from gaplab.services.store.sqlite_file import in_use
 
 GRACE_S = 5
 """Time that requests under way have to finish when the service ends."""
@@ -40,8 +42,13 @@ def listen(host: str, port: int) -> socket.socket:
         raise CommandError(msg) from error
 
 
-def serve_api(settings: Settings, listener: socket.socket) -> None:
+def serve_api(settings: Settings, listener: socket.socket, supervisor: SupervisorProcess | None = None) -> None:
     """Serve until SIGINT or SIGTERM, then finish the requests under way.
+
+    Args:
+        settings: of the service.
+        listener: where requests come in.
+        supervisor: that this process keeps, whose troubles `/readyz` tells.
 
     Raises:
         Unauthenticated: other machines can reach the host, and no token exists.
@@ -53,7 +60,10 @@ def serve_api(settings: Settings, listener: socket.socket) -> None:
     require_token(settings)
     store = Store(settings.database_url)
     try:
-        Server(create_app(store, settings, Limits.from_environment())).run([listener])
+        with in_use(store.file):
+            app = create_app(store, settings, Limits.from_environment())
+            app.state.supervisor, app.state.lease_s = supervisor, settings.lease_s
+            Server(app).run([listener])
     finally:
         store.dispose()
 

@@ -39,6 +39,7 @@ fail = _LEASES.fail
 release = _LEASES.release
 hand_back = _LEASES.hand_back
 requeue_lost = _LEASES.requeue_lost
+release_all = _LEASES.release_all
 
 
 def complete(store: Store, lease: CheckClaim, found: Sequence[Sensitivity]) -> bool:
@@ -56,4 +57,4 @@ def claim(session: Session, owner: str) -> CheckClaim | None:
     ):
         return None
     check = session.get_one(row, id_, populate_existing=True)
-    return CheckClaim(check.id, check.epoch, Checked.model_validate(check.spec))
+    return CheckClaim(check.id, check.epoch, Checked.model_validate(check.spec), owner=owner)
