@@ -10,7 +10,7 @@ import ray
 from ray import ObjectRefGenerator
 from ray.exceptions import RayError, RayTaskError
 
-from gaplab.services.core.errors import ClusterUnusable, Conflict, StoreUnavailable
+from gaplab.services.core.errors import ClusterUnusable, Conflict, PluginDiffers, StoreUnavailable
 from gaplab.services.core.types import Measured, Probed
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Checkpoint, Claim, Delivered
@@ -18,6 +18,7 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import CHECKPOINT_S, recorded
 from gaplab.workers.nodes import Versions, check_here
+from gaplab.workers.plugins import Plugins
 from gaplab.workers.pool import Pool
 
 BATCH_S = 0.2
@@ -38,6 +39,7 @@ def run(claim: Claim, expected: Versions, checkpoint_s: float) -> Iterator[tuple
 
     Raises:
         ClusterUnusable: this node lacks the expected versions.
+        PluginDiffers: this process lacks those of the plug-ins.
     """
     check_here(expected)
     yield ()
@@ -72,7 +74,7 @@ class Run:
         received: deliveries that are not stored yet.
         begun: the task no longer waits for a core.
         ended: the task has come to its end.
-        failed: why its code raised.
+        failed: why its code raised, or its process refused it.
         lost: why another worker must go on: its worker is gone, or its log refused a delivery.
     """
 
@@ -81,7 +83,7 @@ class Run:
     received: list[Delivered] = field(default_factory=list)
     begun: bool = False
     ended: bool = False
-    failed: str | None = None
+    failed: str | PluginDiffers | None = None
     lost: str | None = None
 
     def receive(self) -> None:
@@ -94,7 +96,8 @@ class Run:
         except RayTaskError as error:
             if isinstance(error.cause, ClusterUnusable):
                 raise error.cause from error
-            self.failed = f"{type(error.cause).__name__}: {error.cause}"
+            differs = isinstance(error.cause, PluginDiffers)
+            self.failed = error.cause if differs else f"{type(error.cause).__name__}: {error.cause}"
         except RayError as error:
             self.lost = f"the worker was lost: {type(error).__name__}"
 
@@ -127,14 +130,14 @@ class Repetitions:
         self.runs: list[Run] = []
         self._store = store
         self._owner = owner
-        self._versions = versions
+        self._plugins = Plugins(versions)
         self._checkpoint_s = checkpoint_s
         self._looked = -WAIT_S
         self._unsure = False
 
     def launch(self, claim: Claim) -> Run:
         """Give a claimed repetition to a Ray task."""
-        return Run(claim, run.remote(claim, self._versions, self._checkpoint_s))
+        return Run(claim, run.remote(claim, self._plugins.expected(claim.spec), self._checkpoint_s))
 
     def heartbeat(self) -> None:
         """Prolong the claims, and stop the runs whose claim no longer holds."""
@@ -146,12 +149,13 @@ class Repetitions:
             return
         self._looked = monotonic()
         waiting = [run.claim for run in self.runs if not (run.begun or run.over)]
-        if given := set(execution.give_way(self._store, waiting)):
+        present = self._plugins.present()
+        if given := set(execution.give_way(self._store, waiting, *present)):
             self._drop_all_but([run.claim for run in self.runs if run.claim not in given])
         if self._unsure:
             execution.hand_back_unheard(self._store, self._owner, [run.claim for run in self.runs])
         self._unsure = True
-        claims = execution.claim(self._store, self._owner, capacity() - len(self.runs))
+        claims = execution.claim(self._store, self._owner, capacity() - len(self.runs), *present)
         self._unsure = False
         for claim in claims:
             self.runs.append(self.launch(claim))
@@ -189,7 +193,9 @@ class Repetitions:
             return
         self._complete([run for run in over if run.ended and run.lost is None])
         for run in over:
-            if run.failed is not None:
+            if isinstance(run.failed, PluginDiffers):
+                self._plugins.hand_back(self._store, run.claim, run.failed)
+            elif run.failed is not None:
                 execution.fail(self._store, run.claim, run.failed)
                 log.error("failed: %s", run.failed, extra=run.place)
             elif run.lost is not None:

@@ -8,7 +8,7 @@ from ray import ObjectRef
 from ray.exceptions import RayError, RayTaskError
 
 from gaplab.schemas.sensitivity import Checked, Sensitivity
-from gaplab.services.core.errors import ClusterUnusable
+from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort
 from gaplab.services.core.sensitivity import check as check_tunables
@@ -18,6 +18,7 @@ from gaplab.services.running.sensitivity import CheckClaim
 from gaplab.services.specs.assembly import subject
 from gaplab.services.store.session import Store
 from gaplab.workers.nodes import Versions, check_here
+from gaplab.workers.plugins import Plugins
 
 LOOK_S = 0.2
 """Shortest time between two looks for a queued check."""
@@ -33,6 +34,7 @@ def check(checked: Checked, expected: Versions) -> tuple[Sensitivity, ...]:
 
     Raises:
         ClusterUnusable: this node lacks the expected versions.
+        PluginDiffers: this process lacks the expected versions of plug-ins.
     """
     check_here(expected)
     return check_tunables(subject(checked), SteadyState(), Effort(checked.points, checked.evaluations))
@@ -56,7 +58,7 @@ class Checks:
         self._store = store
         self._owner = owner
         self._lease_s = lease_s
-        self._versions = versions or {}
+        self._plugins = Plugins(versions)
         self._run: tuple[CheckClaim, ObjectRef[tuple[Sensitivity, ...]]] | None = None
         self._looked = -LOOK_S
 
@@ -86,8 +88,9 @@ class Checks:
             self._run = None
 
     def _claim(self) -> None:
-        if (claim := sensitivity.claim(self._store, self._owner)) is not None:
-            self._run = claim, check.remote(claim.spec, self._versions)
+        _, refused = self._plugins.present()
+        if (claim := sensitivity.claim(self._store, self._owner, refused)) is not None:
+            self._run = claim, check.remote(claim.spec, self._plugins.expected(claim.spec))
 
     def _end(self, claim: CheckClaim, result: "ObjectRef[tuple[Sensitivity, ...]]") -> None:
         if not ray.wait([result], timeout=0)[0]:
@@ -98,9 +101,18 @@ class Checks:
         except RayTaskError as error:
             if isinstance(error.cause, ClusterUnusable):
                 raise error.cause from error
-            sensitivity.fail(self._store, claim, f"{type(error.cause).__name__}: {error.cause}")
-            log.error("sensitivity check %s: failed: %s", claim.id, error.cause)
+            self._over(claim, error.cause)
         except RayError as error:
             sensitivity.release(self._store, claim, f"the worker was lost: {type(error).__name__}")
             log.warning("sensitivity check %s: queued again: %s", claim.id, type(error).__name__)
         self._run = None
+
+    def _over(self, claim: CheckClaim, cause: BaseException) -> None:
+        """Fail the check because its code raised, or hand it back because its process has other plug-ins."""
+        if isinstance(cause, PluginDiffers):
+            self._plugins.refuse(cause)
+            sensitivity.hand_back(self._store, claim)
+            log.warning("sensitivity check %s: queued again, for a process has other plug-ins: %s", claim.id, cause)
+        else:
+            sensitivity.fail(self._store, claim, f"{type(cause).__name__}: {cause}")
+            log.error("sensitivity check %s: failed: %s", claim.id, cause)

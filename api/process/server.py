@@ -42,7 +42,6 @@ def serve_api(settings: Settings, listener: socket.socket) -> None:
     Raises:
         Unauthenticated: other machines can reach the host, and no token exists.
         StoreUnavailable: the database does not answer.
-        PluginBroken: an external plug-in cannot be used.
     """
     exit_on_signals()
     folders.load()

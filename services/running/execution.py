@@ -94,7 +94,13 @@ hand_back_unheard = _LEASES.hand_back_unheard
 requeue_lost = _LEASES.requeue_lost
 
 
-def claim(store: Store, owner: str, limit: int, under: Provenance | None = None) -> tuple[Claim, ...]:
+def claim(
+    store: Store,
+    owner: str,
+    limit: int,
+    under: Provenance | None = None,
+    refused: Mapping[str, str] = provenance.NONE,
+) -> tuple[Claim, ...]:
     """Claim up to `limit` queued repetitions in the order of turns, and return them with their logs.
 
     Args:
@@ -103,8 +109,10 @@ def claim(store: Store, owner: str, limit: int, under: Provenance | None = None)
         limit: most repetitions.
         under: provenance of the supervisor; this process's if left out. An experiment that was begun under another
             engine, plug-in, architecture or version of the spec is left alone, and says so.
+        refused: why processes of the supervisor refuse plug-ins, by kind and name; experiments that name them are left
+            alone as well, and so are those whose plug-ins are not available here.
     """
-    return store.write(_claim, owner, limit, under or present_provenance()) if limit > 0 else ()
+    return store.write(_claim, owner, limit, under or present_provenance(), refused) if limit > 0 else ()
 
 
 def record(store: Store, claim: Claim, step: Step, *, seconds: float = 0.0) -> bool:
@@ -128,26 +136,39 @@ def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[Delivere
     return store.write(_record, by_claim) if by_claim else ()
 
 
-def give_way(store: Store, waiting: Iterable[Claim], under: Provenance | None = None) -> tuple[Claim, ...]:
+def give_way(
+    store: Store,
+    waiting: Iterable[Claim],
+    under: Provenance | None = None,
+    refused: Mapping[str, str] = provenance.NONE,
+) -> tuple[Claim, ...]:
     """Hand back claims that should not begin now, and return them: a request to pause or stop, or another's turn.
 
     Args:
         store: of the claims.
         waiting: claims whose repetition waits for a core; a running one is never interrupted for another.
         under: as of `claim`.
+        refused: as of `claim`.
     """
     claims = tuple(waiting)
     if not claims:
         return ()
     with store.reading() as session:
-        unwanted = _unwanted(session, claims, under or present_provenance())
+        permitted = provenance.permitted(session, under or present_provenance(), refused)
+        unwanted = _unwanted(session, claims, permitted)
     return hand_back(store, *unwanted)
 
 
-def _claim(session: Session, owner: str, limit: int, under: Provenance) -> tuple[Claim, ...]:
-    ids = next_repetitions(session, limit, provenance.permitted(session, under))
+def _claim(
+    session: Session, owner: str, limit: int, under: Provenance, refused: Mapping[str, str] = provenance.NONE
+) -> tuple[Claim, ...]:
+    permitted = provenance.permitted(session, under, refused)
+    ids = next_repetitions(session, limit, permitted)
+    while ids and (unusable := provenance.refuse_unusable(session, ids, refused)):
+        permitted &= ExperimentRow.id.not_in(unusable)
+        ids = next_repetitions(session, limit, permitted)
     if len(ids) < limit:
-        provenance.refuse(session, under)
+        provenance.refuse(session, under, refused)
     if not ids:
         return ()
     _LEASES.take(session, ids, owner)
@@ -201,8 +222,8 @@ def _locked_requests(session: Session, claims: Iterable[Claim]) -> dict[str, Sta
     return {experiment: state for experiment, state in states.items() if state in ASKED}
 
 
-def _unwanted(session: Session, waiting: Sequence[Claim], under: Provenance) -> tuple[Claim, ...]:
+def _unwanted(session: Session, waiting: Sequence[Claim], permitted: ColumnElement[bool]) -> tuple[Claim, ...]:
     row, experiments = ExperimentRow, sorted({claim.experiment_id for claim in waiting})
     requested = session.scalars(select(row.id).where(row.id.in_(experiments), row.state.in_(ASKED))).all()
-    gone = {*requested, *ahead(session, experiments, provenance.permitted(session, under))}
+    gone = {*requested, *ahead(session, experiments, permitted)}
     return tuple(claim for claim in waiting if claim.experiment_id in gone)

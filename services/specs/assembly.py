@@ -167,12 +167,17 @@ def refuse_missing(spec: ResolvedSpec, *, reality: bool = False) -> None:
 
 
 def engine_of(ref: PluginRef) -> Engine:
-    """Return the engine: one instance in this process for equal options, warm from use to use."""
-    return _warm_engine(ref.model_dump_json())
+    """Return the engine: one instance in this process for equal options, warm from use to use.
+
+    Raises:
+        InvalidSpec: it is not available here.
+    """
+    engine, _ = engines.check(ref)
+    return _warm_engine(engine, ref.model_dump_json())
 
 
 @cache
-def _warm_engine(ref: str) -> Engine:
+def _warm_engine(_engine: type[Engine], ref: str) -> Engine:
     return engines.create(PluginRef.model_validate_json(ref))
 
 
