@@ -23,6 +23,7 @@ def serve(settings: Settings) -> int:
 
     logs.adopt("ray")
     logs.configure()
+    folders.load()
     store, stop = Store(settings.database_url), Event()
     try:
         with cluster(settings) as joined:
@@ -71,7 +72,6 @@ def main(arguments: list[str]) -> int:
         return 2
     try:
         settings = Settings.from_environment()
-        folders.load()
     except ValueError as error:
         sys.stderr.write(f"{error}\n")
         return 2
