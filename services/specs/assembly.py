@@ -2,12 +2,14 @@
 
 from collections.abc import Iterable, Sequence
 from functools import cache, lru_cache, partial
+from types import ModuleType
 
 import numpy as np
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked
+from gaplab.services.core import external_plugins
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters
 from gaplab.services.core.errors import gather
 from gaplab.services.core.loop import Setting
@@ -172,12 +174,11 @@ def engine_of(ref: PluginRef) -> Engine:
     Raises:
         InvalidSpec: it is not available here.
     """
-    engine, _ = engines.check(ref)
-    return _warm_engine(engine, ref.model_dump_json())
+    return _warm_engine(external_plugins.package(), ref.model_dump_json())
 
 
 @cache
-def _warm_engine(_engine: type[Engine], ref: str) -> Engine:
+def _warm_engine(_package: ModuleType | None, ref: str) -> Engine:
     return engines.create(PluginRef.model_validate_json(ref))
 
 

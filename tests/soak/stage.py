@@ -81,10 +81,12 @@ class Stage:
         url: of the API.
         database: Sqlite or Postgres, as in `databases`.
         lease_s: for which a supervisor may be silent.
+        plugins: folder of the service's external plug-ins.
+        history: of what clients were told, for faults that are requests.
     """
 
-    def __init__(self, folder: Path, database: Any, lease_s: Any) -> None:
-        self.database, self.lease_s = database, lease_s
+    def __init__(self, folder: Path, database: Any, lease_s: Any, plugins: Any = None, history: Any = None) -> None:
+        self.database, self.lease_s, self.plugins, self.history = database, lease_s, plugins, history
         self._folder = Path(folder)
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
@@ -95,6 +97,7 @@ class Stage:
             "GAPLAB_PORT": str(self._port),
             "GAPLAB_WORKERS": "1",
             "GAPLAB_LEASE_S": str(lease_s),
+            "GAPLAB_PLUGINS": str(plugins or ""),
             "RAY_TMPDIR": mkdtemp(prefix="gaplab-"),  # Ray leaves logs behind; the paths of its sockets must be short
         }
         self._kept: list[Any] = []
