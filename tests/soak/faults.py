@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from gaplab.services.store.session import Store
-from tests.soak import misbehaviour, witness
+from tests.soak import misbehaviour, plugin_faults, witness
 from tests.soak.stage import send, until
 
 PAST_THE_LEASE = 1.5
@@ -88,8 +88,8 @@ def faults(database: Any, misbehaviours: Any = misbehaviour.HARMLESS) -> Any:
     if hasattr(database, "restart"):
         found += [Fault("Postgres restarted", _restart), Fault("SIGKILL Postgres", _kill_database)]
         found.append(Fault("connections ended", _hang_up))
-    found += [Fault("plug-in edited", misbehaviour.edited), Fault("plug-in broken", misbehaviour.broken)]
-    return found + [Fault(f"plug-in {kind}", misbehaviour.submitting(kind)) for kind in misbehaviours]
+    found += [Fault("plug-in edited", plugin_faults.edited), Fault("plug-in broken", plugin_faults.broken)]
+    return found + [Fault(f"plug-in {kind}", plugin_faults.submitting(kind)) for kind in misbehaviours]
 
 
 def volleys(kinds: Any, rng: Any, at_once: Any) -> Iterator[Any]:
