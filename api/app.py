@@ -82,7 +82,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
 
     Args:
         store: the database.
-        settings: of the process that serves; None for a program that calls the app directly.
+        settings: settings of the service; None for a program that calls the app directly.
         limits: left out: the defaults.
     """
     app = FastAPI(

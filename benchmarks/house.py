@@ -74,7 +74,7 @@ def circle(graph: Graph) -> list[str]:
 
 
 def arrows(graph: Graph, top: str) -> set[tuple[str, str]]:
-    """Return the pairs of rooms of a top-level folder of which the first imports from the second."""
+    """Return the pairs of rooms of a top-level folder in which the first imports from the second."""
     rooms = ((_room(module, top), _room(target, top)) for module in graph for target in graph[module])
     return {(source, target) for source, target in rooms if source and target and source != target}
 

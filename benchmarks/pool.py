@@ -15,7 +15,7 @@ from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.workers import repetitions as task
+from gaplab.workers import task
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.cluster import cluster
 
@@ -56,7 +56,7 @@ def alone() -> int:
 def on_all_cores() -> int:
     """Run the repetition as the service does; return its number of steps."""
     claim = Claim(id=0, epoch=0, experiment_id="none", number=0, spec=resolve_experiment(SPEC))
-    stream: Any = task.run.remote(claim, {}, CHECKPOINT_S)
+    stream: Any = task.run.remote(claim, {}, CHECKPOINT_S, None)
     return sum(isinstance(each, TimedStep) for batch in stream for each in ray.get(batch))
 
 

@@ -42,8 +42,8 @@ class Speed:
     """Core-seconds of one rollout.
 
     Attributes:
-        alone_s: in a call of its own.
-        together_s: in a call with many rollouts.
+        alone_s: core-seconds in a separate call.
+        together_s: core-seconds in a call with many rollouts.
     """
 
     alone_s: float

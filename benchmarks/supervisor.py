@@ -11,15 +11,17 @@ from benchmarks.measure import Row
 from gaplab import migrations
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.experiments import reading, submission
-from gaplab.services.running.execution import Claim, Delivered
+from gaplab.services.running.execution import Claim
 from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.cluster import cluster
-from gaplab.workers.repetitions import Repetitions, Run, batches
+from gaplab.workers.repetitions import Repetitions
+from gaplab.workers.run import Run
 from gaplab.workers.supervisor import Supervisor
+from gaplab.workers.task import Batch, batches
 from tests.postgres import running
 
 AT_ONCE = 200
@@ -36,7 +38,7 @@ SPEC = ExperimentSpec.model_validate(
 )
 """A spec with every kind of step, and with the largest ones to store: 20 simulators in each tuning."""
 
-Batches = tuple[tuple[Delivered, ...], ...]
+Batches = tuple[Batch, ...]
 
 
 def simulated() -> Batches:
@@ -60,7 +62,7 @@ class WithoutRay(Repetitions):
         for run in self.runs:
             batch = next(run.stream, None)
             run.ended = batch is None
-            run.received += batch or ()
+            run.take(batch or ())
 
 
 class ThroughRay(Repetitions):
@@ -76,7 +78,7 @@ class ThroughRay(Repetitions):
 
 
 @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-def _deliver(delivered: Batches) -> Iterator[tuple[Delivered, ...]]:
+def _deliver(delivered: Batches) -> Iterator[Batch]:
     yield from (batch for batch in delivered)  # Ray requires a generator
 
 

@@ -39,7 +39,7 @@ class ImportRead(Frozen):
     experiments: tuple[Id, ...] = Field(description="ids of the experiments in this service, in the order of the study")
     renamed: dict[str, str] = Field(
         default_factory=dict,
-        description="new ids, by those in the archive that were taken in this service",
+        description="new ids of experiments and studies whose id was taken, by their id in the archive",
         examples=[{"kx3t9vbm2q": "01f2e3d4c5"}],
     )
     called_off: tuple[str, ...] = Field(

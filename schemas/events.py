@@ -26,6 +26,7 @@ class EventKind(StrEnum):
     RESUMED = "resumed"
     STOPPING = "stopping"
     EXTENDED = "extended"
+    RETRIED = "retried"
     COMPLETED = "completed"
     FAILED = "failed"
     CANCELLED = "cancelled"

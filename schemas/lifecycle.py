@@ -18,10 +18,13 @@ An experiment:
              others are CANCELLED. An experiment stopped before its first point is therefore CANCELLED.
     cancel   Immediate: results of the current steps are discarded.
     extend   From COMPLETED, to QUEUED with more iterations or repetitions; existing numbers stay.
+    retry    Queues the repetitions that FAILED once more; each goes on from its stored steps.
+
+An error of reality pauses the experiment: a person looks at the robot, and then resumes.
 
 A repetition is QUEUED, RUNNING or ended. It returns from RUNNING to QUEUED when it is paused or handed back, or when
 its worker is lost, which is not a failure. It resumes from its log. `extend` queues COMPLETED and CANCELLED repetitions
-again; a FAILED one stays, because it would fail again.
+again; a FAILED one waits for `retry`, because it would fail again.
 
 A verb whose state is not in `PERMITTED` is refused even if redundant: pausing twice is a conflict. A verb on a study
 applies to all of its experiments that permit it.
@@ -60,6 +63,7 @@ class Verb(StrEnum):
     STOP = "stop"
     CANCEL = "cancel"
     EXTEND = "extend"
+    RETRY = "retry"
 
 
 class Ending(StrEnum):
@@ -88,6 +92,7 @@ PERMITTED: dict[Verb, tuple[State, ...]] = {
     Verb.STOP: (State.QUEUED, State.RUNNING, State.PAUSING, State.PAUSED),
     Verb.CANCEL: OPEN,
     Verb.EXTEND: (State.COMPLETED,),
+    Verb.RETRY: (State.QUEUED, State.RUNNING, State.PAUSED, State.COMPLETED, State.FAILED),
 }
 
 MOVES: dict[State, frozenset[State]] = {
@@ -97,10 +102,7 @@ MOVES: dict[State, frozenset[State]] = {
     State.PAUSED: frozenset({State.QUEUED, *ENDS}),
     State.STOPPING: ENDS,
     State.COMPLETED: frozenset({State.QUEUED}),
-    State.FAILED: frozenset(),
+    State.FAILED: frozenset({State.QUEUED}),
     State.CANCELLED: frozenset({State.QUEUED}),
 }
 """Permitted moves of experiments and repetitions. Only repetitions leave CANCELLED, when `extend` queues them again."""
-
-CHECK_MOVES = MOVES | {State.FAILED: frozenset({State.QUEUED})}
-"""Moves of a sensitivity check: a failed one is queued again when its settings are submitted again."""

@@ -14,7 +14,9 @@ class SpecError(Frozen):
         description="JSON pointer into the body, or the name of a query or path parameter", examples=["/robot"]
     )
     value: Any = Field(default=None, description="the offending value, as sent")
-    message: str = Field(examples=["there is no robot 'quadrupet' (did you mean 'quadruped'?)"])
+    message: str = Field(
+        examples=["unknown robot 'quadrupet' (did you mean 'quadruped'?); permitted: quadruped, toy_function"]
+    )
     permitted: tuple[str, ...] | str | None = None
     nearest: str | None = None
 

@@ -31,7 +31,9 @@ class Progress(Frozen):
     failed: int
     iterations: int = Field(description="iterations of all repetitions, including number 0", examples=[440])
     iterations_done: int = Field(examples=[150])
-    rollouts: int = Field(description="budgeted rollouts; at the end, done plus saved, unless stopped")
+    rollouts: int = Field(
+        description="budgeted rollouts: in the end those done plus those saved, unless the experiment was stopped"
+    )
     rollouts_done: int = Field(examples=[4_363_000])
     rollouts_failed: int = Field(description="rollouts done whose physics failed (nan); they never win")
     rollouts_saved: int = Field(
@@ -60,13 +62,15 @@ class ExperimentRead(Frozen):
     spec: dict[str, Any] = Field(
         examples=[{"strategy": {"name": "simulated_fit"}, "iterations": 10, "repetitions": 40}]
     )
-    priority: int = Field(default=0, description="higher is computed first")
+    priority: int = Field(default=0, description="the highest priority is computed first")
     max_parallel: int | None = Field(default=None, description="largest number of repetitions at once; null: no limit")
     progress: Progress
     best_fitness: Statistic = Field(
         default=None, description="best recorded fitness of each repetition so far, averaged over repetitions"
     )
-    reasons: tuple[str, ...] = Field(default=(), description="distinct reasons of failed repetitions")
+    reasons: tuple[str, ...] = Field(
+        default=(), description="why it was paused, if not by a person; then the distinct reasons of failed repetitions"
+    )
     sensitivity: Id | None = Field(default=None, description="id of the sensitivity check")
     warnings: tuple[str, ...] = Field(
         default=(), description="findings of the sensitivity check, and versions that prevent continuing"
@@ -98,6 +102,7 @@ class RepetitionRead(Frozen):
     rollouts_done: int
     attempts: int
     error: str | None = Field(default=None, examples=["the engine pybullet is not installed"])
+    measuring_at: Moment | None = Field(default=None, description="time since which it waits for reality's answer")
     started_at: Moment | None = None
     ended_at: Moment | None = None
 

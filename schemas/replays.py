@@ -62,7 +62,7 @@ class Replay(Frozen):
     repetition: int
     iteration: int
     kind: ControllerKind
-    simulator: int | None = Field(description="iteration of the simulator, its best; null: no simulator")
+    simulator: int | None = Field(description="iteration whose best simulator was used; null: no simulator")
     robot: RobotName
     unit: Unit = Field(description="unit of fitness")
     bodies: tuple[str, ...] = Field(
@@ -74,4 +74,6 @@ class Replay(Frozen):
     times_s: tuple[float, ...] = Field(description="times of the frames, up to 20 s", examples=[(0.0, 0.02)])
     counted_s: Interval = Field(description="interval in which movement counts for fitness", examples=[(0.5, 3.0)])
     simulation: ReplayWorld | None = Field(description="null: the controller evolved in reality itself")
-    reality: ReplayWorld | None = Field(description="null: reality's parameters are unknown here")
+    reality: ReplayWorld | None = Field(
+        description="null: reality's parameters are unknown here, or reality is hardware, which no replay moves"
+    )

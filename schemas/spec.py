@@ -32,8 +32,8 @@ class BudgetSpec(Frozen):
     reuse_transfer: bool = Field(
         default=True,
         strict=True,
-        description="true: `simulated_fit` tries the controller that was just transferred instead of searching again: "
-        "the best of `controller_evaluations`, where other strategies select from `selection_evaluations`",
+        description="true: `simulated_fit` tries the controller that was just transferred, without another search. It "
+        "is the best of `controller_evaluations`; other strategies select from `selection_evaluations`",
     )
 
     @model_validator(mode="before")
@@ -83,7 +83,7 @@ class SharedSettings(Frozen):
 class Schedule(Frozen):
     """Schedule of an experiment. It changes no number, so it is not part of the stored spec."""
 
-    priority: Priority = Field(default=0, description="higher is computed first")
+    priority: Priority = Field(default=0, description="the highest priority is computed first")
     max_parallel: Annotated[Count, Field(le=10_000)] | None = Field(
         default=None, description="largest number of repetitions of an experiment at once; null: no limit"
     )
@@ -152,5 +152,5 @@ class StudySpec(SharedSettings, Schedule):
         max_length=100,
     )
     direct_repetitions: Annotated[Count, Field(le=10_000)] | None = Field(
-        default=None, description="repetitions of `direct`; default: as many as of the strategies"
+        default=None, description="repetitions of `direct`; default: `repetitions`"
     )

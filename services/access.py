@@ -26,10 +26,10 @@ from gaplab.services.store.statements import storable
 MAKE_ONE = "`gaplab token create --role admin` makes one"
 
 NOTED_EVERY = timedelta(minutes=1)
-"""Precision of a token's last use; a write with every request would cost more than it tells."""
+"""Precision of a token's last use; a write with every request would be too costly."""
 
 _NO_DIGEST = "0" * 64
-"""Compared with where there is no such token, so that the answer takes as long."""
+"""Digest to compare with if no such token exists, so that the answer takes as long."""
 
 _TOKEN = re.compile(r"gaplab_([a-z0-9]{1,32})_([0-9a-f]{64})")
 
@@ -39,7 +39,7 @@ class Caller:
     """The sender of a request.
 
     Attributes:
-        token: id of its token; None where none is needed.
+        token: id of its token; None if no token is required.
         role: what it may do.
     """
 
@@ -48,7 +48,7 @@ class Caller:
 
 
 ANYONE = Caller(None, Role.RUNNER)
-"""The caller of an open service on loopback; what is hidden stays hidden from it."""
+"""The caller of an open service on loopback, which sees no hidden values."""
 
 
 @dataclass(frozen=True)
@@ -56,20 +56,20 @@ class NewToken:
     """A token with its secret, which is shown this once.
 
     Attributes:
-        token: as it is listed.
-        secret: what a client sends.
+        token: the token as lists show it.
+        secret: text that a client sends.
     """
 
     token: TokenRead
     secret: str
 
     def __repr__(self) -> str:
-        """Without the secret."""
+        """Return a text without the secret."""
         return f"NewToken(token={self.token!r})"
 
 
 def create_token(store: Store, role: Role, name: str | None = None) -> NewToken:
-    """Make a token; its secret cannot be read again."""
+    """Create a token; its secret cannot be read again."""
     secret = token_hex(32)
     token = store.write(_insert, name or role.value, role, _digest(secret))
     return NewToken(token, f"gaplab_{token.id}_{secret}")
@@ -77,13 +77,13 @@ def create_token(store: Store, role: Role, name: str | None = None) -> NewToken:
 
 @snapshot
 def list_tokens(session: Session) -> tuple[TokenRead, ...]:
-    """Return all tokens, revoked ones too, the oldest first."""
+    """Return all tokens, revoked ones too, oldest first."""
     return tuple(map(_view, session.scalars(select(TokenRow).order_by(TokenRow.created_at, TokenRow.id))))
 
 
 @transaction
 def revoke_token(session: Session, token_id: str) -> TokenRead:
-    """Revoke a token, so that it admits no request from now on; a second time changes nothing.
+    """Revoke a token: it admits no request from now on. Revoking it twice changes nothing.
 
     Raises:
         NotFound: no such token.
@@ -97,15 +97,15 @@ def revoke_token(session: Session, token_id: str) -> TokenRead:
 
 
 def authenticate(store: Store, shown: str | None, *, required: bool) -> Caller:
-    """Return the caller that sent this token, or none.
+    """Return the caller of a request with this token, or without a token.
 
     Args:
-        store: with the tokens.
+        store: has the tokens.
         shown: the token; None for none.
-        required: whether a token is needed even where none was ever made.
+        required: whether a token is required even if none was ever created.
 
     Raises:
-        Unauthenticated: a token is needed and missing, unknown or revoked.
+        Unauthenticated: a token is required, and is missing, unknown or revoked.
     """
     if shown is not None:
         return _known(store, shown)
@@ -122,7 +122,7 @@ def demand(caller: Caller, role: Role, what: str) -> None:
     """Refuse a caller whose role does not permit an action.
 
     Raises:
-        Forbidden: the message says what wants which role.
+        Forbidden: the message names the action and the required role.
     """
     if not caller.role.permits(role):
         held = f"this token is a {caller.role.value}'s" if caller.token else "none was shown"
@@ -134,18 +134,18 @@ def demand_token_beyond_loopback(store: Store, host: str) -> None:
     """Refuse to serve an address beyond loopback as long as there is no valid token.
 
     Raises:
-        Unauthenticated: everyone who reaches that address could do anything.
+        Unauthenticated: no token is valid, so anyone who can reach the address could do anything.
     """
     if is_loopback(host):
         return
     with store.reading() as session:
         if session.scalar(select(TokenRow.id).where(TokenRow.revoked_at.is_(None)).limit(1)) is None:
-            msg = f"{host} is more than loopback, and there is no token yet to let anyone in: {MAKE_ONE}"
+            msg = f"{host} is reachable from other machines, but no token is valid yet: {MAKE_ONE}"
             raise Unauthenticated(msg)
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether only this machine reaches the host; a name other than `localhost` may lead anywhere."""
+    """Return whether only this machine can reach the host; any name but `localhost` may belong to another machine."""
     if host == "localhost":
         return True
     try:

@@ -15,12 +15,12 @@ from gaplab.services.store.session import Session, snapshot
 
 @dataclass(frozen=True)
 class WantedEvents:
-    """WantedEvents events are wanted; all, where nothing is said.
+    """A selection of events; without a condition, all events.
 
     Attributes:
-        experiment: only of this one.
-        study: only of the experiments of this one.
-        kinds: only of these.
+        experiment: only events of this experiment.
+        study: only events of this study's experiments.
+        kinds: only events of these kinds.
     """
 
     experiment: str | None = None
@@ -28,7 +28,7 @@ class WantedEvents:
     kinds: frozenset[EventKind] = frozenset()
 
     def has(self, event: EventRead) -> bool:
-        """Return whether the event is one of them."""
+        """Return whether the selection contains the event."""
         return (
             self.experiment in (None, event.experiment)
             and self.study in (None, event.study)
@@ -38,7 +38,7 @@ class WantedEvents:
 
 @snapshot
 def page(session: Session, after: int, wanted: WantedEvents, *, limit: int) -> EventPage:
-    """Return up to `limit` of these events in order, from the first that follows the number `after`."""
+    """Return up to `limit` selected events in order, from the first after the number `after`."""
     row, experiment, newest = EventRow, ExperimentRow, _latest(session)
     query = select(row.number, row.kind, row.experiment_id, experiment.study_id, row.repetition, row.body, row.at)
     if wanted.experiment is not None:
@@ -63,7 +63,7 @@ def latest(session: Session) -> int:
 
 @snapshot
 def check(session: Session, wanted: WantedEvents) -> None:
-    """Refuse a choice of events of what is not there.
+    """Refuse a selection whose experiment or study does not exist.
 
     Raises:
         NotFound: no such experiment, or no such study.

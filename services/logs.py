@@ -1,7 +1,7 @@
 """Logs of every process of the service: readable lines in a terminal, JSON lines anywhere else.
 
-A record names its experiment and repetition by `extra=`. Secrets never get through: what looks like a token, a
-password or an Authorization header is left out of messages and tracebacks.
+A record names its experiment and repetition by `extra=`. Anything that looks like a token, a password or an
+Authorization header is removed from messages and tracebacks.
 """
 
 import json
@@ -14,7 +14,7 @@ from typing import Any, TextIO
 HIDDEN = "…"
 
 _NAME = r"(?<![\w-])(?=[\w-]*(?:token|password|passwd|secret|api_?key))[\w-]*+"
-"""Matched once a word, and then takes the whole word: a request's address may be one very long word."""
+"""A pattern that starts only at words and takes whole words: an address may be one very long word."""
 
 _SECRETS = (
     (re.compile(r"(?i)(authorization\W{1,6})(?:(?:bearer|basic|token)\s+)?[^\s'\",;)}\]]+"), rf"\1{HIDDEN}"),
@@ -32,7 +32,7 @@ _EXPERIMENT = re.compile(r"^/experiments/([\w-]{1,64})")
 
 
 def configure(stream: TextIO | None = None) -> None:
-    """Let this process log to the stream, or to standard error: readable lines on a terminal, else JSON."""
+    """Log to the stream, or to standard error: readable lines on a terminal, else JSON."""
     target = stream or sys.stderr
     handler = logging.StreamHandler(target)
     handler.setFormatter(Readable() if target.isatty() else Json())
@@ -43,7 +43,7 @@ def configure(stream: TextIO | None = None) -> None:
 
 
 def adopt(name: str) -> None:
-    """Let a library with log handlers of its own log like the rest, and warnings only."""
+    """Make a library with its own log handlers log like the rest, and only warnings."""
     logger = logging.getLogger(name)
     logger.handlers.clear()
     logger.propagate = True
@@ -51,7 +51,7 @@ def adopt(name: str) -> None:
 
 
 def without_secrets(text: str) -> str:
-    """Return the text without what looks like a secret."""
+    """Return the text without anything that looks like a secret."""
     for pattern, replacement in _SECRETS:
         text = pattern.sub(replacement, text)
     return text

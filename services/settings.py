@@ -1,4 +1,4 @@
-"""Settings of the service and limits of the API, read from the environment once by a main."""
+"""Settings of the service and limits of the API. Each process reads them from the environment once, at its start."""
 
 from typing import Annotated, Self
 
@@ -7,7 +7,7 @@ from pydantic_settings import BaseSettings, EnvSettingsSource, PydanticBaseSetti
 
 
 class _Environment(BaseSettings):
-    """Values that `from_environment` reads; the constructor reads nothing."""
+    """Values that `from_environment` reads; the constructor does not read the environment."""
 
     model_config = SettingsConfigDict(frozen=True, extra="forbid", env_prefix="GAPLAB_", env_ignore_empty=True)
 
@@ -20,12 +20,12 @@ class _Environment(BaseSettings):
         dotenv_settings: PydanticBaseSettingsSource,  # noqa: ARG003
         file_secret_settings: PydanticBaseSettingsSource,  # noqa: ARG003
     ) -> tuple[PydanticBaseSettingsSource, ...]:
-        """Take values from the constructor's arguments alone."""
+        """Return only the constructor's arguments as a source of values."""
         return (init_settings,)
 
     @classmethod
     def from_environment(cls) -> Self:
-        """Return the values that the process was started with; an empty variable is not set.
+        """Return the values of the environment; an empty variable counts as not set.
 
         Raises:
             ValueError: a value is not permitted; the message names its variable.
@@ -40,23 +40,27 @@ class _Environment(BaseSettings):
 
 
 class Settings(_Environment):
-    """Where the database and Ray are, and how the service behaves; nothing here changes a number of a result.
+    """Settings of the service; none of them changes a number of a result.
 
     Attributes:
         database_url: SQLAlchemy URL. `GAPLAB_DATABASE_URL`; `sqlite:///gaplab.db` in the working directory.
-        ray_address: of an existing cluster; None starts Ray on this machine. `GAPLAB_RAY_ADDRESS`.
+        ray_address: address of an existing cluster; None starts Ray on this machine. `GAPLAB_RAY_ADDRESS`.
         workers: cores of gaplab's own Ray, or repetitions at once on a cluster; None is all cores. `GAPLAB_WORKERS`.
         lease_s: seconds of silence after which a supervisor's work goes to others. `GAPLAB_LEASE_S`; 30.
-        host: that the API binds. `GAPLAB_HOST`; loopback.
-        port: that the API binds. `GAPLAB_PORT`; 8000.
-        url: where the command finds the service. `GAPLAB_URL`; host and port.
-        token: that the command shows to the service. `GAPLAB_TOKEN`; none.
+        rollout_limit_s: seconds that a rollout may take, unless hardware measures. `GAPLAB_ROLLOUT_LIMIT_S`; 60.
+        step_limit_s: seconds of work that a step may take. `GAPLAB_STEP_LIMIT_S`; a week.
+        host: host that the API binds. `GAPLAB_HOST`; loopback.
+        port: port that the API binds. `GAPLAB_PORT`; 8000.
+        url: address of the service, for the command. `GAPLAB_URL`; host and port.
+        token: token that the command sends to the service. `GAPLAB_TOKEN`; none.
     """
 
     database_url: str = "sqlite:///gaplab.db"
     ray_address: str | None = None
     workers: PositiveInt | None = None
     lease_s: PositiveInt = 30
+    rollout_limit_s: PositiveInt = 60
+    step_limit_s: PositiveInt = 604_800
     host: str = "127.0.0.1"
     port: PositiveInt = 8000
     url: str = Field(default_factory=lambda given: address(given["host"], given["port"]))
@@ -64,20 +68,20 @@ class Settings(_Environment):
 
 
 class Limits(_Environment):
-    """How much the API lets in. Each is `GAPLAB_MAX_…` in the environment: `GAPLAB_MAX_BODY_BYTES` and so on.
+    """Limits of the API. Each is `GAPLAB_MAX_…` in the environment: `GAPLAB_MAX_BODY_BYTES` and so on.
 
     Requests without a token share the limits of one token.
 
     Attributes:
-        body_bytes: of one request.
-        iterations: of one experiment.
-        repetitions: of one submission, over all experiments of a study.
-        experiments_per_token: that have not ended.
-        experiments: that have not ended, of all tokens.
-        rollouts_per_token: budgeted and not yet done, of experiments that have not ended.
-        rollouts: the same, of all tokens.
-        streams_per_token: of events, open at once at one API process; a request that waits for events is one.
-        streams: the same, of all tokens.
+        body_bytes: bytes of one request.
+        iterations: iterations of one experiment.
+        repetitions: repetitions of one submission, over all experiments of a study.
+        experiments_per_token: experiments of one token that have not ended.
+        experiments: experiments of all tokens that have not ended.
+        rollouts_per_token: remaining rollouts of one token, in experiments that have not ended.
+        rollouts: remaining rollouts of all tokens, in experiments that have not ended.
+        streams_per_token: open event streams of one token in one API process, including requests that wait for events.
+        streams: open event streams of all tokens in one API process.
     """
 
     model_config = SettingsConfigDict(env_prefix="GAPLAB_MAX_")

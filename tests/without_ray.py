@@ -13,9 +13,10 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.session import Store
 from gaplab.workers import repetitions, supervisor
-from gaplab.workers.checkpoints import recorded
-from gaplab.workers.repetitions import Repetitions, Run, batches
+from gaplab.workers.repetitions import Repetitions
+from gaplab.workers.run import Run
 from gaplab.workers.supervisor import Supervisor
+from gaplab.workers.task import delivered
 
 SPEC = ExperimentSpec.model_validate(
     {
@@ -41,8 +42,8 @@ class HereRun(Run):
     def receive(self) -> None:
         """The next batch, or the end."""
         batch = next(self.stream, None)
-        self.begun, self.ended = True, batch is None
-        self.received += batch or ()
+        self.ended = batch is None
+        self.take(batch or ())
 
     def cancel(self) -> None:
         """What computes it ends with its next delivery."""
@@ -67,7 +68,7 @@ class HereRepetitions(Repetitions):
 
     def launch(self, claim: Claim) -> Run:
         """Compute the repetition in this process."""
-        stream = batches(recorded(setting(claim.spec, claim.number), claim.log, claim.checkpoints, 0.0))
+        stream = delivered(lambda: setting(claim.spec, claim.number), claim, 0.0)
         return HereRun(claim, stream)
 
     def receive(self) -> None:

@@ -1,1 +1,1 @@
-"""Ray: a supervisor that claims repetitions, and the task that runs one. Start with `supervisor`."""
+"""Ray: a supervisor that claims repetitions, and the task that runs a repetition. Start with `supervisor`."""

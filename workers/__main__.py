@@ -1,4 +1,4 @@
-"""`python -m workers serve`: run what is queued until told to stop. `python -m workers check`: could it?"""
+"""`python -m workers serve`: run queued work until told to stop. `python -m workers check`: test whether it could."""
 
 import logging
 import os
@@ -19,6 +19,7 @@ def serve(settings: Settings) -> int:
     """Work until SIGTERM or SIGINT; return 1 if there is no cluster to work on."""
     choose_authentication(settings)
     from gaplab.workers.cluster import cluster  # Ray takes a second to import
+    from gaplab.workers.patience import Patience
     from gaplab.workers.supervisor import Supervisor
 
     logs.adopt("ray")
@@ -30,7 +31,11 @@ def serve(settings: Settings) -> int:
             for signum in (signal.SIGTERM, signal.SIGINT):  # only now, for Ray has put handlers of its own in place
                 signal.signal(signum, lambda *_: stop.set())
             logging.getLogger("gaplab.supervisor").info("ready for %d repetitions at once", joined.capacity())
-            Supervisor(store, joined.capacity, joined.versions, lease_s=settings.lease_s).serve(stop)
+            patience = Patience(settings.rollout_limit_s, settings.step_limit_s)
+            supervisor = Supervisor(
+                store, joined.capacity, joined.versions, lease_s=settings.lease_s, patience=patience
+            )
+            supervisor.serve(stop)
     except ClusterUnusable as error:
         sys.stderr.write(f"{error}\n")
         return 1
@@ -40,7 +45,7 @@ def serve(settings: Settings) -> int:
 
 
 def choose_authentication(settings: Settings) -> None:
-    """Make a Ray that this process starts ask for a token, and send one to a cluster unless the environment forbids it.
+    """Require a token of clients of our own Ray, and send one to a cluster unless the environment forbids it.
 
     Ray reads these variables when it is imported. By default it sends its token only to a cluster that it started, and
     keeps the token in a file of the home folder that other users may read.

@@ -1,45 +1,74 @@
-"""Repetitions that deliver checkpoints of a step while it is under way."""
+"""Repetitions that deliver steps, checkpoints of the running step, and signs of life."""
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
-from queue import SimpleQueue
+from dataclasses import replace
+from queue import Empty, SimpleQueue
 from threading import Event, Thread
-from time import perf_counter
+from time import perf_counter, sleep
+from typing import TypeAlias
 
 from gaplab.services.core.answers import Answer, Answers, pack
+from gaplab.services.core.arrays import Genome
+from gaplab.services.core.errors import RealityFailed, TryAgain
 from gaplab.services.core.loop import Setting, repetition
 from gaplab.services.core.types import Step
-from gaplab.services.running.execution import Checkpoint, Delivered, TimedStep
+from gaplab.services.store.lease import Checkpoint, Delivered, Pulse, TimedStep
+from gaplab.workers.permits import PermittedReality
 
 CHECKPOINT_S = 10.0
 """Seconds between the checkpoints of a step; shorter steps have none.
 
-They bound what a crash costs, and how long a repetition that is told to stop goes on."""
+It limits the work that a crash loses, and the time that a repetition needs to stop."""
 
 SHARE = 4
-"""Calls that would take longer than the time between checkpoints divided by this are split."""
+"""Number of calls between two checkpoints, at least; longer calls are split."""
 
-Emit = Callable[[Delivered], None]
+PULSE_S = 5.0
+"""Seconds without a delivery after which a worker gives a sign of life."""
+
+PAUSES_S = (1.0, 10.0, 60.0)
+"""Pauses before each repetition of a step whose error may pass; after the last, the error counts."""
+
+PASSING = (TryAgain, ConnectionError, TimeoutError, BlockingIOError, InterruptedError, MemoryError)
+"""Errors that may pass by themselves."""
+
+Emit: TypeAlias = Callable[[Delivered | Pulse], None]
 
 
 def recorded(
-    setting: Setting, log: Sequence[Step], checkpoints: Sequence[Checkpoint], every_s: float = CHECKPOINT_S
-) -> Iterator[Delivered]:
-    """Yield the steps that follow the log, and checkpoints of those that take long, as they come about.
+    setting: Setting,
+    log: Sequence[Step],
+    checkpoints: Sequence[Checkpoint],
+    every_s: float = CHECKPOINT_S,
+    pauses_s: Sequence[float] = PAUSES_S,
+) -> Iterator[Delivered | Pulse]:
+    """Yield the steps that follow the log, checkpoints of long steps as soon as they exist, and signs of life.
 
     Args:
-        setting: of the repetition.
+        setting: setting of the repetition.
         log: its steps so far.
-        checkpoints: of the step that comes next.
+        checkpoints: checkpoints of the next step.
         every_s: seconds between checkpoints of a step.
+        pauses_s: pauses before each repetition of a step whose error may pass.
     """
+    items: SimpleQueue[Delivered | Pulse | None] = SimpleQueue()
+    unwanted = Event()
 
-    def compute(emit: Emit) -> None:
-        recorder = StepRecorder(emit, every_s, len(log), checkpoints)
-        for step in repetition(setting, log, partial(recorder.answers, setting)):
-            recorder.end(step)
+    def emit(item: Delivered | Pulse) -> None:
+        if unwanted.is_set():
+            raise _Unwanted
+        items.put(item)
 
-    return _in_a_thread(compute)
+    recorder = StepRecorder(emit, every_s, log, checkpoints)
+    thread = _Computation(lambda: recorder.run(setting, pauses_s), lambda: items.put(None))
+    thread.start()
+    try:
+        while (item := _next(items, recorder)) is not None:
+            yield item
+    finally:
+        unwanted.set()
+    if thread.raised is not None:
+        raise thread.raised
 
 
 class StepRecorder:
@@ -48,27 +77,46 @@ class StepRecorder:
     Args:
         emit: takes steps and checkpoints.
         every_s: seconds between checkpoints.
-        step: the place in the log of the step under way.
-        checkpoints: of it, from before an interruption.
+        log: the steps before the running step.
+        checkpoints: its checkpoints from before an interruption.
     """
 
-    def __init__(self, emit: Emit, every_s: float, step: int, checkpoints: Sequence[Checkpoint] = ()) -> None:
+    def __init__(self, emit: Emit, every_s: float, log: Sequence[Step], checkpoints: Sequence[Checkpoint] = ()) -> None:
         self._emit = emit
         self._every_s = every_s
-        self._step, self._part = step, len(checkpoints)
-        self._before = checkpoints
+        self._log = list(log)
+        self._parts = list(checkpoints)
         self._before_s = sum(checkpoint.seconds for checkpoint in checkpoints)
-        self._begun = self._last = self._called = perf_counter()
+        self._begun = self._last = self._called = self._progressed = perf_counter()
         self._answers: list[Answer] = []
         self._rollout_s = 0.0
+        self._measuring = False
+
+    def run(self, setting: Setting, pauses_s: Sequence[float]) -> None:
+        """Compute the repetition to its end; repeat a step after a pause if its error may pass."""
+        watched = replace(setting, reality=lambda genome: self._measured(setting, genome))
+        tries, steps = 0, len(self._log)
+        while True:
+            try:
+                for step in repetition(watched, tuple(self._log), lambda: self.answers(watched)):
+                    self.end(step)
+            except Exception as error:
+                tries = tries + 1 if len(self._log) == steps else 1
+                steps = len(self._log)
+                if not may_pass(error) or tries > len(pauses_s):
+                    raise
+                self._answers, self._progressed = [], perf_counter() + pauses_s[tries - 1]
+                sleep(pauses_s[tries - 1])
+            else:
+                return
 
     def answers(self, setting: Setting) -> Answers:
         """Return the answers of the step under way: those of its checkpoints, then new ones, which are recorded."""
-        checkpoints = (checkpoint.answers for checkpoint in self._before)
+        checkpoints = (checkpoint.answers for checkpoint in tuple(self._parts))
         return Answers(setting.simulate, setting.batch_size, checkpoints, self)
 
     def genomes_per_call(self, simulators: int) -> int:
-        """Return as many genomes as take a part of the time between checkpoints; one while that is unknown."""
+        """Return the number of genomes of a call that is short enough; 1 while durations are unknown."""
         self._called = perf_counter()
         if not self._rollout_s:
             return 1
@@ -76,57 +124,77 @@ class StepRecorder:
 
     def record(self, answers: Sequence[Answer]) -> None:
         """Keep the answers of a call that has just ended, and emit a checkpoint if it is time."""
-        now = perf_counter()
+        self._progressed = now = perf_counter()
         self._rollout_s = (now - self._called) / sum(len(fitnesses) for _, fitnesses in answers)
         self._answers += answers
         if now - self._last >= self._every_s:
             self._checkpoint(now)
 
     def end(self, step: Step) -> None:
-        """Emit the step, which has come to its end, and begin the next."""
+        """Emit the completed step, and begin the next."""
         now = perf_counter()
         self._emit(TimedStep(step, self._before_s + now - self._begun))
-        self._step, self._part, self._before = self._step + 1, 0, ()
-        self._before_s, self._begun, self._last = 0.0, now, now
-        self._answers = []
+        self._log.append(step)
+        self._before_s, self._begun, self._last, self._progressed = 0.0, now, now, now
+        self._parts, self._answers = [], []
+
+    def pulse(self) -> Pulse:
+        """Return a sign of life."""
+        now = perf_counter()
+        step_s = self._before_s + now - self._begun
+        return Pulse(len(self._log), self._measuring, max(0.0, now - self._progressed), step_s)
+
+    def _measured(self, setting: Setting, genome: Genome) -> float:
+        self._measuring, self._progressed = True, perf_counter()
+        if isinstance(setting.reality, PermittedReality):
+            self._emit(self.pulse())  # it waits for a permit, which is given once the beginning is stored
+        try:
+            return setting.reality(genome)
+        finally:
+            self._measuring = False
 
     def _checkpoint(self, now: float) -> None:
-        self._emit(Checkpoint(self._step, self._part, pack(self._answers), now - self._last))
-        self._part, self._last, self._answers = self._part + 1, now, []
+        checkpoint = Checkpoint(len(self._log), len(self._parts), pack(self._answers), now - self._last)
+        self._emit(checkpoint)
+        self._parts.append(checkpoint)
+        self._last, self._answers = now, []
+
+
+def may_pass(error: BaseException) -> bool:
+    """Return whether the error, or reality's error behind it, may pass by itself."""
+    return isinstance(error.__cause__ if isinstance(error, RealityFailed) else error, PASSING)
 
 
 class _Unwanted(Exception):
-    """The consumer has closed the iterator, so that nothing takes further items."""
+    """The consumer has closed the iterator, and takes no further items."""
 
 
-def _in_a_thread(compute: Callable[[Emit], None]) -> Iterator[Delivered]:
-    """Yield what a thread of its own emits: a checkpoint comes from the depths of a step, where nothing can yield.
+class _Computation(Thread):
+    """A thread that computes, because checkpoints are emitted deep inside a step, where nothing can yield.
 
-    Once the iterator is closed, the thread ends at the next item that it emits.
+    Attributes:
+        raised: the error that ended it, even SystemExit, which would end a thread silently.
     """
-    items: SimpleQueue[Delivered | None] = SimpleQueue()
-    raised: list[BaseException] = []
-    unwanted = Event()
 
-    def emit(item: Delivered) -> None:
-        if unwanted.is_set():
-            raise _Unwanted
-        items.put(item)
+    def __init__(self, compute: Callable[[], None], ended: Callable[[], None]) -> None:
+        super().__init__(name="repetition", daemon=True)
+        self.raised: BaseException | None = None
+        self._compute, self._ended = compute, ended
 
-    def run() -> None:
+    def run(self) -> None:
+        """Compute, keep the error if there is one, and emit the end."""
         try:
-            compute(emit)
+            self._compute()
         except _Unwanted:
             return
-        except Exception as error:  # noqa: BLE001 - it is raised again below, where the items are taken
-            raised.append(error)
-        items.put(None)
+        except BaseException as error:  # noqa: BLE001 - it is raised again where the items are taken
+            self.raised = error
+        self._ended()
 
-    Thread(target=run, name="repetition", daemon=True).start()
+
+def _next(items: "SimpleQueue[Delivered | Pulse | None]", recorder: StepRecorder) -> Delivered | Pulse | None:
+    """Return the next item, or a sign of life if none comes for a while; None at the end."""
     try:
-        while (item := items.get()) is not None:
-            yield item
-    finally:
-        unwanted.set()
-    if raised:
-        raise raised[0]
+        return items.get(timeout=PULSE_S)
+    except Empty:
+        return recorder.pulse()

@@ -1,4 +1,4 @@
-"""Ray itself: started on this machine, or joined where it runs."""
+"""Ray: started on this machine, or joined as an existing cluster."""
 
 import logging
 import os
@@ -20,24 +20,24 @@ OBJECT_STORE_BYTES = 100 * 2**20
 
 @dataclass(frozen=True)
 class Cluster:
-    """Ray, as it was started or joined.
+    """A Ray that was started or joined.
 
     Attributes:
-        workers: most repetitions at once; None for as many as there are cores.
-        versions: that a process must have to run a repetition. Even a Ray on this machine starts processes later, and
-            files may be edited meanwhile.
+        workers: largest number of repetitions at once; None for the number of cores.
+        versions: versions that a process must have to run a repetition. Even a Ray on this machine starts processes
+            later, and files may be edited meanwhile.
     """
 
     workers: int | None
     versions: Versions
 
     def capacity(self) -> int:
-        """Return the number of repetitions to have at Ray at once, which changes as nodes come and go.
+        """Return the number of repetitions to submit to Ray at once; it changes as nodes join or leave.
 
-        There are two for each core: while one runs, the next one waits at Ray, and no core idles between them.
+        There are two for each core: while one runs, the next one waits in Ray, so no core idles between them.
 
         Raises:
-            ClusterUnusable: this process lost its node, and can run nothing any more.
+            ClusterUnusable: this process lost its node, and cannot run anything.
         """
         _refuse_dead_node()
         return self.workers or 2 * int(ray.cluster_resources().get("CPU", 0))
@@ -54,7 +54,7 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
             repetitions run at once on a cluster.
 
     Raises:
-        ClusterUnusable: it cannot be joined, a node has other versions, or authentication is switched off.
+        ClusterUnusable: the cluster cannot be joined, a node has other versions, or authentication is switched off.
     """
     logging.getLogger("ray").setLevel(logging.ERROR)
     try:
@@ -70,7 +70,7 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
 
 
 def _refuse_dead_node() -> None:
-    """Refuse to go on when this node's Ray has died; only a new process gets another."""
+    """Refuse to continue if this node's Ray has died; only a new process can start another."""
     here = ray.get_runtime_context().get_node_id()
     if any(node["NodeID"] == here and not node["Alive"] for node in ray.nodes()):
         msg = "Ray died on this machine"
@@ -97,8 +97,8 @@ def _start(cores: int | None) -> None:
 def _on_loopback() -> Iterator[None]:
     """Let a Ray that starts within the context listen on loopback, as it does by itself on a Mac.
 
-    On Linux it replaces 127.0.0.1 by an address that other machines reach, and listens there: what it offers for that
-    is a setting, RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER, which it reads into this constant when it is imported.
+    On Linux, Ray replaces 127.0.0.1 by an address that other machines reach, and listens there. The only setting
+    against that is RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER, which Ray reads into this constant when it is imported.
     """
     before = ray_constants.ENABLE_RAY_CLUSTER
     ray_constants.ENABLE_RAY_CLUSTER = False

@@ -48,8 +48,8 @@ def _simulation(spec: str) -> Simulate:
 class Helpers:
     """The helpers of a repetition, one for each idle core; they end with this object.
 
-    A helper has to start and load an engine, and a program that Ray does not know may use its core. So each helper
-    first gets a rollout that nothing waits for, and is ready once it has answered.
+    A helper must start and load an engine, and other programs may use its core. So each helper first gets a rollout
+    whose answer is not needed, and is ready once it has answered.
     """
 
     def __init__(self, spec: ResolvedSpec, versions: Versions) -> None:
@@ -72,12 +72,12 @@ class Helpers:
         return self._ready
 
     def helped(self, but_for: Sequence[Handle] = ()) -> None:
-        """Keep the helpers, except for these: the next check replaces them."""
+        """Keep all helpers except these; the next check replaces them."""
         self._ready = [helper for helper in self._ready if helper not in but_for]
         self._pause_s = CHECK_S
 
     def failed(self) -> None:
-        """End all helpers, because their parts took longer than they would have taken here."""
+        """End all helpers, because their parts took longer than on this core."""
         for helper in (*self._ready, *self._starting.values()):
             ray.kill(helper)
         self._ready, self._starting = [], {}

@@ -1,4 +1,4 @@
-"""The parts of one call, shared between this core and helpers: a slow helper gets fewer, and none is waited for."""
+"""The parts of one call, shared between this core and helpers. A slow helper gets fewer; no call waits for one."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -62,17 +62,17 @@ class SharedCall:
     """One call: this core simulates parts from the front, helpers from the back, until they meet.
 
     Once no other part is left, this core also simulates a part whose helper is late. So a core that is slow, dead or
-    used by another program costs little more time than that of one part.
+    used by another program delays the call by little more than one part.
 
     Args:
-        parts: of the call.
-        here: simulates a part on this core.
-        helpers: simulate parts on other cores.
+        parts: parts of the call.
+        here: function that simulates a part on this core.
+        helpers: helpers, which simulate parts on other cores.
         rollout_s: expected seconds of a rollout.
 
     Attributes:
         gained: rollouts that helpers simulated.
-        lost: rollouts that were lent and then taken back.
+        lost: rollouts of parts that were taken back.
         dead: helpers that no longer answer.
     """
 
@@ -104,7 +104,7 @@ class SharedCall:
         self._lent[helper.part.remote(*self._parts[index])] = Loan(index, helper, until)
 
     def _collect(self, *, patient: bool) -> None:
-        """Take the answers that have come; if patient, wait for one, and take back the latest part if it is late."""
+        """Take the available answers; if patient, wait for one, and take back the latest part if it is late."""
         if not self._lent:
             return
         until = next(reversed(self._lent.values())).until if patient else 0.0

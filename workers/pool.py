@@ -1,4 +1,4 @@
-"""One repetition on many cores: its calls are shared with the cores that are idle."""
+"""One repetition on many cores: it shares its calls with idle cores."""
 
 from math import ceil
 from time import perf_counter
@@ -24,10 +24,10 @@ class Pool:
     """A Simulate that shares its rollouts with the idle cores of the cluster; the numbers stay the same.
 
     Args:
-        spec: of the experiment, from which helpers build the same Simulate.
+        spec: spec of the experiment, from which helpers build the same Simulate.
         here: that Simulate, on this core.
-        per_call: rollouts that one call should ask of it at least.
-        versions: that the node of a helper must have.
+        per_call: smallest sensible number of rollouts of a call.
+        versions: versions that the node of a helper must have.
     """
 
     def __init__(self, spec: ResolvedSpec, here: Simulate, per_call: int, versions: Versions | None = None) -> None:
@@ -65,7 +65,7 @@ class Pool:
         return np.concatenate(fitnesses, axis=0 if by_genome else 1)
 
     def _until_next_check(self, cores: int, across: int) -> int:
-        """Return the rows to simulate before the next check for idle cores; one while their time is unknown."""
+        """Return the number of rows to simulate before the next check for idle cores; 1 while their time is unknown."""
         return max(1, int(cores * CHECK_S / (self._rollout_s * across))) if self._rollout_s else 1
 
     def _least(self, across: int) -> int:

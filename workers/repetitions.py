@@ -1,150 +1,89 @@
-"""Repetitions at Ray: the task that computes one, and the supervisor's hold on its claimed repetitions."""
+"""The repetitions that a supervisor has claimed: it launches them, receives and stores steps, and ends them."""
 
 import logging
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
 from threading import Event
-from time import monotonic, perf_counter
+from time import monotonic
 
 import ray
-from ray import ObjectRefGenerator
-from ray.exceptions import RayError, RayTaskError
 
-from gaplab.services.core.errors import ClusterUnusable, Conflict, PluginDiffers, StoreUnavailable
-from gaplab.services.core.types import Measured, Probed
+from gaplab.services.core.errors import Conflict, StoreUnavailable
+from gaplab.services.plugins.blame import describe
 from gaplab.services.running import execution
-from gaplab.services.running.execution import Checkpoint, Claim, Delivered
-from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.hardware import hardware_of
+from gaplab.services.store.lease import Claim, Failure
 from gaplab.services.store.session import Store
-from gaplab.workers.checkpoints import CHECKPOINT_S, recorded
-from gaplab.workers.nodes import Versions, check_here
+from gaplab.workers import task
+from gaplab.workers.checkpoints import CHECKPOINT_S
+from gaplab.workers.nodes import Versions
+from gaplab.workers.patience import Patience
+from gaplab.workers.permits import SHARE, Handle, Permits
 from gaplab.workers.plugins import Plugins
-from gaplab.workers.pool import Pool
-
-BATCH_S = 0.2
-"""Steps shorter than this travel together; what reality answered never waits."""
+from gaplab.workers.run import Run
 
 WAIT_S = 0.2
-"""Longest wait for a delivery, and shortest time between two looks for queued work."""
+"""Longest wait for a delivery, and shortest interval between checks for queued work."""
+
+STOP_S = 5.0
+"""Longest wait for a task to stop its hardware."""
 
 log = logging.getLogger("gaplab.supervisor")
 
 
-@ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-def run(claim: Claim, expected: Versions, checkpoint_s: float) -> Iterator[tuple[Delivered, ...]]:
-    """Yield the steps that follow the claim's log, in batches; the first, empty batch says that the task has begun.
-
-    Ray never retries it: a repetition goes on from its stored log, not from its beginning. The engine stays warm in
-    the worker process from one task to the next.
-
-    Raises:
-        ClusterUnusable: this node lacks the expected versions.
-        PluginDiffers: this process lacks those of the plug-ins.
-    """
-    check_here(expected)
-    yield ()
-    alone = setting(claim.spec, claim.number)
-    pool = Pool(claim.spec, alone.simulate, alone.batch_size(), expected)
-    spread = replace(alone, simulate=pool, batch_size=pool.batch_size)
-    yield from batches(recorded(spread, claim.log, claim.checkpoints, checkpoint_s))
-
-
-def batches(deliveries: Iterator[Delivered]) -> Iterator[tuple[Delivered, ...]]:
-    """Yield the deliveries in batches; a batch ends with an answer of reality or a checkpoint, or when it is old."""
-    batch: list[Delivered] = []
-    begun = perf_counter()
-    for delivered in deliveries:
-        batch.append(delivered)
-        urgent = isinstance(delivered, Checkpoint) or isinstance(delivered.step, Measured | Probed)
-        if urgent or perf_counter() - begun >= BATCH_S:
-            yield tuple(batch)
-            batch = []
-            begun = perf_counter()
-    if batch:
-        yield tuple(batch)
-
-
-@dataclass(eq=False)
-class Run:
-    """A claimed repetition on its way.
-
-    Attributes:
-        claim: the right to it.
-        stream: batches of steps and checkpoints from the task.
-        received: deliveries that are not stored yet.
-        begun: the task no longer waits for a core.
-        ended: the task has come to its end.
-        failed: why its code raised, or its process refused it.
-        lost: why another worker must go on: its worker is gone, or its log refused a delivery.
-    """
-
-    claim: Claim
-    stream: ObjectRefGenerator
-    received: list[Delivered] = field(default_factory=list)
-    begun: bool = False
-    ended: bool = False
-    failed: str | PluginDiffers | None = None
-    lost: str | None = None
-
-    def receive(self) -> None:
-        """Take a batch that the stream has ready, its end, or the reason why there is none."""
-        try:
-            self.received += ray.get(next(self.stream))
-            self.begun = True
-        except StopIteration:
-            self.ended = True
-        except RayTaskError as error:
-            if isinstance(error.cause, ClusterUnusable):
-                raise error.cause from error
-            differs = isinstance(error.cause, PluginDiffers)
-            self.failed = error.cause if differs else f"{type(error.cause).__name__}: {error.cause}"
-        except RayError as error:
-            self.lost = f"the worker was lost: {type(error).__name__}"
-
-    def cancel(self) -> None:
-        """End the task at once."""
-        ray.cancel(self.stream, force=True)
-
-    @property
-    def over(self) -> bool:
-        """Whether the stream has nothing more to give."""
-        return self.ended or self.failed is not None or self.lost is not None
-
-    @property
-    def place(self) -> dict[str, str | int]:
-        """Experiment and number, for the log."""
-        return {"experiment": self.claim.experiment_id, "repetition": self.claim.number}
-
-
 class Repetitions:
-    """The repetitions that one supervisor has claimed. All methods raise StoreUnavailable; nothing is lost by it.
+    """The claimed repetitions of one supervisor. All methods raise StoreUnavailable; no delivery is lost then.
 
     Args:
         store: the database.
         owner: the supervisor's name in it.
-        versions: that a node must have to run them.
+        versions: versions that a node must have to run them.
         checkpoint_s: seconds between the checkpoints of a step.
+        patience: how long work may take.
+        lease_s: seconds without a heartbeat after which others may take the claims.
     """
 
-    def __init__(self, store: Store, owner: str, versions: Versions, checkpoint_s: float = CHECKPOINT_S) -> None:
+    def __init__(
+        self,
+        store: Store,
+        owner: str,
+        versions: Versions,
+        checkpoint_s: float = CHECKPOINT_S,
+        patience: Patience | None = None,
+        lease_s: float = execution.STALE_AFTER_S,
+    ) -> None:
         self.runs: list[Run] = []
         self._store = store
         self._owner = owner
         self._plugins = Plugins(versions)
         self._checkpoint_s = checkpoint_s
+        self._patience = patience or Patience()
+        self._lease_s = lease_s
         self._looked = -WAIT_S
         self._unsure = False
+        self._permits: Handle | None = None
 
     def launch(self, claim: Claim) -> Run:
         """Give a claimed repetition to a Ray task."""
-        return Run(claim, run.remote(claim, self._plugins.expected(claim.spec), self._checkpoint_s))
+        hardware = hardware_of(claim.spec) is not None
+        if hardware and self._permits is None:
+            self._permits = Permits.remote()  # type: ignore[attr-defined]  # Ray adds it
+        permits = self._permits if hardware else None
+        return Run(
+            claim, task.run.remote(claim, self._plugins.expected(claim.spec), self._checkpoint_s, permits), permits
+        )
 
     def heartbeat(self) -> None:
-        """Prolong the claims, and stop the runs whose claim no longer holds."""
+        """Renew the claims, stop the runs whose claim is no longer valid, and end those that hang."""
+        begun = monotonic()
         self._drop_all_but(execution.heartbeat(self._store, [run.claim for run in self.runs]))
+        self._permit(begun)
+        for run in self.runs:
+            if not run.over and (reason := run.overdue(self._patience)):
+                run.cancel()
+                run.failed = Failure(reason, of_reality=bool(run.pulse and run.pulse.measuring))
 
     def claim(self, capacity: Callable[[], int]) -> None:
-        """Hand back what should not begin now, and claim up to the capacity."""
+        """Hand back repetitions that should not start now, and claim up to the capacity."""
         if monotonic() - self._looked < WAIT_S:
             return
         self._looked = monotonic()
@@ -159,7 +98,7 @@ class Repetitions:
         self._unsure = False
         for claim in claims:
             self.runs.append(self.launch(claim))
-            log.info("on from step %d", len(claim.log), extra=self.runs[-1].place)
+            log.info("continues from step %d", len(claim.log), extra=self.runs[-1].place)
 
     def receive(self) -> None:
         """Wait shortly for deliveries, and take the ready ones."""
@@ -172,15 +111,18 @@ class Repetitions:
             ready, _ = ray.wait(list(streams), num_returns=1, timeout=WAIT_S)
         for stream in ready:
             streams[stream].receive()
+        self._note_measuring()
 
     def store_received(self) -> None:
-        """Record what was received, and stop the runs whose claim no longer holds."""
+        """Record the received deliveries, and stop the runs whose claim is no longer valid."""
         filled = [run for run in self.runs if run.received]
         if not filled:
             return
         try:
             held = execution.record_all(self._store, [(run.claim, run.received) for run in filled])
-        except Conflict:
+        except StoreUnavailable:
+            raise
+        except Exception:  # noqa: BLE001 - what one repetition delivered must not stop the others
             held = self._record_each(filled)
         for run in filled:
             run.received = []
@@ -193,11 +135,11 @@ class Repetitions:
             return
         self._complete([run for run in over if run.ended and run.lost is None])
         for run in over:
-            if isinstance(run.failed, PluginDiffers):
-                self._plugins.hand_back(self._store, run.claim, run.failed)
+            if run.refused is not None:
+                self._plugins.hand_back(self._store, run.claim, run.refused)
             elif run.failed is not None:
                 execution.fail(self._store, run.claim, run.failed)
-                log.error("failed: %s", run.failed, extra=run.place)
+                log.error("%s", run.failed.reason, extra=run.place)
             elif run.lost is not None:
                 execution.release(self._store, run.claim, run.lost)
                 log.warning("queued again: %s", run.lost, extra=run.place)
@@ -207,9 +149,9 @@ class Repetitions:
         self._looked = -WAIT_S  # cores are free: look for work at once
 
     def hand_back(self, runs: list[Run]) -> None:
-        """Stop these runs, and let others go on with them; what the database does not hear, a lease's end tells it."""
+        """Stop these runs, and return their leases; without the database, the leases expire."""
         for run in list(runs):
-            run.cancel()
+            self._stop(run)
             self.runs.remove(run)
             try:
                 execution.hand_back(self._store, run.claim)
@@ -219,16 +161,48 @@ class Repetitions:
                 log.info("handed back", extra=run.place)
 
     def _record_each(self, runs: list[Run]) -> tuple[Claim, ...]:
-        """Record each run's deliveries by themselves, and give up the runs whose log refuses them."""
+        """Record each run's deliveries separately, and give up the runs whose log refuses them."""
         held: list[Claim] = []
         for run in runs:
             try:
                 held += execution.record_all(self._store, [(run.claim, run.received)])
+            except StoreUnavailable:
+                raise
             except Conflict as error:
                 run.cancel()
                 run.received, run.lost = [], f"what it delivered could not be stored: {error}"
                 held.append(run.claim)
+            except Exception as error:
+                log.exception("what it delivered cannot be stored", extra=run.place)
+                run.cancel()
+                run.received, run.failed = [], Failure(f"what it delivered cannot be stored: {describe(error)}")
+                held.append(run.claim)
         return tuple(held)
+
+    def _note_measuring(self) -> None:
+        """Store for each run, once per measurement, that it waits for reality."""
+        noted = [run for run in self.runs if run.pulse and run.pulse.measuring and run.pulse.step != run.measuring]
+        begun = monotonic()
+        if noted:
+            execution.note_measuring(self._store, [run.claim for run in noted])
+        for run in noted:
+            run.measuring = run.pulse.step if run.pulse else None
+        if noted:
+            self._permit(begun)
+
+    def _permit(self, begun: float, but: Run | None = None) -> None:
+        """Permit the runs whose measurement is noted to move their hardware, for a part of the lease since `begun`."""
+        if self._permits is not None:
+            noted = (run for run in self.runs if run.permits is not None and run.measuring is not None)
+            keys = [(run.claim.id, run.claim.epoch) for run in noted if run is not but]
+            self._permits.renew.remote(keys, begun + SHARE * self._lease_s - monotonic())
+
+    def _stop(self, run: Run) -> None:
+        """End a run's task; a task that moves hardware may stop it first."""
+        if run.permits is not None:
+            self._permit(monotonic(), but=run)
+            run.wait_for_end(STOP_S)
+        run.cancel()
 
     def _complete(self, runs: list[Run]) -> None:
         try:
@@ -241,9 +215,12 @@ class Repetitions:
                     run.lost = f"it ended too early: {error}"
 
     def _drop_all_but(self, held: list[Claim] | tuple[Claim, ...]) -> None:
-        """Stop the runs whose claim no longer holds: cancelled, paused, stopped, handed back, or taken over."""
+        """Stop the runs whose claim is no longer valid: cancelled, paused, stopped, handed back, or taken over."""
         claims = set(held)
-        for run in [run for run in self.runs if run.claim not in claims]:
-            run.cancel()
+        dropped = [run for run in self.runs if run.claim not in claims]
+        for run in dropped:
+            self._stop(run)
             self.runs.remove(run)
-            log.info("dropped, it is no longer ours", extra=run.place)
+            log.info("dropped: this supervisor no longer holds its lease", extra=run.place)
+        if dropped:
+            execution.free_hardware(self._store, [run.claim for run in dropped])

@@ -1,6 +1,6 @@
-"""The supervisor: claims work, gives it to Ray tasks, and alone writes what they deliver.
+"""The supervisor: it claims work, gives it to Ray tasks, and is the only writer of their deliveries.
 
-It keeps nothing that it could not lose: killed at any moment and started again, it goes on from the stored steps.
+It has no state of its own: killed at any moment and restarted, it continues from the stored steps.
 """
 
 import logging
@@ -17,30 +17,32 @@ from gaplab.services.running import execution, supervisors
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.nodes import Versions
+from gaplab.workers.patience import Patience
 from gaplab.workers.repetitions import Repetitions
 from gaplab.workers.sensitivity import Checks
 
 HEARTBEATS = 6
-"""Heartbeats in the time after which a lease without one is lost."""
+"""Number of heartbeats within the time after which a lease without one is lost."""
 
 RETRY_S = 1.0
-"""Wait before the next try while the database cannot be used."""
+"""Pause before the next attempt while the database cannot be used."""
 
 GRACE_S = 15.0
-"""Longest wait, once it is told to stop, for one more delivery of each repetition."""
+"""Longest wait for one more delivery of each repetition, after a request to stop."""
 
 log = logging.getLogger("gaplab.supervisor")
 
 
 class Supervisor:
-    """Runs what is queued in the store.
+    """Runs the queued work of a store.
 
     Args:
         store: the database.
-        capacity: number of repetitions to have at Ray at once, asked before each claim.
-        versions: that a node must have to run them.
+        capacity: returns the number of repetitions to submit to Ray at once; called before each claim.
+        versions: versions that a node must have to run them.
         checkpoint_s: seconds between the checkpoints of a long step.
-        lease_s: silence after which a supervisor's work goes to others; the same for all supervisors.
+        lease_s: seconds without a heartbeat after which a supervisor loses its work; the same for all supervisors.
+        patience: how long work may take; default: that of the default settings.
     """
 
     def __init__(
@@ -51,22 +53,23 @@ class Supervisor:
         *,
         checkpoint_s: float = CHECKPOINT_S,
         lease_s: float = execution.STALE_AFTER_S,
+        patience: Patience | None = None,
     ) -> None:
         self._store = store
         self._capacity = capacity
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{token_hex(4)}"
-        self._repetitions = Repetitions(store, self._owner, versions or {}, checkpoint_s)
-        self._checks = Checks(store, self._owner, lease_s, versions)
+        self._repetitions = Repetitions(store, self._owner, versions or {}, checkpoint_s, patience, lease_s)
+        self._checks = Checks(store, self._owner, lease_s, versions, patience)
         self._lease_s = lease_s
         self._beat = -lease_s
 
     @property
     def busy(self) -> bool:
-        """Whether repetitions are under way."""
+        """Whether repetitions are running."""
         return bool(self._repetitions.runs)
 
     def serve(self, stop: Event) -> None:
-        """Work until told to stop; then hand unfinished repetitions back, each after one more delivery.
+        """Work until told to stop; then hand back unfinished repetitions, each after one more delivery.
 
         Raises:
             ClusterUnusable: a node would compute other numbers; this ends the work as well.
@@ -92,8 +95,8 @@ class Supervisor:
         """Do one round: heartbeat, claim, receive, store; sensitivity checks before repetitions.
 
         Raises:
-            StoreUnavailable: nothing is lost by it; what was received is stored in a later round.
-            ClusterUnusable: a node that joined has other versions; nothing of it is stored.
+            StoreUnavailable: the database cannot be used; received deliveries are stored in a later round.
+            ClusterUnusable: a node that joined has other versions; its deliveries are not stored.
         """
         self._heartbeat()
         self._checks.step()

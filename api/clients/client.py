@@ -70,6 +70,7 @@ class Client:
         self.provenance, self.accept_versions = records.provenance, life_cycle.accept_versions
         self.pause, self.resume, self.stop = life_cycle.pause, life_cycle.resume, life_cycle.stop
         self.cancel, self.extend, self.schedule = life_cycle.cancel, life_cycle.extend, life_cycle.schedule
+        self.retry = life_cycle.retry
         self.curves, self.curves_of, self.curves_csv = results.curves, results.curves_of, results.curves_csv
         self.compare, self.misfit = results.compare, results.misfit
         self.curve, self.samples = tables.curve, tables.samples

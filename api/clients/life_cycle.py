@@ -29,6 +29,10 @@ class LifeCycle:
         """Cancel a study or an experiment at once."""
         return self._apply(id, Verb.CANCEL)
 
+    def retry(self, id: str) -> ExperimentRead | StudyRead:
+        """Queue the FAILED repetitions of a study or an experiment once more, from their stored steps."""
+        return self._apply(id, Verb.RETRY)
+
     def extend(self, id: str, *, iterations: int | None = None, repetitions: int | None = None) -> ExperimentRead:
         """Extend a completed experiment to these totals."""
         totals = {"iterations": iterations, "repetitions": repetitions}

@@ -40,6 +40,13 @@ def cancel(id: Id, as_json: AsJson = False, url: Url = None) -> None:
 
 
 @app.command()
+def retry(id: Id, as_json: AsJson = False, url: Url = None) -> None:
+    """Queue the FAILED repetitions of an experiment or a study once more; they go on from their stored steps."""
+    with connect(url) as client:
+        _print_state(client.retry(id), as_json=as_json)
+
+
+@app.command()
 def extend(
     id: ExperimentId,
     iterations: Annotated[int | None, Total] = None,

@@ -27,7 +27,9 @@ def serve(
 
 @app.command()
 def demo(
-    folder: Annotated[Path, typer.Option(help="for the database, the figures and the log")] = Path("results/demo"),
+    folder: Annotated[Path, typer.Option(help="folder for the database, the figures and the log")] = Path(
+        "results/demo"
+    ),
 ) -> None:
     """Compare six strategies and the direct baseline on small budgets: on a toy function, then on a quadruped."""
     from gaplab.api.commands.demo import run

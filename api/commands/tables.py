@@ -126,8 +126,8 @@ def _effect(found: Sensitivity) -> tuple[str, ...]:
 def _tuned(found: TunableDistribution) -> tuple[str, ...]:
     sides = ((found.lower, found.at_lower), (found.upper, found.at_upper))
     bounds = ", ".join(f"{100 * share:.0f} % at {bound:g}" for bound, share in sides if share) or "-"
-    spread = f"{_number(found.mean)}±{_number(found.sd)}"
-    return found.name, spread, _number(found.least), _number(found.greatest), bounds
+    mean_sd = f"{_number(found.mean)}±{_number(found.sd)}"
+    return found.name, mean_sd, _number(found.least), _number(found.greatest), bounds
 
 
 def _number(value: float | None) -> str:

@@ -20,10 +20,10 @@ OPEN = {"/livez", "/readyz"}
 """Health checks, which reveal nothing else."""
 
 ASSETS = "/assets/"
-"""Static files, which hold no data, like the page at `/`: the page asks its reader for the token."""
+"""Static files, which hold no data, like the page at `/`; the page asks people for their token."""
 
 WITHOUT_A_STORE = "/metrics"
-"""While the database is away this needs no token: it then says only that."""
+"""The path that needs no token while the database does not answer, since it then says only that."""
 
 READING = {"GET", "HEAD", "OPTIONS"}
 
@@ -36,7 +36,7 @@ class Access:
 
     Args:
         app: the application to protect.
-        settings: of the process that serves; None accepts any host name, for a program that calls the app directly.
+        settings: settings of the service; None accepts any host name, for a program that calls the app directly.
     """
 
     def __init__(self, app: ASGIApp, settings: Settings | None) -> None:
@@ -45,7 +45,7 @@ class Access:
         self._checks_host = settings is not None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request if its caller may ask it."""
+        """Serve one request if its caller may send it."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -66,13 +66,13 @@ class Access:
         caller = authenticate(request.app.state.store, token, required=self._required)
         if caller.token is None and self._checks_host:
             _refuse_other_sites(request)
-        reads = request.method in READING or request.scope["path"] in ASKING
-        demand(caller, Role.READER if reads else Role.RUNNER, f"{request.method} here")
+        only_reads = request.method in READING or request.scope["path"] in ASKING
+        demand(caller, Role.READER if only_reads else Role.RUNNER, f"{request.method} here")
         return caller
 
 
 def _refuse_other_sites(request: Request) -> None:
-    """Check that the request comes from this machine's own pages: a browser sends requests for any page that it shows.
+    """Refuse requests that a browser sends for a page of another site.
 
     A page of another site names its `Origin`; one whose host name resolves to this machine names itself as `Host`.
 
@@ -81,11 +81,11 @@ def _refuse_other_sites(request: Request) -> None:
     """
     host = request.headers.get("host", "")
     if not is_loopback(_without_port(host)):
-        msg = f"without tokens the host must be 127.0.0.1, [::1] or localhost, not {host[:100]!r}"
+        msg = f"without tokens, the host must be 127.0.0.1, [::1] or localhost, not {host[:100]!r}"
         raise Forbidden(msg)
     origin = request.headers.get("origin")
     if origin is not None and origin.partition("://")[2] != host:
-        msg = f"without tokens pages of other sites have no access; this request comes from {origin[:100]!r}"
+        msg = f"without tokens, pages of other sites have no access; this request comes from {origin[:100]!r}"
         raise Forbidden(msg)
 
 

@@ -31,7 +31,7 @@ IdempotencyKey = Annotated[
         min_length=1,
         max_length=255,
         pattern=r"^[!-~]+$",
-        description="any text of your choice: repeating the request with the same key within a week does it only once",
+        description="text of your choice; a request repeated with the same key within a week is executed only once",
     ),
 ]
 
@@ -107,7 +107,10 @@ class Paging(Parameters):
 class Revealing(Parameters):
     """Whether to show reality's parameters before the experiment ends."""
 
-    reveal: bool = Field(default=False, description="show reality's parameters already; needs an admin's token")
+    reveal: bool = Field(
+        default=False,
+        description="show reality's parameters before the experiment has ended; requires an admin's token",
+    )
 
     def permitted(self, caller: Caller) -> bool:
         """Return `reveal`.

@@ -65,7 +65,7 @@ class EventFeed:
                         yield event
 
     def close(self) -> None:
-        """End every stream, now and from now on."""
+        """End all streams, and refuse later ones."""
         self._closed = True
         self._news.set()
 
@@ -107,7 +107,7 @@ class EventFeed:
                 await self._read_once()
                 await asyncio.sleep(self._every_s)
             except StoreUnavailable as error:
-                log.warning("event streams wait: %s", error)
+                log.warning("event streams wait for the database: %s", error)
                 await asyncio.sleep(RETRY_S)
 
     def _end_streams(self, reader: "asyncio.Task[None]") -> None:

@@ -30,9 +30,13 @@ class Drawing(Parameters):
     """How to draw a figure; each kind of figure adds what to draw."""
 
     format: Literal["html", "json", "svg", "png", "pdf"] = Field(default="html", description=_FORMATS)
-    title: str | None = Field(default=None, max_length=TITLE, description="above the figure; left out: what it shows")
-    width: float = Field(default=3.5, ge=2.5, le=20, description="of a file, in inches; a column has 3.5, a page 7.2")
-    caption: bool = Field(default=True, description="whether a file has its caption beneath")
+    title: str | None = Field(
+        default=None, max_length=TITLE, description="text above the figure; left out: what it shows"
+    )
+    width: float = Field(
+        default=3.5, ge=2.5, le=20, description="width of a file in inches; a column has 3.5, a page 7.2"
+    )
+    caption: bool = Field(default=True, description="whether a file has the caption below the figure")
 
 
 def answer(figure: FigureDefinition, query: Drawing) -> Response:

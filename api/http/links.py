@@ -16,6 +16,7 @@ FROM_EXPERIMENT = (
     "resume_experiment",
     "stop_experiment",
     "cancel_experiment",
+    "retry_experiment",
     "schedule_experiment",
 )
 FROM_STUDY = (
@@ -27,6 +28,7 @@ FROM_STUDY = (
     "resume_study",
     "stop_study",
     "cancel_study",
+    "retry_study",
 )
 FROM_CHECK = ("read_sensitivity",)
 

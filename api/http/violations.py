@@ -133,7 +133,7 @@ def _unknown_field(place: str, path: Sequence[str | int], value: object, request
     nearest = _nearest(name, fields)
     hint = f" (did you mean {nearest!r}?)" if nearest else ""
     kind = "field" if place == "body" else "parameter"
-    message = f"there is no {kind} {name!r}{hint}; permitted: {', '.join(fields)}"
+    message = f"unknown {kind} {name!r}{hint}; permitted: {', '.join(fields)}"
     return SpecError(
         pointer=_pointer(place, path), value=finite(value), message=message, permitted=fields, nearest=nearest
     )

@@ -20,8 +20,8 @@ def start(
     """Start a Python module in a separate process and session, which gets SIGTERM if the calling thread ends.
 
     Args:
-        module: as in `python -m`.
-        arguments: of the module.
+        module: name of the module, as in `python -m`.
+        arguments: arguments of the module.
         environment: variables to add to the caller's.
         log: receives the output; left out: the caller's output.
     """

@@ -33,7 +33,7 @@ def local_service(folder: str | Path = "results/local", *, plugins: str | Path |
     """Start a service with workers on this machine and return its client; it ends when closed, or with Python.
 
     Args:
-        folder: for the database and the log; made if absent. A later service in the same folder continues with both.
+        folder: folder of the database and the log, created if absent; a later service in it continues with both.
         plugins: a folder with your own plug-ins; left out: GAPLAB_PLUGINS.
 
     Raises:

@@ -35,7 +35,7 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
     """Serve until SIGINT or SIGTERM, then end in order.
 
     Args:
-        settings: for the API and the supervisor.
+        settings: settings of the API and the supervisor.
         workers: whether to run experiments, or only accept and show them.
 
     Raises:

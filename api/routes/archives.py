@@ -56,7 +56,7 @@ def export_study(id: Id, store: StoreDep) -> Response:
     openapi_extra={"requestBody": {"required": True, "content": {MEDIA_TYPE: _BINARY}}},
 )
 async def import_archive(store: StoreDep, request: Request, response: Response) -> ImportRead:
-    """Store an exported archive to the last bit, or nothing of it; experiments that had not ended become CANCELLED."""
+    """Store all of an exported archive, or nothing; experiments that had not ended become CANCELLED."""
     with TemporaryFile() as file:
         async for chunk in request.stream():
             file.write(chunk)

@@ -39,9 +39,11 @@ class ComparisonQuery(Parameters):
     """The experiments to compare, and the range of real-world evaluations to pool."""
 
     experiment: Annotated[Ids, Field(min_length=2)]
-    from_evaluations: Evaluations = Field(default=None, alias="from", description="first count to pool; left out: 1")
+    from_evaluations: Evaluations = Field(
+        default=None, alias="from", description="smallest number to pool; left out: 1"
+    )
     to_evaluations: Evaluations = Field(
-        default=None, alias="to", description="last count to pool; left out: the last of any experiment"
+        default=None, alias="to", description="largest number to pool; left out: the largest of any experiment"
     )
 
 

@@ -37,7 +37,7 @@ class EventFilter(Parameters):
     after: After = 0
 
     def which(self) -> WantedEvents:
-        """Return the filter for the service."""
+        """Return the selection of events for the service."""
         return WantedEvents(experiment=self.experiment, study=self.study, kinds=frozenset(self.kind))
 
 

@@ -42,7 +42,9 @@ class ExperimentFilter(Paging):
     strategy: str | None = Field(
         default=None, max_length=100, pattern=r"^\w+$", description="only experiments with this strategy"
     )
-    text: str | None = Field(default=None, max_length=200, description="only experiments with this in the name or id")
+    text: str | None = Field(
+        default=None, max_length=200, description="only experiments whose name or id contains this text"
+    )
     sort: Literal["created_at", "-created_at", "name", "-name", "strategy", "-strategy", "state", "-state"] = Field(
         default="-created_at", description="field to sort by; a minus reverses the order"
     )
@@ -183,5 +185,5 @@ def read_misfit(id: Id, store: StoreDep) -> MisfitRead:
     responses=documented(404, 422),
 )
 def list_attempts(id: Id, number: Annotated[int, Path(ge=0, le=1_000_000)], store: StoreDep) -> tuple[AttemptRead, ...]:
-    """List the attempts at a repetition: supervisor, start, end, outcome and reason. A lost one is queued again."""
+    """List the attempts at a repetition: supervisor, start, end, outcome, reason. A lost repetition is queued again."""
     return reading.list_attempts(store, id, number)

@@ -47,7 +47,7 @@ class CurvesDrawing(Drawing):
         description="around each curve: 95 % interval of the mean, or SD; left out: SD below five repetitions",
     )
     x: Literal["evaluations", "rollouts", "time"] = Field(
-        default="evaluations", description="number of real-world evaluations, or the cost up to them"
+        default="evaluations", description="real-world evaluations, or the rollouts or the time that they took"
     )
     cost_s: float = Field(default=0.0, ge=0, le=1e9, description="seconds per real-world evaluation, if x is time")
     each: bool = EACH
@@ -129,7 +129,7 @@ def install(app: FastAPI) -> None:
 def _refuse_unknown(kind: str, request: Request) -> None:
     prefix = f"{router.prefix}/"
     kinds = sorted(path.removeprefix(prefix) for path in request.app.openapi()["paths"] if path.startswith(prefix))
-    msg = f"there is no figure {kind[:64]!r}; permitted: {', '.join(kinds)}"
+    msg = f"unknown figure {kind[:64]!r}; permitted: {', '.join(kinds)}"
     raise NotFound(msg)
 
 

@@ -24,5 +24,5 @@ def live() -> Health:
 
 @router.get("/readyz", summary="Check that requests are served", responses=documented())
 def ready(store: StoreDep) -> Health:  # noqa: ARG001 - the dependency is the check
-    """Answer if the database does, and has the schema of this version."""
+    """Answer if the database answers and has the schema of this version."""
     return Health(status="ok")

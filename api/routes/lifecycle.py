@@ -20,6 +20,8 @@ _RESUMED = "RUNNING or QUEUED; it continues where it was"
 _STOPPED = "STOPPING, or ended if no repetition is running"
 _CANCELLED = "CANCELLED; what is stored is kept"
 
+_RETRIED = "QUEUED again, or as before if it has not ended"
+
 
 @_experiment.post("/pause", summary="Pause an experiment", response_description=_PAUSED, responses=documented(404, 409))
 def pause_experiment(id: Id, store: StoreDep) -> ExperimentRead:
@@ -50,6 +52,14 @@ def stop_experiment(id: Id, store: StoreDep) -> ExperimentRead:
 def cancel_experiment(id: Id, store: StoreDep) -> ExperimentRead:
     """Cancel an experiment at once; what is stored is kept. An experiment that has ended cannot be cancelled."""
     return lifecycle.ask_experiment(store, id, Verb.CANCEL)
+
+
+@_experiment.post(
+    "/retry", summary="Retry an experiment", response_description=_RETRIED, responses=documented(404, 409)
+)
+def retry_experiment(id: Id, store: StoreDep) -> ExperimentRead:
+    """Queue the repetitions that FAILED once more; each goes on from its stored steps."""
+    return lifecycle.ask_experiment(store, id, Verb.RETRY)
 
 
 @_experiment.post(
@@ -108,6 +118,12 @@ def stop_study(id: Id, store: StoreDep) -> StudyRead:
 def cancel_study(id: Id, store: StoreDep) -> StudyRead:
     """Cancel every experiment of the study that has not ended."""
     return lifecycle.ask_study(store, id, Verb.CANCEL)
+
+
+@_study.post("/retry", summary="Retry a study", response_description=_RETRIED, responses=documented(404, 409))
+def retry_study(id: Id, store: StoreDep) -> StudyRead:
+    """Queue the FAILED repetitions of every experiment of the study once more."""
+    return lifecycle.ask_study(store, id, Verb.RETRY)
 
 
 router = APIRouter()

@@ -27,8 +27,8 @@ class ReplayQuery(Parameters):
         default=None,
         ge=0,
         le=1_000_000,
-        description="iteration whose best simulator replays it; left out: the one that selected the controller, which "
-        "for a sample is that of the iteration before",
+        description="iteration whose best simulator replays the controller; left out: the same iteration for a "
+        "transferred controller, the one before for a sample",
     )
 
 

@@ -21,11 +21,15 @@ router = APIRouter(prefix="/studies", tags=["studies"])
 class StudyFilter(Paging):
     """The studies to list, and their order."""
 
-    state: State | None = Field(default=None, description="only studies in this state, which their experiments decide")
+    state: State | None = Field(
+        default=None, description="only studies in this state, which follows from their experiments"
+    )
     strategy: str | None = Field(
         default=None, max_length=100, pattern=r"^\w+$", description="only studies with this strategy"
     )
-    text: str | None = Field(default=None, max_length=200, description="only studies with this in the name or id")
+    text: str | None = Field(
+        default=None, max_length=200, description="only studies whose name or id contains this text"
+    )
     sort: Literal["created_at", "-created_at", "name", "-name"] = Field(
         default="-created_at", description="field to sort by; a minus reverses the order"
     )

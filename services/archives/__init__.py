@@ -1,4 +1,4 @@
-"""Archives: one file with everything of an experiment or a study, for backup, analysis elsewhere, and import.
+"""Archives: one file with everything about an experiment or a study, for backup, analysis elsewhere, and import.
 
 An archive is a zip with one member for each exported table (Parquet, or JSON Lines where values are nested), the curves
 as `curves.json` for readers without gaplab, and `manifest.json`. The same content gives the same bytes.

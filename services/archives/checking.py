@@ -26,7 +26,7 @@ from gaplab.services.store.tables import Column, Kind
 Row = dict[str, Any]
 
 LONGEST_LINE = 8 * 2**20
-"""Characters of one row."""
+"""Most characters of one row."""
 
 GREATEST, GREATEST_LARGE = 2**30, 2**48
 """Limits of whole numbers of 32 and 64 bits: far from overflow, since some continue to count or are added up."""
@@ -53,9 +53,9 @@ def checked(table: str, file: Path, count: int) -> Iterator[Row]:
     """Yield the rows of a table from its file of JSON Lines.
 
     Args:
-        table: its name.
-        file: one row a line.
-        count: the number of rows that the manifest states.
+        table: name of the table.
+        file: file with one row a line.
+        count: number of rows that the manifest states.
 
     Raises:
         InvalidArchive: a row or the number of rows is invalid; the message names the first invalid row and column.

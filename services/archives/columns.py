@@ -1,7 +1,7 @@
 """The tables and columns of an archive.
 
 Each table is exported, or left out for a reason; a column that is added to an exported table is exported from then on.
-Values that have a meaning in one database only are left out, or replaced by the values they stand for.
+Values that are valid in one database only are left out, or replaced by the values they stand for.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ EXPORTED = (
     "simulator",
     "attempt",
 )
-"""In the order in which an import inserts them: each after the tables that it refers to."""
+"""The exported tables, in the order of insertion: each after the tables that it refers to."""
 
 LEFT_OUT: Mapping[str, str] = {
     "sensitivity": "follows from what is tuned, and is shared by all experiments that tune the same",
@@ -36,7 +36,7 @@ LEFT_OUT: Mapping[str, str] = {
     "idempotency": "belongs to requests to one service",
     "checkpoint": "is part of an unfinished step, which only its own service continues",
 }
-"""The other tables, each with the reason."""
+"""Tables that are left out, each with the reason."""
 
 COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
     "experiment": {
@@ -44,19 +44,25 @@ COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
         "sensitivity_id": "names a check of one service",
         "running": "counts leases, and an archive has none",
         "claimable": "follows from the states of repetitions",
+        "paused_because": "is about work that goes on, and an archive has none",
+        "hardware": "names hardware of one laboratory; it follows from the spec",
     },
     "repetition": {
         "checkpoints": "counts checkpoints, which are left out",
         "owner": "names a machine and a process there",
         "heartbeat_at": "belongs to a lease, and an archive has none",
+        "hardware": "belongs to a lease, and an archive has none",
+        "measuring_at": "belongs to a lease, and an archive has none",
+        "hidden_error": "may name hidden parameters",
     },
+    "attempt": {"hidden_reason": "may name hidden parameters"},
 }
-"""Columns of exported tables, each with the reason."""
+"""Columns of exported tables that are left out, each with the reason."""
 
 
 @cache
 def columns_of(table: str) -> tuple[Column, ...]:
-    """Return the columns that an archive has of a table.
+    """Return the columns of a table that an archive has.
 
     The id of a repetition is replaced by its experiment and its number.
     """

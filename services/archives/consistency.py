@@ -34,9 +34,11 @@ def checked_experiments(opened: OpenedArchive) -> dict[str, Row]:
     study = manifest.id if manifest.kind == "study" else None
     studies = [row["id"] for row in opened.rows("study")]
     if studies != ([study] if study else []) or {row.get("study_id") for row in experiments.values()} - {study}:
-        raise InvalidArchive(f"its study or experiments are not those of the {manifest.kind} {manifest.id!r}")
+        raise InvalidArchive(
+            f"it has other studies or experiments than the {manifest.kind} {manifest.id!r} of its manifest"
+        )
     if study is None and list(experiments) != [manifest.id]:
-        raise InvalidArchive(f"its experiment is not {manifest.id!r}")
+        raise InvalidArchive(f"it has another experiment than {manifest.id!r}, which its manifest names")
     return experiments
 
 
@@ -73,7 +75,7 @@ def _check_provenance(row: Row) -> None:
 
 
 def _checked_spec(row: Row) -> Row:
-    """Return the spec as it is stored: with the fields that were given, and unknown parameters of reality as null."""
+    """Return the spec to store, with the archive's fields; unknown parameters of reality are null."""
     place, given = f"the spec of experiment {row['id']!r}", row["spec"]
     if row.get("spec_version", SPEC_VERSION) > SPEC_VERSION:
         raise InvalidArchive(f"{place} has version {row['spec_version']}; this gaplab reads up to {SPEC_VERSION}")

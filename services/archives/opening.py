@@ -1,4 +1,4 @@
-"""Archives are unpacked within limits, and checked against their manifest.
+"""Unpacking of archives, within limits, and comparison with their manifest.
 
 Nothing in them is trusted: members with unknown names are refused, sizes are counted while unpacking, and a subprocess
 reads Parquet.
@@ -38,8 +38,8 @@ class OpenedArchive:
     """An archive that was unpacked.
 
     Attributes:
-        manifest: what it states about itself.
-        files: by table, the rows as JSON Lines.
+        manifest: manifest of the archive.
+        files: files of the tables' rows, as JSON Lines.
     """
 
     manifest: Manifest
@@ -86,9 +86,9 @@ def _members(archive: ZipFile) -> dict[str, ZipInfo]:
     found: dict[str, ZipInfo] = {}
     for info in archive.infolist():
         if info.filename not in known:
-            raise InvalidArchive(f"a member is called {info.filename[:64]!r}; permitted: {', '.join(sorted(known))}")
+            raise InvalidArchive(f"unknown member {info.filename[:64]!r}; permitted: {', '.join(sorted(known))}")
         if info.filename in found:
-            raise InvalidArchive(f"{info.filename} is there twice")
+            raise InvalidArchive(f"it has {info.filename} twice")
         if info.compress_type not in {ZIP_STORED, ZIP_DEFLATED} or info.flag_bits & 1:
             raise InvalidArchive(f"{info.filename} is encrypted, or compressed by another method than deflate")
         found[info.filename] = info

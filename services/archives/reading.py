@@ -1,7 +1,7 @@
-"""Import: an archive is stored as a whole or not at all, and nothing in it is run.
+"""Import of archives. An archive is stored as a whole or not at all, and nothing in it is run.
 
-An experiment that had not ended is CANCELLED on arrival, since its archive hides the parameters of reality. All that
-had ended arrives as it was, to the last bit.
+An experiment that had not ended is CANCELLED on arrival, since its archive hides the parameters of reality. One that
+had ended arrives unchanged, to the last bit.
 """
 
 from collections.abc import Mapping
@@ -22,6 +22,8 @@ from gaplab.services.archives.logs import check_logs
 from gaplab.services.archives.opening import OpenedArchive, open_archive
 from gaplab.services.core.errors import Conflict, InvalidArchive
 from gaplab.services.experiments.states import settle
+from gaplab.services.specs.hardware import hardware_of
+from gaplab.services.specs.resolution import spec_of
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import archives
 from gaplab.services.store.queries.events import note
@@ -39,10 +41,10 @@ class Arrival:
     """The values that change when rows of an archive are stored.
 
     Attributes:
-        now: by the database's clock.
+        now: time by the database's clock.
         study: id of the study here; None if the archive has none.
-        ids: of experiments here, by their ids in the archive.
-        specs: of experiments, checked, by their ids in the archive.
+        ids: ids of experiments here, by their ids in the archive.
+        specs: checked specs of experiments, by their ids in the archive.
     """
 
     now: datetime
@@ -52,11 +54,11 @@ class Arrival:
 
 
 def import_archive(store: Store, file: IO[bytes]) -> ImportRead:
-    """Store the content of an archive, under its own ids, or new ones where those are taken.
+    """Store the content of an archive under its own ids; ids that are taken are replaced.
 
     Args:
-        store: at the latest revision.
-        file: seekable, at its beginning.
+        store: database at the latest revision.
+        file: seekable file, at its beginning.
 
     Raises:
         InvalidArchive: the file is damaged, harmful or not an archive; nothing was stored.
@@ -89,7 +91,7 @@ def _store(session: Session, opened: OpenedArchive, experiments: Mapping[str, Ro
         for table in EXPORTED:
             archives.insert_rows(session, table, (_arriving(table, row, arrival) for row in opened.rows(table)))
     except (*archives.Refused, KeyError) as error:
-        msg = "its rows contradict each other: one is there twice, or belongs to a row that is missing"
+        msg = "its rows contradict each other: one occurs twice, or belongs to a missing row"
         raise InvalidArchive(msg) from error
     check_logs(session, ids.values())
     for id_ in ids.values():
@@ -104,12 +106,13 @@ def _store(session: Session, opened: OpenedArchive, experiments: Mapping[str, Ro
 
 
 def _arriving(table: str, row: Row, arrival: Arrival) -> Row:
-    """Return the row as it is stored here."""
+    """Return the row with the ids of this database."""
     row = dict(row)
     if table == "study":
         return row | {"id": arrival.study}
     if table == "experiment":
         row |= {"spec": arrival.specs[row["id"]], "id": arrival.ids[row["id"]], "study_id": arrival.study}
+        row["hardware"] = hardware_of(spec_of(row["spec"]))
     for name in {EXPERIMENT, "experiment_id"} & set(row):
         row[name] = arrival.ids[row[name]]
     if table in {"experiment", "repetition"} and not State(row["state"]).ended:

@@ -63,7 +63,7 @@ def convert(source: str, target: str) -> bool:
 def _plain(value: Any) -> str:  # noqa: ANN401 - whatever Parquet has
     if isinstance(value, datetime) and value.tzinfo is not None:
         return value.astimezone(UTC).isoformat()
-    raise TypeError(f"an archive cannot have a {type(value).__name__}")
+    raise TypeError(f"an archive cannot contain values of type {type(value).__name__}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Export: experiments and studies are written from a store into an archive."""
+"""Export of experiments and studies from a store into an archive."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -35,8 +35,8 @@ class Archive:
 
     Attributes:
         name: a suitable file name.
-        size: in bytes.
-        file: at its beginning.
+        size: size in bytes.
+        file: open file, at its beginning.
     """
 
     name: str

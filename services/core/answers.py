@@ -1,12 +1,12 @@
-"""The answers of simulators within one step: counted, prefetched, and recorded so that an interrupted step can go on.
+"""The answers of simulators within one step: counted, prefetched, and recorded to continue an interrupted step.
 
-A search follows from its random stream and from the answers that it gets. So the answers are a complete checkpoint of a
-step, whichever strategy and optimizer it runs. Each answer has a digest of its genome and its simulators as its key: a
-checkpoint of any other step holds no answer to this one, and never a wrong one.
+A search depends only on its random stream and on the answers that it gets. So the answers are a complete checkpoint of
+a step, for any strategy and optimizer. The key of an answer is a digest of its genome and its simulators, so a
+checkpoint of another step never gives a wrong answer.
 
 Answers are also prefetched. A steady-state search asks about one newcomer at a time, because the next one may descend
-from it. But the search rejects most newcomers at once, and then the next one is known beforehand. While cores are idle
-they simulate the next ones too. No number changes: a prefetched answer is used only if the search asks for it.
+from it. But the search rejects most newcomers at once, and then the next one is known beforehand. Idle cores simulate
+the next ones too. No number changes: a prefetched answer is used only if the search asks for it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -26,7 +26,7 @@ Answer: TypeAlias = tuple[bytes, FloatArray]
 """The key of a genome in a block of m simulators, and its `(m,)` fitnesses there."""
 
 Following: TypeAlias = Callable[[int], Genomes]
-"""Returns up to n genomes that will probably be asked about next, `(≤ n, g)`."""
+"""A function that returns up to n genomes of the next questions, probably, `(≤ n, g)`."""
 
 BLOCK = 100
 """Most simulators in one call. It is the smallest part of a question that a checkpoint can hold."""
@@ -44,17 +44,17 @@ class Recorder(Protocol):
         ...
 
     def record(self, answers: Sequence[Answer]) -> None:
-        """Take the answers of that call."""
+        """Record the answers of that call."""
         ...
 
 
 def nothing(_: int) -> Genomes:
-    """Return no genome: what follows is unknown."""
+    """Return no genome, since the next questions are unknown."""
     return np.empty((0, 0))
 
 
 class Answers:
-    """A Simulate for one step: it counts rollouts, prefetches answers and reads those of checkpoints.
+    """A Simulate for one step, which counts rollouts, prefetches answers, and reads answers from checkpoints.
 
     Args:
         simulate: the simulation.
@@ -81,8 +81,8 @@ class Answers:
 
         Args:
             genomes: asked about now; only these count as rollouts.
-            parameters: of the simulators.
-            following: of the genomes that will probably be asked about next, in the same simulators.
+            parameters: parameters of the simulators.
+            following: returns the genomes of the next questions, probably, in the same simulators.
         """
         blocks = [parameters[start : start + BLOCK] for start in range(0, len(parameters), BLOCK)]
         keys = [_keys(genomes, block) for block in blocks]

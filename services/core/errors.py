@@ -14,8 +14,10 @@
     ├── InvalidArchive       a file is not an archive of gaplab, or is damaged or malicious
     ├── Unsupported          the request needs another kind of database
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
-    ├── PluginBroken         an external plug-in file is unusable
+    ├── PluginBroken         an external plug-in file is unusable, or a plug-in breaks its contract
     ├── PluginDiffers        a process has other versions of plug-ins than the supervisor
+    ├── RealityFailed        the code of reality raised an error
+    ├── TryAgain             a fault that may pass: the step is repeated after a pause
     └── EngineError
         ├── EngineUnavailable    the engine's library is not installed
         └── EngineInterrupted    the process died, or exceeded its time
@@ -143,6 +145,14 @@ class PluginDiffers(GaplabError):
         return "; ".join(self.differences.values())
 
 
+class RealityFailed(GaplabError):
+    """The code of reality raised the error that is this one's cause; its message may name hidden parameters."""
+
+
+class TryAgain(GaplabError):
+    """A plug-in raises it for a fault that may pass by itself, like a lost connection; the step is then repeated."""
+
+
 class EngineError(GaplabError):
     """An engine failed."""
 
@@ -159,7 +169,7 @@ def unknown_name(pointer: str, kind: str, name: str, permitted: Sequence[str]) -
     """Return the violation of an unknown name, with the nearest permitted one."""
     nearest = next(iter(get_close_matches(name, permitted, n=1, cutoff=0.5)), None)
     hint = f" (did you mean {nearest!r}?)" if nearest else ""
-    message = f"there is no {kind} called {name!r}{hint}; there is {', '.join(permitted)}"
+    message = f"unknown {kind} {name!r}{hint}; permitted: {', '.join(permitted)}"
     return Violation(pointer, name, message, tuple(permitted), nearest)
 
 

@@ -140,7 +140,7 @@ def _check(plugin: type) -> None:
     if missing := [name for name in dir(plugin) if _is_abstract(plugin, name)]:
         raise PluginBroken(f"{where} does not define {', '.join(missing)}")
     if not isinstance(getattr(plugin, "name", None), str):
-        raise PluginBroken(f"{where} has no name, by which specs would call it: add name = '…'")
+        raise PluginBroken(f"{where} has no name for specs to use: add name = '…'")
     try:
         plugin.Options()  # type: ignore[attr-defined]
         plugin.describe().model_dump_json()  # type: ignore[attr-defined]

@@ -54,19 +54,19 @@ def clearances_m(body: Body, positions: FloatArray, orientations: FloatArray) ->
 
 
 def about(axis: FloatArray, angles_rad: FloatArray) -> FloatArray:
-    """`(k, 4)`: turns by `(k,)` angles about a unit vector `(3,)`."""
+    """Return `(k, 4)`: rotations by `(k,)` angles about a unit vector `(3,)`."""
     half = angles_rad[:, None] / 2
     return np.hstack([np.sin(half) * axis, np.cos(half)])
 
 
 def product(first: FloatArray, second: FloatArray) -> FloatArray:
-    """`(..., 4)`: the turn `second` within the frame that `first` turned."""
+    """Return `(..., 4)`: rotation `first`, followed by `second` within the rotated frame."""
     (v, w), (u, s) = (first[..., :3], first[..., 3:]), (second[..., :3], second[..., 3:])
     return np.concatenate([w * u + s * v + np.cross(v, u), w * s - np.sum(v * u, axis=-1, keepdims=True)], axis=-1)
 
 
-def rotated(turns: FloatArray, vector: FloatArray) -> FloatArray:
-    """`(..., 3)`: the vector `(3,)` turned by `(..., 4)`."""
-    v, w = turns[..., :3], turns[..., 3:]
+def rotated(rotations: FloatArray, vector: FloatArray) -> FloatArray:
+    """Return `(..., 3)`: the vector `(3,)` rotated by `(..., 4)`."""
+    v, w = rotations[..., :3], rotations[..., 3:]
     across = 2 * np.cross(v, vector)
     return np.asarray(vector + w * across + np.cross(v, across))

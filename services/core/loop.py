@@ -1,7 +1,7 @@
 """The algorithm of the paper's Fig. 2: select a sample, measure it, tune simulators, transfer a controller, probe it.
 
 A repetition is a generator of steps. Each step follows from the steps before it and from random streams with an
-address, so the stored steps are the whole checkpoint: `repetition(setting, log)` goes on after any log as if it had
+address, so the stored steps are the whole checkpoint: `repetition(setting, log)` continues after any log as if it had
 never stopped.
 """
 
@@ -50,8 +50,8 @@ class Setting:
         known: `(g,)`, the hand-designed genome.
         budget: evaluations of each search.
         iterations: real-world evaluations to spend; 0 for the direct baseline.
-        seed: of the experiment.
-        repetition: the number of the repetition, from 0.
+        seed: seed of the experiment.
+        repetition: number of the repetition, from 0.
         batch_size: returns how many rollouts a call of `simulate` should have at present; it changes no number.
     """
 
@@ -83,8 +83,8 @@ class History:
 
     Attributes:
         last: the latest step; None at the very start.
-        samples: measured so far.
-        simulators: of the latest tuning, best first.
+        samples: samples measured so far.
+        simulators: simulators of the latest tuning, best first.
         transferred: the latest transferred genome.
     """
 
@@ -111,8 +111,8 @@ def repetition(
     """Yield the steps that follow the log, to the end of the repetition; each is computed when it is asked for.
 
     Args:
-        setting: of the repetition.
-        log: its steps so far.
+        setting: setting of the repetition.
+        log: steps so far.
         answers: returns the answers of the next step; default: those of the setting.
     """
     history = History()
@@ -152,7 +152,8 @@ def _select(setting: Setting, history: History, iteration: int, answers: Answers
         return Selected(iteration, history.transferred, Cost(saved=searched))
     belief = Belief(setting.genomes, setting.known, history.samples, history.simulators)
     search = _search(setting, answers, belief.parameters, setting.stream(iteration, "search"))
-    genome = setting.strategy.select(belief, search, setting.stream(iteration, "select"))
+    selected = setting.strategy.select(belief, search, setting.stream(iteration, "select"))
+    genome = setting.genomes.check(selected, f"strategy {setting.strategy.name!r}")
     return Selected(iteration, genome, answers.cost_of(searched))
 
 
@@ -163,8 +164,10 @@ def _search(setting: Setting, answers: Answers, parameters: Parameters, rng: Gen
     def search(score: Score) -> Genome:
         nonlocal left
         if not left:
-            wrong = "searches twice in one selection" if setting.strategy.searches else "says that it does not search"
-            raise PluginBroken(f"strategy {name!r} {wrong}, so that no budget is left for this search")
+            permitted = (
+                "one search a selection is permitted" if setting.strategy.searches else "it has searches = False"
+            )
+            raise PluginBroken(f"strategy {name!r} has no budget left for this search: {permitted}")
         left -= 1
         found = maximise(
             setting.optimizer,
@@ -192,6 +195,8 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
         return Tuned(iteration, draw_simulators(setting.parameters, ensemble, rng), Cost(saved=budget))
     optimizer = setting.optimizer.diverse(ensemble) if ensemble > 1 else setting.optimizer
     found = tune(Misfit(answers, samples), setting.parameters, optimizer, evaluations, rng)
+    for simulator in found[:ensemble]:
+        setting.parameters.check(simulator.parameters, f"optimizer {setting.optimizer.name!r}")
     return Tuned(iteration, found[:ensemble], answers.cost_of(budget))
 
 
@@ -207,7 +212,8 @@ def _transfer(setting: Setting, history: History, iteration: int, answers: Answe
     )
     fitness = float(found.fitness[0]) if np.isfinite(found.fitness[0]) else float("nan")
     cost = answers.cost_of(setting.budget.controller_evaluations)
-    return Transferred(iteration, found.genomes[0], fitness, cost)
+    genome = setting.genomes.check(found.genomes[0], f"optimizer {setting.optimizer.name!r}")
+    return Transferred(iteration, genome, fitness, cost)
 
 
 def _probe(setting: Setting, history: History, iteration: int, genome: Genome) -> Probed:

@@ -29,7 +29,7 @@ class Tuning:
     """The best simulator of one iteration of one repetition.
 
     Attributes:
-        parameters: `(p,)`, its tunables.
+        parameters: `(p,)`, values of its tunables.
         squared_error: Σe² over its samples; inf if the physics failed on one.
         samples: number of samples that it was tuned on.
         simulated: simulated fitness of the controller that evolved in it; nan if there is none yet.
@@ -54,18 +54,18 @@ def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str]
     """Return the misfit of an iteration, over the repetitions that have reached it.
 
     Args:
-        iteration: its number.
-        tunings: one for each of these repetitions; may be empty.
+        iteration: number of the iteration.
+        tunings: tunings of the iteration, one for each of these repetitions; may be empty.
         names: names of the p tunables.
         space: bounds of the tunables.
     """
     parameters = np.array([each.parameters for each in tunings]).reshape(-1, space.size)
     return MisfitPoint(
         iteration=iteration,
-        error=Distribution.model_validate(_spread([each.error for each in tunings])),
-        gap=Distribution.model_validate(_spread([abs(each.simulated - each.real) for each in tunings])),
+        error=Distribution.model_validate(_distribution([each.error for each in tunings])),
+        gap=Distribution.model_validate(_distribution([abs(each.simulated - each.real) for each in tunings])),
         tunables=tuple(
-            _tuned(name, parameters[:, index], float(space.lower[index]), float(space.upper[index]))
+            _tunable_distribution(name, parameters[:, index], float(space.lower[index]), float(space.upper[index]))
             for index, name in enumerate(names)
         ),
     )
@@ -81,17 +81,16 @@ def remarks(points: Sequence[MisfitPoint], unit: str) -> tuple[str, ...]:
     return (_remaining(last, unit), *_gaps(first, last, unit), *stuck)
 
 
-def _tuned(name: str, values: FloatArray, lower: float, upper: float) -> TunableDistribution:
+def _tunable_distribution(name: str, values: FloatArray, lower: float, upper: float) -> TunableDistribution:
     near = AT_BOUND * (upper - lower)
     at_lower = float((values <= lower + near).mean()) if len(values) else None
     at_upper = float((values >= upper - near).mean()) if len(values) else None
-    return TunableDistribution.model_validate(
-        {"name": name, "lower": lower, "upper": upper, "at_lower": at_lower, "at_upper": at_upper} | _spread(values)
-    )
+    bounds = {"lower": lower, "upper": upper, "at_lower": at_lower, "at_upper": at_upper}
+    return TunableDistribution.model_validate({"name": name} | bounds | _distribution(values))
 
 
-def _spread(values: Sequence[float] | FloatArray) -> dict[str, float | int | None]:
-    """As `Distribution` has it, over the finite values."""
+def _distribution(values: Sequence[float] | FloatArray) -> dict[str, float | int | None]:
+    """Return statistics over the finite values."""
     there = np.asarray(values, dtype=np.float64)
     there = there[np.isfinite(there)]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -108,10 +107,10 @@ def _spread(values: Sequence[float] | FloatArray) -> dict[str, float | int | Non
 
 def _remaining(point: MisfitPoint, unit: str) -> str:
     error = point.error
-    spread = f"SD {error.sd:.2g}, " if error.sd is not None else ""
+    deviation = f"SD {error.sd:.2g}, " if error.sd is not None else ""
     return (
         f"at {_many(point.iteration, 'real-world evaluation')} the best simulators err by {error.mean:.2g} {unit} "
-        f"a sample ({spread}{error.least:.2g} to {error.greatest:.2g} over {_many(error.n, 'repetition')})"
+        f"a sample ({deviation}{error.least:.2g} to {error.greatest:.2g} over {_many(error.n, 'repetition')})"
     )
 
 

@@ -1,4 +1,4 @@
-"""The paper's formulas for the worth of a controller as the next sample, and nothing else.
+"""The paper's formulas for the score of a controller as the next sample.
 
 All take the fitness of n controllers in m simulators, `(n, m)`, and return `(n,)`. A nan fitness makes the controller's
 score nan, which never wins. The exception is a simulator of weight 0, whose physics failed on a sample: it is ignored,
@@ -68,7 +68,7 @@ def simulator_weights(squared_errors: FloatArray, floor: float) -> FloatArray:
 
     Args:
         squared_errors: `(m,)`, inf where the physics failed.
-        floor: above 0, in the unit of fitness squared.
+        floor: floor under Σe², above 0, in the unit of fitness squared.
     """
     weights = 1.0 / np.maximum(squared_errors, floor)
     total = weights.sum()
@@ -76,5 +76,5 @@ def simulator_weights(squared_errors: FloatArray, floor: float) -> FloatArray:
 
 
 def _weighty(fitnesses: Fitnesses, weights: FloatArray) -> Fitnesses:
-    """Return the fitnesses with 0 for simulators of weight 0, whose nan would remain in a sum."""
+    """Return the fitnesses, with 0 for simulators of weight 0, because 0 times nan would be nan."""
     return fitnesses if np.all(weights > 0) else np.where(weights > 0, fitnesses, 0.0)

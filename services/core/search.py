@@ -10,6 +10,7 @@ from numpy.random import Generator
 
 from gaplab.services.core.answers import Following
 from gaplab.services.core.arrays import FloatArray, Genomes
+from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.optimizers.base import Optimizer, Population
 from gaplab.services.core.types import Space
 
@@ -18,13 +19,13 @@ FARTHEST = 32
 
 
 class Question(NamedTuple):
-    """What an optimizer wants to know.
+    """A question of an optimizer: the fitness of these genomes.
 
     Attributes:
         genomes: `(n, g)` to evaluate.
-        thresholds: `(n,)`; the optimizer rejects a genome whose fitness is below its threshold, so that any number
-            below it will do as the answer. -inf where it may keep the genome whatever its fitness.
-        following: returns the genomes that it asks about next if it rejects all of these.
+        thresholds: `(n,)`: the optimizer rejects a genome whose fitness is below its threshold, so any number below it
+            is a valid answer; -inf if it may keep the genome at any fitness.
+        following: returns the genomes of the next question if the optimizer rejects all of these.
     """
 
     genomes: Genomes
@@ -33,7 +34,7 @@ class Question(NamedTuple):
 
 
 Evaluate: TypeAlias = Callable[[Question], FloatArray]
-"""Returns the fitness of each genome, `(n,)`, to be maximised; not finite where it has none."""
+"""A function that returns the fitness of each genome, `(n,)`, to be maximised; not finite if the physics failed."""
 
 
 @runtime_checkable
@@ -46,15 +47,15 @@ class Rejecting(Protocol):
 
 
 def maximise(optimizer: Optimizer, space: Space, evaluate: Evaluate, evaluations: int, rng: Generator) -> Population:
-    """Return the population after exactly `evaluations` fitness evaluations, ranked; what is not finite never wins.
+    """Return the ranked population after exactly `evaluations` fitness evaluations; nan and infinities never win.
 
     A copy of a genome that the search has evaluated counts, but is not evaluated again unless it was rejected. Copies
     are common: genes clip at their bounds.
 
     Args:
         optimizer: asks for genomes and is told their fitness.
-        space: of the genomes.
-        evaluate: is asked about as many genomes as the optimizer asks for, or as the budget has left.
+        space: space of the genomes.
+        evaluate: returns fitnesses; each call has the optimizer's genomes, or as many as the budget has left.
         evaluations: the budget, at least 1.
         rng: all randomness of the search.
     """
@@ -63,6 +64,8 @@ def maximise(optimizer: Optimizer, space: Space, evaluate: Evaluate, evaluations
     known: dict[bytes, float] = {}
     while evaluations > 0:
         genomes = optimizer.ask(state, rng)[:evaluations]
+        if not len(genomes):
+            raise PluginBroken(f"optimizer {optimizer.name!r} asks for no genome although {evaluations} are left")
         keys = [genome.tobytes() for genome in genomes]
         new = [index for index, key in enumerate(keys) if key not in known]
         fitness = np.array([known.get(key, np.nan) for key in keys])

@@ -181,10 +181,10 @@ def warning(found: Sensitivity) -> str | None:
     match found.verdict:
         case Verdict.NOTHING:
             share = 100 * (found.relative_effect or 0.0)
-            return f"{where} does nothing: it changes fitness by {share:.2g} % of what controllers differ by"
+            return f"{where} does nothing: its effect on fitness is {share:.2g} % of the spread between controllers"
         case Verdict.ROUGH:
             share = 100 * (found.roughness or 0.0)
-            return f"{where} is rough: {share:.0f} % of what it does to fitness jumps from value to value"
+            return f"{where} is rough: {share:.0f} % of its effect on fitness is noise between neighbouring values"
         case Verdict.UNKNOWN:
             return f"{where} is unknown: physics failed in {found.failures} of the check's rollouts"
         case Verdict.SMOOTH:

@@ -47,8 +47,8 @@ def effect_size(first: FloatArray, second: FloatArray) -> float | None:
     freedom = len(first) + len(second) - 2
     if min(len(first), len(second)) < 2 or (equal(first) and equal(second)):
         return None  # the computed variance of equal numbers may differ from 0
-    spread = ((len(first) - 1) * first.var(ddof=1) + (len(second) - 1) * second.var(ddof=1)) / freedom
-    return known((first.mean() - second.mean()) / spread**0.5) if 0 < spread < inf else None
+    pooled = ((len(first) - 1) * first.var(ddof=1) + (len(second) - 1) * second.var(ddof=1)) / freedom
+    return known((first.mean() - second.mean()) / pooled**0.5) if 0 < pooled < inf else None
 
 
 def holm(p_values: Sequence[float | None]) -> tuple[float | None, ...]:

@@ -12,7 +12,7 @@ from gaplab.services.core.search import Question, maximise
 from gaplab.services.core.types import Sample, Simulator, Space
 
 ROUNDING = 1e-9
-"""Relative excess of a partial sum over a limit from which the whole sum exceeds it in spite of rounding."""
+"""Relative excess of a partial sum over a limit: from it on, the whole sum exceeds the limit in spite of rounding."""
 
 
 def squared_errors(fitnesses: Fitnesses, measured: FloatArray) -> FloatArray:
@@ -50,8 +50,8 @@ class Misfit:
     rollouts that were needed count. So no number, not even a count, depends on how many rollouts run at once.
 
     Args:
-        answers: of the simulators.
-        samples: at least one; all measurements succeeded.
+        answers: answers of the simulators.
+        samples: at least one sample; all measurements succeeded.
     """
 
     def __init__(self, answers: Answers, samples: Sequence[Sample]) -> None:
@@ -102,9 +102,9 @@ def tune(misfit: Misfit, space: Space, optimizer: Optimizer, evaluations: int, r
     The optimizer maximises −Σe². It ranks simulators as f(sim) = 1/Σe² does, and is finite at a perfect fit.
 
     Args:
-        misfit: to the samples so far.
+        misfit: misfit to the samples so far.
         space: bounds of the tunables.
-        optimizer: of the search; a diverse one keeps an ensemble.
+        optimizer: optimizer of the search; a diverse one keeps an ensemble.
         evaluations: number of simulators to evaluate.
         rng: all randomness of the search.
     """

@@ -9,6 +9,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Parameters, frozen
+from gaplab.services.core.errors import PluginBroken
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +57,31 @@ class Space:
     def draw(self, count: int, rng: Generator) -> Genomes:
         """Return vectors `(count, g)`, drawn uniformly from the box."""
         return self.lower + self.extent * rng.random((count, self.size))
+
+    def check(self, vector: object, source: str) -> FloatArray:
+        """Return the vector `(g,)`, which a plug-in returned.
+
+        Args:
+            vector: anything.
+            source: subject of the error's sentence, like `strategy 'random'`.
+
+        Raises:
+            PluginBroken: it is not one vector of g finite numbers within the bounds.
+        """
+        try:
+            found = np.asarray(vector, dtype=float)
+        except (TypeError, ValueError):
+            found = np.empty((0, 0))
+        if found.shape != self.lower.shape:
+            raise PluginBroken(f"{source} returned {_brief(vector)}; permitted: one vector of {self.size} numbers")
+        inside = (self.lower <= found) & (found <= self.upper)  # false for nan
+        if not inside.all():
+            where = int(np.argmin(inside))
+            raise PluginBroken(
+                f"{source} returned {found[where]} as number {where} of a vector; "
+                f"permitted: {self.lower[where]} to {self.upper[where]}"
+            )
+        return found
 
     def contain(self, vectors: FloatArray) -> FloatArray:
         """Return the vectors moved into the box: periodic coordinates wrap, the others clip."""
@@ -202,3 +228,8 @@ class Probed:
 
 
 Step: TypeAlias = Selected | Measured | Tuned | Transferred | Probed
+
+
+def _brief(value: object) -> str:
+    """Return the shape of an array, else a short representation."""
+    return f"an array of shape {value.shape}" if isinstance(value, np.ndarray) else f"{value!r:.100}"

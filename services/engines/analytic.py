@@ -20,6 +20,7 @@ class Analytic(Engine):
     source = "Paper, section 2, Fig. 3 shows such a function; this one is gaplab's"
     honours = frozenset({"material.static_friction", "material.dynamic_friction", "material.restitution"})
     batch = 1_000
+    repeatable = True
     usual_rollout_s = 1e-4
 
     @classmethod

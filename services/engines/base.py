@@ -46,6 +46,8 @@ class Engine(Plugin):
         honours: World fields that affect the results, like `material.dynamic_friction`.
         batch: preferred number of rollouts in a call; 1 if a call has little overhead.
         usual_rollout_s: usual seconds of a rollout, for estimates before any measurement.
+        repeatable: true if a rollout is only computed, so that it may be repeated at any time: for replays, and by
+            several repetitions at once. False by default, because an engine may move hardware.
     """
 
     library: ClassVar[str | None] = None
@@ -53,6 +55,7 @@ class Engine(Plugin):
     honours: ClassVar[frozenset[str]]
     batch: ClassVar[int] = 1
     usual_rollout_s: ClassVar[float] = 0.02
+    repeatable: ClassVar[bool] = False
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)
@@ -93,6 +96,9 @@ class Engine(Plugin):
         seen = self.rollout(world, replace(motion, observe_s=times_s))
         poses = np.hstack([seen.positions_m, seen.orientations])
         return Recording(self.rollout(world, motion), times_s, poses, None)
+
+    def stop(self) -> None:
+        """Stop the hardware at once, if there is any; called from another thread while a rollout is under way."""
 
     @classmethod
     def available(cls) -> bool:

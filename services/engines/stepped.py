@@ -28,6 +28,7 @@ class SteppedEngine(Engine, Generic[S]):
     """
 
     honours = ALL_FIELDS
+    repeatable = True
     failures: tuple[type[Exception], ...] = ()
 
     def __init__(self, options: Frozen | None = None) -> None:

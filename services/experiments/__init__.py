@@ -1,1 +1,1 @@
-"""Experiments and studies, as people submit, list, edit and control them."""
+"""Experiments and studies: submission, lists, edits and control by people."""

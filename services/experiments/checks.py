@@ -1,4 +1,4 @@
-"""Sensitivity checks as people ask for them: submitted, read, and summed up for the experiments that they belong to.
+"""Sensitivity checks as people use them: submitted, read, and summarised for their experiments.
 
 Supervisors run them by `gaplab.services.running.sensitivity`. Use cases raise StoreUnavailable while the database
 cannot be used.
@@ -13,7 +13,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.lifecycle import State
+from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.schemas.sensitivity import Checked, Sensitivity, SensitivityRead, SensitivitySpec
 from gaplab.services.core.errors import NotFound
 from gaplab.services.core.sensitivity import VERSION, Effort, warning
@@ -35,8 +35,8 @@ class CheckSummary:
     """What an experiment shows of its check.
 
     Attributes:
-        id: of the check; None if there is none.
-        warnings: as sentences; none before the check has ended.
+        id: id of the check; None if there is none.
+        warnings: warnings as sentences; empty before the check has ended.
     """
 
     id: str | None = None
@@ -44,10 +44,10 @@ class CheckSummary:
 
 
 def submit(store: Store, spec: SensitivitySpec) -> SensitivityRead:
-    """Queue the check of these settings, unless it is there already and has not FAILED.
+    """Queue the check of these settings, unless it exists and has not FAILED.
 
     Raises:
-        InvalidSpec: with everything that is wrong with them.
+        InvalidSpec: they are invalid; the error has every violation.
     """
     return admit(store, spec, FREELY).answer
 
@@ -56,8 +56,8 @@ def admit(store: Store, spec: SensitivitySpec, admitted: Admission) -> Once[Sens
     """Submit the check, once for each idempotency key.
 
     Raises:
-        InvalidSpec: with everything that is wrong with them.
-        KeyReused: the key stands for another request.
+        InvalidSpec: they are invalid; the error has every violation.
+        KeyReused: the key was used for another request.
     """
     resolved = resolve_sensitivity(spec)
     return once(store, admitted, spec, SensitivityRead, lambda session: _view(queue(session, resolved)))
@@ -65,7 +65,7 @@ def admit(store: Store, spec: SensitivitySpec, admitted: Admission) -> Once[Sens
 
 @snapshot
 def read(session: Session, id: str) -> SensitivityRead:
-    """Return the check, with its findings once it is COMPLETED.
+    """Return the check; it has results once it is COMPLETED.
 
     Raises:
         NotFound: no such check.
@@ -74,20 +74,21 @@ def read(session: Session, id: str) -> SensitivityRead:
 
 
 def queue(session: Session, spec: Checked) -> SensitivityRow:
-    """Return the check of this spec, QUEUED if it is new or had FAILED.
+    """Return the check of this spec, QUEUED if it is new, had FAILED or was CANCELLED.
 
-    The row stays locked until the transaction ends: a check that ended meanwhile would not tell the experiments that
+    The row stays locked until the transaction ends. A check that ended earlier would not warn the experiments that
     are being submitted with it.
     """
     row, id_ = SensitivityRow, id_of(spec)
     values = {"id": id_, "spec": spec.model_dump(mode="json"), "created_at": moment(session)}
     session.execute(insert_new(session, row).values(values))
-    move(session, row, (row.id == id_) & (row.state == State.FAILED), State.QUEUED, losses=0, error=None)
+    again = (row.id == id_) & row.state.in_((State.FAILED, State.CANCELLED))
+    move(session, row, again, State.QUEUED, losses=0, error=None)
     return session.get_one(row, id_, populate_existing=True, with_for_update={"read": True})
 
 
 def queue_for(session: Session, experiments: Iterable[ExperimentRow]) -> None:
-    """Queue the one check of what these experiments tune; an experiment that tunes nothing has none."""
+    """Queue the check that these experiments share; an experiment without tunables has none."""
     tuning = [row for row in experiments if row.iterations > 1]
     if not tuning:
         return
@@ -99,8 +100,15 @@ def queue_for(session: Session, experiments: Iterable[ExperimentRow]) -> None:
         tell(session, check, [row.id for row in tuning])
 
 
+def cancel_unneeded(session: Session, check: str | None) -> None:
+    """Cancel a check that has not ended if every experiment that it belongs to has."""
+    row, experiment = SensitivityRow, ExperimentRow
+    needed = select(experiment.sensitivity_id).where(experiment.sensitivity_id == check, experiment.state.in_(OPEN))
+    move(session, row, (row.id == check) & row.id.not_in(needed), State.CANCELLED)
+
+
 def get(session: Session, id_: str) -> SensitivityRow:
-    """Return the check of that id.
+    """Return the check with this id.
 
     Raises:
         NotFound: there is none.
@@ -112,7 +120,7 @@ def get(session: Session, id_: str) -> SensitivityRow:
 
 
 def tell(session: Session, check: SensitivityRow, experiments: Iterable[str]) -> None:
-    """Note for these experiments that their check has ended, and what it warns of."""
+    """Record for these experiments that their check has ended, with its warnings."""
     body = {"sensitivity": check.id, "state": check.state.value, "warnings": list(warnings(check))}
     for experiment in experiments:
         note(session, EventKind.SENSITIVITY_ENDED, experiment, **body)
@@ -132,19 +140,19 @@ def summaries(session: Session, experiments: Iterable[ExperimentRow]) -> dict[st
 
 
 def warnings(check: SensitivityRow) -> tuple[str, ...]:
-    """Return what a person who tunes this should know, as sentences."""
+    """Return warnings about these tunables, as sentences."""
     if check.state is State.FAILED:
         return (f"the sensitivity check failed, so that nothing is known of the tunables: {check.error}",)
     return tuple(sentence for finding in _findings(check) if (sentence := warning(finding)))
 
 
 def id_of(spec: Checked, external: Mapping[str, str] | None = None) -> str:
-    """Return the id of the check: it follows from the spec, the version of the method, and external plug-ins.
+    """Return the id of the check: a hash of the spec, the version of the method, and the external plug-ins.
 
     Args:
-        spec: what is checked.
-        external: versions of external plug-ins by kind and name, so that an edited one is checked again; left out, this
-            process's.
+        spec: subject of the check.
+        external: versions of external plug-ins by kind and name, so that an edited one is checked again; left out:
+            this process's.
     """
     versions = external_plugins() if external is None else external
     names = (f"robot {spec.robot.name}", f"engine {spec.engine.name}", *(f"tunable {t.name}" for t in spec.tunables))

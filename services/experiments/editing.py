@@ -1,7 +1,7 @@
 """Names and notes, changed after submission. Each function is one transaction, and raises StoreUnavailable.
 
-`starting_from` protects another person's edit: it lists the values of `edits` that the sender takes for the present
-one; None takes any. Progress is no edit.
+`starting_from` protects another person's edit: the change is refused unless the present number of edits is in it.
+None permits any number. Progress is no edit.
 """
 
 from collections.abc import Collection

@@ -18,17 +18,17 @@ LATEST = 100
 """Number of the newest experiments whose times estimate a rollout."""
 
 SILENT_S = 60.0
-"""Age of the last sign of life after which a supervisor does not work."""
+"""Age of the last heartbeat after which a supervisor does not count as working."""
 
 Key = tuple[str, str]
 """Robot and engine, with their options."""
 
 
 def estimate(store: Store, spec: StudySpec, *, limits: Limits | None = None, cores: int = 1) -> EstimateRead:
-    """Return what the study would take on a number of cores.
+    """Return the cost of the study on a number of cores.
 
     Raises:
-        InvalidSpec: with everything that is wrong with it, as if it were submitted.
+        InvalidSpec: the spec is invalid; the error has every violation, as on submission.
         StoreUnavailable: the database cannot be used now.
     """
     resolved = resolve_study(spec)
@@ -51,7 +51,7 @@ def estimate(store: Store, spec: StudySpec, *, limits: Limits | None = None, cor
 
 
 def _measured(found: tuple[tuple[dict[str, object], float, int], ...]) -> dict[Key, float]:
-    """Return the seconds of a rollout by robot and simulator's engine, which computes nearly all of them."""
+    """Return the seconds of a rollout by robot and simulators' engine, which computes nearly all rollouts."""
     seconds: dict[Key, float] = defaultdict(float)
     rollouts: dict[Key, int] = defaultdict(int)
     for stored, took, count in found:
@@ -66,7 +66,7 @@ def _key(spec: ResolvedSpec) -> Key:
 
 
 def _engine(spec: ResolvedSpec) -> PluginRef:
-    """Return the engine that computes it."""
+    """Return the engine that computes the experiment."""
     return spec.reality.engine if is_direct(spec) else spec.engine
 
 

@@ -27,18 +27,18 @@ def extend_experiment(
 ) -> ExperimentRead:
     """Queue a COMPLETED experiment again with larger totals; its results so far stay.
 
-    With its present totals, an experiment that was stopped is computed to its end. Raises StoreUnavailable while the
+    Given its present totals, a stopped experiment is completed. Raises StoreUnavailable while the
     database cannot be used.
 
     Raises:
         NotFound: no such experiment.
-        Conflict: it is not COMPLETED, nothing would be left to run, or its reality is not known here.
-        InvalidSpec: less than there is, more than a limit permits, or iterations for the direct baseline.
-        LimitReached: there is no room for it now.
+        Conflict: it is not COMPLETED, the totals add nothing, or its reality is unknown here.
+        InvalidSpec: a total is smaller than the present one or above a limit, or the direct baseline gets iterations.
+        LimitReached: too much work is in progress.
     """
     experiment, row = get_permitting(session, experiment_id, Verb.EXTEND), RepetitionRow
     if None in experiment.spec["reality"]["parameters"].values():
-        msg = f"experiment {experiment_id!r} was imported before its reality was shown, so it cannot be extended"
+        msg = f"experiment {experiment_id!r} was imported while its reality was hidden, so it cannot be extended"
         raise Conflict(msg)
     spec = _extended(ResolvedSpec.model_validate(experiment.spec), extension)
     check_extent([spec], admitted.limits)
@@ -46,10 +46,11 @@ def extend_experiment(
     check_load(session, [spec], admitted, done=tally.rollouts_done + tally.rollouts_saved)
     extent, total = extent_of(spec), spec.repetitions
     present = len(repetitions_of(session, experiment_id))
-    unfinished = (row.experiment_id == experiment_id) & (row.iterations_done < extent.iterations)
+    extendable = (row.experiment_id == experiment_id) & (row.state != State.FAILED)
+    unfinished = extendable & (row.iterations_done < extent.iterations)
     if not move(session, row, unfinished, State.QUEUED, losses=0) and total == present:
         msg = f"experiment {experiment_id!r} has {spec.iterations} iterations and {total} repetitions already"
-        raise Conflict(f"{msg}, and none of them is left to run; larger totals extend it")
+        raise Conflict(f"{msg}, and none of these is left to run: ask for larger totals")
     insert_repetitions(session, experiment_id, range(present, total))
     experiment.spec = experiment.spec | {"iterations": spec.iterations, "repetitions": total}
     experiment.iterations, experiment.rollouts = extent.iterations, extent.rollouts
@@ -69,14 +70,12 @@ def _extended(spec: ResolvedSpec, extension: ExtensionSpec) -> ResolvedSpec:
 def _violations(spec: ResolvedSpec, extension: ExtensionSpec) -> Iterator[Violation]:
     totals = extension.model_dump(exclude_none=True)
     if not totals:
-        yield Violation(
-            "", {}, "name the total of iterations, of repetitions, or of both", ["iterations", "repetitions"]
-        )
+        yield Violation("", {}, "give a total of iterations, of repetitions, or both", ["iterations", "repetitions"])
     if extension.iterations is not None and is_direct(spec):
         message = "the direct baseline has no iterations: it evolves in reality itself; extend its repetitions"
         yield Violation("/iterations", extension.iterations, message)
     for name, total in totals.items():
         present = getattr(spec, name)
         if total < present:
-            message = f"it has {present} {name} already; {total} is a total, which must not be smaller"
+            message = f"{total} is less than the {present} {name} that the experiment has; give a total"
             yield Violation(f"/{name}", total, message, f"at least {present}")

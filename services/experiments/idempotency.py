@@ -1,4 +1,4 @@
-"""Requests that create something, answered once for each key that their sender gave them."""
+"""Requests that create something, executed once for each idempotency key."""
 
 import json
 from collections.abc import Callable
@@ -18,18 +18,18 @@ from gaplab.services.store.session import Session, Store
 from gaplab.services.store.statements import insert_new
 
 KEYS_LIVE = timedelta(days=7)
-"""Time for which an idempotency key stands for its request."""
+"""Time for which an idempotency key is kept."""
 
 R = TypeVar("R", bound=Frozen)
 
 
 @dataclass(frozen=True)
 class Once(Generic[R]):
-    """The answer to a request that may have come before.
+    """The answer to a request that may be a repetition.
 
     Attributes:
-        answer: the same each time.
-        replayed: whether it was given before, and nothing was done now.
+        answer: the same answer each time.
+        replayed: whether the answer was stored earlier, so that no work was done now.
     """
 
     answer: R
@@ -37,19 +37,19 @@ class Once(Generic[R]):
 
 
 def once(store: Store, admitted: Admission, asked: Frozen, kind: type[R], work: Callable[[Session], R]) -> Once[R]:
-    """Do the work and keep its answer under the key, in one transaction; or return the answer that is kept.
+    """Do the work and store its answer under the key, in one transaction; or return the stored answer.
 
-    Another transaction with the same key is waited for: in Postgres by the unique key, in SQLite by the one writer.
+    This waits for another transaction with the same key: in Postgres at the unique key, in SQLite for the one writer.
 
     Args:
         store: the database.
-        admitted: with the key; without one, the work is always done.
-        asked: the request's body; its class tells one endpoint from another.
+        admitted: has the key; without a key, the work is always done.
+        asked: the request's body; its class identifies the endpoint.
         kind: class of the answer.
         work: creates the answer in the transaction.
 
     Raises:
-        KeyReused: the key stands for another request.
+        KeyReused: the key was used for another request.
     """
     key, caller, row = admitted.key, admitted.token or "", IdempotencyRow
     if key is None:

@@ -1,4 +1,4 @@
-"""Limits of submissions: how large one may be, and how much may be under way."""
+"""Limits of submissions: the size of one, and the work in progress."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,19 +14,19 @@ from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.session import Session
 
 RETRY_AFTER_S = 60
-"""A service that is full of experiments is full for minutes at least."""
+"""A service at its limit stays there for minutes at least."""
 
 _LOCK = 0x67617071  # among the advisory locks of a Postgres database
 
 
 @dataclass(frozen=True)
 class Admission:
-    """The sender of a submission, and the limits that hold for it.
+    """The sender of a submission, and its limits.
 
     Attributes:
-        token: id of the sender's token; None where none is needed.
-        limits: None for none, as for programs that use the database directly.
-        key: the idempotency key that came with the request.
+        token: id of the sender's token; None if no token is required.
+        limits: limits to check; None for none, as for programs that use the database directly.
+        key: idempotency key of the request.
     """
 
     token: str | None = None
@@ -39,17 +39,17 @@ FREELY = Admission()
 
 @dataclass(frozen=True)
 class OpenWork:
-    """Experiments that have not ended, and the rollouts that they have left."""
+    """Number of experiments that have not ended, and their remaining rollouts."""
 
     experiments: int
     rollouts: int
 
 
 def check_extent(specs: Sequence[ResolvedSpec], limits: Limits | None) -> None:
-    """Refuse a submission that is larger than one may be.
+    """Refuse a submission that is too large.
 
     Raises:
-        InvalidSpec: it may not; the message names the limit.
+        InvalidSpec: it is; the message names the limit.
     """
     if limits is None:
         return
@@ -66,13 +66,13 @@ def check_extent(specs: Sequence[ResolvedSpec], limits: Limits | None) -> None:
 
 
 def check_load(session: Session, specs: Sequence[ResolvedSpec], admitted: Admission, *, done: int = 0) -> None:
-    """Refuse a submission for which there is no room, in the transaction that inserts it.
+    """Refuse a submission that would exceed the work in progress, in the transaction that inserts it.
 
     Args:
-        session: of the transaction.
-        specs: of the submission.
+        session: session of the transaction.
+        specs: specs of the submission.
         admitted: the sender and its limits.
-        done: rollouts of these specs that are over.
+        done: completed rollouts of these specs.
 
     Raises:
         LimitReached: the message names the limit.
@@ -91,7 +91,7 @@ def check_load(session: Session, specs: Sequence[ResolvedSpec], admitted: Admiss
 
 
 def _load(session: Session) -> dict[str | None, OpenWork]:
-    """Return what is under way, by the id of the token that submitted it."""
+    """Return the work in progress, by the id of the token that submitted it."""
     row, run = ExperimentRow, RepetitionRow
     left = row.rollouts - run.rollouts_done - run.rollouts_saved
     counts = select(row.token_id, func.count()).where(row.state.in_(OPEN)).group_by(row.token_id)

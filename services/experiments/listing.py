@@ -1,7 +1,7 @@
 """Lists of experiments and studies, page by page, filtered and sorted. Use cases raise StoreUnavailable.
 
-A page begins after the key of the last row of the page before. The key is the sorted column, then the id. A row whose
-state or name changes between two pages may be in both or in none.
+A page begins after the key of the last row of the page before. The key is the sorted column, then the id. If a row's
+state or name changes between two pages, both pages or neither may have it.
 """
 
 import json
@@ -28,13 +28,13 @@ Key = tuple[str | int | datetime, ...]
 
 @dataclass(frozen=True)
 class ListFilter:
-    """What a list has, and in which order.
+    """The selection and the order of a list.
 
     Attributes:
-        study: experiments of this study only.
-        state: experiments in this state only, or studies whose experiments taken together are.
-        strategy: experiments with this strategy only, or studies that have one.
-        text: only what has this text in its name or id.
+        study: only experiments of this study.
+        state: only experiments or studies in this state.
+        strategy: only experiments with this strategy, or studies that have such an experiment.
+        text: only experiments or studies whose name or id contains this text.
         sort: a name of EXPERIMENT_ORDERS or STUDY_ORDERS; a minus before it reverses the order.
     """
 
@@ -45,7 +45,7 @@ class ListFilter:
     sort: str = "-created_at"
 
     def digest(self) -> str:
-        """Return the text that a cursor is bound to."""
+        """Return a text that identifies the list, for its cursors."""
         return sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:12]
 
 
@@ -82,10 +82,10 @@ NEWEST_FIRST = ListFilter()
 def list_experiments(
     session: Session, wanted: ListFilter = NEWEST_FIRST, *, limit: int = 50, cursor: str | None = None
 ) -> Page[ExperimentRead]:
-    """Return a page of experiments; submissions meanwhile shift no later page.
+    """Return a page of experiments; concurrent submissions do not shift later pages.
 
     Raises:
-        InvalidSpec: a cursor that no page of this list gave.
+        InvalidSpec: the cursor is invalid, or of another list.
     """
     rows = _page_of_experiments(session, wanted, limit=limit + 1, cursor=cursor)
     return Page(items=view_experiments(session, rows[:limit]), next=_next(rows, limit, wanted))
@@ -98,14 +98,14 @@ def list_studies(
     """Return a page of studies.
 
     Raises:
-        InvalidSpec: a cursor that no page of this list gave.
+        InvalidSpec: the cursor is invalid, or of another list.
     """
     rows = _page_of_studies(session, wanted, limit=limit + 1, cursor=cursor)
     return Page(items=view_studies(session, rows[:limit]), next=_next(rows, limit, wanted))
 
 
 def _next(rows: Sequence[R], limit: int, wanted: ListFilter) -> str | None:
-    """Return the cursor of the next page; `rows` has one row more than the page if there is one."""
+    """Return the cursor of the next page; `rows` has one row more than the page if a next page exists."""
     return _cursor_after(rows[limit - 1], wanted) if len(rows) > limit else None
 
 
@@ -157,7 +157,7 @@ def _has(condition: ColumnElement[bool]) -> ColumnElement[bool]:
 
 
 def _study_is(state: State) -> list[ColumnElement[bool]]:
-    """SQL condition: the study's experiments taken together are in the state; as `views.state_of` for one study."""
+    """SQL condition: the study is in the state; `views.state_of` computes the same for one study."""
     open_ = _has(ExperimentRow.state.in_(OPEN))
     if state is State.RUNNING:
         return [open_, *(~_all_left_are(each) for each in OPEN if each is not State.RUNNING)]

@@ -1,4 +1,4 @@
-"""The progress of experiments: what is done, what is left, and the best fitness so far."""
+"""The progress of experiments: work done, work left, and the best fitness so far."""
 
 from collections.abc import Sequence
 from math import fsum
@@ -22,7 +22,7 @@ def mean_best(values: Sequence[float]) -> float:
 
 
 def _seconds_left(tally: Tally) -> float | None:
-    """Return the time left if the repetitions that run continue at their present pace; None if unknown."""
+    """Return the time left if running repetitions continue at their present pace; None if unknown."""
     if not tally.open:
         return 0.0
     finished = tally.rollouts_done + tally.rollouts_saved

@@ -13,6 +13,7 @@ from gaplab.schemas.records import (
     SimulatorRead,
     StudyRead,
 )
+from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view_experiments, view_repetition, view_studies
 from gaplab.services.store.queries import attempts, results
 from gaplab.services.store.queries.experiments import get_experiment, get_study, repetitions_of
@@ -23,7 +24,7 @@ R = TypeVar("R")
 
 @snapshot
 def read_experiment(session: Session, experiment_id: str, *, reveal: bool = False) -> ExperimentRead:
-    """Return the experiment with its progress; `reveal` shows reality's parameters although they are hidden.
+    """Return the experiment with its progress; `reveal` includes hidden parameters of reality.
 
     Raises:
         NotFound: no such experiment.
@@ -33,7 +34,7 @@ def read_experiment(session: Session, experiment_id: str, *, reveal: bool = Fals
 
 @snapshot
 def read_study(session: Session, study_id: str, *, reveal: bool = False) -> StudyRead:
-    """Return the study with its experiments and their progress; `reveal` as of an experiment.
+    """Return the study with its experiments and their progress; `reveal` includes hidden parameters of reality.
 
     Raises:
         NotFound: no such study.
@@ -48,8 +49,8 @@ def list_repetitions(session: Session, experiment_id: str) -> tuple[RepetitionRe
     Raises:
         NotFound: no such experiment.
     """
-    get_experiment(session, experiment_id)
-    return tuple(map(view_repetition, repetitions_of(session, experiment_id)))
+    secret = bool(hidden(session, [get_experiment(session, experiment_id)]))
+    return tuple(view_repetition(row, secret=secret) for row in repetitions_of(session, experiment_id))
 
 
 @snapshot
@@ -66,7 +67,7 @@ def list_samples(
 
     Raises:
         NotFound: no such experiment.
-        InvalidSpec: a cursor that no page gave.
+        InvalidSpec: the cursor is invalid, or of another list.
     """
     get_experiment(session, experiment_id)
     rows = results.page_of_samples(
@@ -89,7 +90,7 @@ def list_simulators(
 
     Raises:
         NotFound: no such experiment.
-        InvalidSpec: a cursor that no page gave.
+        InvalidSpec: the cursor is invalid, or of another list.
     """
     row = get_experiment(session, experiment_id)
     rows = results.page_of_simulators(
@@ -105,10 +106,10 @@ def list_attempts(session: Session, experiment_id: str, repetition: int) -> tupl
     Raises:
         NotFound: no such experiment, or no such repetition of it.
     """
-    get_experiment(session, experiment_id)
-    return attempts.attempts_of(session, experiment_id, repetition)
+    secret = bool(hidden(session, [get_experiment(session, experiment_id)]))
+    return attempts.attempts_of(session, experiment_id, repetition, secret=secret)
 
 
 def _next(rows: Sequence[R], limit: int, cursor_of: Callable[[R], str]) -> str | None:
-    """Return the cursor of the next page; `rows` has one row more than the page if there is one."""
+    """Return the cursor of the next page; `rows` has one row more than the page if a next page exists."""
     return cursor_of(rows[limit - 1]) if len(rows) > limit else None

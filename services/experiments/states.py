@@ -1,4 +1,4 @@
-"""States: the one place that writes them, and what the states of repetitions mean for their experiment."""
+"""States. Only this module writes them; the state of an experiment follows from its repetitions."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -7,10 +7,10 @@ from sqlalchemy import ColumnElement, func, select, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.lifecycle import CHECK_MOVES, MOVES, State
+from gaplab.schemas.lifecycle import MOVES, State
 from gaplab.services.core.errors import Conflict
 from gaplab.services.store.clock import now
-from gaplab.services.store.models import ExperimentRow, LeasedRow, RepetitionRow, SensitivityRow
+from gaplab.services.store.models import ExperimentRow, LeasedRow, RepetitionRow
 from gaplab.services.store.queries.events import note
 
 _CLAIMABLE = (State.QUEUED, State.RUNNING)
@@ -22,7 +22,7 @@ _FOLLOWING_EVENTS = {
     State.FAILED: EventKind.FAILED,
     State.CANCELLED: EventKind.CANCELLED,
 }
-"""The event of each move that follows from repetitions; the event of a requested move is noted with the request."""
+"""The event of each move that follows from repetitions; a requested move has its event where the request is handled."""
 
 
 def move(
@@ -37,32 +37,31 @@ def move(
     A row whose state may not become `to` stays as it is. `ended_at` follows from the state.
 
     Args:
-        session: of a transaction that writes.
-        table: whose rows are moved.
-        which: condition on these rows.
+        session: session of a transaction that writes.
+        table: table of the rows.
+        which: condition on the rows.
         to: their new state.
         values: further columns to set.
     """
-    moves = CHECK_MOVES if table is SensitivityRow else MOVES
-    sources = [state for state, targets in moves.items() if to in targets]
+    sources = [state for state, targets in MOVES.items() if to in targets]
     ended_at = now() if to.ended else None
     moved = update(table).where(which, table.state.in_(sources)).values(state=to, ended_at=ended_at, **values)
     return list(session.scalars(moved.returning(table.id)))
 
 
 def settle(session: Session, experiments: Iterable[str], requested: State | None = None) -> None:
-    """Bring experiments in line with their repetitions, whenever one of them has moved or a state is requested.
+    """Update the states of experiments after a repetition has moved, or when a state is requested.
 
     An experiment without a repetition left to run ends. A PAUSING one becomes PAUSED when its last running step is
-    over. A STOPPING one keeps no queued repetition. The counts that decide about turns are kept here and nowhere else.
+    over. A STOPPING one keeps no queued repetition. Only this function keeps the counts that turns depend on.
 
     Args:
-        session: of a transaction that has locked these experiments.
+        session: session of a transaction that has locked these experiments.
         experiments: their ids.
-        requested: the state that a person asks for, to be entered or passed through; None without a request.
+        requested: a state that a person requests; None without a request.
 
     Raises:
-        Conflict: the experiment may not move to the state that follows.
+        Conflict: the move to the resulting state is not permitted.
     """
     for experiment in experiments:
         _settle(session, experiment, requested)
@@ -89,13 +88,13 @@ def _settle(session: Session, experiment: str, requested: State | None) -> None:
 
 
 def _following(state: State, queued: int, running: int, states: set[State]) -> State:
-    """Return the state that follows for an experiment from its repetitions.
+    """Return the state of an experiment that follows from its repetitions.
 
     Args:
-        state: of the experiment, stored or requested.
+        state: stored or requested state of the experiment.
         queued: number of queued repetitions.
         running: number of running repetitions.
-        states: of all repetitions.
+        states: states of all repetitions.
     """
     if state.ended:
         return state

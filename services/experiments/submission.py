@@ -1,4 +1,4 @@
-"""Submission of experiments and studies: resolved, admitted and stored in one transaction.
+"""Submission of experiments and studies: they are resolved, admitted and stored in one transaction.
 
 All functions raise StoreUnavailable while the database cannot be used.
 """
@@ -10,16 +10,18 @@ from gaplab.services.experiments.checks import queue_for
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
 from gaplab.services.experiments.views import view_experiments, view_studies
+from gaplab.services.specs.hardware import hardware_of
 from gaplab.services.specs.resolution import expected_rollouts, is_direct, resolve_experiment, resolve_study
+from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries.experiments import Extent, insert_experiment, insert_study
 from gaplab.services.store.session import Session, Store
 
 
 def submit_experiment(store: Store, spec: ExperimentSpec) -> ExperimentRead:
-    """Store the resolved experiment, its repetitions QUEUED, and with it a sensitivity check unless there is one.
+    """Store the resolved experiment with QUEUED repetitions, and queue its sensitivity check unless it exists.
 
     Raises:
-        InvalidSpec: with everything that is wrong with it.
+        InvalidSpec: the spec is invalid; the error has every violation.
     """
     return admit_experiment(store, spec, FREELY).answer
 
@@ -28,16 +30,16 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
     """Submit it within limits, and once for each idempotency key.
 
     Raises:
-        InvalidSpec: with everything that is wrong with it.
-        LimitReached: there is no room for it now.
-        KeyReused: the key stands for another request.
+        InvalidSpec: the spec is invalid; the error has every violation.
+        LimitReached: too much work is in progress.
+        KeyReused: the key was used for another request.
     """
     resolved = resolve_experiment(spec)
     check_extent([resolved], admitted.limits)
 
     def create(session: Session) -> ExperimentRead:
         check_load(session, [resolved], admitted)
-        row = insert_experiment(session, resolved, extent_of(resolved), token=admitted.token)
+        row = _insert(session, resolved, admitted)
         queue_for(session, [row])
         return view_experiments(session, [row])[0]
 
@@ -45,10 +47,10 @@ def admit_experiment(store: Store, spec: ExperimentSpec, admitted: Admission) ->
 
 
 def submit_study(store: Store, spec: StudySpec) -> StudyRead:
-    """Store the study, an experiment for each of its strategies, and a sensitivity check unless there is one.
+    """Store the study with an experiment for each strategy, and queue its sensitivity check unless it exists.
 
     Raises:
-        InvalidSpec: with everything that is wrong with it.
+        InvalidSpec: the spec is invalid; the error has every violation.
     """
     return admit_study(store, spec, FREELY).answer
 
@@ -57,9 +59,9 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
     """Submit it within limits, and once for each idempotency key.
 
     Raises:
-        InvalidSpec: with everything that is wrong with it.
-        LimitReached: there is no room for it now.
-        KeyReused: the key stands for another request.
+        InvalidSpec: the spec is invalid; the error has every violation.
+        LimitReached: too much work is in progress.
+        KeyReused: the key was used for another request.
     """
     resolved = resolve_study(spec)
     check_extent(resolved, admitted.limits)
@@ -67,14 +69,19 @@ def admit_study(store: Store, spec: StudySpec, admitted: Admission) -> Once[Stud
     def create(session: Session) -> StudyRead:
         check_load(session, resolved, admitted)
         study = insert_study(session, spec.name or "study")
-        rows = [
-            insert_experiment(session, each, extent_of(each), study=study, position=position, token=admitted.token)
-            for position, each in enumerate(resolved)
-        ]
+        rows = [_insert(session, each, admitted, study, position) for position, each in enumerate(resolved)]
         queue_for(session, rows)
         return view_studies(session, [study])[0]
 
     return once(store, admitted, spec, StudyRead, create)
+
+
+def _insert(
+    session: Session, spec: ResolvedSpec, admitted: Admission, study: StudyRow | None = None, position: int = 0
+) -> ExperimentRow:
+    row = insert_experiment(session, spec, extent_of(spec), study=study, position=position, token=admitted.token)
+    row.hardware = hardware_of(spec)
+    return row
 
 
 def extent_of(spec: ResolvedSpec) -> Extent:

@@ -1,4 +1,4 @@
-"""Experiments, studies and repetitions as they are shown: rows, their progress, and no hidden parameters."""
+"""Experiments, studies and repetitions as the API shows them: with progress, without hidden parameters."""
 
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
@@ -24,15 +24,15 @@ def view_experiments(
     """Return the experiments with their progress.
 
     Args:
-        session: of a transaction.
-        rows: the experiments.
-        reveal: show reality's parameters although they are hidden.
+        session: session of a transaction.
+        rows: rows of the experiments.
+        reveal: include hidden parameters of reality.
     """
     return _view(session, rows, tallies(session, [row.id for row in rows]), reveal=reveal)
 
 
 def view_studies(session: Session, rows: Sequence[StudyRow], *, reveal: bool = False) -> tuple[StudyRead, ...]:
-    """Return the studies with their experiments; `reveal` as of experiments."""
+    """Return the studies with their experiments; `reveal` includes hidden parameters of reality."""
     experiments = experiments_of(session, [row.id for row in rows])
     progress = tallies(session, [row.id for row in experiments])
     by_study: dict[str | None, list[ExperimentRead]] = defaultdict(list)
@@ -41,16 +41,22 @@ def view_studies(session: Session, rows: Sequence[StudyRow], *, reveal: bool = F
     return tuple(_study(row, by_study[row.id], progress) for row in rows)
 
 
-def view_repetition(row: RepetitionRow) -> RepetitionRead:
-    """Return the repetition."""
-    return RepetitionRead(**{name: getattr(row, name) for name in RepetitionRead.model_fields})
+def view_repetition(row: RepetitionRow, *, secret: bool) -> RepetitionRead:
+    """Return the repetition.
+
+    Args:
+        row: the repetition.
+        secret: keep what reality's code said about an error to itself.
+    """
+    shown = RepetitionRead(**{name: getattr(row, name) for name in RepetitionRead.model_fields})
+    return shown if secret or row.hidden_error is None else shown.model_copy(update={"error": row.hidden_error})
 
 
 def state_of(states: Collection[State]) -> State:
-    """Return the state of experiments taken together.
+    """Return the combined state of experiments.
 
-    Once all have ended: COMPLETED if one is, else FAILED if one is, else CANCELLED. Before that: the state that all
-    open ones have in common, else RUNNING.
+    If all have ended: COMPLETED if at least one is, else FAILED if at least one is, else CANCELLED. Otherwise: the
+    state that all open experiments share, else RUNNING.
     """
     open_ = {state for state in states if not state.ended}
     if not open_:
@@ -104,7 +110,7 @@ def _experiment(
         max_parallel=row.max_parallel,
         progress=progress_of(tally),
         best_fitness=best,
-        reasons=failures,
+        reasons=(*([row.paused_because] if row.paused_because else []), *failures),
         sensitivity=check.id,
         warnings=(*check.warnings, *_version_warnings(row, tally)),
         created_at=row.created_at,
@@ -127,7 +133,7 @@ def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: Mappi
 
 
 def _version_warnings(row: ExperimentRow, tally: Tally) -> tuple[str, ...]:
-    """Return why the experiment waits, if a supervisor left it alone for having other versions."""
+    """Return why the experiment waits, if a supervisor skipped it because its versions differ."""
     if row.refused_by is None or row.state.ended or tally.running:
         return ()
     if tells_unavailable(row.refused_by):

@@ -20,11 +20,11 @@ class Line:
     """A line through points, with a band around it where `lower` and `upper` have values.
 
     Attributes:
-        name: in the legend; marks of one name share one colour and one entry there.
+        name: entry in the legend; marks with the same name share it and its colour.
         hover: a text for each point, for the mouse pointer.
-        markers: whether its points are marked.
-        faint: drawn thinly behind other lines, as one repetition behind the mean.
-        steps: whether a value holds until the next point.
+        markers: draw a marker at each point.
+        faint: draw a thin line behind the others, like one repetition behind the mean.
+        steps: keep each value until the next point.
     """
 
     name: str
@@ -49,9 +49,9 @@ class Points:
     Attributes:
         shades: a number for each point, drawn from light to dark instead of the style's colour; a bar beside the
             figure explains them.
-        shades_label: of that bar.
+        shades_label: label of that bar.
         hover: a text for each point.
-        size: of the markers, as a factor.
+        size: factor of the markers' size.
         hollow: draw outlines only.
     """
 
@@ -74,7 +74,7 @@ class Level:
     """A reference value, drawn across the whole panel, with a band between `lower` and `upper`.
 
     Attributes:
-        upright: a value of x rather than y.
+        upright: the value is one of x, not of y.
     """
 
     name: str
@@ -102,7 +102,7 @@ class Bars:
 
     Attributes:
         intervals: `(begin, end, y)` of each bar.
-        thickness: in units of y.
+        thickness: thickness in units of y.
     """
 
     name: str
@@ -147,7 +147,7 @@ class Axis:
     """One axis of a panel.
 
     Attributes:
-        label: with the unit; empty for none.
+        label: name with the unit; empty for none.
         limits: the ends of the axis, ascending.
         whole: put ticks at whole numbers only.
         log: logarithmic; the limits are above 0.
@@ -171,8 +171,8 @@ class Panel:
     """Marks between two axes.
 
     Attributes:
-        height: as a factor of the usual height.
-        square: as high as wide.
+        height: factor of the usual height.
+        square: make the panel as high as wide.
     """
 
     marks: tuple[Mark, ...]
@@ -196,14 +196,14 @@ class FigureDefinition:
     """The content of a figure, in words and numbers.
 
     Attributes:
-        name: of its kind, for file names.
-        title: above it; empty for none.
-        panels: row by row.
+        name: kind of the figure, for file names.
+        title: text above the figure; empty for none.
+        panels: panels, row by row.
         columns: panels in a row.
         share_x: panels of a column share one horizontal axis, which is labelled beneath the last.
-        caption: says at least how many repetitions there are and what the bands are.
+        caption: text that states at least the number of repetitions and the meaning of the bands.
         alt: a description in a sentence or two, for screen readers.
-        nothing: the text in place of marks as long as there are none.
+        nothing: text that replaces the marks while there are none.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """External plug-ins: the files in the folders that GAPLAB_PLUGINS names.
 
-Only the environment of a process can name a folder; no spec and no request can. Each process finds them for itself:
-services and supervisors when they start, the processes that Ray starts before their first task.
+Only the environment of a process can name a folder; no spec and no request can. Each process finds the plug-ins
+itself: services and supervisors at their start, Ray's processes before their first task.
 """
 
 import logging
@@ -19,7 +19,7 @@ log = logging.getLogger("gaplab.plugins")
 
 @cache
 def find() -> None:
-    """Let registries find the plug-ins in the folders of GAPLAB_PLUGINS; later calls in this process do nothing.
+    """Register the folders of GAPLAB_PLUGINS; later calls in this process do nothing.
 
     The variable becomes absolute, for processes that this one starts in other folders.
     """

@@ -36,13 +36,13 @@ Pair = tuple[Fitness, Fitness]
 
 
 def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, seconds: float = SECONDS) -> Predictions:
-    """Return the predictions of an experiment's samples, as far as they are computed.
+    """Return the predictions of an experiment's samples that are computed so far.
 
-    Each request computes more of them, early iterations first. The rest counts as pending: request it again. Samples
+    Each request computes more of them, early iterations first. The rest counts as pending: repeat the request. Samples
     beyond `MOST_KEPT` are left out.
 
     Args:
-        store: has the experiment.
+        store: database with the experiment.
         process: executes the rollouts and caches their fitness.
         experiment_id: the experiment.
         seconds: time limit of the rollouts of this request.
@@ -77,11 +77,11 @@ def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, se
 
 
 def predict(spec: str, samples: Sequence[TunedSample], seconds: float) -> list[Pair]:
-    """Return the fitness before and after tuning of the first samples: at least one, then until the time is over.
+    """Return the fitness of samples before and after tuning: of the first one, and of as many others as time permits.
 
     Args:
-        spec: resolved, as JSON.
-        samples: with the simulators around them.
+        spec: resolved spec, as JSON.
+        samples: samples, with the simulators before and after them.
         seconds: time limit.
     """
     read = ResolvedSpec.model_validate_json(spec)

@@ -1,4 +1,4 @@
-"""Rollouts in a subprocess: a crash, a hang or memory that physics takes there does no harm to the service."""
+"""Rollouts in a subprocess, so that a crash, a hang or a lack of memory does not affect the service."""
 
 import logging
 import os
@@ -60,8 +60,8 @@ class AnswerCache:
 class RolloutProcess:
     """A subprocess that executes one call at a time.
 
-    It starts with the first call, and again after a crash or a timeout. It ends with its parent, even a parent that was
-    killed: the parent's end of the pipe closes, and the next read fails.
+    It starts with the first call, and again after a crash or a timeout. It ends with its parent, even if that
+    is killed: the parent's end of the pipe closes, and the next read fails.
 
     Args:
         longest_s: time limit of one call.
@@ -132,7 +132,7 @@ class RolloutProcess:
             late = isinstance(error, TimeoutError)
             what = f"took more than {self._longest_s:g} s in" if late else "ended"
             log.warning("%s %s the process for rollouts; the next call starts another", function.__name__, what)
-            raise EngineInterrupted(f"the physics {what} its process; nothing else was harmed") from error
+            raise EngineInterrupted(f"the physics {what} its process; nothing else is affected") from error
         if succeeded:
             return answer  # type: ignore[no-any-return]
         kind, text = answer

@@ -16,7 +16,7 @@ from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, real
 
 FRAMES_PER_S = 50
 LONGEST_S = 20.0
-"""The part of a motion that is shown; a motion may last ten minutes."""
+"""Longest part of a motion that is shown; a motion may last ten minutes."""
 
 AROUND_FRAMES = 5
 """A speed is the mean over this many frames before and after."""
@@ -27,7 +27,7 @@ class ReplayChoice:
     """The choice of a controller and of a simulator.
 
     Attributes:
-        repetition: its number, from 0.
+        repetition: number of the repetition, from 0.
         iteration: the iteration that measured the controller.
         kind: a sample, or the transferred controller.
         simulator: the iteration whose best simulator is used; None for the simulator that chose the controller: of the
@@ -45,15 +45,15 @@ class ReplayRequest:
     """Everything a subprocess needs to compute a replay, in plain values.
 
     Attributes:
-        experiment: its id.
-        choice: the controller.
-        spec: resolved, as JSON.
-        genome: the controller's.
+        experiment: id of the experiment.
+        choice: choice of the controller.
+        spec: resolved spec, as JSON.
+        genome: genome of the controller.
         simulator: the iteration of the simulator; None if the controller evolved in reality itself.
-        parameters: the simulator's.
+        parameters: parameters of the simulator.
         simulated: the stored fitness in the simulator, if there is one.
         real: the stored fitness in reality.
-        known: whether the spec has the parameters of reality.
+        known: whether reality can be shown: the spec has its parameters, and it is no hardware.
     """
 
     experiment: str

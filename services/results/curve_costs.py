@@ -26,8 +26,8 @@ def cost_axis(store: Store, curves: Sequence[Curve], cost: Cost, *, cost_s: floa
     """Return the horizontal axis for curves that are drawn against their cost.
 
     Args:
-        store: has the experiments.
-        curves: of the experiments; the direct baseline is a level and has no place on the axis.
+        store: database with the experiments.
+        curves: curves of the experiments; the direct baseline is a level without a place on the axis.
         cost: the rollouts so far, or the time of simulation and real-world evaluations so far.
         cost_s: seconds that one real-world evaluation takes.
     """

@@ -68,10 +68,10 @@ def compare(
 ) -> tuple[Comparison, ...]:
     """Compare every pair of experiments on their recorded fitness, pooled over a range of real-world evaluations.
 
-    The only value of the direct baseline belongs to any range.
+    The only value of the direct baseline is in every range.
 
     Args:
-        store: has the experiments.
+        store: database with the experiments.
         experiment_ids: two or more, each once.
         from_evaluations: the first number of evaluations; by default 1.
         to_evaluations: the last number of evaluations; by default the last that an experiment has.

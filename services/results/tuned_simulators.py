@@ -19,7 +19,7 @@ class TunedSimulators:
     """The best simulators of an experiment.
 
     Attributes:
-        unit: of fitness.
+        unit: unit of fitness.
         dimensions: the tunables.
         simulators: the best of each iteration of each repetition.
         errors: squared errors by iteration and repetition, without iteration 0; None if the physics failed.

@@ -1,1 +1,1 @@
-"""Repetitions and sensitivity checks, as supervisors run them."""
+"""Repetitions and sensitivity checks: the work of supervisors."""

@@ -1,7 +1,7 @@
-"""Running repetitions: claim them in the order of turns, record their steps, end them.
+"""Execution of repetitions: claims in the order of turns, records of steps, and ends.
 
-The lease mechanism is that of `gaplab.services.running.leases`. Requests of people are obeyed here, so that no holder
-can forget them: the first new step after a pause or a stop is stored, and is the last of its lease.
+The lease mechanism is that of `gaplab.services.running.leases`. People's requests are handled here, so they do not
+depend on the holder: the first new step after a pause or stop is stored, and ends the lease.
 
 All functions raise StoreUnavailable while the database cannot be used; each may then be tried again.
 """
@@ -14,84 +14,60 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.lifecycle import ASKED, Ending, State
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.core.errors import Conflict
 from gaplab.services.core.types import Step
 from gaplab.services.experiments.states import settle
 from gaplab.services.running import provenance
 from gaplab.services.running.leases import STALE_AFTER_S as STALE_AFTER_S
-from gaplab.services.running.leases import Change, Leases
-from gaplab.services.running.turns import ahead, next_repetitions
+from gaplab.services.running.leases import Change
+from gaplab.services.running.repetition_leases import RepetitionLeases, pause
+from gaplab.services.running.turns import FREE_HARDWARE, ahead, next_repetitions
 from gaplab.services.running.versions import provenance as present_provenance
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Checkpoint as Checkpoint
 from gaplab.services.store.lease import Claim as Claim
 from gaplab.services.store.lease import Delivered as Delivered
+from gaplab.services.store.lease import Failure as Failure
 from gaplab.services.store.lease import TimedStep as TimedStep
-from gaplab.services.store.models import ExperimentRow, RepetitionRow
+from gaplab.services.store.models import AttemptRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import attempts, checkpoints, steps
 from gaplab.services.store.queries.experiments import lock
 from gaplab.services.store.queries.logs import logs
-from gaplab.services.store.session import Store
+from gaplab.services.store.session import Store, transaction
+from gaplab.services.store.statements import storable
 
-_REQUESTED_ENDINGS = {State.PAUSING: Ending.PAUSED, State.STOPPING: Ending.STOPPED}
-
-
-class _Repetitions(Leases[Claim]):
-    """Leases of repetitions: an end is told to the history and to the experiment."""
-
-    table = RepetitionRow
-
-    def end(self, session: Session, which: ColumnElement[bool], change: Change) -> list[int]:
-        """End leases as the base does; a hand-back to an experiment that is being paused or stopped is told as such.
-
-        Raises:
-            Conflict: a repetition is to be COMPLETED and iterations of it are missing.
-        """
-        row = RepetitionRow
-        held = select(row.id, row.experiment_id).where(which, row.state == State.RUNNING)
-        owners = dict(session.execute(held).all())
-        if not owners:
-            return []
-        states = lock(session, sorted(set(owners.values())))
-        if change.to is State.COMPLETED:
-            _refuse_unfinished(session, which)
-        ended: list[int] = super().end(session, which & row.id.in_(owners), change)
-        endings = {id_: _ending(change.ending, states[owners[id_]]) for id_ in ended}
-        for each in Ending:
-            if ids := [id_ for id_ in ended if endings[id_] is each]:
-                attempts.end(session, ids, each, change.reason)
-        if change.to is State.FAILED:
-            checkpoints.forget(session, ended)
-        settle(session, states)
-        return ended
-
-
-def _ending(ending: Ending, state: State) -> Ending:
-    return _REQUESTED_ENDINGS.get(state, ending) if ending is Ending.HANDED_BACK else ending
-
-
-def _refuse_unfinished(session: Session, which: ColumnElement[bool]) -> None:
-    row = RepetitionRow
-    unfinished = session.execute(
-        select(row.number, row.experiment_id, ExperimentRow.iterations - row.iterations_done)
-        .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
-        .where(which, row.state == State.RUNNING, ExperimentRow.iterations != row.iterations_done)
-    ).first()
-    if unfinished is not None:
-        number, experiment, missing = unfinished
-        msg = f"repetition {number} of {experiment!r} is not complete: {missing} iterations are missing"
-        raise Conflict(msg)
-
-
-_LEASES = _Repetitions()
+_LEASES = RepetitionLeases()
 
 heartbeat = _LEASES.heartbeat
 complete = _LEASES.complete
-fail = _LEASES.fail
 release = _LEASES.release
 hand_back = _LEASES.hand_back
 hand_back_unheard = _LEASES.hand_back_unheard
 requeue_lost = _LEASES.requeue_lost
+
+
+def fail(store: Store, claim: Claim, failure: Failure) -> bool:
+    """End a repetition as FAILED; return False if the claim is no longer valid.
+
+    If reality failed, queue the repetition instead, and pause its experiment until a person resumes it.
+    """
+    return store.write(_fail, claim, failure)
+
+
+@transaction
+def note_measuring(session: Session, claims: Sequence[Claim]) -> tuple[Claim, ...]:
+    """Record that these repetitions wait for reality's answer, and return the claims that are still valid."""
+    row = RepetitionRow
+    holds = update(row).where(_LEASES.of(claims), row.state == State.RUNNING)
+    noted = session.execute(holds.values(measuring_at=now(), heartbeat_at=now()).returning(row.id, row.epoch))
+    held = {(id_, epoch) for id_, epoch in noted}
+    return tuple(claim for claim in claims if (claim.id, claim.epoch) in held)
+
+
+@transaction
+def free_hardware(session: Session, claims: Sequence[Claim]) -> None:
+    """Record that the workers of these ended claims have stopped, so that others may use their hardware."""
+    row = RepetitionRow
+    session.execute(update(row).where(_LEASES.of(claims), row.state != State.RUNNING).values(hardware=None))
 
 
 def claim(
@@ -104,9 +80,9 @@ def claim(
     """Claim up to `limit` queued repetitions in the order of turns, and return them with their logs.
 
     Args:
-        store: where they are queued.
-        owner: the supervisor that runs them.
-        limit: most repetitions.
+        store: the database.
+        owner: the supervisor.
+        limit: largest number of repetitions.
         under: provenance of the supervisor; this process's if left out. An experiment that was begun under another
             engine, plug-in, architecture or version of the spec is left alone, and says so.
         refused: why processes of the supervisor refuse plug-ins, by kind and name; experiments that name them are left
@@ -116,19 +92,19 @@ def claim(
 
 
 def record(store: Store, claim: Claim, step: Step, *, seconds: float = 0.0) -> bool:
-    """Append a step to the repetition's log, as `record_all` does, and return whether the claim still holds."""
+    """Append a step to the repetition's log, as `record_all` does, and return whether the claim is still valid."""
     return bool(record_all(store, [(claim, (TimedStep(step, seconds),))]))
 
 
 def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[Delivered]]]) -> tuple[Claim, ...]:
-    """Append steps to the logs of repetitions in one transaction, and return the claims that still hold.
+    """Append steps to the logs of repetitions in one transaction, and return the claims that are still valid.
 
     A second delivery of a step changes nothing. A checkpoint is kept until its step is recorded. Nothing is written for
     a claim that does not hold. A claim whose experiment is being paused or stopped ends with its first new step, which
     is written.
 
     Raises:
-        Conflict: steps before a delivered one are missing; nothing at all was written.
+        Conflict: steps before a delivered one are missing; nothing was written.
     """
     by_claim: dict[Claim, list[Delivered]] = {}
     for claim, delivered in deliveries:
@@ -142,27 +118,43 @@ def give_way(
     under: Provenance | None = None,
     refused: Mapping[str, str] = provenance.NONE,
 ) -> tuple[Claim, ...]:
-    """Hand back claims that should not begin now, and return them: a request to pause or stop, or another's turn.
+    """Hand back claims of repetitions that should not start now, and return them.
+
+    The reason is a request to pause or stop, or another experiment's turn.
 
     Args:
-        store: of the claims.
+        store: the database.
         waiting: claims whose repetition waits for a core; a running one is never interrupted for another.
-        under: as of `claim`.
-        refused: as of `claim`.
+        under: as in `claim`.
+        refused: as in `claim`.
     """
     claims = tuple(waiting)
     if not claims:
         return ()
     with store.reading() as session:
-        permitted = provenance.permitted(session, under or present_provenance(), refused)
+        permitted = provenance.permitted(session, under or present_provenance(), refused) & FREE_HARDWARE
         unwanted = _unwanted(session, claims, permitted)
     return hand_back(store, *unwanted)
+
+
+def _fail(session: Session, claim: Claim, failure: Failure) -> bool:
+    why, hidden = storable(failure.reason), storable(failure.hidden) if failure.hidden else None
+    to = State.QUEUED if failure.of_reality else State.FAILED
+    values = {"error": why, "hidden_error": hidden} | ({"owner": None} if failure.of_reality else {})
+    if not _LEASES.end(session, _LEASES.of([claim]), Change(to, Ending.FAILED, why, values)):
+        return False
+    attempt = AttemptRow
+    latest = (attempt.repetition_id == claim.id) & (attempt.epoch == claim.epoch)
+    session.execute(update(attempt).where(latest).values(hidden_reason=hidden))
+    if failure.of_reality:
+        pause(session, claim.experiment_id, f"repetition {claim.number}: {why}")
+    return True
 
 
 def _claim(
     session: Session, owner: str, limit: int, under: Provenance, refused: Mapping[str, str] = provenance.NONE
 ) -> tuple[Claim, ...]:
-    permitted = provenance.permitted(session, under, refused)
+    permitted = provenance.permitted(session, under, refused) & FREE_HARDWARE
     ids = next_repetitions(session, limit, permitted)
     while ids and (unusable := provenance.refuse_unusable(session, ids, refused)):
         permitted &= ExperimentRow.id.not_in(unusable)
@@ -212,9 +204,9 @@ def _record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -
 
 
 def _locked_requests(session: Session, claims: Iterable[Claim]) -> dict[str, State]:
-    """Lock the experiments of these claims that are being paused or stopped, and return their states.
+    """Lock the experiments of these claims that people are pausing or stopping, and return their states.
 
-    An experiment is always locked before its repetitions; hence the first look without a lock.
+    An experiment is always locked before its repetitions, so they are first read without a lock.
     """
     row = ExperimentRow
     requested = select(row.id).where(row.id.in_({claim.experiment_id for claim in claims}), row.state.in_(ASKED))

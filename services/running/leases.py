@@ -1,6 +1,6 @@
 """The lease of a supervisor on a piece of work: claim, heartbeat, complete, fail, release, hand back.
 
-A holder sends a heartbeat every few seconds, and counts as lost after `STALE_AFTER_S` without one. The next lease has
+A holder sends a heartbeat every few seconds; without one for `STALE_AFTER_S`, it counts as lost. The next lease has
 the next epoch. Every write carries the lease, and changes nothing once it has ended; the caller learns this from the
 answer, and drops the work. Work that was lost is queued again, and fails after `MAX_LOSSES` losses without progress.
 
@@ -26,19 +26,19 @@ from gaplab.services.store.statements import storable
 STALE_AFTER_S = 30.0
 
 MAX_LOSSES = 5
-"""Work that loses as many workers in a row without getting on is what kills them."""
+"""Losses in a row, without progress, after which work is FAILED: it probably kills its workers."""
 
 L = TypeVar("L", bound=Lease)
 
 
 @dataclass(frozen=True)
 class Change:
-    """What becomes of a row whose lease ends.
+    """The change of a row when its lease ends.
 
     Attributes:
-        to: its next state.
-        ending: how the lease ends, for the history.
-        reason: why it ends, for the history.
+        to: next state of the row.
+        ending: kind of the end, for the list of attempts.
+        reason: reason of the end, for the list of attempts.
         values: further columns to set.
     """
 
@@ -49,61 +49,61 @@ class Change:
 
 
 class Leases(Generic[L]):
-    """Leases on the rows of one table; a subclass says what else follows when one ends.
+    """Leases on the rows of one table; a subclass adds the consequences of an end.
 
     Attributes:
-        table: of the work.
+        table: table of the work.
     """
 
     table: ClassVar[type[LeasedRow]]
 
     def heartbeat(self, store: Store, leases: Iterable[L]) -> tuple[L, ...]:
-        """Prolong leases, and return those that still hold."""
+        """Renew leases, and return those that are still valid."""
         held = tuple(leases)
         return store.write(self._heartbeat, held) if held else ()
 
     def complete(self, store: Store, *leases: L, **results: Any) -> tuple[L, ...]:  # noqa: ANN401 - columns of any type
-        """End work as COMPLETED, and return the leases that held.
+        """End work as COMPLETED, and return the leases that were valid.
 
         Args:
-            store: of the work.
-            leases: of the work that is done.
+            store: the database.
+            leases: leases of the completed work.
             results: columns to set.
         """
         if not leases:
             return ()
         change = Change(State.COMPLETED, Ending.COMPLETED, values={"error": None} | results)
-        ended = store.write(self.end, self._of(leases), change)
+        ended = store.write(self.end, self.of(leases), change)
         return tuple(lease for lease in leases if lease.id in ended)
 
     def fail(self, store: Store, lease: L, reason: str) -> bool:
-        """End work as FAILED; return False if the lease no longer holds."""
+        """End work as FAILED; return False if the lease is no longer valid."""
         why = storable(reason)
         change = Change(State.FAILED, Ending.FAILED, why, {"error": why})
-        return bool(store.write(self.end, self._of([lease]), change))
+        return bool(store.write(self.end, self.of([lease]), change))
 
     def release(self, store: Store, lease: L, reason: str) -> bool:
-        """Queue work again whose worker was lost; return False if the lease no longer holds."""
-        return bool(store.write(self._release, self._of([lease]), storable(reason)))
+        """Queue work again whose worker was lost; return False if the lease is no longer valid."""
+        return bool(store.write(self.lose, self.of([lease]), storable(reason)))
 
     def hand_back(self, store: Store, *leases: L) -> tuple[L, ...]:
-        """Queue work again as if it had not been claimed, and return the leases that held."""
-        given = store.write(self._hand_back, self._of(leases)) if leases else ()
+        """Queue work again as if it had not been claimed, and return the leases that were valid."""
+        given = store.write(self._hand_back, self.of(leases)) if leases else ()
         return tuple(lease for lease in leases if lease.id in given)
 
     def hand_back_unheard(self, store: Store, owner: str, known: Iterable[L]) -> int:
         """Hand back claims whose reply never reached their owner, and return their number.
 
         Args:
-            store: of the work.
+            store: the database.
             owner: the supervisor.
-            known: all leases that it knows of.
+            known: all leases that the supervisor knows of.
         """
         ids = [lease.id for lease in known]
         return len(store.write(self._hand_back, (self.table.owner == owner) & self.table.id.not_in(ids)))
 
     def requeue_lost(self, store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:
-        """Queue work again whose holder was silent for too long, and return how many pieces there were."""
+        """Queue work again whose holder was silent for too long, and return the number of rows."""
         return len(store.write(self._requeue_lost, stale_after_s))
 
     def take(self, session: Session, ids: Sequence[int | str], owner: str) -> list[Any]:
@@ -119,25 +119,34 @@ class Leases(Generic[L]):
             attempts=row.attempts + 1,
             heartbeat_at=now(),
             started_at=func.coalesce(row.started_at, now()),
+            **self.taken(),
         )
 
+    def taken(self) -> Mapping[str, Any]:
+        """Return further columns that a claim sets."""
+        return {}
+
+    def free_lost(self, session: Session, stale: ColumnElement[bool]) -> None:
+        """Free what an ended lease still holds once its holder is silent; nothing by default."""
+
     def end(self, session: Session, which: ColumnElement[bool], change: Change) -> list[Any]:
-        """End leases that hold, and return the ids of their rows.
+        """End valid leases, and return the ids of their rows.
 
         Args:
-            session: of a transaction that writes.
-            which: condition on the rows; rows without a lease that holds are left alone.
-            change: what becomes of them.
+            session: session of a transaction that writes.
+            which: condition on the rows; rows without a valid lease stay unchanged.
+            change: change of the rows.
         """
         return move(session, self.table, which & (self.table.state == State.RUNNING), change.to, **change.values)
 
     def _heartbeat(self, session: Session, leases: Sequence[L]) -> tuple[L, ...]:
         row = self.table
-        beaten = update(row).where(self._of(leases), row.state == State.RUNNING).values(heartbeat_at=now())
+        beaten = update(row).where(self.of(leases), row.state == State.RUNNING).values(heartbeat_at=now())
         held = {(id_, epoch) for id_, epoch in session.execute(beaten.returning(row.id, row.epoch))}
         return tuple(lease for lease in leases if (lease.id, lease.epoch) in held)
 
-    def _release(self, session: Session, which: ColumnElement[bool], reason: str) -> list[Any]:
+    def lose(self, session: Session, which: ColumnElement[bool], reason: str) -> list[Any]:
+        """Queue work again whose worker was lost, or end it as FAILED after too many losses; return the ids."""
         losses = self.table.losses + 1
         values = {"losses": losses, "owner": None}
         last = f"lost {MAX_LOSSES} times without progress; the last time {reason}"
@@ -152,8 +161,9 @@ class Leases(Generic[L]):
 
     def _requeue_lost(self, session: Session, stale_after_s: float) -> list[Any]:
         stale = self.table.heartbeat_at < moment(session) - timedelta(seconds=stale_after_s)
-        return self._release(session, stale, f"its worker was not heard of for {stale_after_s:g} s")
+        self.free_lost(session, stale)
+        return self.lose(session, stale, f"its worker was not heard of for {stale_after_s:g} s")
 
-    def _of(self, leases: Sequence[L]) -> ColumnElement[bool]:
-        """Return the condition that a row's lease is one of these."""
+    def of(self, leases: Sequence[L]) -> ColumnElement[bool]:
+        """Return the SQL condition: the row's lease is one of these."""
         return tuple_(self.table.id, self.table.epoch).in_([(lease.id, lease.epoch) for lease in leases])

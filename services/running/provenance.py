@@ -1,8 +1,8 @@
-"""Provenance: what experiments were computed with, and which supervisors may go on with them.
+"""Provenance: the versions that computed an experiment, and the supervisors that may continue it.
 
-An experiment keeps what computed its first steps: its engines with their libraries, the machine's architecture, the
-version of the spec, its external plug-ins. A supervisor that differs leaves it alone until a person accepts that.
-A supervisor that cannot use a plug-in leaves all experiments alone that name it; they stay queued, and tell why.
+An experiment is bound to the versions that computed its first steps: its engines with their libraries, the machine's
+architecture, the version of the spec, its external plug-ins. A supervisor with others skips it until a person accepts.
+A supervisor that cannot use a plug-in skips all experiments that name it; they stay queued, and tell why.
 """
 
 import re
@@ -36,7 +36,7 @@ _IMPORTED = re.compile(r", \S+\.py [0-9a-f]{12}(?=[,)])")
 
 @snapshot
 def read(session: Session, experiment_id: str) -> ProvenanceRead:
-    """Return what the experiment was computed with, and what a supervisor has that left it alone.
+    """Return the versions that computed the experiment, and those of a supervisor that skipped it.
 
     Raises:
         NotFound: no such experiment.
@@ -50,18 +50,22 @@ def read(session: Session, experiment_id: str) -> ProvenanceRead:
 
 @transaction
 def accept_versions(session: Session, experiment_id: str) -> ExperimentRead:
-    """Let the next supervisor go on with the experiment under any versions, which bind it from then on.
+    """Let the next supervisor continue the experiment under any versions; the experiment is then bound to those.
 
     Raises:
         NotFound: no such experiment.
-        Conflict: it has ended, or has not begun.
+        Conflict: it has ended, or has not started.
         StoreUnavailable: the database cannot be used now.
     """
     experiment = get_experiment(session, experiment_id)
     lock(session, [experiment_id])
     session.refresh(experiment)
     if experiment.state.ended or experiment.computed_with is None:
-        why = f"has ended: it is {experiment.state}" if experiment.state.ended else "has not begun under any versions"
+        why = (
+            f"has ended: it is {experiment.state}"
+            if experiment.state.ended
+            else "has not started, so it has no versions yet"
+        )
         msg = f"experiment {experiment_id!r} {why}; there is nothing to accept"
         raise Conflict(msg)
     told = {"computed_with": experiment.computed_with, "refused_by": experiment.refused_by}
@@ -114,7 +118,7 @@ def refuse_unusable(session: Session, repetitions: Sequence[int], refused: Mappi
 
 
 def record(session: Session, under: Provenance, claims: Sequence[Claim]) -> None:
-    """Store the provenance of claims, and bind experiments that begin to it. The experiments are locked."""
+    """Store the provenance of claims, and bind starting experiments to it. The experiments must be locked."""
     id_, experiment = id_of(under), ExperimentRow
     specs = {claim.experiment_id: claim.spec.model_dump(mode="json") for claim in claims}
     insert_unless_there(session, [{"id": id_, "facts": under.model_dump(mode="json")}])
@@ -199,7 +203,7 @@ def _uses(session: Session, experiment_id: str) -> tuple[ProvenanceUse, ...]:
 
 
 def _holds(text: str, under: Provenance) -> bool:
-    """Return whether each part of a `decisive` text is true of this provenance."""
+    """Return whether this provenance has each version in a `decisive` text."""
     true = [*(_engine(under, name) for name in under.engines), *_machine(under)]
     true += [_external(under, plugin) for plugin in under.outside]
     part = "|".join(map(re.escape, [*true, *(_IMPORTED.sub("", text) for text in true)]))
@@ -219,6 +223,6 @@ def _external(under: Provenance, plugin: str) -> str:
 
 
 def _engines(spec: Mapping[str, Any]) -> set[str]:
-    """Return the names of the simulators' engine and of reality's."""
+    """Return the names of the simulators' engine and of reality's engine."""
     chosen = (spec.get("engine"), spec["reality"].get("engine"))
     return {ref["name"] for ref in chosen if ref}

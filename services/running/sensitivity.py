@@ -1,4 +1,4 @@
-"""Running sensitivity checks, the oldest first, under the lease of `gaplab.services.running.leases`.
+"""Execution of sensitivity checks, oldest first, under the lease of `gaplab.services.running.leases`.
 
 All functions raise StoreUnavailable while the database cannot be used; each may then be tried again.
 """
@@ -21,7 +21,7 @@ from gaplab.services.store.statements import storable
 
 
 class _Checks(Leases[CheckClaim]):
-    """Leases of sensitivity checks: an end is told to the experiments that the check belongs to."""
+    """Leases of sensitivity checks. When one ends, its experiments get an event."""
 
     table = SensitivityRow
 
@@ -45,7 +45,7 @@ requeue_lost = _LEASES.requeue_lost
 
 
 def complete(store: Store, lease: CheckClaim, found: Sequence[Sensitivity]) -> bool:
-    """End the check as COMPLETED with what it found; return False if the lease no longer holds."""
+    """End the check as COMPLETED with its results; return False if the lease is no longer valid."""
     return bool(_LEASES.complete(store, lease, found=[each.model_dump(mode="json") for each in found]))
 
 

@@ -1,4 +1,4 @@
-"""Signs of life of supervisors. Each function is one transaction, and raises StoreUnavailable."""
+"""Heartbeats of supervisors. Each function is one transaction, and raises StoreUnavailable."""
 
 from datetime import timedelta
 
@@ -9,12 +9,12 @@ from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Session, transaction
 
 FORGET_AFTER = timedelta(days=1)
-"""Age of the last sign of life after which a supervisor is forgotten."""
+"""Age of the last heartbeat after which a supervisor is forgotten."""
 
 
 @transaction
 def heartbeat(session: Session, owner: str) -> None:
-    """Note that the supervisor works now, whether it has anything to do or not."""
+    """Record that the supervisor is alive now, with or without work."""
     row = SupervisorRow
     beaten = session.execute(update(row).where(row.owner == owner).values(heartbeat_at=now()).returning(row.owner))
     if beaten.first() is None:
@@ -24,5 +24,5 @@ def heartbeat(session: Session, owner: str) -> None:
 
 @transaction
 def end(session: Session, owner: str) -> None:
-    """Forget a supervisor that has stopped in good order."""
+    """Forget a supervisor that has shut down in order."""
     session.execute(delete(SupervisorRow).where(SupervisorRow.owner == owner))

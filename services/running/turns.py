@@ -16,6 +16,11 @@ from gaplab.services.store.queries.experiments import lock
 _ROW = ExperimentRow
 _ORDER = (_ROW.precedence, _ROW.running, _ROW.created_at, _ROW.position, _ROW.id)
 
+_HELD = select(RepetitionRow.hardware).where(RepetitionRow.hardware.is_not(None))
+
+FREE_HARDWARE = _ROW.hardware.is_(None) | _ROW.hardware.not_in(_HELD)
+"""That an experiment needs no hardware, or some that no repetition holds."""
+
 
 def next_repetitions(session: Session, limit: int, permitted: ColumnElement[bool]) -> tuple[int, ...]:
     """Lock the experiments whose turn it is, and return up to `limit` of their queued repetitions in order."""
@@ -29,12 +34,12 @@ def next_repetitions(session: Session, limit: int, permitted: ColumnElement[bool
 
 
 def next_experiments(limit: int) -> Select[str]:
-    """Select the experiments with the next turns off an index; no later one can have one of the `limit` turns."""
+    """Select the experiments with the next turns from an index; no other can have one of the `limit` turns."""
     return select(_ROW.id).where(_ROW.claimable.is_(True)).order_by(*_ORDER).limit(limit)
 
 
 def ahead(session: Session, experiments: Sequence[str], permitted: ColumnElement[bool]) -> frozenset[str]:
-    """Return the experiments that should give one claimed repetition up for another, permitted experiment's."""
+    """Return the experiments that should give up a claimed repetition for one of another permitted experiment."""
     waits = _ROW.claimable.is_(True) & permitted
     first = select(_ROW.precedence, _ROW.running).where(waits).order_by(*_ORDER).limit(1)
     if (waiting := session.execute(first).first()) is None:
@@ -48,9 +53,9 @@ def ahead(session: Session, experiments: Sequence[str], permitted: ColumnElement
 
 
 def _turns(session: Session, experiments: Sequence[str], limit: int, permitted: ColumnElement[bool]) -> list[str]:
-    """Return the experiment of each turn; an experiment has one more running after each of its turns.
+    """Return the experiment of each turn; each turn gives its experiment one more running repetition.
 
-    What is claimable and permitted is read again now that the experiments are locked.
+    The experiments are locked, so this reads again which of them are claimable and permitted.
     """
     row = RepetitionRow
     queued = (
@@ -60,20 +65,25 @@ def _turns(session: Session, experiments: Sequence[str], limit: int, permitted: 
         .subquery()
     )
     candidates = session.execute(
-        select(_ROW.id, _ROW.precedence, _ROW.running, _ROW.max_parallel, queued.c.queued)
+        select(_ROW.id, _ROW.precedence, _ROW.running, _ROW.max_parallel, queued.c.queued, _ROW.hardware)
         .join(queued, queued.c.experiment_id == _ROW.id)
         .where(_ROW.claimable.is_(True), permitted)
         .order_by(_ROW.created_at, _ROW.position, _ROW.id)
     ).all()
     heap = [
         (precedence, running, age, min(waiting, waiting if most is None else most - running))
-        for age, (_, precedence, running, most, waiting) in enumerate(candidates)
+        for age, (_, precedence, running, most, waiting, _) in enumerate(candidates)
     ]
     heapify(heap)
     turns: list[str] = []
+    used: set[str] = set()
     while heap and len(turns) < limit:
         precedence, running, age, room = heap[0]
+        if (hardware := candidates[age].hardware) in used:
+            heappop(heap)
+            continue
         turns.append(candidates[age].id)
+        used |= {hardware} - {None}
         if room > 1:
             heapreplace(heap, (precedence, running + 1, age, room - 1))
         else:

@@ -1,4 +1,4 @@
-"""Versions that numbers depend on, of this process: code, Python, libraries, engines, kind of processor."""
+"""Versions of this process that numbers depend on: code, Python, libraries, engines, kind of processor."""
 
 import platform
 import subprocess
@@ -22,7 +22,7 @@ from gaplab.services.store.models import SPEC_VERSION
 CODE = ("schemas", "services", "workers")
 LIBRARIES = ("numpy", "scipy", "cma", "numba")
 DISTRIBUTIONS = {"mujoco": ("mujoco-core", "mujoco")}
-"""Distributions of modules that may come under another name."""
+"""Distributions that may provide a module, if its own name is not the only one."""
 
 ROOT = Path(__file__).parents[2]
 GIT_S = 5.0
@@ -116,13 +116,13 @@ def _version(module: str) -> str:
 
 @cache
 def _distributions() -> Mapping[str, list[str]]:
-    """Return the distributions of each module; their names often differ. The look-up takes a quarter of a second."""
+    """Return the distributions of each module, whose name may differ from its own; this takes a quarter of a second."""
     return packages_distributions()
 
 
 @cache
 def _digest() -> str:
-    """Return eight letters that change with the code; a version alone does not name the checked-out commit."""
+    """Return a hash of the code, eight letters; the version alone does not identify the checked-out commit."""
     digest = sha256()
     for path in sorted(path for top in CODE for path in (ROOT / top).rglob("*.py")):
         digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
@@ -130,7 +130,7 @@ def _digest() -> str:
 
 
 def _git(*command: str) -> str | None:
-    """Return git's answer about this code; None without git, or if the folder is no repository's top."""
+    """Return git's answer about this code; None without git, or if the folder is not the top of a repository."""
     if not (ROOT.parent / ".git").exists():
         return None
     try:

@@ -1,1 +1,1 @@
-"""From a submitted spec to what runs."""
+"""Specs: from a submitted spec to the simulation that runs."""

@@ -11,7 +11,7 @@ from gaplab.schemas.resolved import ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked
 from gaplab.services.core import external_plugins
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters
-from gaplab.services.core.errors import gather
+from gaplab.services.core.errors import PluginBroken, RealityFailed, gather
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.ports import Simulate
@@ -46,6 +46,9 @@ class Simulation:
         worlds = [self._world(tuple(row)) for row in parameters.tolist()]
         motions = [self._robot.motion(genome) for genome in genomes]
         fitnesses = self._robot.fitness(self._engine.rollouts(worlds, motions))
+        if np.shape(fitnesses) != (len(genomes), len(parameters)):
+            expected = f"the fitness of {len(genomes)} genomes in {len(parameters)} simulators"
+            raise PluginBroken(f"robot {self._robot.name!r} returned {np.shape(fitnesses)} numbers for {expected}")
         return np.where(np.isfinite(fitnesses), fitnesses, np.nan)
 
     def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:
@@ -61,7 +64,7 @@ class Simulation:
 
 
 class HiddenReality:
-    """A Reality that is a simulation with hidden parameters.
+    """A simulation with hidden parameters.
 
     Args:
         simulate: the simulation on reality's engine.
@@ -72,28 +75,39 @@ class HiddenReality:
         self._simulate = simulate
         self._parameters = parameters[None, :]
 
+    def fitnesses(self, genomes: Genomes) -> FloatArray:
+        """Return the fitnesses `(n,)` of genomes `(n, g)` in reality; nan where the physics failed.
+
+        Raises:
+            RealityFailed: its code raised an error.
+        """
+        try:
+            return self._simulate(genomes, self._parameters)[:, 0]
+        except (Exception, SystemExit) as error:
+            raise RealityFailed("reality failed") from error
+
+
+class MeasuredReality(HiddenReality):
+    """A Reality that is a simulation with hidden parameters."""
+
     def __call__(self, genome: Genome) -> float:
         """Return the fitness of a genome `(g,)` in reality; nan if the physics failed."""
-        return float(self._simulate(genome[None, :], self._parameters)[0, 0])
+        return float(self.fitnesses(genome[None, :])[0])
 
 
-class EvolutionInReality:
+class EvolutionInReality(HiddenReality):
     """A Simulate for the direct baseline: every simulator is reality."""
-
-    def __init__(self, simulate: Simulate, parameters: FloatArray) -> None:
-        self._simulate = simulate
-        self._parameters = parameters[None, :]
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
         """Return the fitnesses of genomes `(n, g)` in reality, `(n, m)`; the m simulators do not matter."""
-        return np.repeat(self._simulate(genomes, self._parameters), len(parameters), axis=1)
+        return np.repeat(self.fitnesses(genomes)[:, None], len(parameters), axis=1)
 
 
 def setting(spec: ResolvedSpec, repetition: int) -> Setting:
-    """Return everything that one repetition depends on.
+    """Return the setting of one repetition.
 
     Args:
-        spec: of the experiment.
+        spec: spec of the experiment.
         repetition: the number of the repetition, from 0.
     """
     robot = robots.create(spec.robot)
@@ -106,7 +120,7 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
         simulate = EvolutionInReality(real, truth)
     return Setting(
         simulate=simulate,
-        reality=HiddenReality(real, truth),
+        reality=MeasuredReality(real, truth),
         strategy=strategy,
         optimizer=optimizers.create(spec.optimizer),
         genomes=robot.space,
@@ -144,7 +158,7 @@ def edits_of(names: Iterable[str]) -> list[Tunable]:
     """Return the tunables of these names.
 
     Raises:
-        InvalidSpec: one is not installed here.
+        InvalidSpec: a tunable is not installed here.
     """
     return [tunables.create(PluginRef(name=name), "/tunables") for name in names]
 
@@ -153,11 +167,11 @@ def refuse_missing(spec: ResolvedSpec, *, reality: bool = False) -> None:
     """Check that the plug-ins that a stored spec simulates with are installed here.
 
     Args:
-        spec: of the experiment.
+        spec: spec of the experiment.
         reality: also check the plug-ins of reality.
 
     Raises:
-        InvalidSpec: one is not; perhaps its file was removed.
+        InvalidSpec: a plug-in is missing; perhaps its file was removed.
     """
     needed = [(spec.engine, "/engine"), *([(spec.reality.engine, "/reality/engine")] if reality else [])]
     names = [*(ref.name for ref in spec.tunables), *(spec.reality.parameters if reality else ())]
@@ -169,7 +183,7 @@ def refuse_missing(spec: ResolvedSpec, *, reality: bool = False) -> None:
 
 
 def engine_of(ref: PluginRef) -> Engine:
-    """Return the engine: one instance in this process for equal options, warm from use to use.
+    """Return the engine: one instance in this process for equal options, which keeps its worlds loaded.
 
     Raises:
         InvalidSpec: it is not available here.

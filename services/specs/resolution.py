@@ -41,7 +41,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     budget = _budget(spec)
     violations = [
         *tunable_violations(spec, engine),
-        *reality_violations(spec, reality_engine),
+        *reality_violations(spec, strategy, engine, reality_engine),
         *budget_violations(budget, strategy, optimizer),
     ]
     if violations:
@@ -105,7 +105,7 @@ def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
 
 
 def spec_of(stored: Mapping[str, Any]) -> ResolvedSpec:
-    """Return a stored spec to read from, not to run: it lacks the parameters of reality that are unknown here."""
+    """Return a stored spec for reading, not for running: it may lack parameters of reality."""
     reality = stored["reality"]
     known = {name: value for name, value in reality["parameters"].items() if value is not None}
     return ResolvedSpec.model_validate({**stored, "reality": {**reality, "parameters": known}})

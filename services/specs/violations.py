@@ -47,7 +47,7 @@ def _bound_violations(ref: TunableRef, pointer: str) -> Iterator[Violation]:
 def _range_violations(tunable: type[Tunable], value: float, pointer: str) -> Iterator[Violation]:
     if not tunable.least <= value <= tunable.greatest:
         permitted = f"{tunable.least:g} to {tunable.greatest:g}"
-        yield Violation(pointer, value, f"{tunable.name} is {permitted}, not {value:g}", permitted)
+        yield Violation(pointer, value, f"{tunable.name} must be from {permitted}, not {value:g}", permitted)
 
 
 def _honour_violations(name: str, engine: type[Engine], pointer: str) -> Iterator[Violation]:
@@ -58,8 +58,20 @@ def _honour_violations(name: str, engine: type[Engine], pointer: str) -> Iterato
         yield Violation(pointer, name, message, able)
 
 
-def reality_violations(spec: ExperimentSpec, engine: type[Engine]) -> Iterator[Violation]:
-    """Yield parameters of reality that are unknown, out of range, or ignored by its engine."""
+def reality_violations(
+    spec: ExperimentSpec, strategy: Strategy, simulated: type[Engine], engine: type[Engine]
+) -> Iterator[Violation]:
+    """Yield parameters of reality that are unknown, out of range, or ignored by its engine; direct use of hardware.
+
+    Args:
+        spec: as submitted.
+        strategy: that it names.
+        simulated: engine of the simulators.
+        engine: of reality.
+    """
+    if strategy.in_reality and engine is not simulated and not engine.repeatable:
+        message = f"{strategy.name} evolves in reality itself, and the engine {engine.name!r} may move hardware"
+        yield Violation("/strategy", strategy.name, message, "another strategy, or an engine with `repeatable = True`")
     for name, value in spec.reality.parameters.items():
         pointer = f"/reality/parameters/{name}"
         if name not in tunables:

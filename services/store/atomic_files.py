@@ -1,4 +1,4 @@
-"""Files that get their name once they are whole, and replace no other."""
+"""Files that appear under their name when complete, and never replace another file."""
 
 import os
 from collections.abc import Iterator
@@ -9,16 +9,16 @@ from secrets import token_hex
 
 @contextmanager
 def appearing(file: Path, mode: int = 0o666) -> Iterator[Path]:
-    """Open a part file to write into; it gets its name when the context ends well, once it is on the disk.
+    """Yield a part file to write into. When the context ends without an error, it is synced and renamed to `file`.
 
-    A killed process leaves a part file, whose random name blocks no later one.
+    A killed process leaves its part file; the name is random, so a later attempt is not blocked.
 
     Args:
-        file: its name, which must be free.
+        file: final name, which must be free.
         mode: permissions, restricted by the process's umask.
 
     Raises:
-        OSError: the file is there already, or cannot be written.
+        OSError: the file exists already, or cannot be written.
     """
     if file.exists():
         raise _taken(file)
@@ -34,7 +34,7 @@ def appearing(file: Path, mode: int = 0o666) -> Iterator[Path]:
 
 
 def _name(part: Path, file: Path) -> None:
-    """Give the part file its name, unless another file has got it meanwhile."""
+    """Rename the part file, unless another file has taken the name meanwhile."""
     try:
         os.link(part, file)
     except FileExistsError as error:

@@ -11,23 +11,23 @@ from gaplab.services.store.atomic_files import appearing
 from gaplab.services.store.engine import open_engine
 
 PG_DUMP = 'pg_dump --format=custom --file={file} "postgresql:${{GAPLAB_DATABASE_URL#*:}}"'
-"""The URL may name a driver before its first colon, as in postgresql+psycopg://; pg_dump knows none."""
+"""The URL may name a driver before its first colon, as in postgresql+psycopg://; pg_dump accepts none."""
 
 
 def backup(url: str, file: Path) -> int:
-    """Copy a SQLite database as of one moment, while others write to it, and return the size in bytes.
+    """Copy a SQLite database as of one moment, even while it is in use, and return the size in bytes.
 
-    Writers wait as long as the file takes to be read. The copy appears under its name once it is whole, checked and on
+    Writers wait until the database has been read. The copy appears under its name once it is complete, checked and on
     the disk. Only its owner may read it.
 
     Args:
-        url: of the database, at any revision.
-        file: that must not be there yet.
+        url: URL of the database, at any revision.
+        file: file that must not exist yet.
 
     Raises:
-        Unsupported: the database is a Postgres; the message says what copies one.
+        Unsupported: the database is a Postgres; the message names the tool that copies one.
         StoreUnavailable: there is no database, it is in use for too long, or it is corrupt.
-        OSError: the file is there already, or cannot be written.
+        OSError: the file exists already, or cannot be written.
     """
     engine = open_engine(url)
     if engine.name != "sqlite":

@@ -11,7 +11,7 @@ from sqlalchemy.types import TypeDecorator
 
 
 class UtcDateTime(TypeDecorator[datetime]):
-    """A moment in UTC; aware in Python on every database, though SQLite itself knows no time zones."""
+    """A time in UTC; Python gets it with its time zone from every database, although SQLite has no time zones."""
 
     impl = DateTime(timezone=True)
     cache_ok = True
@@ -22,23 +22,23 @@ class UtcDateTime(TypeDecorator[datetime]):
         return datetime
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002  # the base's signature
-        """Refuse a moment without a time zone, which is ambiguous."""
+        """Refuse a time without a time zone, which is ambiguous."""
         if value is None:
             return None
         if value.tzinfo is None:
-            msg = f"a moment needs its time zone: {value!r} has none"
+            msg = f"a time needs a time zone: {value!r} has none"
             raise ValueError(msg)
         return value.astimezone(UTC)
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002  # the base's signature
-        """Return the moment in UTC."""
+        """Return the time in UTC."""
         if value is None:
             return None
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
 
 
 class now(FunctionElement[datetime]):  # noqa: N801  # reads as the SQL function that it is
-    """The database's clock: all hosts of a service agree on it, which leases need."""
+    """SQL function for the time by the database's clock, which is the same for all hosts; leases need that."""
 
     type = UtcDateTime()
     inherit_cache = True

@@ -51,5 +51,5 @@ def _part(part: object, column: Column) -> ColumnElement[Any]:
 
 
 def _storable(text: str) -> bool:
-    """Return whether the databases take the text: Postgres refuses NULs, and neither takes halves of characters."""
+    """Return whether both databases accept the text: Postgres refuses NULs, and both refuse lone surrogates."""
     return "\0" not in text and bool(text.encode())

@@ -9,7 +9,7 @@ from sqlalchemy.exc import TimeoutError as PoolExhausted
 from gaplab.services.core.errors import StoreUnavailable
 
 _CLASHES = {"40001", "40P01"}
-"""Postgres gave up one of two transactions for the other: serialization failure, deadlock."""
+"""Postgres aborted one of two conflicting transactions: serialization failure, deadlock."""
 
 _NO_SCHEMA = {"42P01", "42703"}
 """Postgres knows no such table, or no such column."""
@@ -22,7 +22,7 @@ def named() -> Iterator[None]:
     """Turn errors of the database into one sentence without its password.
 
     Raises:
-        StoreUnavailable: it is unreachable, locked for too long, no database at all, or has another schema.
+        StoreUnavailable: the database is unreachable, locked for too long, not a database, or has another schema.
     """
     try:
         yield
@@ -39,7 +39,7 @@ def named() -> Iterator[None]:
 
 
 def is_clash(error: DBAPIError) -> bool:
-    """Return whether the transaction was given up for another, and may succeed if it runs again."""
+    """Return whether the transaction was aborted for another one, and may succeed if it runs again."""
     return _sqlstate(error) in _CLASHES
 
 

@@ -1,4 +1,4 @@
-"""Opening of databases, with the settings that durability and locking rest on."""
+"""Database engines, with the settings on which durability and locking depend."""
 
 import sqlite3
 from typing import Any
@@ -20,19 +20,19 @@ CONNECT_S = 5
 _WAL_IS_SOUND = (3, 51, 3)
 """Before this, SQLite's write-ahead log can be corrupted when it is reset. Source: https://sqlite.org/wal.html.
 
-The rollback journal is then kept and its header zeroed, which is synced before COMMIT returns. A deleted journal may be
-back after a power loss, and then undoes the last transaction. Source: https://sqlite.org/pragma.html, EXTRA.
+The rollback journal is then kept and its header zeroed, which is synced before COMMIT returns. A deleted journal may
+reappear after a power loss, and then undoes the last transaction. Source: https://sqlite.org/pragma.html, EXTRA.
 """
 
 
 def open_engine(url: str, *, enforce_foreign_keys: bool = True) -> Engine:
     """Return the engine of a SQLite or Postgres URL, without connecting.
 
-    Its errors carry no values, for a spec would tell the log what reality hides.
+    Its errors contain no values, since a logged spec would reveal reality's parameters.
 
     Args:
         url: SQLAlchemy URL; Postgres without a driver gets psycopg 3.
-        enforce_foreign_keys: in SQLite; False in a migration that rebuilds tables.
+        enforce_foreign_keys: enforce them in SQLite; False in a migration that rebuilds tables.
 
     Raises:
         StoreUnavailable: no such kind of database.
@@ -65,8 +65,8 @@ def _parse(url: str) -> URL:
 def _prepare_sqlite(engine: Engine, *, enforce_foreign_keys: bool) -> None:
     """Make SQLite durable, and let writers wait for each other.
 
-    The driver's own BEGIN is deferred: a read that turns into a write would fail at once, without patience. So the
-    driver begins nothing, and a transaction that will write begins IMMEDIATE.
+    The driver's own BEGIN is deferred: a transaction that first reads and then writes would fail at once, without
+    waiting. So the driver begins nothing, and a transaction that will write begins IMMEDIATE.
     """
     journal = "WAL" if sqlite3.sqlite_version_info >= _WAL_IS_SOUND else "PERSIST"
 

@@ -1,4 +1,4 @@
-"""Leases of repetitions and sensitivity checks, and what the holder of a repetition delivers."""
+"""Leases of repetitions and sensitivity checks, and the deliveries of a repetition's holder."""
 
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -10,13 +10,13 @@ from gaplab.services.core.types import Step
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A part of what simulators answered in the step under way, so that it need not be simulated again.
+    """Some of the simulators' answers in the current step, so that they need not be simulated again.
 
     Attributes:
-        step: the place of the step in the log.
-        part: its number within the step, from 0.
-        answers: as `gaplab.services.core.answers` packs them.
-        seconds: of work that they took.
+        step: place of the step in the log.
+        part: number of the checkpoint within the step, from 0.
+        answers: answers, packed by `gaplab.services.core.answers`.
+        seconds: seconds of work that they took.
     """
 
     step: int
@@ -30,7 +30,7 @@ class Lease:
     """The right of one supervisor to a piece of work; a write with an old epoch is refused.
 
     Attributes:
-        id: of the work.
+        id: id of the work.
         epoch: number of the lease among the leases of this work, from 1.
     """
 
@@ -40,14 +40,14 @@ class Lease:
 
 @dataclass(frozen=True)
 class Claim(Lease):
-    """The lease of a repetition; equal to another of the same epoch.
+    """The lease of a repetition; claims with the same epoch are equal.
 
     Attributes:
-        experiment_id: of the repetition's experiment.
-        number: of the repetition within its experiment, from 0.
-        spec: of the experiment.
-        log: the steps recorded so far, from which to go on.
-        checkpoints: of the next step, if it was under way before.
+        experiment_id: id of the repetition's experiment.
+        number: number of the repetition within its experiment, from 0.
+        spec: spec of the experiment.
+        log: recorded steps, after which to continue.
+        checkpoints: checkpoints of the next step, if an earlier lease began it.
     """
 
     id: int
@@ -63,7 +63,7 @@ class CheckClaim(Lease):
     """The lease of a sensitivity check.
 
     Attributes:
-        spec: what is checked.
+        spec: subject of the check.
     """
 
     id: str
@@ -78,5 +78,37 @@ class TimedStep:
     seconds: float
 
 
+@dataclass(frozen=True)
+class Pulse:
+    """A sign of life of a worker, while it has nothing else to deliver.
+
+    Attributes:
+        step: place of the running step in the log.
+        measuring: whether reality is being asked.
+        idle_s: seconds since a rollout or a step ended.
+        step_s: seconds of work in this step so far.
+    """
+
+    step: int
+    measuring: bool
+    idle_s: float
+    step_s: float
+
+
+@dataclass(frozen=True)
+class Failure:
+    """The reason why a worker cannot continue a repetition.
+
+    Attributes:
+        reason: text that everybody may see at any time.
+        hidden: the reason with the message of reality's code, which may name hidden parameters.
+        of_reality: whether the code of reality raised it.
+    """
+
+    reason: str
+    hidden: str | None = None
+    of_reality: bool = False
+
+
 Delivered: TypeAlias = TimedStep | Checkpoint
-"""What a worker delivers."""
+"""A delivery of a worker, to be stored."""

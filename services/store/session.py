@@ -30,7 +30,7 @@ class Store:
 
     Attributes:
         errors: number of times that the database could not be used.
-        retries: number of transactions that Postgres gave up for others, and that ran again.
+        retries: number of transactions that Postgres aborted for others, and that ran again.
     """
 
     def __init__(self, url: str) -> None:
@@ -43,7 +43,7 @@ class Store:
 
     @contextmanager
     def transaction(self) -> Iterator[Session]:
-        """Open a session that may write: all of it is committed at the end, or none of it.
+        """Open a session that may write; at the end, all of it is committed, or nothing.
 
         Raises:
             StoreUnavailable: the database cannot be used now.
@@ -53,7 +53,7 @@ class Store:
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
-        """Open a session that reads one moment of the database; keep it short, for in SQLite it delays writers.
+        """Open a session that reads a snapshot of the database; keep it short, since it delays writers in SQLite.
 
         Raises:
             StoreUnavailable: the database cannot be used now.
@@ -62,9 +62,9 @@ class Store:
             yield session
 
     def write(self, work: Callable[Concatenate[Session, P], T], /, *args: P.args, **kwargs: P.kwargs) -> T:
-        """Return `work(session, *args, **kwargs)` from a transaction of its own.
+        """Return `work(session, *args, **kwargs)`, run in a separate transaction.
 
-        The transaction runs again when Postgres gave it up for another one.
+        The transaction runs again if Postgres aborted it for another one.
 
         Raises:
             StoreUnavailable: the database cannot be used now.
@@ -86,7 +86,7 @@ class Store:
         """Check that the database can be used and has the schema of this version.
 
         Raises:
-            StoreUnavailable: it cannot or has not; the message says what to do.
+            StoreUnavailable: it cannot be used, or has another schema; the message says what to do.
         """
         with self.reading() as session:
             revisions = session.scalars(text("SELECT version_num FROM alembic_version")).all()
@@ -111,7 +111,7 @@ class Store:
 
 
 def transaction(work: Callable[Concatenate[Session, P], T]) -> Callable[Concatenate[Store, P], T]:
-    """Make a use case of a function of a session: called with a store, it runs as `Store.write` does."""
+    """Turn a function of a session into a use case: called with a store, it runs as `Store.write` does."""
 
     @wraps(work)
     def use_case(store: Store, /, *args: P.args, **kwargs: P.kwargs) -> T:
@@ -121,7 +121,7 @@ def transaction(work: Callable[Concatenate[Session, P], T]) -> Callable[Concaten
 
 
 def snapshot(work: Callable[Concatenate[Session, P], T]) -> Callable[Concatenate[Store, P], T]:
-    """Make a use case of a function that only reads: called with a store, it sees one moment of the database."""
+    """Turn a function that only reads into a use case: called with a store, it reads a snapshot of the database."""
 
     @wraps(work)
     def use_case(store: Store, /, *args: P.args, **kwargs: P.kwargs) -> T:

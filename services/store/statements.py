@@ -1,4 +1,4 @@
-"""Statements and values that SQLite and Postgres want written differently."""
+"""Statements and values that differ between SQLite and Postgres."""
 
 from collections.abc import Callable
 
@@ -14,10 +14,10 @@ _INSERT: dict[str, Callable[..., postgresql.Insert | sqlite.Insert]] = {
 
 
 def insert_new(session: Session, table: type[Base]) -> postgresql.Insert | sqlite.Insert:
-    """Return an INSERT that leaves rows alone whose key is there already."""
+    """Return an INSERT that skips rows whose key exists already."""
     return _INSERT[session.get_bind().dialect.name](table).on_conflict_do_nothing()
 
 
 def storable(text: str) -> str:
-    """Return the text with a replacement for what a database refuses: NUL characters and halves of characters."""
+    """Return the text with NUL characters and lone surrogates replaced, which databases refuse."""
     return text.encode(errors="replace").decode().replace("\0", "\N{REPLACEMENT CHARACTER}")

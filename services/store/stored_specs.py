@@ -7,7 +7,7 @@ from gaplab.schemas.sensitivity import Checked
 
 
 def checked(spec: Mapping[str, Any]) -> Checked:
-    """What a sensitivity check of this resolved spec looks at."""
+    """Return the subject of a sensitivity check of this resolved spec."""
     return Checked.model_validate({name: spec[name] for name in ("robot", "engine", "tunables")})
 
 

@@ -33,7 +33,7 @@ class Column:
         nullable: null is permitted.
         required: an insert must give a value, since there is no default.
         generated: the database itself numbers the rows.
-        longest: characters of a text; None if there is no limit.
+        longest: most characters of a text; None if there is no limit.
         large: a whole number of 64 bits, rather than 32.
         choices: the only permitted texts; empty if all are.
     """

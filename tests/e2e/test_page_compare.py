@@ -167,7 +167,7 @@ def test_it_grows_as_an_experiment_goes_on(api: Any, written: Store, visit: Any)
         expect(page.locator(".large .point")).to_have_count(1 + iteration)
     for claim in claims:
         assert execution.complete(written, claim)
-    expect(page.locator(".chosen .pill.completed")).to_be_visible()
+    expect(page.locator(".chosen .state-badge.completed")).to_be_visible()
 
 
 def test_its_figure_is_saved_in_every_format(archive: Any, ids: Any, visit: Any) -> None:

@@ -10,6 +10,7 @@ from playwright.sync_api import expect
 
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import some_log, toy
@@ -67,7 +68,7 @@ def test_it_grows_as_iterations_come_in_without_being_loaded_anew(api: Any, writ
     expect(page.locator(".state-now")).to_contain_text("completed")
     expect(happened.first).to_contain_text("Completed")
     page.get_by_role("tabpanel").scroll_into_view_if_needed()
-    expect(page.get_by_role("tabpanel").locator("tbody .pill.completed")).to_have_count(2)
+    expect(page.get_by_role("tabpanel").locator("tbody .state-badge.completed")).to_have_count(2)
     simulators = page.locator(".figure-simulators")
     simulators.scroll_into_view_if_needed()
     expect(simulators.locator(".legendtext").get_by_text("Reality", exact=True)).to_be_visible()
@@ -117,7 +118,7 @@ def test_it_says_that_the_service_is_away_and_catches_up_by_itself(api: Any, wri
 def test_what_failed_is_said_with_its_reason_and_attempts(api: Any, written: Store, visit: Any) -> None:
     submitted = submission.submit_experiment(written, toy(repetitions=1))
     (claim,) = execution.claim(written, "tests", 1)
-    assert execution.fail(written, claim, "a foot fell off")
+    assert execution.fail(written, claim, Failure("a foot fell off"))
     page = visit(address(api, submitted.id))
     expect(page.locator(".state-now")).to_contain_text("failed")
     expect(page.locator(".remark.broken")).to_contain_text("a foot fell off")

@@ -136,8 +136,8 @@ def test_errors_stand_beside_their_fields_until_they_are_right(visit: Any, archi
     page.get_by_label("Static friction", exact=True).last.fill("99")
     page.locator(".trouble", has_text="whole number").or_(page.locator(".trouble", has_text="integer")).wait_for()
     page.get_by_label("Iterations").fill("")
-    page.locator(".trouble", has_text="static_friction is 0 to 10, not 99").wait_for()
-    page.locator(".trouble", has_text="restitution is 0 to 0.9, not -1").wait_for()
+    page.locator(".trouble", has_text="static_friction must be from 0 to 10, not 99").wait_for()
+    page.locator(".trouble", has_text="restitution must be from 0 to 0.9, not -1").wait_for()
     axe(page)
     screenshot(page, "new-errors")
     assert page.locator("[aria-invalid]").count() == 2

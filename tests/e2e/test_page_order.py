@@ -201,15 +201,15 @@ def test_a_part_that_could_not_be_had_for_a_while_is_not_left_as_it_was(visit: A
     made = archive.http.post("/experiments", json={"robot": "toy_function", "strategy": "random", "budget": "smoke"})
     page = visit(f"{archive.url}/#/experiments/{made.json()['id']}?tab=repetitions")
     page.get_by_role("tabpanel").scroll_into_view_if_needed()
-    page.locator("tbody .pill.queued").first.wait_for()
+    page.locator("tbody .state-badge.queued").first.wait_for()
 
     page.route("**/repetitions", lambda route: route.fulfill(status=500, json={"status": 500, "title": "Busy"}))
     archive.http.post(f"/experiments/{made.json()['id']}/cancel")
-    page.locator(".state-now .pill.cancelled").wait_for()
+    page.locator(".state-now .state-badge.cancelled").wait_for()
     page.wait_for_timeout(3000)
     page.unroute("**/repetitions")
 
-    page.locator("tbody .pill.cancelled").first.wait_for()
+    page.locator("tbody .state-badge.cancelled").first.wait_for()
 
 
 def test_what_was_saved_is_shown_though_nothing_can_be_looked_at_any_more(visit: Any, archive: Any) -> None:

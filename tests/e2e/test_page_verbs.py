@@ -39,7 +39,9 @@ def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api: Any, written
     verbs = page.get_by_role("group", name="Actions on this experiment")
     state = page.locator(".state-now")
     verbs.get_by_role("button", name="Resume").press("Enter")
-    expect(page.locator(".verbs .said")).to_contain_text("queued cannot be resumed, only one that is pausing or paused")
+    expect(page.locator(".life-cycle .outcome")).to_contain_text(
+        "queued cannot be resumed, only one that is pausing or paused"
+    )
 
     verbs.get_by_role("button", name="Pause").click()
     expect(state).to_contain_text("paused")
@@ -104,5 +106,5 @@ def test_with_a_token_files_are_saved_and_a_reader_is_told_that_he_may_only_look
     assert saved.value.url.startswith("blob:")
     assert saved.value.path().read_bytes().startswith(b"PK")
     page.get_by_role("button", name="Pause").click()
-    expect(page.locator(".verbs .said")).to_contain_text("runner")
+    expect(page.locator(".life-cycle .outcome")).to_contain_text("runner")
     expect(page.locator(".state-now")).to_contain_text("queued")

@@ -253,11 +253,7 @@ def test_the_verbs_of_an_experiment_and_of_a_study(api: TestClient) -> None:
     assert [each.status_code for each in answers] == [200, 409, 200, 200, 409, 200, 200, 200, 409]
     states = [each.json().get("state") for each in answers]
     assert states == ["PAUSED", None, "QUEUED", "CANCELLED", None, "PAUSED", "RUNNING", "CANCELLED", None]
-    assert (
-        answers[1]
-        .json()["detail"]
-        .endswith("is PAUSED and cannot be paused; what can be done with it: resume, stop, cancel")
-    )
+    assert answers[1].json()["detail"].endswith("is PAUSED and cannot be paused; permitted: resume, stop, cancel")
 
 
 def test_an_experiment_is_extended_to_totals_and_given_another_turn(store: Store, api: TestClient) -> None:

@@ -96,7 +96,7 @@ def test_beyond_loopback_a_service_without_a_token_does_not_start_and_says_how_t
     )
 
     assert refused.returncode == 1
-    assert refused.stderr.startswith("gaplab: 0.0.0.0 is more than loopback")
+    assert refused.stderr.startswith("gaplab: 0.0.0.0 is reachable from other machines")
     assert "gaplab token create" in refused.stderr
     assert refused.stderr.count("\n") == 1
 

@@ -343,7 +343,7 @@ def test_what_came_without_its_reality_cannot_be_extended(store: Store, other: A
     import_archive(other, BytesIO(exported(export_study(store, study.id))))
 
     assert reading.read_experiment(other, direct).state is State.COMPLETED
-    with pytest.raises(Conflict, match="before its reality was shown"):
+    with pytest.raises(Conflict, match="while its reality was hidden"):
         extension.extend_experiment(other, direct, ExtensionSpec(repetitions=3))
 
 

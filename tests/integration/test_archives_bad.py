@@ -124,14 +124,14 @@ def test_what_is_no_zip(sqlite_store: Store, archive: Any) -> None:
 
 @pytest.mark.parametrize("name", ["../../../etc/passwd", "/etc/passwd", "C:\\x", "event.parquet", "a/experiment.jsonl"])
 def test_a_member_with_another_name(sqlite_store: Store, good: Any, name: Any) -> None:
-    refused(sqlite_store, packed(good | {name: b"x"}), "a member is called", "permitted: ")
+    refused(sqlite_store, packed(good | {name: b"x"}), "unknown member", "permitted: ")
 
 
 def test_a_member_twice(sqlite_store: Store, good: Any) -> None:
     file = BytesIO(packed(good))
     with pytest.warns(UserWarning, match="Duplicate"), zipfile.ZipFile(file, "a") as archive:
         archive.writestr("experiment.jsonl", b"{}")
-    refused(sqlite_store, file.getvalue(), "experiment.jsonl is there twice")
+    refused(sqlite_store, file.getvalue(), "it has experiment.jsonl twice")
 
 
 def test_another_compression(sqlite_store: Store, good: Any) -> None:
@@ -174,7 +174,7 @@ def test_a_member_that_is_missing(sqlite_store: Store, good: Any, name: Any) -> 
         ({"format": "1"}, "format"),
         ({"format": float("nan")}, "format"),
         ({"kind": "everything"}, "kind"),
-        ({"kind": "study"}, "are not those of the study"),
+        ({"kind": "study"}, "other studies or experiments than the study"),
         ({"id": "another"}, "another"),
         ({"members": {}}, "but not in both"),
         ({"surprise": 1}, "surprise"),
@@ -227,7 +227,7 @@ def without(part: Any) -> Any:
         ({"created_at": "yesterday"}, "created_at"),
         ({"created_at": "2012-11-05T09:00:00"}, "timezone info"),
         ({"created_at": "0001-01-01T00:00:00+14:00"}, "created_at"),
-        ({"study_id": "a1"}, "are not those"),
+        ({"study_id": "a1"}, "other studies or experiments"),
         ({"spec": []}, "not a spec"),
         ({"spec": "text"}, "spec/dict[str,any]: Input should be a valid dictionary"),
         ({"spec": in_spec(repetitions=1)}, "does not fit its experiment"),
@@ -274,7 +274,7 @@ def test_a_number_or_a_value_that_json_has_not(sqlite_store: Store, good: Any, t
         (b"5\n", "not a JSON object"),
         (b"\xff\n", "not JSON"),
         (b'{"id": "a", "password": 1}\n', "does not know: password"),
-        (b"", "its experiment is not"),
+        (b"", "another experiment than"),
     ],
 )
 def test_rows_that_are_none(sqlite_store: Store, good: Any, content: Any, said: Any, unpacked_here: Any) -> None:
@@ -292,7 +292,7 @@ def test_a_row_without_an_end(
 @pytest.mark.parametrize(
     ("table", "change", "said"),
     [
-        ("measurement", lambda rows: [*rows, rows[0]], "there twice"),
+        ("measurement", lambda rows: [*rows, rows[0]], "occurs twice"),
         ("measurement", lambda rows: rows[1:], "not a log of 13 steps"),
         ("measurement", lambda rows: set_in(rows, 0, fitness=float("nan")), "measurement.parquet"),
         ("measurement", lambda rows: set_in(rows, 0, fitness=float("inf")), "measurement.parquet"),

@@ -1,6 +1,7 @@
 """Checkpoints of the step under way: made by the worker, kept by the store, and used once."""
 
 import time
+from itertools import islice
 from threading import enumerate as threads
 from typing import Any
 
@@ -15,6 +16,7 @@ from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution
 from gaplab.services.running.execution import Checkpoint
 from gaplab.services.running.leases import MAX_LOSSES
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.models import CheckpointRow
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import StepRecorder, recorded
@@ -61,7 +63,9 @@ def test_a_call_that_would_take_long_is_made_in_several() -> None:
         return paraboloid(genomes, parameters)
 
     calls, told = Recorder(slow), []  # type: ignore[var-annotated]
-    answers = StepRecorder(told.append, 0.02, 5).answers(small_setting(simulate=calls))
+    answers = StepRecorder(told.append, 0.02, tuple(islice(repetition(small_setting()), 5))).answers(
+        small_setting(simulate=calls)
+    )
     genomes = np.random.default_rng(0).random((30, 2))
 
     fitnesses = answers(genomes, genomes[:2])
@@ -196,7 +200,7 @@ def test_a_repetition_that_fails_leaves_no_checkpoints(store: Store, hopeless: A
         assert checkpoints_left(store) == 1
         execution.release(store, claim, "killed")
         (claim,) = execution.claim(store, "me", 1) or (claim,)
-    assert execution.fail(store, claim, "no") is not hopeless
+    assert execution.fail(store, claim, Failure("no")) is not hopeless
 
     assert checkpoints_left(store) == 0
 

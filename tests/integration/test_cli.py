@@ -20,6 +20,7 @@ from gaplab.services.core.sensitivity import Effort, check
 from gaplab.services.experiments import listing
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import subject
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab, served
 from tests.experiments import run, some_log
@@ -122,7 +123,7 @@ def test_watching_what_fails_says_why_and_ends_with_1(gaplab: Gaplab, sqlite_sto
     def work() -> None:
         wait_for_submission(sqlite_store)
         for claim in execution.claim(sqlite_store, "test", limit=10):
-            execution.fail(sqlite_store, claim, "ValueError: the robot fell apart")
+            execution.fail(sqlite_store, claim, Failure("ValueError: the robot fell apart"))
 
     worker = threading.Thread(target=work)
     worker.start()
@@ -172,7 +173,7 @@ def test_the_verbs_say_what_it_is_now_and_forbidden_ones_are_a_sentence(gaplab: 
 
     assert [each.out.rpartition(" is ")[2].strip() for each in said] == ["PAUSED.", "QUEUED.", "", "QUEUED.", ""]
     assert [each.code for each in said] == [0, 0, Exit.CONFLICT, 0, Exit.CONFLICT]
-    assert said[2].err.endswith("is QUEUED and cannot be resumed; what can be done with it: pause, stop, cancel\n")
+    assert said[2].err.endswith("is QUEUED and cannot be resumed; permitted: pause, stop, cancel\n")
     assert gaplab("stop", id).out.endswith("is COMPLETED.\n")
 
 

@@ -24,6 +24,7 @@ from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind, EventRead
 from gaplab.services import access
 from gaplab.services.running import execution
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 
 SMALL = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 3}
@@ -223,7 +224,7 @@ def test_waiting_shows_progress_on_standard_error_if_asked(
 def test_waiting_for_what_fails_raises_with_its_reason(client: Client, sqlite_store: Store) -> None:
     experiment = client.submit(SMALL)
     for claim in execution.claim(sqlite_store, "test", limit=10):
-        execution.fail(sqlite_store, claim, "ValueError: the robot fell apart")
+        execution.fail(sqlite_store, claim, Failure("ValueError: the robot fell apart"))
 
     with pytest.raises(ExperimentFailed, match="ended as FAILED; ValueError: the robot fell apart") as failed:
         client.wait(experiment.id)

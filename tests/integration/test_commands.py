@@ -25,6 +25,7 @@ from gaplab.api.commands.cli import app
 from gaplab.api.commands.exit_codes import BY_STATUS, Exit
 from gaplab.api.http import problems
 from gaplab.services.running import execution
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 
@@ -160,7 +161,7 @@ def test_a_failed_experiment_is_a_document_and_still_a_failure_for_the_shell(
     gaplab: Gaplab, study: str, sqlite_store: Store
 ) -> None:
     for claim in execution.claim(sqlite_store, "test", limit=10):
-        execution.fail(sqlite_store, claim, "ValueError: the robot fell apart")
+        execution.fail(sqlite_store, claim, Failure("ValueError: the robot fell apart"))
 
     said = gaplab("watch", study, "--json")
 

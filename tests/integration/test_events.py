@@ -33,6 +33,7 @@ from gaplab.services.running import execution, provenance, sensitivity
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.running.versions import provenance as own
 from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.queries.events import note, write
 from gaplab.services.store.queries.experiments import insert_experiment
 from gaplab.services.store.session import Store
@@ -90,7 +91,7 @@ def everything_that_can_happen(store: Store) -> None:
     submission.submit_experiment(store, toy(repetitions=2))
     fails, waits = execution.claim(store, "me", 2)
     execution.record(store, waits, next(some_log()))
-    execution.fail(store, fails, "it is broken")
+    execution.fail(store, fails, Failure("it is broken"))
     execution.hand_back(store, waits)
     execution.claim(store, "other", 1, OTHER)
     provenance.accept_versions(store, waits.experiment_id)

@@ -13,6 +13,7 @@ from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.running import execution
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import setting
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, same, some_log, toy
 
@@ -161,7 +162,7 @@ def test_a_holder_who_wakes_up_late_cannot_write(store: Store) -> None:
         execution.record(store, late, first),
         execution.record(store, late, second),
         bool(execution.complete(store, late)),
-        execution.fail(store, late, "x"),
+        execution.fail(store, late, Failure("x")),
         execution.release(store, late, "x"),
     )
 
@@ -245,7 +246,7 @@ def test_the_experiment_is_completed_with_its_last_repetition(store: Store) -> N
 
     run(store, claims[0])
     states.append(reading.read_experiment(store, submitted.id).state)
-    execution.fail(store, claims[1], "the code raised")
+    execution.fail(store, claims[1], Failure("the code raised"))
     states.append(reading.read_experiment(store, submitted.id).state)
     run(store, claims[2])
 
@@ -259,7 +260,7 @@ def test_an_experiment_fails_when_all_of_its_repetitions_do_and_says_each_reason
     submitted = submission.submit_experiment(store, toy(repetitions=3))
 
     for claim, reason in zip(execution.claim(store, "me", 3), ("zero division", "a key", "zero division"), strict=True):
-        assert execution.fail(store, claim, reason)
+        assert execution.fail(store, claim, Failure(reason))
 
     found = reading.read_experiment(store, submitted.id)
     assert found.state is State.FAILED
@@ -321,7 +322,7 @@ def test_cancelling_while_repetitions_end_leaves_no_experiment_without_an_end(st
         return "cancelled"
 
     with ThreadPoolExecutor(4) as pool:
-        failed = [pool.submit(execution.fail, store, each, "x") for each in claims]
+        failed = [pool.submit(execution.fail, store, each, Failure("x")) for each in claims]
         cancelled = [pool.submit(called_off, each) for each in ids]
 
     assert [each.result() for each in failed] == [each.result() == "ended before" for each in cancelled]

@@ -14,6 +14,7 @@ from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
 from gaplab.services.running import execution
 from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.experiments import AWKWARD, cancel, run, some_log, toy
 
@@ -94,7 +95,7 @@ def test_the_state_of_a_study_is_that_of_its_experiments_together(store: Store) 
 
     (first,) = execution.claim(store, "me", 1)
     states.append(reading.read_study(store, study).state)
-    execution.fail(store, first, "x")
+    execution.fail(store, first, Failure("x"))
     states.append(reading.read_study(store, study).state)
     finish_all(store)
     states.append(reading.read_study(store, study).state)
@@ -289,7 +290,7 @@ def test_repetitions_tell_how_far_they_are(store: Store) -> None:
     experiment = submission.submit_experiment(store, toy()).id
     first, second = execution.claim(store, "me", 2)
     run(store, first)
-    execution.fail(store, second, "the code raised")
+    execution.fail(store, second, Failure("the code raised"))
 
     found = reading.list_repetitions(store, experiment)
 

@@ -23,6 +23,7 @@ from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.settings import Limits
 from gaplab.services.specs.assembly import setting
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 
 HIDDEN = {"static_friction": 0.7319462853, "dynamic_friction": 0.2846190537}
@@ -61,7 +62,7 @@ def run_halfway(store: Store) -> None:
         for step in islice(repetition(setting(claim.spec, claim.number)), 7):
             assert execution.record(store, claim, step, seconds=0.1)
         if number == 0:
-            assert execution.fail(store, claim, "physics went wrong")
+            assert execution.fail(store, claim, Failure("physics went wrong"))
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ from gaplab.services.results import curves
 from gaplab.services.running import execution
 from gaplab.services.running.execution import TimedStep
 from gaplab.services.specs.assembly import setting
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
@@ -220,7 +221,7 @@ def in_state(store: Store, wanted: Any) -> Any:
         compute_with(store, some_log)
     elif wanted is State.FAILED:
         for each in (claim, *execution.claim(store, "me", 9)):
-            execution.fail(store, each, "broken")
+            execution.fail(store, each, Failure("broken"))
     else:
         verbs = {State.PAUSING: Verb.PAUSE, State.PAUSED: Verb.PAUSE, State.STOPPING: Verb.STOP}
         verbs[State.CANCELLED] = Verb.CANCEL
@@ -263,7 +264,7 @@ def test_a_verb_of_a_study_goes_to_all_of_its_experiments_that_permit_it(store: 
     ask(store, second, Verb.PAUSE)
 
     paused = lifecycle.ask_study(store, study.id, Verb.PAUSE)
-    with pytest.raises(Conflict, match="they are CANCELLED, PAUSED; permitted is QUEUED, RUNNING"):
+    with pytest.raises(Conflict, match="they are CANCELLED, PAUSED; permitted: QUEUED, RUNNING"):
         lifecycle.ask_study(store, study.id, Verb.PAUSE)
     resumed = lifecycle.ask_study(store, study.id, Verb.RESUME)
     cancelled = lifecycle.ask_study(store, study.id, Verb.CANCEL)
@@ -333,7 +334,7 @@ def test_repetitions_of_the_direct_baseline_can_be_extended_but_it_has_no_iterat
 def test_totals_below_what_is_there_are_refused(store: Store, totals: Any) -> None:
     experiment = in_state(store, State.COMPLETED)
 
-    with pytest.raises(InvalidSpec, match=r"is a total, which must not be smaller|name the total"):
+    with pytest.raises(InvalidSpec, match=r"that the experiment has; give a total|give a total of"):
         extension.extend_experiment(store, experiment, ExtensionSpec(**totals))
 
     assert state(store, experiment) is State.COMPLETED
@@ -343,7 +344,7 @@ def test_a_failed_repetition_is_not_tried_again_by_extending(store: Store) -> No
     experiment = submitted(store, repetitions=2)
     first, second = execution.claim(store, "me", 2)
     run(store, first)
-    execution.fail(store, second, "broken")
+    execution.fail(store, second, Failure("broken"))
 
     extension.extend_experiment(store, experiment, ExtensionSpec(iterations=3))
 
@@ -366,7 +367,7 @@ def test_attempts_say_who_had_a_repetition_and_how_it_ended(store: Store) -> Non
         ("first", lambda claim: execution.release(store, claim, "its process was killed")),
         ("second", lambda claim: execution.requeue_lost(store, stale_after_s=-1)),
         ("third", lambda claim: execution.hand_back(store, claim)),
-        ("fourth", lambda claim: execution.fail(store, claim, "ZeroDivisionError")),
+        ("fourth", lambda claim: execution.fail(store, claim, Failure("ZeroDivisionError"))),
     ):
         (claim,) = execution.claim(store, owner, 1)
         end(claim)

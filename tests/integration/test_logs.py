@@ -41,9 +41,9 @@ def logged(stream: io.StringIO, *given: object, **named: object) -> str:
 
 @pytest.mark.usefixtures("restored")
 def test_a_terminal_gets_a_line_that_people_read() -> None:
-    line = logged(Terminal(), "on from step %d", 3, extra={"experiment": "abc", "repetition": 0})
+    line = logged(Terminal(), "continues from step %d", 3, extra={"experiment": "abc", "repetition": 0})
 
-    assert line.endswith(" INFO    gaplab.test abc/0: on from step 3\n")
+    assert line.endswith(" INFO    gaplab.test abc/0: continues from step 3\n")
 
 
 @pytest.mark.usefixtures("restored")

@@ -17,8 +17,7 @@ from gaplab.services.core.errors import ClusterUnusable
 from gaplab.services.experiments import reading, submission
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import Store
-from gaplab.workers import nodes
-from gaplab.workers import repetitions as task
+from gaplab.workers import nodes, task
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
 from tests.integration.test_workers import expected, run, stored, toy

@@ -16,7 +16,7 @@ from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.settings import Settings
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
-from gaplab.workers import repetitions as task
+from gaplab.workers import task
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.cluster import cluster
 from gaplab.workers.lending import SharedCall, sizes
@@ -157,7 +157,7 @@ def test_a_task_computes_every_step_of_a_repetition() -> None:
     )
     claim = Claim(id=0, epoch=0, experiment_id="none", number=0, spec=spec)
 
-    stream = task.run.remote(claim, {}, CHECKPOINT_S)
+    stream = task.run.remote(claim, {}, CHECKPOINT_S, None)
 
     steps = [each for batch in stream for each in ray.get(batch) if isinstance(each, TimedStep)]  # type: ignore[attr-defined]
     assert len(steps) == sum(1 for _ in repetition(setting(spec, 0)))

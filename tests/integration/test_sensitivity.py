@@ -126,8 +126,8 @@ def test_what_a_check_finds_is_shown_and_warns_the_experiments(store: Store) -> 
     assert read.state is State.COMPLETED
     assert read.tunables[:2] == found
     assert read.warnings == (
-        "grip over 0 to 1.5 does nothing: it changes fitness by 0.1 % of what controllers differ by",
-        "slip over 0 to 1.5 is rough: 70 % of what it does to fitness jumps from value to value",
+        "grip over 0 to 1.5 does nothing: its effect on fitness is 0.1 % of the spread between controllers",
+        "slip over 0 to 1.5 is rough: 70 % of its effect on fitness is noise between neighbouring values",
     )
     assert reading.read_experiment(store, experiment).warnings == read.warnings
     assert listing.list_experiments(store).items[0].warnings == read.warnings

@@ -25,6 +25,7 @@ from gaplab.services.running import execution
 from gaplab.services.running.execution import Claim, TimedStep
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.models import AttemptRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
@@ -231,7 +232,8 @@ class LifeCycle(RuleBasedStateMachine):
     def fail(self, pick: Any, seldom: Any) -> None:
         if not seldom:
             experiment, each = self.one_of(self.running(), pick)
-            self.end(experiment, each, State.FAILED, Ending.FAILED, lambda *held: execution.fail(*held, "broken"))  # type: ignore[call-arg]
+            broken = Failure("broken")
+            self.end(experiment, each, State.FAILED, Ending.FAILED, lambda *held: execution.fail(*held, broken))  # type: ignore[call-arg]
 
     @precondition(lambda self: self.running())
     @rule(pick=picks)
@@ -270,7 +272,7 @@ class LifeCycle(RuleBasedStateMachine):
         (following,) = [step for _, step in zip(range(1), repetition(setting(late.spec, late.number)), strict=False)]
         assert not execution.record(self.store, late, following)
         assert not execution.complete(self.store, late)
-        assert not execution.fail(self.store, late, "late")
+        assert not execution.fail(self.store, late, Failure("late"))
         assert not execution.release(self.store, late, "late")
         assert not execution.hand_back(self.store, late)
         assert execution.heartbeat(self.store, [late]) == ()

@@ -20,13 +20,13 @@ from gaplab.services.core.sensitivity import Effort, check
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import setting, subject
+from gaplab.services.store.lease import Failure
 from gaplab.services.store.models import CheckpointRow, RepetitionRow, SensitivityRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from gaplab.workers import repetitions, supervisor
 from gaplab.workers import sensitivity as checking
-from gaplab.workers.checkpoints import recorded
-from gaplab.workers.repetitions import batches
+from gaplab.workers.task import delivered
 from tests.fakes import flat
 from tests.without_ray import OPEN, SPEC, Here, HereRepetitions, HereRun, Stop
 
@@ -53,14 +53,16 @@ class Troubled(HereRun):
 
     def receive(self) -> None:
         self.begun = True
-        self.lost, self.failed = ("the worker was lost", None) if self.trouble == "lost" else (None, "it is broken")
+        self.lost, self.failed = (
+            ("the worker was lost", None) if self.trouble == "lost" else (None, Failure("it is broken"))
+        )
 
 
 class TryingRepetitions(HereRepetitions):
     """Everything that may happen to a repetition: the second of the first experiment loses its first worker."""
 
     def launch(self, claim: Any) -> Any:
-        stream = batches(recorded(setting(claim.spec, claim.number), claim.log, claim.checkpoints, 0.0))
+        stream = delivered(lambda: setting(claim.spec, claim.number), claim, 0.0)
         if claim.spec.name == "broken":
             return Troubled(claim, stream, "failed")
         if claim.number == 1 and not Trying.lost:

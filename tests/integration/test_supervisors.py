@@ -184,7 +184,7 @@ def test_a_supervisor_that_slept_past_its_lease_writes_nothing_any_more(
     wait(lambda: state(store, experiment).ended, ours.step)
     ended = stored(store, experiment)
     os.kill(process.pid, signal.SIGCONT)
-    wait(lambda: "no longer ours" in said.read_text())
+    wait(lambda: "no longer holds its lease" in said.read_text())
 
     tried = attempts(store, experiment, 2)
     assert ended == stored(store, experiment) == expected(2)

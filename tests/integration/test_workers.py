@@ -26,8 +26,8 @@ from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.models import CheckpointRow, RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
-from gaplab.workers import repetitions as task
 from gaplab.workers import sensitivity as checking
+from gaplab.workers import task
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
@@ -114,7 +114,7 @@ def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-    def raising(claim: Any, expected: Any, checkpoint_s: Any) -> Iterator[Any]:
+    def raising(claim: Any, *_: Any) -> Iterator[Any]:
         if claim.number == 1:
             msg = "the second one is broken"
             raise ZeroDivisionError(msg)
@@ -136,7 +136,7 @@ def delivering(left_out: Any, attempts: Any) -> Any:
     """A task whose repetition 1 leaves out some of what it has done in its first attempts."""
 
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
-    def task_(claim: Any, expected: Any, checkpoint_s: Any) -> Iterator[Any]:
+    def task_(claim: Any, *_: Any) -> Iterator[Any]:
         delivered = list(recorded(setting(claim.spec, claim.number), claim.log, ()))
         if claim.number == 1 and claim.epoch <= attempts:
             del delivered[left_out]

@@ -10,9 +10,11 @@ const { lastIteration } = await import("../../api/dashboard/views/replay.js");
 const { gathered } = await import("../../api/dashboard/views/study/head.js");
 
 test("an action that a state forbids says what would permit it", () => {
-  assert.equal(refusal("pause", "RUNNING"), "");
-  assert.equal(refusal("resume", "QUEUED"), "An experiment that is queued cannot be resumed, only one that is pausing or paused.");
-  assert.equal(refusal("extend", "FAILED"), "An experiment that is failed cannot be extended, only one that is completed.");
+  assert.equal(refusal("pause", { state: "RUNNING", progress: { failed: 0 } }), "");
+  assert.equal(refusal("resume", { state: "QUEUED", progress: { failed: 0 } }), "An experiment that is queued cannot be resumed, only one that is pausing or paused.");
+  assert.equal(refusal("extend", { state: "FAILED", progress: { failed: 1 } }), "An experiment that is failed cannot be extended, only one that is completed.");
+  assert.equal(refusal("retry", { state: "FAILED", progress: { failed: 1 } }), "");
+  assert.equal(refusal("retry", { state: "COMPLETED", progress: { failed: 0 } }), "None of its repetitions has failed, so none can be retried.");
 });
 
 test("events are sentences, and a kind that is newer than the page has its name", () => {

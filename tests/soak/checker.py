@@ -79,6 +79,7 @@ def _as_submitted(record: Any, found: Any, studies: Any, extended: Any) -> Itera
 
 def _unlike(experiment: Any, spec: Any, larger: Any) -> Iterator[Any]:
     there = ResolvedSpec.model_validate(experiment.spec)
+    spec = spec.model_copy(update={"priority": there.priority})  # a column keeps it
     if larger:
         spec = spec.model_copy(update={"iterations": there.iterations, "repetitions": there.repetitions})
     if there != spec:

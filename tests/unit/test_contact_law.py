@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.engines.mujoco.law import Drive, coast, drive, press, settings, spread, touch
+from gaplab.services.engines.mujoco.law import Drive, apply_impulses, coast, drive, press, settings, touch
 
 WORLD = Quadruped().world
 STEP_S = WORLD.time_step_s
@@ -108,7 +108,7 @@ def test_impulses_act_on_the_degrees_of_freedom_as_these_move_the_contacts() -> 
     excess, cleared, forces = np.empty(3), np.ones(3), np.zeros(7)
 
     coast(STEP_S, jacobian, before, accelerations, excess, cleared)
-    spread(STEP_S, jacobian, impulses, forces)
+    apply_impulses(STEP_S, jacobian, impulses, forces)
 
     assert excess == pytest.approx(before + STEP_S * jacobian @ accelerations)
     assert np.array_equal(cleared, np.zeros(3))

@@ -89,7 +89,7 @@ BROKEN = [
         "has a strategy called 'random', but so has gaplab",
     ),
     (CAREFUL.replace("def select", "def choose"), "careful", r"Careful in broken\.py does not define select"),
-    (CAREFUL.replace('    name = "careful"\n', ""), "broken", "has no name, by which specs would call it"),
+    (CAREFUL.replace('    name = "careful"\n', ""), "broken", "has no name for specs to use"),
     (CAREFUL.replace("searches = False", "Options = 7"), "careful", "cannot be described: TypeError"),
     (CAREFUL.replace("searches = False", "details = {1, 2}.pop"), "careful", "cannot be described: "),
 ]

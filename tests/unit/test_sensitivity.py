@@ -47,7 +47,10 @@ def test_a_tunable_that_changes_nothing_is_found_out() -> None:
 
     assert first.verdict is Verdict.SMOOTH
     assert (second.verdict, second.effect, second.roughness) == (Verdict.NOTHING, 0.0, 0.0)
-    assert warning(second) == "second over 0 to 1 does nothing: it changes fitness by 0 % of what controllers differ by"
+    assert (
+        warning(second)
+        == "second over 0 to 1 does nothing: its effect on fitness is 0 % of the spread between controllers"
+    )
     assert warning(first) is None
 
 

@@ -1,4 +1,4 @@
-"""Progress in a notebook: one display that is replaced, with nothing to install beside Jupyter."""
+"""Progress in a notebook: one display that is replaced, without packages beside Jupyter."""
 
 import sys
 from collections.abc import Iterable

@@ -3,7 +3,7 @@
 
 import { h } from "./dom.js";
 
-/** @typedef {"pause" | "resume" | "stop" | "cancel" | "extend"} Action */
+/** @typedef {"pause" | "resume" | "stop" | "cancel" | "extend" | "retry"} Action */
 
 /**
  * The states of an experiment in which an action is permitted, as gaplab.schemas.lifecycle has them.
@@ -16,21 +16,22 @@ export const PERMITTED = {
   stop: ["QUEUED", "RUNNING", "PAUSING", "PAUSED"],
   cancel: ["QUEUED", "RUNNING", "PAUSING", "PAUSED", "STOPPING"],
   extend: ["COMPLETED"],
+  retry: ["QUEUED", "RUNNING", "PAUSED", "COMPLETED", "FAILED"],
 };
 
 /** @type {Record<Action, string>} */
-const LABELS = { pause: "Pause", resume: "Resume", stop: "Stop…", cancel: "Cancel…", extend: "Extend…" };
+const LABELS = { pause: "Pause", resume: "Resume", stop: "Stop…", cancel: "Cancel…", extend: "Extend…", retry: "Retry" };
 
 /** @type {Record<Action, string>} */
-export const PARTICIPLES = { pause: "paused", resume: "resumed", stop: "stopped", cancel: "cancelled", extend: "extended" };
+export const PARTICIPLES = { pause: "paused", resume: "resumed", stop: "stopped", cancel: "cancelled", extend: "extended", retry: "retried" };
 
 /**
- * Return whether the service permits an action in a state.
+ * Return whether the service permits an action on an experiment: only one with a failed repetition can be retried.
  *
  * @param {Action} action
- * @param {Api.State} state
+ * @param {{ state: Api.State, progress: { failed: number } }} experiment
  */
-export const isPermitted = (action, state) => PERMITTED[action].includes(state);
+export const isPermitted = (action, { state, progress }) => PERMITTED[action].includes(state) && (action !== "retry" || progress.failed > 0);
 
 /**
  * Return the states in which an action is permitted: `queued or running`.
@@ -52,7 +53,7 @@ export function permittedStates(action) {
  * @returns {Page.Updatable}
  */
 export function actionButtons(label, refusal, run, others = []) {
-  const message = h("p", { class: "said", role: "status" });
+  const message = h("p", { class: "outcome", role: "status" });
   const press = async (/** @type {Action} */ action) => {
     message.textContent = refusal(action);
     if (message.textContent) return;
@@ -82,5 +83,5 @@ export function actionButtons(label, refusal, run, others = []) {
     }
   };
   const group = h("div", { role: "group", "aria-label": label }, ...buttons.values(), ...otherButtons);
-  return { element: h("div", { class: "verbs" }, group, message), update };
+  return { element: h("div", { class: "life-cycle" }, group, message), update };
 }

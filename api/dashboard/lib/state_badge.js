@@ -18,4 +18,4 @@ export const ENDED = /** @type {Api.State[]} */ (["COMPLETED", "FAILED", "CANCEL
  * @param {Api.State} state
  */
 export const stateBadge = (state) =>
-  h("span", { class: `pill ${state.toLowerCase()}` }, h("span", { "aria-hidden": "true" }, SIGNS[state]), " ", state.toLowerCase());
+  h("span", { class: `state-badge ${state.toLowerCase()}` }, h("span", { "aria-hidden": "true" }, SIGNS[state]), " ", state.toLowerCase());

@@ -49,7 +49,7 @@ class Optimizer(Plugin):
     @property
     @abstractmethod
     def least_evaluations(self) -> int:
-        """The smallest sensible budget: evaluations of one full population."""
+        """Return the smallest sensible budget: evaluations of one full population."""
 
     @abstractmethod
     def ask(self, state: Population, rng: Generator) -> Genomes:

@@ -26,7 +26,7 @@ REPLACEMENTS: dict[str, tuple[Replacement, Bound]] = {
 
 
 class SteadyStateOptions(Frozen):
-    """What the paper leaves open of its evolutionary algorithm; its reference [10], which says it, could not be found.
+    """Details of the evolutionary algorithm that the paper leaves to its reference [10], which could not be found.
 
     The defaults are gaplab's.
     """
@@ -51,7 +51,8 @@ class SteadyStateOptions(Frozen):
         description="smallest standard deviation of a mutation; each newcomer draws one log-uniformly between the two",
     )
     replacement: Literal["least_fit", "less_fit_of_most_similar"] = Field(
-        default="least_fit", description="rule for the member that leaves; tuning an ensemble always uses the second"
+        default="least_fit",
+        description="rule for the member that leaves; tuning an ensemble always uses `less_fit_of_most_similar`",
     )
     offspring: Annotated[int, Field(strict=True, ge=1, le=10_000)] = Field(
         default=1, description="newcomers evaluated at once, to use many cores; the paper: 1"
@@ -61,8 +62,8 @@ class SteadyStateOptions(Frozen):
 class SteadyState(Optimizer):
     """Steady-state evolution: a newcomer is evaluated and added, then the replacement rule drops a member.
 
-    The first population is drawn uniformly and told whole. Mutation is Gaussian; periodic genes wrap, others clip; at
-    least one gene mutates, so that a newcomer is a copy only where that gene clips at its bound.
+    The first population is drawn uniformly, and evaluated as a whole. Mutation is Gaussian; periodic genes wrap, others
+    clip. At least one gene mutates, so a newcomer is a copy only if that gene clips at its bound.
     """
 
     name = "steady_state"
@@ -72,7 +73,7 @@ class SteadyState(Optimizer):
 
     @property
     def least_evaluations(self) -> int:
-        """The size of the population."""
+        """Return the size of the population."""
         return self.options.population
 
     def ask(self, state: Population, rng: Generator) -> Genomes:
@@ -89,9 +90,9 @@ class SteadyState(Optimizer):
         return insert(state, genomes, fitness, self.options.population, rule)
 
     def rejection_thresholds(self, state: Population, genomes: Genomes) -> FloatArray:
-        """Return the fitness, `(n,)`, below which each newcomer is dropped at once; -inf where that is uncertain.
+        """Return the fitness, `(n,)`, below which each newcomer is dropped at once; -inf if that is uncertain.
 
-        Of several newcomers, an earlier one may change which pair is the most similar: then nothing is certain.
+        With several newcomers, an earlier one may change the most similar pair, so all thresholds are -inf.
         """
         uncertain = self.options.replacement != "least_fit" and len(genomes) > 1
         if state.size < self.options.population or uncertain:

@@ -1,4 +1,4 @@
-"""What a robot is: a world, genomes that move it, and what its movement is worth."""
+"""The contract of a robot: a world, genomes that describe its motion, and the fitness of a trajectory."""
 
 from abc import abstractmethod
 from typing import Any, ClassVar
@@ -14,9 +14,9 @@ class Robot(Plugin):
 
     Attributes:
         engine: the engine that runs it when a spec names none.
-        unit: of its fitness.
+        unit: unit of its fitness.
         world: the robot in reality: its nominal world, whose coefficients are the default hidden truth.
-        space: of its genomes.
+        space: space of its genomes.
         known: `(g,)`, a hand-designed genome of middling fitness.
     """
 
@@ -28,11 +28,11 @@ class Robot(Plugin):
 
     @abstractmethod
     def motion(self, genome: Genome) -> Motion:
-        """The controller that the genome `(g,)` describes."""
+        """Return the motion that the genome `(g,)` describes."""
 
     @abstractmethod
     def fitness(self, trajectory: Trajectory) -> FloatArray:
-        """`(...)`: the worth of each trajectory, maximised; nan where the physics failed."""
+        """Return `(...)`: the fitness of each trajectory, maximised; nan where the physics failed."""
 
     @property
     def is_function(self) -> bool:
@@ -41,6 +41,6 @@ class Robot(Plugin):
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """The robot's default engine, its unit of fitness, the size of its genome, and whether it is a function."""
+        """Return the default engine, the unit of fitness, the size of the genome, and whether it is a function."""
         robot = cls()
         return {"engine": cls.engine, "unit": cls.unit, "genes": robot.space.size, "function": robot.is_function}

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from gaplab.services.engines.mujoco.law import DOFS, ROWS, STEP, SWEEPS, coast, drive, press, spread, touch
+from gaplab.services.engines.mujoco.law import DOFS, ROWS, STEP, SWEEPS, apply_impulses, coast, drive, press, touch
 from gaplab.services.engines.mujoco.layout import layout
 
 MANY = 1 << 20
@@ -70,7 +70,9 @@ def _meet(numba: Any) -> Any:
     count_of, contacts_of, row_of = at["ncon"] // 4, at["contact"] // 8, contact["efc_address"] // 4
     depth_of, friction_of = contact["dist"] // 8, contact["friction"] // 8
     view, pointer, solve = numba.carray, _pointer(numba), _solve()
-    begin, want, balance, bear = (numba.njit(error_model="numpy")(each) for each in (coast, touch, press, spread))
+    begin, want, balance, bear = (
+        numba.njit(error_model="numpy")(each) for each in (coast, touch, press, apply_impulses)
+    )
 
     def meet(model: Any, data: Any, known: Any, forces: Any, rows: int) -> None:
         fields, dofs, step = view(data, MANY, np.int64), len(forces), known[STEP]

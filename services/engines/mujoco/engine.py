@@ -40,6 +40,7 @@ class MuJoCo(Engine):
     Options = MuJoCoOptions
     options: MuJoCoOptions
     honours = ALL_FIELDS
+    repeatable = True
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)

@@ -143,7 +143,7 @@ def press(sweeps: int, inverse: Any, excess: Any, frictions: Any, impulses: Any)
                 excess[other] += inverse[first, other] * change + inverse[second, other] * aside
 
 
-def spread(step: float, jacobian: Any, impulses: Any, forces: Any) -> None:
+def apply_impulses(step: float, jacobian: Any, impulses: Any, forces: Any) -> None:
     """Add the impulses `(r,)` of the contacts in a step to `forces` `(d,)`, as forces on the degrees of freedom."""
     for row in range(len(impulses)):
         for dof in range(len(forces)):

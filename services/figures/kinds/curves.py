@@ -23,7 +23,7 @@ class CostAxis:
     """A horizontal axis other than the number of real-world evaluations.
 
     Attributes:
-        label: of the axis.
+        label: label of the axis.
         note: its explanation in the caption.
         at: x by experiment and number of real-world evaluations; points without an x are not drawn.
     """
@@ -55,9 +55,9 @@ def curves_figure(
     A point without a mean, or with one too large to compute with, is left out. A band needs two repetitions.
 
     Args:
-        curves: in the order of the legend.
-        title: above the figure; empty for none.
-        band: around the lines; by default the interval, or the SD with so few repetitions that the interval would fill
+        curves: curves in the order of the legend.
+        title: text above the figure; empty for none.
+        band: band around the lines; by default the interval, or the SD if few repetitions would make the interval fill
             the figure. The direct baseline always has its SD, as in the paper.
         against: the horizontal axis; by default the number of real-world evaluations.
         each: draw a thin line for every repetition.
@@ -179,8 +179,8 @@ def _caption(
 
 def _level_in_words(one: _Placed) -> str:
     ((_, mean, point), *_) = one.points
-    spread = f" ± {point.sd:.2f} SD" if point.sd is not None else ""
-    return f"{mean:.2f}{spread} (n = {point.n})".replace(" ", "\N{NO-BREAK SPACE}")
+    deviation = f" ± {point.sd:.2f} SD" if point.sd is not None else ""
+    return f"{mean:.2f}{deviation} (n = {point.n})".replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _alt(lines: Sequence[_Placed], levels: Sequence[_Placed], x: Axis, y: Axis) -> str:
@@ -201,5 +201,5 @@ def _table(placed: Sequence[_Placed]) -> Table:
 
 
 def _written(point: CurvePoint, n: str = "") -> str:
-    spread = f" ± {point.sd:.3f}" if point.sd is not None else ""
-    return f"{point.mean:.3f}{spread} ({n}{point.n})"
+    deviation = f" ± {point.sd:.3f}" if point.sd is not None else ""
+    return f"{point.mean:.3f}{deviation} ({n}{point.n})"

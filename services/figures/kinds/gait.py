@@ -17,7 +17,7 @@ def gait_figure(replay: Replay, *, title: str | None = None) -> FigureDefinition
 
     Args:
         replay: the motion; a world whose physics failed is left out.
-        title: above the figure; by default the controller.
+        title: text above the figure; by default the controller.
     """
     there = [("In simulation", replay.simulation), ("In reality", replay.reality)]
     worlds = [(name, world) for name, world in there if world is not None and world.heights_m]

@@ -25,10 +25,10 @@ def predictions_figure(
 
     Args:
         items: the samples.
-        unit: of fitness.
+        unit: unit of fitness.
         pending: samples that are not computed yet.
         left_out: samples of later repetitions that will not be computed.
-        title: above the figure.
+        title: text above the figure.
     """
     told, drawn = _pairs(items)
     values = [value for pairs in drawn.values() for both in pairs for value in both]

@@ -34,7 +34,7 @@ class SimulatorPoint:
     """The best simulator of one iteration of one repetition.
 
     Attributes:
-        parameters: in the order of the dimensions.
+        parameters: tuned values, in the order of the dimensions.
     """
 
     repetition: int
@@ -58,7 +58,7 @@ def simulators_figure(
         tuned: the best simulator of each iteration of each repetition.
         dimensions: the tunables.
         truth: the known parameters of reality by name; None as long as they are hidden.
-        title: above the figure.
+        title: text above the figure.
         columns: most panels in a row.
     """
     shown = _first_repetitions(sorted(tuned, key=lambda each: (each.iteration, each.repetition)))

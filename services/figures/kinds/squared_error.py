@@ -23,9 +23,9 @@ def squared_error_figure(
     """Return a figure of the median and quartiles of the squared error after each iteration with tuning.
 
     Args:
-        errors: by iteration; values too large to compute with are left out.
-        unit: of fitness.
-        title: above the figure.
+        errors: squared errors by iteration; values too large to compute with are left out.
+        unit: unit of fitness.
+        title: text above the figure.
         each: draw a thin line for every repetition.
     """
     errors = {at: {one: drawable(value) for one, value in found.items()} for at, found in errors.items()}

@@ -21,7 +21,7 @@ def toy_figure(toys: Sequence[ToyIteration], *, title: str | None = None) -> Fig
 
     Args:
         toys: one or more iterations of one repetition.
-        title: above the figure; by default the experiment and the repetition.
+        title: text above the figure; by default the experiment and the repetition.
     """
     several = len(toys) > 1
     first = toys[0]

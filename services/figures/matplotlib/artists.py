@@ -26,8 +26,8 @@ def draw_marks(panel: Panel, axes: "Axes", shades: tuple[float, float]) -> None:
     """Draw the marks of a panel, the first lines above later ones.
 
     Args:
-        panel: has the marks.
-        axes: with their limits set.
+        panel: panel with the marks.
+        axes: matplotlib's axes, with their limits set.
         shades: the numbers of the lightest and the darkest shade.
     """
     for order, mark in enumerate(panel.marks):

@@ -25,12 +25,12 @@ class PageLayout:
     """The space around the panels, in inches.
 
     Attributes:
-        columns: of the legend.
+        columns: number of columns of the legend.
         legend_in: height of the legend.
-        caption: its lines.
-        title: its lines.
-        width: of the file.
-        sides: free space at the left and at the right.
+        caption: lines of the caption.
+        title: lines of the title.
+        width: width of the file.
+        sides: free space on the left and on the right.
     """
 
     columns: int

@@ -3,18 +3,18 @@
     study ──< experiment ──< repetition ──< iteration ──< measurement
                                     │                └──< simulator
                                     ├──< attempt
-                                    └──< checkpoint, of the step under way
-    sensitivity, named after what it checks, which many experiments have in common
-    provenance, named after its facts, which many experiments have in common: experiment_provenance
+                                    └──< checkpoint, of the current step
+    sensitivity, shared by experiments with the same subject, whose hash is its id
+    provenance, shared by experiments through experiment_provenance; its id is a hash of its facts
     event, numbered by event_counter
     supervisor
     token, of a caller;  idempotency, a request with its answer
 
-What is plotted or filtered is a column; vectors are JSON arrays, in which floats round-trip exactly. Neither a database
-nor JSON has nan or infinity: a fitness of nan and a squared error of infinity are NULL.
+Values that are plotted or filtered are columns; vectors are JSON arrays, in which floats round-trip exactly. Neither a
+database nor JSON has nan or infinity: a fitness of nan and a squared error of infinity are NULL.
 
-The tallies in `repetition` (steps, rollouts, seconds) are kept in the transaction that adds the rows they count, so
-that progress is a sum over repetitions and never reads results.
+The tallies in `repetition` (steps, rollouts, seconds) are updated in the transaction that adds the rows they count.
+So progress is a sum over repetitions, and reads no results.
 """
 
 from gaplab.services.store.models.access import IdempotencyRow as IdempotencyRow

@@ -11,12 +11,12 @@ from gaplab.services.store.models.base import Base
 
 
 class TokenRow(Base):
-    """A token; the secret itself is nowhere.
+    """A token; its secret is not stored.
 
     Attributes:
         id: the public part of the token, by which it is found, listed and revoked.
         digest: SHA-256 of the secret part, in hexadecimal.
-        last_used_at: to the minute.
+        last_used_at: time of the last use, to the minute.
         revoked_at: time since which it is invalid; the row stays, so revoking the last token does not open the service.
     """
 
@@ -41,12 +41,12 @@ class TokenRow(Base):
 
 
 class IdempotencyRow(Base):
-    """A request that created something under a key of its sender's, with the answer that it got.
+    """A request that created something under an idempotency key, with its answer.
 
     Attributes:
-        caller: id of the sender's token; empty where none is needed. Each caller has keys of its own.
-        digest: SHA-256 of what was asked: the endpoint and the body.
-        answer: as it was sent; NULL only within the transaction that makes it.
+        caller: id of the sender's token; empty if no token is required. Keys of different callers are independent.
+        digest: SHA-256 of the endpoint and the body.
+        answer: answer as it was sent; NULL only within the transaction that computes it.
     """
 
     __tablename__ = "idempotency"

@@ -10,12 +10,13 @@ from gaplab.services.store.models.base import Base
 
 
 class AttemptRow(Base):
-    """One lease of a repetition. The one that has not ended is the one that holds; there is at most one.
+    """One lease of a repetition. At most one has not ended: the valid one.
 
     Attributes:
-        epoch: of the lease, which numbers the attempts of a repetition from 1.
-        ended_at, ending: NULL while it holds.
-        reason: why it failed or was lost.
+        epoch: epoch of the lease, which numbers the attempts of a repetition from 1.
+        ended_at, ending: NULL while the lease is valid.
+        reason: reason of a failure or a loss.
+        hidden_reason: as `hidden_error` of a repetition.
     """
 
     __tablename__ = "attempt"
@@ -27,3 +28,4 @@ class AttemptRow(Base):
     ended_at: Mapped[datetime | None]
     ending: Mapped[Ending | None]
     reason: Mapped[str | None] = mapped_column(Text)
+    hidden_reason: Mapped[str | None] = mapped_column(Text)

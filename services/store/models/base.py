@@ -1,4 +1,4 @@
-"""What all tables have in common."""
+"""The base of all tables."""
 
 from datetime import datetime
 from enum import StrEnum
@@ -11,15 +11,15 @@ from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.store.clock import UtcDateTime
 
-REVISION = "0008"
-"""The migration that makes these tables; a database at any other revision is not ours to touch."""
+REVISION = "0009"
+"""The revision with these tables; a database at any other revision is refused."""
 
 SPEC_VERSION = 1
-"""Of the specs that are stored now."""
+"""Version of newly stored specs."""
 
 
 def _words(kind: type[StrEnum], name: str) -> Enum:
-    """A text that a named constraint holds to the values of an enumeration."""
+    """Return a text type that a named constraint limits to the values of an enumeration."""
     return Enum(
         kind,
         native_enum=False,
@@ -31,18 +31,18 @@ def _words(kind: type[StrEnum], name: str) -> Enum:
 
 
 class Number(TypeDecorator[float]):
-    """A double without the sign of a zero: SQLite keeps none, and an archive has the same bits from each database."""
+    """A double without negative zero, which SQLite does not keep: archives have the same bits from each database."""
 
     impl = Double
     cache_ok = True
 
     def process_bind_param(self, value: float | None, dialect: Dialect) -> float | None:  # noqa: ARG002
-        """-0.0 as 0.0."""
+        """Replace -0.0 by 0.0."""
         return None if value is None else value + 0.0
 
 
 class Base(DeclarativeBase):
-    """The base of all tables: every constraint has a name, so that a migration can name it."""
+    """The base of all tables. Every constraint has a name, so that a migration can refer to it."""
 
     metadata = MetaData(
         naming_convention={

@@ -1,4 +1,4 @@
-"""What simulators answered in steps that are under way."""
+"""Checkpoints: answers of simulators in steps that are not recorded yet."""
 
 from sqlalchemy import ForeignKey
 from sqlalchemy.orm import Mapped, mapped_column
@@ -7,13 +7,13 @@ from gaplab.services.store.models.base import Base
 
 
 class CheckpointRow(Base):
-    """A part of one step; it is gone once the step is recorded, and nothing but time is lost without it.
+    """A part of one step. It is deleted once the step is recorded; without it, only time is lost.
 
     Attributes:
-        step: its place in the log of its repetition.
-        part: its number within the step.
-        answers: digests and fitnesses, as `gaplab.services.core.answers` packs them; no other module reads them.
-        seconds: of work that they took.
+        step: place of the step in the log of its repetition.
+        part: number of the part within the step.
+        answers: digests and fitnesses, packed by `gaplab.services.core.answers`; no other module reads them.
+        seconds: seconds of work that they took.
     """
 
     __tablename__ = "checkpoint"

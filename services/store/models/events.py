@@ -1,4 +1,4 @@
-"""What happened, in order."""
+"""Events of experiments, in commit order."""
 
 from datetime import datetime
 from typing import Any
@@ -11,19 +11,19 @@ from gaplab.services.store.clock import now
 from gaplab.services.store.models.base import Base
 
 NUMBER = BigInteger().with_variant(Integer, "sqlite")
-"""In SQLite, an INTEGER primary key is the row's own number and needs no index of its own."""
+"""Type of the key: in SQLite, an INTEGER primary key is the row number, and needs no index."""
 
 
 class EventRow(Base):
-    """One thing that happened to an experiment, written in the transaction that made it so.
+    """An event of an experiment, written in the transaction that causes it.
 
     There is no foreign key to the experiment: on Postgres it would lock the experiment's row after the counter's, and
     a transaction that has locked the experiment waits for the counter.
 
     Attributes:
-        number: without holes, in the order of commits.
-        repetition: its number within the experiment.
-        kind: one of `EventKind`; a later version has more.
+        number: number without gaps, in commit order.
+        repetition: number of the repetition within the experiment.
+        kind: one of `EventKind`, or a kind of a later version.
     """
 
     __tablename__ = "event"
@@ -38,7 +38,7 @@ class EventRow(Base):
 
 
 class EventCounterRow(Base):
-    """The number of the latest event, in the only row, which a transaction with events locks until its commit."""
+    """The number of the latest event, in a single row; a transaction with events locks it until the commit."""
 
     __tablename__ = "event_counter"
 

@@ -1,4 +1,4 @@
-"""What was submitted, and where it stands."""
+"""Studies, experiments and repetitions, with their states."""
 
 from datetime import datetime
 from typing import Any
@@ -15,7 +15,7 @@ class StudyRow(Base):
     """Experiments that belong together to be compared.
 
     Attributes:
-        notes, edits: as of an experiment.
+        notes, edits: as in `ExperimentRow`.
     """
 
     __tablename__ = "study"
@@ -32,19 +32,21 @@ class ExperimentRow(Base):
     """One resolved spec.
 
     Attributes:
-        position: within its study.
-        spec: what makes its results.
-        iterations: of one repetition, number 0 included.
-        rollouts: expected of one repetition.
-        precedence: its negated priority: the least has its turn first, so that one index is in the order of turns.
-        max_parallel: most repetitions that run at once; NULL for any number.
+        position: position within its study.
+        spec: resolved spec, which determines the results.
+        iterations: iterations of one repetition, number 0 included.
+        rollouts: expected rollouts of one repetition.
+        precedence: negated priority: the smallest has its turn first, so that one index has the order of turns.
+        max_parallel: largest number of repetitions that run at once; NULL for no limit.
         running: number of claimed repetitions.
         claimable: whether one more may be claimed now. `services/experiments/states.py` keeps it and `running`.
         computed_with: engines, machine, version of the spec and external plug-ins that computed its first steps.
-        refused_by: the same of a supervisor that left it alone because they differ.
-        sensitivity_id: of the check of what it tunes.
-        token_id: of the token that submitted it; NULL where none is needed.
-        notes: written by people.
+        refused_by: the same of a supervisor that skipped the experiment because they differ.
+        paused_because: reason why a supervisor paused it; NULL if a person did, or has requested something since.
+        hardware: name of the hardware that is its reality; NULL if reality is only computed.
+        sensitivity_id: id of its sensitivity check.
+        token_id: id of the token that submitted it; NULL without a token.
+        notes: free text by people.
         edits: number of changes of its name or notes.
     """
 
@@ -75,6 +77,8 @@ class ExperimentRow(Base):
     claimable: Mapped[bool] = mapped_column(default=True)
     computed_with: Mapped[str | None] = mapped_column(Text)
     refused_by: Mapped[str | None] = mapped_column(Text)
+    paused_because: Mapped[str | None] = mapped_column(Text)
+    hardware: Mapped[str | None] = mapped_column(String(32), index=True)
     sensitivity_id: Mapped[str | None] = mapped_column(String(32), index=True)
     token_id: Mapped[str | None] = mapped_column(String(32))
     notes: Mapped[str | None] = mapped_column(Text)
@@ -90,14 +94,18 @@ class RepetitionRow(LeasedRow):
     Attributes:
         losses: number of workers lost since a step or a checkpoint was last recorded.
         steps: number of recorded steps, and so the position of the next one in the log.
-        checkpoints: stored parts of the next step.
-        seconds: of work in the recorded steps.
-        provenance_id: of its latest claim.
+        checkpoints: number of stored parts of the next step.
+        seconds: seconds of work in the recorded steps.
+        provenance_id: provenance of its latest claim.
+        measuring_at: time since which it waits for reality's answer; NULL if it does not wait.
+        hidden_error: the error with the message of reality's code, to be shown when hidden parameters may be.
+        hardware: name of the hardware that it holds; unique, so hardware has one holder at a time.
     """
 
     __tablename__ = "repetition"
     __table_args__ = (
         UniqueConstraint("experiment_id", "number"),
+        UniqueConstraint("hardware"),
         Index(None, "state", "heartbeat_at"),
         Index(None, "experiment_id", "state", "number"),
     )
@@ -113,3 +121,6 @@ class RepetitionRow(LeasedRow):
     rollouts_saved: Mapped[int] = mapped_column(BigInteger, default=0)
     seconds: Mapped[float] = mapped_column(default=0.0)
     provenance_id: Mapped[str | None] = mapped_column(String(32))
+    measuring_at: Mapped[datetime | None]
+    hidden_error: Mapped[str | None] = mapped_column(Text)
+    hardware: Mapped[str | None] = mapped_column(String(32))

@@ -15,11 +15,11 @@ class LeasedRow(Base):
 
     Attributes:
         owner: the supervisor that holds the lease, or held it last.
-        epoch: of the lease; every write of a holder carries it, and a write with an old one changes nothing.
-        heartbeat_at: the holder's latest sign of life.
+        epoch: epoch of the lease; every write of a holder has it, and a write with an old epoch changes nothing.
+        heartbeat_at: time of the holder's latest heartbeat.
         attempts: number of claims that were not handed back.
-        losses: number of workers lost since the work last got on.
-        error: why it FAILED or was last queued again.
+        losses: number of workers lost since the last progress.
+        error: reason why it FAILED or was last queued again.
     """
 
     __abstract__ = True

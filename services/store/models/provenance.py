@@ -1,4 +1,4 @@
-"""Provenances of experiments, and the supervisors at work."""
+"""Provenances of experiments, and the running supervisors."""
 
 from datetime import datetime
 from typing import Any
@@ -11,7 +11,7 @@ from gaplab.services.store.models.base import Base
 
 
 class ProvenanceRow(Base):
-    """One distinct provenance; its id follows from the facts."""
+    """One distinct provenance; its id is a hash of its facts."""
 
     __tablename__ = "provenance"
 
@@ -21,7 +21,7 @@ class ProvenanceRow(Base):
 
 
 class ExperimentProvenanceRow(Base):
-    """That an experiment was computed under a provenance, and since when."""
+    """A provenance that computed an experiment, and the time of the first claim under it."""
 
     __tablename__ = "experiment_provenance"
 
@@ -31,7 +31,7 @@ class ExperimentProvenanceRow(Base):
 
 
 class SupervisorRow(Base):
-    """A supervisor that works, or was not heard of since it did."""
+    """A supervisor that works, or that ended without saying so."""
 
     __tablename__ = "supervisor"
 

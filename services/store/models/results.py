@@ -1,4 +1,4 @@
-"""What repetitions found."""
+"""Results of repetitions."""
 
 from datetime import datetime
 
@@ -16,7 +16,7 @@ from gaplab.services.store.models.base import Base
 
 
 class IterationRow(Base):
-    """Select, measure, tune, transfer; what has not happened yet is NULL.
+    """An iteration: select, measure, tune, transfer; columns of later steps are NULL.
 
     The rollouts of a phase are NULL until it is recorded. Number 0, the untuned baseline, selects nothing.
     """

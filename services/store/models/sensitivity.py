@@ -13,8 +13,8 @@ class SensitivityRow(LeasedRow):
     """A sensitivity check, with its lease.
 
     Attributes:
-        id: follows from the spec, so that the same is checked once.
-        spec: robot, engine and tunables, and how much is simulated.
+        id: hash of the spec, so that equal subjects are checked once.
+        spec: robot, engine and tunables, and the size of the check.
         found: effect of each tunable on fitness; NULL until it is known.
     """
 

@@ -1,5 +1,5 @@
-"""Loads and saves by subject, in the session that they are given; they decide nothing and commit nothing.
+"""Loads and saves by subject, in a given session; they decide nothing and commit nothing.
 
 `steps` appends to the logs of repetitions, `logs` reads them, `checkpoints` keeps parts of the next step, and `events`
-notes what happens. `experiments` finds and locks what the others are about.
+records events. `experiments` finds and locks studies and experiments.
 """

@@ -17,10 +17,10 @@ from gaplab.services.store.queries import provenance
 Row = dict[str, Any]
 
 Refused = (IntegrityError, DataError)
-"""Errors of the database for rows that contradict each other, or have no place in it."""
+"""Errors of the database for rows that contradict each other, or do not fit their table."""
 
 REPETITION_ID, EXPERIMENT, REPETITION = "repetition_id", "experiment", "repetition"
-"""Rows have the experiment and the number of a repetition in place of its id, which one database generated."""
+"""Rows have the experiment and the number of a repetition instead of its id, which one database generated."""
 
 _AT_ONCE = 1_000
 _LOCK = 0x67617069  # among the advisory locks of a Postgres database
@@ -29,13 +29,13 @@ _REPLACED = {EXPERIMENT: _REPETITIONS.c.experiment_id, REPETITION: _REPETITIONS.
 
 
 def read_rows(session: Session, name: str, columns: Iterable[str], owners: Sequence[str]) -> Iterator[Row]:
-    """Yield the rows that experiments have in a table, as they come from the database.
+    """Yield the rows of experiments in a table, as the database returns them.
 
     Args:
         session: a snapshot of the database.
         name: the table.
         columns: their names, with `EXPERIMENT` and `REPETITION` in place of the id of a repetition.
-        owners: ids of experiments; of studies, if the table is `study`. Their rows come in this order.
+        owners: ids of experiments, or of studies if the table is `study`; rows have this order.
     """
     names = list(columns)
     queries = [_provenances(names, owners)] if name == "provenance" else [_query(name, names, each) for each in owners]
@@ -45,7 +45,7 @@ def read_rows(session: Session, name: str, columns: Iterable[str], owners: Seque
 
 
 def taken_ids(session: Session, model: type[StudyRow | ExperimentRow], ids: Iterable[str]) -> set[str]:
-    """Return the ids that the database has already; another import waits here until this transaction ends."""
+    """Return the ids that exist already; a concurrent import waits here until this transaction ends."""
     if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write ever overlap
         session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
     return set(session.scalars(select(model.id).where(model.id.in_(list(ids)))))
@@ -61,7 +61,7 @@ def insert_rows(session: Session, name: str, rows: Iterable[Row]) -> int:
 
     Raises:
         IntegrityError: a row exists already, or belongs to a row that does not exist.
-        DataError: a value has no place in its column.
+        DataError: a value does not fit its column.
         KeyError: a row belongs to a repetition that does not exist.
     """
     table, count, incoming = Base.metadata.tables[name], 0, iter(rows)

@@ -32,7 +32,7 @@ def begin(session: Session, repetitions: Sequence[int]) -> None:
 
 
 def end(session: Session, repetitions: Sequence[int], ending: Ending, reason: str | None = None) -> None:
-    """End the open attempts at these repetitions, and note an event for each."""
+    """End the open attempts at these repetitions, and record an event for each."""
     row, repetition = AttemptRow, RepetitionRow
     ended = session.scalars(
         update(row)
@@ -49,15 +49,21 @@ def end(session: Session, repetitions: Sequence[int], ending: Ending, reason: st
 
 
 def latest(session: Session, experiment: str) -> dict[int, int]:
-    """Return the number of the latest attempt by repetition, for an experiment's repetitions that have had one."""
+    """Return the number of the latest attempt by repetition, for all repetitions of an experiment with attempts."""
     row, repetition = AttemptRow, RepetitionRow
     of_it = select(row.repetition_id, func.max(row.epoch)).join(repetition, repetition.id == row.repetition_id)
     found = of_it.where(repetition.experiment_id == experiment).group_by(row.repetition_id)
     return dict(session.execute(found).all())
 
 
-def attempts_of(session: Session, experiment: str, number: int) -> tuple[AttemptRead, ...]:
+def attempts_of(session: Session, experiment: str, number: int, *, secret: bool = True) -> tuple[AttemptRead, ...]:
     """Return the attempts at a repetition, by number.
+
+    Args:
+        session: of a transaction.
+        experiment: its id.
+        number: of the repetition.
+        secret: keep what reality's code said about an error to itself.
 
     Raises:
         NotFound: the experiment has no such repetition.
@@ -74,7 +80,7 @@ def attempts_of(session: Session, experiment: str, number: int) -> tuple[Attempt
             started_at=each.started_at,
             ended_at=each.ended_at,
             ending=each.ending,
-            reason=each.reason,
+            reason=each.reason if secret else each.hidden_reason or each.reason,
         )
         for each in session.scalars(select(row).where(row.repetition_id == id_).order_by(row.epoch))
     )

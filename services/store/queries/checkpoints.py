@@ -1,4 +1,4 @@
-"""Checkpoints of the steps under way: stored in parts, read with a claim, forgotten when the step is recorded."""
+"""Checkpoints of current steps: stored in parts, read with a claim, deleted when the step is recorded."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -13,15 +13,15 @@ from gaplab.services.store.models import CheckpointRow, RepetitionRow
 
 
 def fresh(checkpoints: Sequence[Checkpoint], step: int, parts: int) -> list[Checkpoint]:
-    """Return the delivered parts of the step under way that are not stored yet.
+    """Return the delivered parts of the current step that are not stored yet.
 
     Args:
-        checkpoints: as delivered, in order.
-        step: place in the log of the step under way.
+        checkpoints: delivered parts, in order.
+        step: place of the current step in the log.
         parts: number of its stored parts.
 
     Raises:
-        Conflict: parts, or steps, before a delivered one are missing.
+        Conflict: parts or steps before a delivered part are missing.
     """
     found: list[Checkpoint] = []
     for each in checkpoints:
@@ -35,7 +35,7 @@ def fresh(checkpoints: Sequence[Checkpoint], step: int, parts: int) -> list[Chec
 
 
 def write(session: Session, parts: Mapping[Claim, Sequence[Checkpoint]]) -> None:
-    """Store parts of steps under way. The repetitions are locked, and the claims hold."""
+    """Store parts of current steps. The repetitions must be locked, and the claims valid."""
     rows = [
         {"repetition_id": claim.id} | {name: getattr(each, name) for name in Checkpoint.__dataclass_fields__}
         for claim, checkpoints in parts.items()
@@ -53,13 +53,13 @@ def write(session: Session, parts: Mapping[Claim, Sequence[Checkpoint]]) -> None
 
 
 def forget(session: Session, repetitions: Sequence[int]) -> None:
-    """Remove the parts of steps that are recorded or given up."""
+    """Delete the parts of steps that are recorded or abandoned."""
     if repetitions:
         session.execute(delete(CheckpointRow).where(CheckpointRow.repetition_id.in_(repetitions)))
 
 
 def stored(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Checkpoint, ...]]:
-    """Return the stored parts of the step under way, by repetition."""
+    """Return the stored parts of the current step, by repetition."""
     row = CheckpointRow
     found = session.scalars(select(row).where(row.repetition_id.in_(repetitions)).order_by(row.step, row.part))
     gathered: dict[int, list[Checkpoint]] = defaultdict(list)

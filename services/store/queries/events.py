@@ -1,7 +1,7 @@
-"""Events: noted during a transaction, then numbered and written right before its commit.
+"""Events: collected during a transaction, then numbered and written right before its commit.
 
-Numbers come from one row, which is locked from then on until the commit: a number is visible only with all smaller
-ones, and a transaction that is rolled back takes none. Nothing is locked after that row, so no deadlock comes of it.
+Numbers come from one row, which stays locked until the commit: a number is visible only with all smaller ones, and a
+transaction that is rolled back takes none. Nothing is locked after that row, so it cannot cause a deadlock.
 """
 
 import json
@@ -38,13 +38,13 @@ _INSERT_ON_POSTGRES = text(
 
 
 def note(session: Session, kind: EventKind, experiment: str, repetition: int | None = None, /, **body: Any) -> None:  # noqa: ANN401
-    """Note an event, which is stored if and when the session's transaction commits.
+    """Add an event to the session's transaction, which stores it at its commit.
 
     Args:
-        session: of a transaction that writes.
-        kind: what happened.
+        session: session of a transaction that writes.
+        kind: kind of the event.
         experiment: id of the experiment.
-        repetition: number of the repetition, if it is about one.
+        repetition: number of the repetition, for an event of a repetition.
         body: a few JSON values; never reality's parameters.
     """
     values = {"kind": kind.value, "experiment_id": experiment, "repetition": repetition, "body": body}
@@ -52,7 +52,7 @@ def note(session: Session, kind: EventKind, experiment: str, repetition: int | N
 
 
 def note_steps(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]) -> None:
-    """Note an event for each of these steps."""
+    """Add an event for each of these steps."""
     for claim, steps in deliveries.items():
         for each in steps:
             kind, body = _event_of(each.step)
@@ -60,7 +60,7 @@ def note_steps(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]
 
 
 def write(session: Session) -> None:
-    """Number and store the noted events; the store calls this right before a commit."""
+    """Number and store the added events; the store calls this right before a commit."""
     if not (noted := session.info.pop(_NOTED, None)):
         return
     session.flush()

@@ -1,4 +1,4 @@
-"""Experiments and studies: inserted, found, locked."""
+"""Inserts, look-ups and locks of experiments and studies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,8 +28,8 @@ class Extent:
     """The size of one repetition.
 
     Attributes:
-        iterations: number 0 included.
-        rollouts: as expected.
+        iterations: number of iterations, number 0 included.
+        rollouts: expected number of rollouts.
     """
 
     iterations: int
@@ -39,8 +39,8 @@ class Extent:
 def new_id() -> str:
     """Return a short random name, without letters that look alike.
 
-    There are 31 to the tenth, 8e14: among a million names, the next one is taken with a probability of 1e-9. The
-    database then refuses it with an IntegrityError, and stores nothing of its transaction.
+    There are 31¹⁰ ≈ 8e14 names. With a million in use, the next one is taken with a probability of 1e-9. The
+    database then raises an IntegrityError, and rolls the transaction back.
     """
     return "".join(choice(_LETTERS) for _ in range(10))
 
@@ -65,11 +65,11 @@ def insert_experiment(
     """Add an experiment with its repetitions, all QUEUED.
 
     Args:
-        session: of a transaction that writes.
-        spec: resolved.
-        extent: of each of its repetitions.
-        study: that it belongs to.
-        position: within the study.
+        session: session of a transaction that writes.
+        spec: resolved spec.
+        extent: size of each repetition.
+        study: study that the experiment belongs to.
+        position: position within the study.
         token: id of the token that submitted it.
     """
     experiment = ExperimentRow(
@@ -94,14 +94,14 @@ def insert_experiment(
 
 
 def insert_repetitions(session: Session, experiment_id: str, numbers: range) -> None:
-    """Add repetitions of these numbers, QUEUED."""
+    """Add QUEUED repetitions with these numbers."""
     rows = [{"experiment_id": experiment_id, "number": each} for each in numbers]
     if rows:
         session.execute(insert(RepetitionRow), rows)
 
 
 def get_experiment(session: Session, experiment_id: str) -> ExperimentRow:
-    """Return the experiment of that id.
+    """Return the experiment with this id.
 
     Raises:
         NotFound: there is none.
@@ -110,10 +110,10 @@ def get_experiment(session: Session, experiment_id: str) -> ExperimentRow:
 
 
 def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow, ...]:
-    """Return the experiments of these ids, in their order.
+    """Return the experiments with these ids, in the order of the ids.
 
     Raises:
-        NotFound: one of them is not there.
+        NotFound: an experiment does not exist.
     """
     named = ExperimentRow.id.in_([storable(each) for each in ids])
     found = {row.id: row for row in session.scalars(select(ExperimentRow).where(named))}
@@ -124,7 +124,7 @@ def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow
 
 
 def get_study(session: Session, study_id: str) -> StudyRow:
-    """Return the study of that id.
+    """Return the study with this id.
 
     Raises:
         NotFound: there is none.
@@ -151,6 +151,13 @@ def repetitions_of(session: Session, experiment_id: str) -> tuple[RepetitionRow,
     return tuple(session.scalars(select(row).where(row.experiment_id == experiment_id).order_by(row.number)))
 
 
+def with_failures(session: Session, experiments: Sequence[str]) -> frozenset[str]:
+    """Return the ids of the experiments of which a repetition FAILED."""
+    row = RepetitionRow
+    failed = select(row.experiment_id).where(row.experiment_id.in_(experiments), row.state == State.FAILED)
+    return frozenset(session.scalars(failed.distinct()))
+
+
 def lock(session: Session, experiments: Sequence[str]) -> dict[str, State]:
     """Lock experiments until the transaction ends, and return their states.
 
@@ -170,7 +177,7 @@ def _get(session: Session, table: type[R], noun: str, id_: str) -> R:
 
 @event.listens_for(ExperimentRow, "load")
 def _refuse_newer(row: ExperimentRow, _: object) -> None:
-    """Refuse a spec of a later version, which may mean something else than it seems to."""
+    """Refuse a spec of a later version, whose fields may have another meaning."""
     if row.spec_version > SPEC_VERSION:
         msg = f"the spec of experiment {row.id!r} is of version {row.spec_version}, and this gaplab reads up to "
         msg += f"{SPEC_VERSION}: use a later gaplab with this database"

@@ -1,4 +1,4 @@
-"""Logs of repetitions, read: the steps equal the recorded ones to the last bit."""
+"""Reading of repetitions' logs: the steps equal the recorded ones to the last bit."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
@@ -17,7 +17,7 @@ R = TypeVar("R", IterationRow, MeasurementRow, SimulatorRow)
 
 
 def logs(session: Session, repetitions: Sequence[int]) -> dict[int, tuple[Step, ...]]:
-    """The log of each of these repetitions."""
+    """Return the log of each of these repetitions."""
     iterations = _rows(session, repetitions, IterationRow, IterationRow.number)
     measurements = _rows(session, repetitions, MeasurementRow, MeasurementRow.iteration)
     simulators = _rows(session, repetitions, SimulatorRow, SimulatorRow.iteration, SimulatorRow.rank)
@@ -35,12 +35,12 @@ def _rows(session: Session, repetitions: Sequence[int], table: type[R], *order: 
 def _log(
     iterations: Iterable[IterationRow], measurements: Iterable[MeasurementRow], simulators: Iterable[SimulatorRow]
 ) -> tuple[Step, ...]:
-    """The steps that one repetition's rows tell of.
+    """Return the steps that one repetition's rows describe.
 
     Args:
-        iterations: by number.
-        measurements: in any order.
-        simulators: by iteration and rank.
+        iterations: iterations by number.
+        measurements: measurements in any order.
+        simulators: simulators by iteration and rank.
     """
     measured = {(each.iteration, each.kind): each for each in measurements}
     tuned: dict[int, list[SimulatorRow]] = {}

@@ -18,8 +18,8 @@ class Tally:
 
     Attributes:
         running: repetitions with a stored step; a claimed repetition without one may still wait for a core.
-        rollouts_left: of repetitions that have not ended.
-        seconds: of work in the rollouts that are done.
+        rollouts_left: remaining rollouts of repetitions that have not ended.
+        seconds: seconds of work in the completed rollouts.
     """
 
     repetitions: int = 0
@@ -84,7 +84,7 @@ def reasons(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str
 
 
 def _tally(*counts: int, seconds: float) -> Tally:
-    """Return a tally of counts in the order of its fields; Postgres sums whole numbers to decimals."""
+    """Return a tally from counts in the order of its fields, as int: Postgres returns decimals."""
     names = (each.name for each in fields(Tally))
     return Tally(seconds=seconds, **{name: int(count) for name, count in zip(names, counts, strict=False)})
 

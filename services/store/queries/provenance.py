@@ -1,4 +1,4 @@
-"""Provenances: each is stored once, under an id that follows from its facts."""
+"""Provenances: each is stored once, under a hash of its facts."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -13,12 +13,12 @@ from gaplab.services.store.statements import insert_new
 
 
 def id_of(provenance: Provenance) -> str:
-    """Return the id of a provenance; one without external plug-ins has that of versions before there were any."""
+    """Return the id of a provenance; without external plug-ins it is the id that earlier versions computed."""
     absent = {name for name in ("plugins", "outside") if not getattr(provenance, name)}
     facts = provenance.model_dump(mode="json", exclude=absent)
     return sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def insert_unless_there(session: Session, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Add provenances; one that is there has the same facts."""
+    """Add provenances whose ids are new; an equal id means equal facts."""
     session.execute(insert_new(session, ProvenanceRow), [dict(row) for row in rows])

@@ -14,7 +14,7 @@ class TunedSample:
     """A sample that simulators were tuned on, and the parameters of the best simulators before and after.
 
     Attributes:
-        fitness: in reality; None if the measurement failed.
+        fitness: fitness in reality; None if the measurement failed.
     """
 
     repetition: int

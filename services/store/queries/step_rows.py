@@ -1,4 +1,4 @@
-"""Rows of steps: a few statements write those of many repetitions."""
+"""Rows of steps. A few statements write the rows of many repetitions."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
@@ -81,7 +81,7 @@ class StepRows:
         return _named(key, "number") | self._columns[key]
 
     def _measured(self, connection: Connection) -> list[Row]:
-        """Return the measurements with their genomes; a probe's may have been transferred and stored long before."""
+        """Return the measurements with their genomes; a probe's genome may be stored with an earlier transfer."""
         probed = [key for key, kind in self._measurements if kind is MeasurementKind.PROBE]
         known = {key: self._columns[key].get("transferred_genome") for key in probed}
         known |= _transferred(connection, [key for key in probed if known[key] is None])

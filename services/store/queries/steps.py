@@ -1,4 +1,4 @@
-"""Logs of repetitions, written: steps are appended in one transaction, and a recorded step stays as it is."""
+"""Writing of repetitions' logs: steps are appended in one transaction, and a recorded step never changes."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, cast
@@ -29,6 +29,7 @@ _ADVANCE = (
         steps=bindparam("to_steps"),
         checkpoints=0,
         losses=0,
+        measuring_at=None,
         heartbeat_at=now(),
         iterations_done=_REPETITION.c.iterations_done + bindparam("more_iterations"),
         rollouts_done=_REPETITION.c.rollouts_done + bindparam("more_rollouts"),
@@ -41,10 +42,10 @@ _ADVANCE = (
 
 
 def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -> dict[Claim, int]:
-    """Append steps to the logs of repetitions, and return the number of new steps by claim that still holds.
+    """Append steps to the logs of repetitions, and return the number of new steps by claim that is still valid.
 
-    The row of a repetition is guard and counter at once. It moves on if the claim holds and the first new step is the
-    next one; otherwise nothing is written. Checkpoints are kept until their step is appended.
+    The row of a repetition is guard and counter at once. It advances if the claim is valid and the first new step is
+    the next one; otherwise nothing is written. Checkpoints are kept until their step is appended.
 
     Raises:
         Conflict: steps before a delivered one are missing.
@@ -53,7 +54,7 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
     fresh = {claim: _new(claim, lengths[claim][0], each) for claim, each in deliveries.items() if claim in lengths}
     moving = [_move(claim, lengths[claim][0], steps) for claim, steps in fresh.items() if steps]
     if moving and session.connection().execute(_ADVANCE, moving).rowcount != len(moving):
-        msg = "a log moved on although it was locked"
+        msg = "a log has new steps although it was locked"
         raise Conflict(msg)
     batch = StepRows()
     for claim, steps in fresh.items():
@@ -69,7 +70,7 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
 
 
 def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, tuple[int, int]]:
-    """Lock the repetitions whose claims hold, and return the number of their steps, and of checkpoints of the next."""
+    """Lock the repetitions whose claims are valid; return their numbers of steps, and of checkpoints of the next."""
     by_key = {(each.id, each.epoch): each for each in claims}
     row = RepetitionRow
     found = session.execute(
@@ -97,7 +98,7 @@ def _new(claim: Claim, length: int, delivered: Iterable[Delivered]) -> list[Time
 
 
 def _parts(delivered: Iterable[Delivered], length: int, parts: int, new: int) -> list[Checkpoint]:
-    """Return the delivered checkpoints of the step under way once the log has its new steps."""
+    """Return the delivered checkpoints of the step that follows the new steps."""
     found = [each for each in delivered if isinstance(each, Checkpoint)]
     return checkpoints.fresh(found, length + new, 0 if new else parts)
 

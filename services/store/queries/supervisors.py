@@ -8,6 +8,6 @@ from gaplab.services.store.models import SupervisorRow
 
 
 def ages(session: Session) -> tuple[float, ...]:
-    """Return the seconds since each supervisor's last sign of life; those that stopped in good order have no entry."""
+    """Return the seconds since each supervisor's last heartbeat, without those that shut down in order."""
     present = moment(session)
     return tuple((present - beat).total_seconds() for beat in session.scalars(select(SupervisorRow.heartbeat_at)))

@@ -20,7 +20,7 @@ const MOST = 100;  // the service's limit for one figure
  */
 export function chooser(view) {
   const options = h("ul", { id: "found", role: "listbox", "aria-label": "Found", class: "found", hidden: true });
-  const message = h("p", { class: "said", role: "status" });
+  const message = h("p", { class: "outcome", role: "status" });
   const field = h("input", {
     id: "chooser", type: "search", role: "combobox", autocomplete: "off", placeholder: "name or id of an experiment or a study",
     "aria-expanded": "false", "aria-controls": "found", "aria-autocomplete": "list", maxlength: 200,

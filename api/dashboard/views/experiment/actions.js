@@ -8,13 +8,15 @@ import { actionButtons, isPermitted, PARTICIPLES, permittedStates } from "../../
 /** @typedef {import("../../lib/life_cycle.js").Action} Action */
 
 /**
- * Return why an action is refused in a state, or the empty text.
+ * Return why an action on an experiment is refused, or the empty text.
  *
  * @param {Action} action
- * @param {Api.State} state
+ * @param {{ state: Api.State, progress: { failed: number } }} experiment
  */
-export function refusal(action, state) {
-  if (isPermitted(action, state)) return "";
+export function refusal(action, experiment) {
+  if (isPermitted(action, experiment)) return "";
+  const { state } = experiment;
+  if (action === "retry" && !experiment.progress.failed) return "None of its repetitions has failed, so none can be retried.";
   return `An experiment that is ${state.toLowerCase()} cannot be ${PARTICIPLES[action]}, only one that is ${permittedStates(action)}.`;
 }
 
@@ -23,12 +25,13 @@ export function refusal(action, state) {
  *
  * @param {Page.ExperimentPage} page
  */
-export const actions = (page) => actionButtons("Actions on this experiment", (action) => refusal(action, page.experiment.state), {
+export const actions = (page) => actionButtons("Actions on this experiment", (action) => refusal(action, page.experiment), {
   pause: () => send(page, "pause"),
   resume: () => send(page, "resume"),
   stop: () => stop(page),
   cancel: () => cancel(page),
   extend: () => extend(page),
+  retry: () => send(page, "retry"),
 }, [{ label: "Change schedule…", press: () => { schedule(page); } }]);
 
 /**

@@ -22,7 +22,7 @@ const RETIME_MS = 30_000;
 export function eventList(page) {
   const list = h("ol", { class: "events" });
   const more = h("button", { type: "button", class: "quiet small" }, "Earlier");
-  const body = h("div", { class: "feed framed", tabindex: "0", role: "region", "aria-label": "Latest events" });
+  const body = h("div", { class: "event-list framed", tabindex: "0", role: "region", "aria-label": "Latest events" });
   /** @type {Load} */
   const load = (query) => get("/events/page", { experiment: page.id, limit: PAGE_SIZE, ...query }, page.signal);
   const past = pastEvents(load, page.latest);

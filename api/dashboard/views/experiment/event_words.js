@@ -22,7 +22,7 @@ const WORDS = {
   submitted: ({ body }) => `Submitted, with ${count(body.repetitions)} repetitions`,
   imported: () => "Imported from an archive",
   started: () => "Started",
-  pausing: () => "Pausing: running repetitions finish their step",
+  pausing: ({ body }) => `Pausing: ${body.reason ?? "running repetitions finish their step"}`,
   paused: () => "Paused",
   resumed: () => "Resumed",
   stopping: () => "Stopping: running repetitions finish their step",
@@ -30,6 +30,7 @@ const WORDS = {
   completed: () => "Completed",
   failed: () => "Failed",
   cancelled: () => "Cancelled",
+  retried: () => "Retried",
   sensitivity_ended: ({ body }) =>
     `Sensitivity check ${String(body.state).toLowerCase()}${body.warnings?.length ? `: ${body.warnings.join(" ")}` : ""}`,
   versions_refused: ({ body }) => / \(unavailable: /.test(body.refused_by)

@@ -26,7 +26,7 @@ export function misfit(page) {
     }
     const tunables = points[0].tunables.map(({ name }) => readableName(name));
     const columns = ["Iteration", `Error on its samples (${unit})`, `Gap of what it evolved (${unit})`, ...tunables, "n"];
-    place.replaceChildren(h("ul", { class: "said-of-it" }, ...remarks.map((remark) => h("li", {}, remark))),
+    place.replaceChildren(h("ul", { class: "misfit-remarks" }, ...remarks.map((remark) => h("li", {}, remark))),
       table("Misfit by iteration", columns, points.map(row)), h("p", { class: "note" }, NOTE));
   });
   return [place];

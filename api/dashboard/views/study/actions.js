@@ -21,13 +21,14 @@ export const actions = (page) => actionButtons("Actions on this study", (action)
   stop: () => stop(page),
   cancel: () => cancel(page),
   extend: () => extend(page),
+  retry: () => send(page, "retry"),
 });
 
 /**
  * @param {Api.StudyRead} study
  * @param {Action} action
  */
-const permitting = (study, action) => study.experiments.filter(({ state }) => isPermitted(action, state));
+const permitting = (study, action) => study.experiments.filter((experiment) => isPermitted(action, experiment));
 
 /**
  * @param {Api.StudyRead} study
@@ -35,6 +36,7 @@ const permitting = (study, action) => study.experiments.filter(({ state }) => is
  */
 function refusal(study, action) {
   if (permitting(study, action).length) return "";
+  if (action === "retry") return "None of its repetitions has failed, so none can be retried.";
   return `None of its experiments can be ${PARTICIPLES[action]} now: only one that is ${permittedStates(action)} can.`;
 }
 

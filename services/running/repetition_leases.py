@@ -1,0 +1,114 @@
+"""The lease of a repetition: its end changes the attempt, the experiment and the hardware."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from sqlalchemy import ColumnElement, select, update
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.lifecycle import PERMITTED, Ending, State, Verb
+from gaplab.services.core.errors import Conflict
+from gaplab.services.experiments.states import settle
+from gaplab.services.running.leases import MAX_LOSSES, Change, Leases
+from gaplab.services.store.lease import Claim
+from gaplab.services.store.models import ExperimentRow, RepetitionRow
+from gaplab.services.store.queries import attempts, checkpoints
+from gaplab.services.store.queries.events import note
+from gaplab.services.store.queries.experiments import lock
+
+_PAUSABLE = PERMITTED[Verb.PAUSE]
+
+_REQUESTED_ENDINGS = {State.PAUSING: Ending.PAUSED, State.STOPPING: Ending.STOPPED}
+
+
+class RepetitionLeases(Leases[Claim]):
+    """Leases of repetitions. When one ends, its attempt and its experiment are updated."""
+
+    table = RepetitionRow
+
+    def taken(self) -> Mapping[str, Any]:
+        """Return the columns that a claim sets: it holds the hardware, and measures nothing yet."""
+        experiment = ExperimentRow
+        hardware = select(experiment.hardware).where(experiment.id == RepetitionRow.experiment_id).scalar_subquery()
+        return {"measuring_at": None, "hardware": hardware}
+
+    def lose(self, session: Session, which: ColumnElement[bool], reason: str) -> list[Any]:
+        """Queue lost work again as the base does, but do not blame a plug-in for a measurement that was cut off.
+
+        If measurements are cut off repeatedly, the experiment is paused, because a person must look.
+        """
+        row = self.table
+        measuring = select(row.id, row.experiment_id, row.losses + 1).where(
+            which, row.state == State.RUNNING, row.measuring_at.is_not(None)
+        )
+        cut_off = session.execute(measuring).all()
+        values = {"losses": row.losses + 1, "owner": None, "error": reason}
+        change = Change(State.QUEUED, Ending.LOST, reason, values)
+        queued = self.end(session, row.id.in_([id_ for id_, _, _ in cut_off]), change)
+        for _, experiment, losses in cut_off:
+            if losses >= MAX_LOSSES:
+                pause(session, experiment, f"a measurement was cut off {losses} times; the last time {reason}")
+        return queued + super().lose(session, which, reason)
+
+    def free_lost(self, session: Session, stale: ColumnElement[bool]) -> None:
+        """Free the hardware of ended leases whose supervisor never reported that its worker has stopped."""
+        row = self.table
+        session.execute(
+            update(row).where(stale, row.state != State.RUNNING, row.hardware.is_not(None)).values(hardware=None)
+        )
+
+    def end(self, session: Session, which: ColumnElement[bool], change: Change) -> list[int]:
+        """End leases as the base does; if the experiment is being paused or stopped, a hand-back is recorded as that.
+
+        Raises:
+            Conflict: a repetition that should become COMPLETED lacks iterations.
+        """
+        row = RepetitionRow
+        held = select(row.id, row.experiment_id).where(which, row.state == State.RUNNING)
+        owners = dict(session.execute(held).all())
+        if not owners:
+            return []
+        states = lock(session, sorted(set(owners.values())))
+        if change.to is State.COMPLETED:
+            _refuse_unfinished(session, which)
+        change = replace(change, values={"hardware": None, "measuring_at": None} | dict(change.values))
+        ended: list[int] = super().end(session, which & row.id.in_(owners), change)
+        endings = {id_: _ending(change.ending, states[owners[id_]]) for id_ in ended}
+        for each in Ending:
+            if ids := [id_ for id_ in ended if endings[id_] is each]:
+                attempts.end(session, ids, each, change.reason)
+        if change.to is State.FAILED:
+            checkpoints.forget(session, ended)
+        settle(session, states)
+        return ended
+
+
+def _ending(ending: Ending, state: State) -> Ending:
+    return _REQUESTED_ENDINGS.get(state, ending) if ending is Ending.HANDED_BACK else ending
+
+
+def _refuse_unfinished(session: Session, which: ColumnElement[bool]) -> None:
+    row = RepetitionRow
+    unfinished = session.execute(
+        select(row.number, row.experiment_id, ExperimentRow.iterations - row.iterations_done)
+        .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
+        .where(which, row.state == State.RUNNING, ExperimentRow.iterations != row.iterations_done)
+    ).first()
+    if unfinished is not None:
+        number, experiment, missing = unfinished
+        msg = f"repetition {number} of {experiment!r} is not complete: {missing} iterations are missing"
+        raise Conflict(msg)
+
+
+def pause(session: Session, experiment: str, reason: str) -> None:
+    """Pause an experiment for a reason that a person should see; one that is ending ends."""
+    row = ExperimentRow
+    state = lock(session, [experiment])[experiment]
+    if state not in (*_PAUSABLE, State.PAUSING, State.PAUSED):
+        return
+    session.execute(update(row).where(row.id == experiment).values(paused_because=reason))
+    if state in _PAUSABLE:
+        note(session, EventKind.PAUSING, experiment, reason=reason)
+        settle(session, [experiment], State.PAUSING)

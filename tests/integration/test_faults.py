@@ -1,0 +1,391 @@
+"""Faults of plug-ins, of reality and of hardware: each concerns the repetitions that it hits, and nothing else."""
+
+from collections.abc import Iterator
+from threading import Event, Lock
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from gaplab.schemas.lifecycle import Ending, State, Verb
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.errors import Conflict, InvalidSpec, TryAgain
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.strategies.base import Strategy
+from gaplab.services.engines import engines
+from gaplab.services.engines.analytic import Analytic
+from gaplab.services.experiments import checks, lifecycle, reading, submission
+from gaplab.services.plugins import blame
+from gaplab.services.running import execution, sensitivity
+from gaplab.services.running.execution import Failure
+from gaplab.services.running.leases import MAX_LOSSES
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.lease import Pulse, TimedStep
+from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.session import Store
+from gaplab.workers import checkpoints, permits, supervisor
+from gaplab.workers.patience import Patience
+from gaplab.workers.run import Run
+from tests.fakes import flat
+from tests.without_ray import Here
+
+SMALL = {
+    "strategy": "simulated_fit",
+    "robot": "toy_function",
+    "iterations": 2,
+    "repetitions": 2,
+    "optimizer": {"name": "steady_state", "options": {"population": 4}},
+    "budget": {"controller_evaluations": 8, "selection_evaluations": 8, "simulator_evaluations": 8},
+}
+
+
+class Liar(Strategy):
+    """Returns what it is told to, or raises it."""
+
+    name = "liar"
+    searches = False
+    answer: ClassVar[Any] = None
+
+    def select(self, belief: Any, search: Any, rng: Any) -> Any:
+        if isinstance(self.answer, BaseException):
+            raise self.answer
+        return self.answer(belief.known) if callable(self.answer) else self.answer
+
+
+class Bench(Analytic):
+    """Hardware, as far as gaplab knows: it counts its measurements, and raises what it is told to."""
+
+    name = "bench"
+    repeatable = False
+    asked: ClassVar[int] = 0
+    errors: ClassVar[list[BaseException]] = []
+
+    def rollouts(self, worlds: Any, motions: Any) -> Any:
+        type(self).asked += 1
+        if self.errors and (error := self.errors.pop(0)) is not None:
+            raise error
+        return super().rollouts(worlds, motions)
+
+
+class Unsendable(Exception):
+    """An error that cannot be pickled, nor shown."""
+
+    def __init__(self) -> None:
+        super().__init__(Lock())
+
+    def __str__(self) -> str:
+        raise RuntimeError
+
+
+@pytest.fixture(autouse=True)
+def plugins(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setitem(strategies._plugins, "liar", Liar)
+    monkeypatch.setitem(engines._plugins, "bench", Bench)
+    monkeypatch.setattr(Bench, "asked", 0)
+    monkeypatch.setattr(Bench, "errors", [])
+    monkeypatch.setattr(checkpoints, "PAUSES_S", (0.0, 0.0, 0.0))
+    monkeypatch.setattr(supervisor, "HEARTBEATS", 10**9)
+    blame._plugins.cache_clear()
+    yield
+    blame._plugins.cache_clear()
+
+
+def small(**changes: Any) -> ExperimentSpec:
+    return ExperimentSpec.model_validate(SMALL | changes)
+
+
+def on_the_bench(**changes: Any) -> ExperimentSpec:
+    return small(reality={"engine": "bench"}, **changes)
+
+
+def work(store: Store, rounds: int = 400) -> None:
+    """Rounds of a supervisor until nothing can go on."""
+    here = Here(store)
+    for _ in range(rounds):
+        here.step()
+        with store.reading() as session:
+            if not here.busy and not session.query(execution.RepetitionRow).filter_by(state=State.RUNNING).count():
+                claimable = session.query(execution.ExperimentRow).filter_by(claimable=True).count()
+                if not claimable:
+                    return
+    raise AssertionError("it does not come to an end")
+
+
+def stored(store: Store, experiment: str) -> dict[int, Any]:
+    with store.reading() as session:
+        rows = session.query(execution.RepetitionRow).filter_by(experiment_id=experiment).all()
+        return {row.number: flat(logs(session, [row.id])[row.id]) for row in rows}
+
+
+def computed(spec: ExperimentSpec) -> dict[int, Any]:
+    resolved = resolve_experiment(spec)
+    return {number: flat(tuple(repetition(setting(resolved, number)))) for number in range(resolved.repetitions)}
+
+
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [
+        (lambda known: known[None, :], "strategy 'liar' returned an array of shape (1, 1)"),
+        (lambda known: np.full_like(known, np.nan), "strategy 'liar' returned nan as number 0"),
+        (lambda known: known + 1e9, "permitted: 0.0 to 1.0"),
+        (0.5, "strategy 'liar' returned 0.5; permitted: one vector of 1 numbers"),
+        (None, "strategy 'liar' returned nan"),
+        (SystemExit("the end"), "strategy 'liar' raised SystemExit (test_faults.py, line "),
+        (IndexError("no such leg"), "): no such leg"),
+        (Unsendable(), "its message cannot be shown"),
+    ],
+)
+def test_a_strategy_that_lies_fails_alone_and_is_named(
+    store: Store, monkeypatch: Any, answer: Any, reason: str
+) -> None:
+    monkeypatch.setattr(Liar, "answer", staticmethod(answer) if callable(answer) else answer)
+    lying = submission.submit_experiment(store, small(strategy="liar")).id
+    honest = submission.submit_experiment(store, small()).id
+
+    work(store)
+
+    read = reading.read_experiment(store, lying)
+    assert read.state is State.FAILED
+    assert any(reason in each for each in read.reasons), read.reasons
+    assert reading.read_experiment(store, honest).state is State.COMPLETED
+    assert stored(store, honest) == computed(small())
+
+
+def test_what_cannot_be_stored_fails_its_repetition_alone(sqlite_store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    record_all = execution.record_all
+
+    def refusing(store: Store, deliveries: Any) -> Any:
+        if any(claim.number == 1 for claim, _ in deliveries):
+            raise TypeError("only size-1 arrays can be converted")
+        return record_all(store, deliveries)
+
+    monkeypatch.setattr(execution, "record_all", refusing)
+    experiment = submission.submit_experiment(sqlite_store, small()).id
+
+    work(sqlite_store)
+
+    states = [each.state for each in reading.list_repetitions(sqlite_store, experiment)]
+    assert states == [State.COMPLETED, State.FAILED]
+    assert "only size-1 arrays" in reading.read_experiment(sqlite_store, experiment).reasons[0]
+
+
+def test_an_error_of_reality_pauses_says_so_hides_what_it_names_and_costs_no_sample(store: Store) -> None:
+    spec = on_the_bench(repetitions=1)
+    Bench.errors[:] = [None, None, ValueError("unstable in static_friction=0.987")]  # type: ignore[list-item]
+    experiment = submission.submit_experiment(store, spec).id
+
+    work(store)
+
+    read = reading.read_experiment(store, experiment)
+    (paused,) = reading.list_repetitions(store, experiment)
+    (attempt,) = reading.list_attempts(store, experiment, 0)
+    assert (read.state, paused.state, attempt.ending) == (State.PAUSED, State.QUEUED, Ending.FAILED)
+    assert "engine 'bench' raised ValueError (test_faults.py, line" in read.reasons[0]
+    with store.reading() as session:
+        events = [event.body for event in session.query(execution.note.__globals__["EventRow"])]
+    assert "0.987" not in f"{read} {paused} {attempt} {events}"
+
+    lifecycle.ask_experiment(store, experiment, Verb.RESUME)
+    work(store)
+
+    ended = reading.read_experiment(store, experiment)
+    assert (ended.state, ended.reasons) == (State.COMPLETED, ())
+    assert "0.987" in str(reading.list_attempts(store, experiment, 0)[0].reason)
+    assert stored(store, experiment) == computed(spec)
+    assert Bench.asked == 2 * (1 + 2 * 2) + 1  # each once here and once in `computed`, and the one that failed
+
+
+@pytest.mark.parametrize("error", [ConnectionError("wireless"), TimeoutError(), MemoryError(), TryAgain("dropped")])
+def test_an_error_that_may_pass_is_tried_again_by_itself(sqlite_store: Store, error: BaseException) -> None:
+    Bench.errors[:] = [None, error, error, error]  # type: ignore[list-item]
+    experiment = submission.submit_experiment(sqlite_store, on_the_bench(repetitions=1)).id
+
+    work(sqlite_store)
+
+    (attempt,) = reading.list_attempts(sqlite_store, experiment, 0)
+    assert attempt.ending is Ending.COMPLETED
+    assert stored(sqlite_store, experiment) == computed(on_the_bench(repetitions=1))
+
+
+def test_what_failed_is_retried_from_its_stored_steps(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    spec = small(strategy="liar")
+    answers = iter([np.array([0.25]), None])
+    monkeypatch.setattr(Liar, "answer", staticmethod(lambda _: next(answers, None)))
+    experiment = submission.submit_experiment(store, spec).id
+    work(store)
+    failed = stored(store, experiment)
+
+    monkeypatch.setattr(Liar, "answer", staticmethod(lambda _: np.array([0.75])))
+    retried = lifecycle.ask_experiment(store, experiment, Verb.RETRY)
+    work(store)
+
+    read = reading.read_experiment(store, experiment)
+    assert (retried.state, retried.progress.failed) == (State.QUEUED, 0)
+    assert (read.state, read.reasons) == (State.COMPLETED, ())
+    again = stored(store, experiment)
+    assert all(again[number][: len(steps)] == steps for number, steps in failed.items())
+    assert max(len(steps) for steps in failed.values()) > 3
+    with pytest.raises(Conflict, match="no repetition of experiment .* has FAILED"):
+        lifecycle.ask_experiment(store, experiment, Verb.RETRY)
+
+
+def test_a_failed_repetition_of_a_study_is_retried_while_others_go_on(store: Store) -> None:
+    study = submission.submit_study(store, study_spec())
+    first, second = (each.id for each in study.experiments)
+    for claim in execution.claim(store, "me", 9):
+        if claim.experiment_id == first and claim.number == 0:
+            execution.fail(store, claim, Failure("a foot fell off"))
+    running = reading.read_experiment(store, first).state
+
+    lifecycle.ask_study(store, study.id, Verb.RETRY)
+
+    states = [each.state for each in reading.list_repetitions(store, first)]
+    assert (running, states) == (State.RUNNING, [State.QUEUED, State.RUNNING])
+    assert reading.read_experiment(store, second).state is State.RUNNING
+    with pytest.raises(Conflict, match="no repetition of study"):
+        lifecycle.ask_study(store, study.id, Verb.RETRY)
+
+
+def study_spec() -> Any:
+    from gaplab.schemas.spec import StudySpec
+
+    return StudySpec.model_validate(
+        {name: value for name, value in SMALL.items() if name != "strategy"} | {"strategies": ["random", "known_fit"]}
+    )
+
+
+def test_a_measurement_that_is_cut_off_is_no_fault_of_a_plugin(store: Store) -> None:
+    experiment = submission.submit_experiment(store, on_the_bench(repetitions=1)).id
+    for loss in range(MAX_LOSSES):
+        (claim,) = execution.claim(store, "me", 9)
+        assert execution.note_measuring(store, [claim]) == (claim,)
+        assert reading.list_repetitions(store, experiment)[0].measuring_at is not None
+        assert execution.release(store, claim, "the worker was lost")
+        state = State.PAUSED if loss == MAX_LOSSES - 1 else State.RUNNING
+        assert reading.read_experiment(store, experiment).state is state
+
+    assert "a measurement was cut off 5 times" in reading.read_experiment(store, experiment).reasons[0]
+    lifecycle.ask_experiment(store, experiment, Verb.RESUME)
+    (claim,) = execution.claim(store, "me", 9)
+    assert execution.release(store, claim, "the worker was lost")
+    assert reading.list_repetitions(store, experiment)[0].state is State.QUEUED
+
+
+def test_hardware_has_one_holder_at_a_time(store: Store) -> None:
+    first, second = (submission.submit_experiment(store, on_the_bench(repetitions=3)).id for _ in range(2))
+    other = submission.submit_experiment(store, small()).id
+
+    (held,) = (each for each in execution.claim(store, "me", 9) if each.experiment_id != other)
+
+    assert held.experiment_id == first
+    assert execution.claim(store, "you", 9) == ()
+    lifecycle.ask_experiment(store, first, Verb.CANCEL)
+    assert execution.claim(store, "you", 9) == ()  # its worker may still move the hardware
+    execution.free_hardware(store, [held])
+    (following,) = execution.claim(store, "you", 9)
+    assert following.experiment_id == second
+    assert execution.hand_back(store, following)
+    lost, *_ = execution.claim(store, "gone", 9)
+    execution.requeue_lost(store, stale_after_s=-1.0)
+    (again,) = execution.claim(store, "next", 1)
+    assert (again.id, again.epoch) == (lost.id, lost.epoch + 1)
+
+
+def test_the_database_itself_refuses_a_second_holder(store: Store) -> None:
+    submission.submit_experiment(store, on_the_bench())
+    execution.claim(store, "me", 9)
+
+    with pytest.raises(Exception, match=r"(?i)unique"), store.writing() as session:
+        session.query(execution.RepetitionRow).update({"hardware": "the same"})
+
+
+def test_the_baseline_that_evolves_in_reality_is_refused_on_hardware() -> None:
+    with pytest.raises(InvalidSpec, match="may move hardware"):
+        resolve_experiment(on_the_bench(strategy="direct"))
+    assert resolve_experiment(small(strategy="direct")).iterations
+
+
+def test_a_hung_rollout_and_a_hung_step_are_told_but_hardware_takes_as_long_as_it_takes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    claim = SimpleNamespace(spec=resolve_experiment(small()), experiment_id="x", number=0)
+    patience, hung = Patience(1.0, 1_000.0), Run(claim, None)  # type: ignore[arg-type]
+
+    def reason(pulse: Pulse | None, **changes: Any) -> str | None:
+        for name, value in ({"begun": True, "pulse": pulse, "permits": None} | changes).items():
+            setattr(hung, name, value)
+        return hung.overdue(patience)
+
+    assert reason(None) is None
+    assert reason(Pulse(3, False, 19.0, 19.0)) is None
+    assert "no rollout ended for 21 s; GAPLAB_ROLLOUT_LIMIT_S is 1 s" in str(reason(Pulse(3, False, 21.0, 21.0)))
+    assert "reality did not answer for 21 s" in str(reason(Pulse(3, True, 21.0, 21.0)))
+    assert reason(Pulse(3, True, 1e9, 1e9), permits=object()) is None
+    assert "a step took 1001 s; GAPLAB_STEP_LIMIT_S" in str(reason(Pulse(3, False, 0.0, 1_001.0)))
+    assert reason(Pulse(3, False, 21.0, 21.0), begun=False) is None
+
+
+def test_a_repetition_that_does_nothing_gives_signs_of_life(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(checkpoints, "PULSE_S", 0.01)
+    pulses, going = [], Event()
+
+    def waiting(_: Any) -> float:
+        assert going.wait(60)
+        return 1.0
+
+    whole = setting(resolve_experiment(small(repetitions=1)), 0)
+    for item in checkpoints.recorded(checkpoints.replace(whole, reality=waiting), (), ()):
+        if isinstance(item, Pulse) and item.measuring:
+            pulses.append(item)
+            if len(pulses) > 3:
+                going.set()
+        if isinstance(item, TimedStep) and going.is_set():
+            break
+
+    assert pulses[0].step == 2
+    assert pulses[-1].idle_s > pulses[0].idle_s
+
+
+def test_hardware_stops_when_its_permit_runs_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(permits, "POLL_S", 0.001)
+    left, done, asked = [0.0, 0.0], Event(), Event()
+    events: list[str] = []
+
+    def moving(_: Any) -> float:
+        events.append("moves")
+        asked.set()
+        assert done.wait(60)
+        return 1.0
+
+    def end() -> None:
+        events.append("ends")
+        done.set()
+
+    def remaining() -> float:
+        if asked.is_set():
+            return -1.0
+        return left.pop() if left else 1e9
+
+    reality = permits.PermittedReality(moving, lambda: events.append("stops"), remaining, end)
+    reality(np.zeros(1))
+
+    assert events == ["moves", "stops", "ends"]
+
+
+def test_a_check_that_no_experiment_needs_any_more_ends(store: Store) -> None:
+    spec = small()
+    first, second = (submission.submit_experiment(store, spec) for _ in range(2))
+    claim = sensitivity.claim(store, "me")
+    assert claim is not None
+
+    lifecycle.ask_experiment(store, first.id, Verb.CANCEL)
+    still = sensitivity.heartbeat(store, [claim])
+    lifecycle.ask_experiment(store, second.id, Verb.CANCEL)
+
+    assert (still, sensitivity.heartbeat(store, [claim])) == ((claim,), ())
+    assert checks.read(store, claim.id).state is State.CANCELLED
+    submission.submit_experiment(store, spec)
+    assert checks.read(store, claim.id).state is State.QUEUED

@@ -1,0 +1,85 @@
+"""Permits to move hardware: short, renewed with each heartbeat, so that a holder that loses its lease stops in time."""
+
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from threading import Event, Thread
+from time import monotonic, sleep
+from typing import Any, TypeAlias
+
+import ray
+from ray.exceptions import RayError
+
+from gaplab.services.core.arrays import Genome
+from gaplab.services.core.ports import Reality
+
+SHARE = 0.8
+"""Part of a lease for which a permit holds: the hardware stops before others may take it."""
+
+POLL_S = 0.25
+"""Seconds between questions for a permit."""
+
+Key: TypeAlias = tuple[int, int]
+"""A repetition's id, and the epoch of its lease."""
+
+Handle: TypeAlias = Any
+"""A handle of a Permits actor, which Ray does not type."""
+
+
+@ray.remote(num_cpus=0, max_restarts=0)
+class Permits:
+    """The permits of one supervisor, in a separate process: they expire even if the supervisor is stopped."""
+
+    def __init__(self) -> None:
+        self._until: dict[Key, float] = {}
+
+    def renew(self, keys: Sequence[Key], seconds: float) -> None:
+        """Permit these repetitions, and no others, to move hardware for some seconds."""
+        self._until = dict.fromkeys(keys, monotonic() + seconds)
+
+    def left(self, key: Key) -> float:
+        """Return the seconds for which the repetition may still move hardware; 0 or less if it may not."""
+        return self._until.get(key, 0.0) - monotonic()
+
+
+class PermittedReality:
+    """A Reality that moves hardware only with a permit; if the permit expires, it stops the hardware and its process.
+
+    Args:
+        reality: the hardware.
+        stop: stops the hardware at once; called from another thread.
+        left: returns the seconds until the permit expires.
+        end: ends this process.
+    """
+
+    def __init__(
+        self,
+        reality: Reality,
+        stop: Callable[[], None],
+        left: Callable[[], float],
+        end: Callable[[], None] = lambda: os._exit(1),
+    ) -> None:
+        self._reality, self._stop, self._left, self._end = reality, stop, left, end
+
+    def __call__(self, genome: Genome) -> float:
+        """Return the fitness of the genome `(g,)` in reality, once it is permitted to ask."""
+        while self._left() <= 0.0:
+            sleep(POLL_S)
+        answered = Event()
+        Thread(target=self._watch, args=(answered,), name="permit", daemon=True).start()
+        try:
+            return self._reality(genome)
+        finally:
+            answered.set()
+
+    def _watch(self, answered: Event) -> None:
+        until = monotonic() + self._left()
+        while not answered.wait(POLL_S):
+            asked = monotonic()
+            with suppress(RayError):  # the permits died: the last one holds
+                until = asked + self._left()
+            if monotonic() > until:
+                with suppress(Exception):
+                    self._stop()
+                self._end()
+                return
