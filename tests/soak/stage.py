@@ -22,6 +22,9 @@ from gaplab import migrations
 from gaplab.services.core.errors import StoreUnavailable
 from tests.soak import witness
 
+ROLLOUT_LIMIT_S = 1
+"""In production it is 60 s; a worker without a rollout for 20 times as long counts as hung."""
+
 RESTART_S = 1.0
 """After how long a service manager starts again what has ended."""
 
@@ -98,6 +101,7 @@ class Stage:
             "GAPLAB_WORKERS": "1",
             "GAPLAB_LEASE_S": str(lease_s),
             "GAPLAB_PLUGINS": str(plugins or ""),
+            "GAPLAB_ROLLOUT_LIMIT_S": str(ROLLOUT_LIMIT_S),
             "RAY_TMPDIR": mkdtemp(prefix="gaplab-"),  # Ray leaves logs behind; the paths of its sockets must be short
         }
         self._kept: list[Any] = []
