@@ -76,6 +76,7 @@ class HereRepetitions(Repetitions):
         for run in self.runs:
             if not run.over:
                 run.receive()
+        self._note_measuring()
 
 
 class Here(Supervisor):

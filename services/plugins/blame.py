@@ -24,17 +24,19 @@ def raised(error: BaseException) -> str:
     """Return the sentence without the message, which may name hidden parameters."""
     kind = type(error).__name__
     for frame, line in reversed(list(walk_tb(error.__traceback__))):
-        module = str(frame.f_globals.get("__name__"))
-        if module in _plugins():
-            return f"{_plugins()[module]} raised {kind} ({Path(frame.f_code.co_filename).name}, line {line})"
+        plugins = _plugins()
+        places = (type(frame.f_locals.get("self")), frame.f_globals.get("__name__"))
+        if named := next((plugins[place] for place in places if place in plugins), None):
+            return f"{named} raised {kind} ({Path(frame.f_code.co_filename).name}, line {line})"
     return kind
 
 
 @cache
-def _plugins() -> dict[str, str]:
-    """Return the kind and name of the plug-in of each module; of several in one module, the first."""
-    found: dict[str, str] = {}
+def _plugins() -> dict[type | str | None, str]:
+    """Return the kind and name of each plug-in, by its class and by its module; of several in a module, the first."""
+    found: dict[type | str | None, str] = {}
     for registry in REGISTRIES.values():
         for name, plugin in registry.items():
-            found.setdefault(plugin.__module__, f"{registry.kind} {name!r}")
+            for place in (plugin, plugin.__module__):
+                found.setdefault(place, f"{registry.kind} {name!r}")
     return found

@@ -9,6 +9,7 @@ All functions raise StoreUnavailable while the database cannot be used; each may
 from collections.abc import Iterable, Mapping, Sequence
 
 from sqlalchemy import ColumnElement, func, select, update
+from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import ASKED, Ending, State
@@ -88,7 +89,12 @@ def claim(
         refused: why processes of the supervisor refuse plug-ins, by kind and name; experiments that name them are left
             alone as well, and so are those whose plug-ins are not available here.
     """
-    return store.write(_claim, owner, limit, under or present_provenance(), refused) if limit > 0 else ()
+    try:
+        return store.write(_claim, owner, limit, under or present_provenance(), refused) if limit > 0 else ()
+    except IntegrityError as error:
+        if "hardware" not in str(error.orig):
+            raise
+        return ()  # another supervisor took the same hardware at the same moment
 
 
 def record(store: Store, claim: Claim, step: Step, *, seconds: float = 0.0) -> bool:

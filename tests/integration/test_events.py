@@ -105,6 +105,7 @@ def everything_that_can_happen(store: Store) -> None:
     check = sensitivity.claim(store, "me")
     assert check is not None
     sensitivity.fail(store, check, "no legs")
+    lifecycle.ask_experiment(store, waits.experiment_id, Verb.RETRY)
 
 
 def all_verbs(store: Store) -> None:

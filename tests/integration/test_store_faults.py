@@ -5,6 +5,7 @@ What is asked is read from the supervisor's own source, so that nothing new is f
 
 import ast
 import shutil
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
@@ -20,7 +21,7 @@ from gaplab.services.core.sensitivity import Effort, check
 from gaplab.services.experiments import submission
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.specs.assembly import setting, subject
-from gaplab.services.store.lease import Failure
+from gaplab.services.store.lease import Failure, Pulse
 from gaplab.services.store.models import CheckpointRow, RepetitionRow, SensitivityRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
@@ -41,7 +42,7 @@ def asked_by_the_supervisor() -> Any:
             match node:
                 case ast.Call(func=ast.Attribute(value=ast.Name(id=module), attr=name)) if module in MODULES:
                     found.add((module, name))
-    return sorted(found)
+    return sorted(found - {("execution", "free_hardware")})  # what it leaves undone, the end of the lease does
 
 
 class Troubled(HereRun):
@@ -58,11 +59,17 @@ class Troubled(HereRun):
         )
 
 
+def measuring(claim: Any) -> Iterator[Any]:
+    """What a worker delivers that waits for reality at first."""
+    yield (Pulse(len(claim.log), measuring=True, idle_s=0.0, step_s=0.0),)
+    yield from delivered(lambda: setting(claim.spec, claim.number), claim, 0.0)
+
+
 class TryingRepetitions(HereRepetitions):
     """Everything that may happen to a repetition: the second of the first experiment loses its first worker."""
 
     def launch(self, claim: Any) -> Any:
-        stream = delivered(lambda: setting(claim.spec, claim.number), claim, 0.0)
+        stream = measuring(claim)
         if claim.spec.name == "broken":
             return Troubled(claim, stream, "failed")
         if claim.number == 1 and not Trying.lost:
