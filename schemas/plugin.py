@@ -46,7 +46,9 @@ class PluginRead(Frozen):
     source: str
     options: dict[str, Any] = Field(description="JSON Schema of the plug-in's options, with defaults")
     available: bool = True
-    note: str | None = Field(default=None, description="how to install the plug-in if it is not available")
+    note: str | None = Field(
+        default=None, description="why the plug-in is not available, and how to install or repair it"
+    )
     details: dict[str, Any] = Field(
         default_factory=dict, description="bounds and unit of a tunable, engines of a robot"
     )

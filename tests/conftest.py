@@ -19,6 +19,8 @@ import psycopg
 import pytest
 
 from gaplab import migrations
+from gaplab.services.core import external_plugins
+from gaplab.services.plugins import folders
 from gaplab.services.store.session import Store
 from tests import postgres as servers
 
@@ -163,3 +165,20 @@ def _opened(url: str) -> Iterator[Store]:
     store = Store(url)
     yield store
     store.dispose()
+
+
+@pytest.fixture
+def put(tmp_path: Path) -> Iterator[Any]:
+    """Writes files into a plug-in folder, and lets this process import all of them again."""
+    folders.find()
+
+    def write(folder: str = "mine", /, **files: str) -> Path:
+        home = tmp_path / folder
+        home.mkdir(exist_ok=True)
+        for name, text in files.items():
+            (home / f"{name}.py").write_text(text)
+        external_plugins.set_folders((*external_plugins.folders(), home))
+        return home
+
+    yield write
+    external_plugins.set_folders(())

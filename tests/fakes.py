@@ -75,3 +75,23 @@ def flat(step: Any) -> Any:
     if hasattr(step, "__dataclass_fields__"):
         return type(step).__name__, *(flat(getattr(step, name)) for name in step.__dataclass_fields__)
     return np.float64(step).tobytes() if isinstance(step, float) else step
+
+
+CAREFUL = '''
+"""A strategy."""
+
+import numpy as np
+
+from gaplab.plugins import Strategy
+
+
+class Careful(Strategy):
+    """Stays in the middle."""
+
+    name = "careful"
+    searches = False
+
+    def select(self, belief, search, rng):
+        return (belief.space.lower + belief.space.upper) / 2
+'''
+"""A file with a strategy of one's own."""

@@ -9,7 +9,7 @@ from secrets import token_hex
 from threading import Event
 
 from gaplab.services import logs
-from gaplab.services.core.errors import ClusterUnusable, PluginBroken, RayGone, StoreChanged, StoreUnavailable
+from gaplab.services.core.errors import ClusterUnusable, RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.plugins import folders
 from gaplab.services.running.pulse import Pulse
 from gaplab.services.settings import Settings
@@ -33,6 +33,7 @@ def serve(settings: Settings) -> int:
     pulse = Pulse.inherited()
     logs.adopt("ray")
     logs.configure()
+    folders.load()
     store = Store(settings.database_url, answer_s=_answer_s(settings.lease_s), pinned=True)
     try:
         with in_use(store.file):
@@ -119,14 +120,13 @@ COMMANDS: dict[str, Callable[[Settings], int]] = {"serve": serve, "check": check
 
 
 def main(arguments: list[str]) -> int:
-    """Run the command; return 2 if the arguments, the environment or a plug-in cannot be used."""
+    """Run the command; return 2 if the arguments or the environment cannot be used."""
     if len(arguments) != 1 or arguments[0] not in COMMANDS:
         sys.stderr.write(f"usage: python -m workers {' | '.join(COMMANDS)}\n")
         return 2
     try:
         settings = Settings.from_environment()
-        folders.load()
-    except (ValueError, PluginBroken) as error:
+    except ValueError as error:
         sys.stderr.write(f"{error}\n")
         return 2
     return COMMANDS[arguments[0]](settings)

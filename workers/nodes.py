@@ -1,38 +1,66 @@
-"""Versions that all nodes of a cluster must share, so that a repetition has the same numbers on each of them."""
+"""Versions that all nodes of a cluster must share, so that a repetition has the same numbers on each of them.
 
+gaplab and its libraries concern all work: a node that has others ends the supervisor. An external plug-in concerns
+only the experiments that name it: a process that has another version refuses them, and does the others.
+"""
+
+import logging
 import platform
+from collections.abc import Mapping
+from typing import Any
 
 import ray
 from ray.exceptions import RayError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-from gaplab.services.core.errors import ClusterUnusable, PluginBroken
+from gaplab.schemas.provenance import Provenance
+from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
 from gaplab.services.plugins import folders
+from gaplab.services.plugins.contents import Contents
+from gaplab.services.plugins.external import unavailable
+from gaplab.services.plugins.watching import imported, present
 from gaplab.services.running.versions import Versions as Versions
+from gaplab.services.running.versions import named_versions, plugin_versions
 from gaplab.services.running.versions import versions as versions
 from gaplab.workers.output import limit_prints
 
 ANSWER_S = 60.0
 """Longest wait for a node to start a process and name its versions."""
 
+PLUGIN = "plug-in "
+"""Begins the names of external plug-ins among versions."""
+
+log = logging.getLogger("gaplab.supervisor")
+
+
+def with_plugins(shared: Versions, under: Provenance, spec: Mapping[str, Any]) -> Versions:
+    """Return the versions that a process must have to work on a spec: the shared ones and those of its plug-ins.
+
+    Args:
+        shared: versions of gaplab and its libraries.
+        under: the provenance under which the work was claimed.
+        spec: of the experiment, or of the sensitivity check.
+    """
+    return shared | _prefixed(named_versions(under, spec))
+
 
 def check_here(expected: Versions) -> None:
-    """Check that this process has the supervisor's versions.
+    """Check that this process has the expected versions. It imports plug-ins again that were edited since.
 
     Raises:
-        ClusterUnusable: it lacks them, or an external plug-in is broken here; the message says which.
+        ClusterUnusable: it lacks versions of gaplab or its libraries; the message says which.
+        PluginDiffers: it lacks versions of plug-ins.
     """
     limit_prints()
-    try:
-        found = _versions_here()
-    except PluginBroken as error:
-        msg = f"the node {platform.node()} cannot use a plug-in that the supervisor has: {error}"
-        raise ClusterUnusable(msg) from error
-    _compare(platform.node(), found, expected)
+    folders.find()
+    _compare(platform.node(), versions(), _shared(expected))
+    wanted = {name.removeprefix(PLUGIN): text for name, text in expected.items() if name.startswith(PLUGIN)}
+    if wanted and _different(imported.contents(), wanted) and (different := _different(imported.renewed(), wanted)):
+        raise PluginDiffers(different, wanted)
 
 
 def check_nodes() -> None:
-    """Check that every node of the cluster has this process's versions.
+    """Check that every node of the cluster has this process's versions, and warn of plug-ins that differ.
 
     Raises:
         ClusterUnusable: one has other versions, or no gaplab at all.
@@ -40,6 +68,7 @@ def check_nodes() -> None:
     alive = [node for node in ray.nodes() if node["Alive"]]
     only = [NodeAffinitySchedulingStrategy(node["NodeID"], soft=False) for node in alive]
     answers = [_versions_of_node.options(scheduling_strategy=each).remote() for each in only]
+    ours = versions() | _prefixed(plugin_versions(present()))
     for answer, node in zip(answers, alive, strict=True):
         name = f"{node['NodeManagerHostname']} ({node['NodeManagerAddress']})"
         try:
@@ -47,18 +76,34 @@ def check_nodes() -> None:
         except RayError as error:
             msg = f"the node {name} cannot run gaplab, which every node needs: {_last_line(error)}"
             raise ClusterUnusable(msg) from error
-        _compare(name, found, versions())
+        _compare(name, found, _shared(ours))
+        for plugin in [each for each in ours if found.get(each) != ours[each]]:
+            log.warning("the node %s has another version of the %s; experiments that name it wait", name, plugin)
 
 
 @ray.remote(num_cpus=0, max_retries=0)
 def _versions_of_node() -> Versions:
-    return _versions_here()
-
-
-def _versions_here() -> Versions:
-    """Return the versions of this process, after finding its plug-ins, which Ray's processes have not done yet."""
     folders.find()
-    return versions()
+    return versions() | _prefixed(plugin_versions(imported.contents()))
+
+
+def _prefixed(plugins: Versions) -> Versions:
+    return {f"{PLUGIN}{plugin}": text for plugin, text in plugins.items()}
+
+
+def _shared(expected: Versions) -> Versions:
+    return {name: text for name, text in expected.items() if not name.startswith(PLUGIN)}
+
+
+def _different(contents: Contents, wanted: Versions) -> dict[str, str]:
+    """Return a sentence for each plug-in that this process has in another version, by its kind and name."""
+    found = plugin_versions(contents)
+    wrong = [plugin for plugin in wanted if found.get(plugin) != wanted[plugin]]
+    return {plugin: unavailable(plugin) or _sentence(found.get(plugin, "none"), wanted[plugin]) for plugin in wrong}
+
+
+def _sentence(found: str, wanted: str) -> str:
+    return f"a process on {platform.node()} has {found}, the supervisor {wanted}: put the same file on all nodes"
 
 
 def _compare(node: str, found: Versions, expected: Versions) -> None:

@@ -18,6 +18,7 @@ from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.nodes import Versions
 from gaplab.workers.patience import Patience
 from gaplab.workers.permits import SHARE, Handle, Permits
+from gaplab.workers.plugins import Plugins
 from gaplab.workers.run import Run
 
 WAIT_S = 0.2
@@ -53,7 +54,7 @@ class Repetitions:
         self.runs: list[Run] = []
         self._store = store
         self._owner = owner
-        self._versions = versions
+        self._plugins = Plugins(versions)
         self._checkpoint_s = checkpoint_s
         self._patience = patience or Patience()
         self._lease_s = lease_s
@@ -67,7 +68,9 @@ class Repetitions:
         if hardware and self._permits is None:
             self._permits = Permits.remote()  # type: ignore[attr-defined]  # Ray adds it
         permits = self._permits if hardware else None
-        return Run(claim, task.run.remote(claim, self._versions, self._checkpoint_s, permits), permits)
+        return Run(
+            claim, task.run.remote(claim, self._plugins.expected(claim.spec), self._checkpoint_s, permits), permits
+        )
 
     def heartbeat(self) -> None:
         """Renew the claims, stop the runs whose claim is no longer valid, and end those that hang."""
@@ -85,12 +88,13 @@ class Repetitions:
             return
         self._looked = monotonic()
         waiting = [run.claim for run in self.runs if not (run.begun or run.over)]
-        if given := set(execution.give_way(self._store, waiting)):
+        present = self._plugins.present()
+        if given := set(execution.give_way(self._store, waiting, *present)):
             self._drop_all_but([run.claim for run in self.runs if run.claim not in given])
         if self._unsure:
             execution.hand_back_unheard(self._store, self._owner, [run.claim for run in self.runs])
         self._unsure = True
-        claims = execution.claim(self._store, self._owner, capacity() - len(self.runs))
+        claims = execution.claim(self._store, self._owner, capacity() - len(self.runs), *present)
         self._unsure = False
         for claim in claims:
             self.runs.append(self.launch(claim))
@@ -132,7 +136,9 @@ class Repetitions:
             return
         self._complete([run for run in over if run.ended and run.lost is None])
         for run in over:
-            if run.failed is not None:
+            if run.refused is not None:
+                self._plugins.hand_back(self._store, run.claim, run.refused)
+            elif run.failed is not None:
                 execution.fail(self._store, run.claim, run.failed)
                 log.error("%s", run.failed.reason, extra=run.place)
             elif run.lost is not None:

@@ -7,7 +7,7 @@ import ray
 from ray import ObjectRefGenerator
 from ray.exceptions import RayError, RayTaskError
 
-from gaplab.services.core.errors import ClusterUnusable
+from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
 from gaplab.services.store.lease import Claim, Delivered, Failure, Pulse
 from gaplab.workers.patience import Patience
 from gaplab.workers.permits import Handle
@@ -29,6 +29,7 @@ class Run:
         pulse: the last sign of life, if no delivery has followed it.
         heard_at: time of the last delivery or sign of life.
         measuring: the place in the log of the step whose measurement the database knows of.
+        refused: reason why its process did not begin it.
         lost: reason why another worker must continue: the worker is gone, or the log refused a delivery.
     """
 
@@ -39,6 +40,7 @@ class Run:
     begun: bool = False
     ended: bool = False
     failed: Failure | None = None
+    refused: PluginDiffers | None = None
     lost: str | None = None
     pulse: Pulse | None = None
     heard_at: float = field(default_factory=monotonic)
@@ -53,7 +55,10 @@ class Run:
         except RayTaskError as error:
             if isinstance(error.cause, ClusterUnusable):
                 raise error.cause from error
-            self.failed = Failure(told(error))
+            if isinstance(error.cause, PluginDiffers):
+                self.refused = error.cause
+            else:
+                self.failed = Failure(told(error))
         except RayError as error:
             self.lost = f"the worker was lost: {type(error).__name__}"
 
@@ -97,7 +102,7 @@ class Run:
     @property
     def over(self) -> bool:
         """Whether the stream has ended, with or without an error."""
-        return self.ended or self.failed is not None or self.lost is not None
+        return self.ended or any(reason is not None for reason in (self.failed, self.refused, self.lost))
 
     @property
     def place(self) -> dict[str, str | int]:

@@ -9,7 +9,7 @@ from ray import ObjectRef
 from ray.exceptions import RayError, RayTaskError
 
 from gaplab.schemas.sensitivity import Checked, Sensitivity
-from gaplab.services.core.errors import ClusterUnusable
+from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort
 from gaplab.services.core.sensitivity import check as check_tunables
@@ -22,6 +22,7 @@ from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from gaplab.workers.nodes import Versions, check_here
 from gaplab.workers.patience import Patience
+from gaplab.workers.plugins import Plugins
 from gaplab.workers.task import told
 
 LOOK_S = 0.2
@@ -40,6 +41,7 @@ def check(checked: Checked, expected: Versions) -> tuple[Sensitivity, ...] | Fai
 
     Raises:
         ClusterUnusable: this node lacks the expected versions.
+        PluginDiffers: this process lacks those of the plug-ins.
     """
     check_here(expected)
     try:
@@ -72,7 +74,7 @@ class Checks:
         self._store = store
         self._owner = owner
         self._lease_s = lease_s
-        self._versions = versions or {}
+        self._plugins = Plugins(versions)
         self._patience = patience or Patience()
         self._run: tuple[CheckClaim, Result] | None = None
         self._begun = 0.0
@@ -104,8 +106,9 @@ class Checks:
             self._run = None
 
     def _claim(self) -> None:
-        if (claim := sensitivity.claim(self._store, self._owner)) is not None:
-            self._run, self._begun = (claim, check.remote(claim.spec, self._versions)), monotonic()
+        _, refused = self._plugins.present()
+        if (claim := sensitivity.claim(self._store, self._owner, refused)) is not None:
+            self._run, self._begun = (claim, check.remote(claim.spec, self._plugins.expected(claim.spec))), monotonic()
 
     def _end(self, claim: CheckClaim, result: Result) -> None:
         if not ray.wait([result], timeout=0)[0]:
@@ -120,7 +123,7 @@ class Checks:
         except RayTaskError as error:
             if isinstance(error.cause, ClusterUnusable):
                 raise error.cause from error
-            self._fail(claim, told(error))
+            self._over(claim, error)
         except RayError as error:
             sensitivity.release(self._store, claim, f"the worker was lost: {type(error).__name__}")
             log.warning("sensitivity check %s: queued again: %s", claim.id, type(error).__name__)
@@ -131,6 +134,15 @@ class Checks:
             ray.cancel(result, force=True)
             self._fail(claim, f"it took more than {self._patience.check_s:g} s; its rollouts hang, or are very slow")
             self._run = None
+
+    def _over(self, claim: CheckClaim, error: RayTaskError) -> None:
+        """Hand back a check that its process refused because it has other plug-ins; fail any other."""
+        if isinstance(error.cause, PluginDiffers):
+            self._plugins.refuse(error.cause)
+            sensitivity.hand_back(self._store, claim)
+            log.warning("sensitivity check %s: queued again: %s", claim.id, error.cause)
+        else:
+            self._fail(claim, told(error))
 
     def _fail(self, claim: CheckClaim, reason: str) -> None:
         sensitivity.fail(self._store, claim, reason)

@@ -39,6 +39,7 @@ def run(claim: Claim, expected: Versions, checkpoint_s: float, permits: Handle |
 
     Raises:
         ClusterUnusable: this node lacks the expected versions.
+        PluginDiffers: this process lacks those of the plug-ins.
     """
     check_here(expected)
     yield ()

@@ -60,7 +60,7 @@ def catalogue(plugins: Catalogue) -> list[Table]:
 
 def plugin(found: PluginRead) -> list[Table | str]:
     """Return all that is known of a plug-in: summary, source, details and options."""
-    lines = [f"[bold]{found.name}[/]", escape(found.summary), f"source: {escape(found.source)}"]
+    lines = [f"[bold]{escape(found.name)}[/]", escape(found.summary), f"source: {escape(found.source)}"]
     lines += [escape(found.note)] if found.note else []
     lines += [f"{name}: {escape(str(value))}" for name, value in found.details.items()]
     options = [
@@ -114,8 +114,8 @@ def _repetition(found: RepetitionRead) -> tuple[str, ...]:
 
 
 def _plugin(found: PluginRead) -> tuple[str, ...]:
-    name = found.name if found.available else f"{found.name} (not installed)"
-    return name, escape(found.summary), ", ".join(found.options.get("properties", {}))
+    name = found.name if found.available else f"{found.name} (not available)"
+    return escape(name), escape(found.summary or found.note or ""), ", ".join(found.options.get("properties", {}))
 
 
 def _effect(found: Sensitivity) -> tuple[str, ...]:

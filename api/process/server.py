@@ -53,7 +53,6 @@ def serve_api(settings: Settings, listener: socket.socket, supervisor: Superviso
     Raises:
         Unauthenticated: other machines can reach the host, and no token exists.
         StoreUnavailable: the database does not answer.
-        PluginBroken: an external plug-in cannot be used.
     """
     exit_on_signals()
     folders.load()

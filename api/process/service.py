@@ -32,7 +32,6 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
         CommandError: the address is invalid or taken.
         StoreUnavailable: the database cannot be migrated.
         Unauthenticated: other machines can reach the host, and no token exists.
-        PluginBroken: an external plug-in cannot be used.
     """
     logs.configure()
     exit_on_signals()

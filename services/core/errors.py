@@ -19,6 +19,7 @@
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
     │   └── RayGone              Ray died or stands still; only a new process gets another
     ├── PluginBroken         an external plug-in file is unusable, or a plug-in breaks its contract
+    ├── PluginDiffers        a process has other versions of plug-ins than the supervisor
     ├── RealityFailed        the code of reality raised an error
     ├── TryAgain             a fault that may pass: the step is repeated after a pause
     └── EngineError
@@ -28,7 +29,7 @@
 Diverged physics is not an error: its fitness is nan, which never wins.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any
@@ -145,6 +146,23 @@ class RayGone(ClusterUnusable):
 
 class PluginBroken(GaplabError):
     """A plug-in file is unusable; the message says which, and why."""
+
+
+class PluginDiffers(GaplabError):
+    """A process has other versions of the external plug-ins that a spec names, or cannot use them.
+
+    Args:
+        differences: a sentence for each plug-in, by its kind and name.
+        expected: the version of each that the supervisor has.
+    """
+
+    def __init__(self, differences: Mapping[str, str], expected: Mapping[str, str]) -> None:
+        self.differences, self.expected = dict(differences), dict(expected)
+        super().__init__(self.differences, self.expected)  # the arguments, so that it can be pickled
+
+    def __str__(self) -> str:
+        """Return the sentences."""
+        return "; ".join(self.differences.values())
 
 
 class RealityFailed(GaplabError):

@@ -1,7 +1,12 @@
-"""External plug-ins: every module of the plug-in folders, imported as `gaplab_plugins.NAME`."""
+"""External plug-ins: every module of the plug-in folders, imported as `gaplab_plugins.NAME`.
+
+A module that cannot be imported and a class that is no valid plug-in stop nothing: they are listed as unusable.
+"""
 
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
 from importlib import import_module, invalidate_caches
 from pathlib import Path
 from pkgutil import iter_modules
@@ -9,6 +14,7 @@ from types import ModuleType
 from typing import TypeGuard, TypeVar
 
 from gaplab.services.core.errors import PluginBroken
+from gaplab.services.core.unusable_plugins import Unusable, from_file, quoted, remedied
 
 PACKAGE = "gaplab_plugins"
 """Name of a package without a file; plug-in files import each other as `from gaplab_plugins.other import …`."""
@@ -16,8 +22,21 @@ PACKAGE = "gaplab_plugins"
 P = TypeVar("P")
 
 
+@dataclass(frozen=True)
+class Loaded:
+    """The modules of the plug-in folders.
+
+    Attributes:
+        modules: those that were imported, by name.
+        unusable: the plug-ins of the others.
+    """
+
+    modules: tuple[ModuleType, ...] = ()
+    unusable: tuple[Unusable, ...] = ()
+
+
 def set_folders(folders: tuple[Path, ...]) -> None:
-    """Set the plug-in folders; registries that were used before keep their plug-ins."""
+    """Set the plug-in folders; their modules are imported again when they are next needed."""
     for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
         del sys.modules[name]
     package = ModuleType(PACKAGE, "External plug-ins.")
@@ -26,57 +45,87 @@ def set_folders(folders: tuple[Path, ...]) -> None:
     invalidate_caches()
 
 
+def package() -> ModuleType | None:
+    """Return the package of external plug-ins, another object after each `set_folders`; None before the first."""
+    return sys.modules.get(PACKAGE)
+
+
 def folders() -> tuple[Path, ...]:
-    """Return the plug-in folders.
-
-    Raises:
-        PluginBroken: one does not exist.
-    """
-    named = tuple(Path(path) for path in sys.modules[PACKAGE].__path__) if PACKAGE in sys.modules else ()
-    for folder in named:
-        if not folder.is_dir():
-            raise PluginBroken(f"there is no plug-in folder {folder}")
-    return named
+    """Return the plug-in folders that exist."""
+    return tuple(folder for folder in dict.fromkeys(named_folders()) if folder.is_dir())
 
 
-def classes(base: type[P]) -> Iterator[type[P]]:
-    """Return the external plug-ins of one kind.
+def named_folders() -> tuple[Path, ...]:
+    """Return the plug-in folders as they were set, whether they exist or not."""
+    found = package()
+    return () if found is None else tuple(Path(path) for path in found.__path__)
 
-    Raises:
-        PluginBroken: a module cannot be imported, or a class is not a valid plug-in.
-    """
-    for module in _modules():
-        for each in vars(module).values():
-            if _is_of(module, each) and issubclass(each, base):
+
+def classes(base: type[P]) -> tuple[list[type[P]], list[Unusable]]:
+    """Return the valid external plug-ins of one kind, and the invalid ones of this kind or of a kind unknown."""
+    valid, invalid = list[type[P]](), list[Unusable]()
+    for module in loaded().modules:
+        for each in _classes(module, base):
+            try:
                 _check(each)
-                yield each
+            except PluginBroken as error:
+                invalid.append(Unusable(file_of(each) or "", _name_of(each), None, remedied(str(error))))
+            else:
+                valid.append(each)
+    return valid, invalid
+
+
+def loaded() -> Loaded:
+    """Return the modules of the folders; the first call after `set_folders` imports them."""
+    return _load(package())
 
 
 def file_of(plugin: type) -> str | None:
     """Return the file of a plug-in relative to its folder; None for gaplab's own plug-ins."""
-    package, _, name = plugin.__module__.partition(".")
-    if package != PACKAGE:
+    top, _, name = plugin.__module__.partition(".")
+    if top != PACKAGE:
         return None
-    is_package = hasattr(sys.modules[plugin.__module__], "__path__")
+    is_package = hasattr(sys.modules.get(plugin.__module__), "__path__")
     return name.replace(".", "/") + ("/__init__.py" if is_package else ".py")
 
 
-def _modules() -> list[ModuleType]:
-    """Return the modules of the folders by name, without those that begin with an underscore."""
-    found: dict[str, str] = {}
+@lru_cache(maxsize=1)
+def _load(_package: ModuleType | None) -> Loaded:
+    places: dict[str, list[Path]] = {}
     for folder in folders():
-        for name in sorted(info.name for info in iter_modules([str(folder)])):
-            if name in found:
-                raise PluginBroken(f"{name}.py is in {found[name]} and in {folder}; rename one of them")
-            found[name] = str(folder)
-    return [_imported(name, folder) for name, folder in found.items() if not name.startswith("_")]
+        for info in iter_modules([str(folder)]):
+            places.setdefault(info.name, []).append(
+                folder / info.name / "__init__.py" if info.ispkg else folder / f"{info.name}.py"
+            )
+    modules, unusable = list[ModuleType](), list[Unusable]()
+    for name, paths in sorted(places.items()):
+        try:
+            modules += _imported(name, paths)
+        except PluginBroken as error:
+            file = f"{name}/__init__.py" if paths[0].name == "__init__.py" else f"{name}.py"
+            unusable += from_file(paths[0], file, str(error))
+    return Loaded(tuple(modules), tuple(unusable))
 
 
-def _imported(name: str, folder: str) -> ModuleType:
+def _imported(name: str, paths: list[Path]) -> Iterator[ModuleType]:
+    """Yield the module of this name, unless an underscore says that it has no plug-ins.
+
+    Raises:
+        PluginBroken: it cannot be imported, or is in several folders.
+    """
+    if len(paths) > 1:
+        places = " and in ".join(path.parent.name for path in paths)
+        raise PluginBroken(f"{name}.py is in {places}: rename one of them")
+    if name.startswith("_"):
+        return
     try:
-        return import_module(f"{PACKAGE}.{name}")
-    except Exception as error:  # a plug-in file may raise anything
-        raise PluginBroken(f"{folder}/{name}.py cannot be imported: {type(error).__name__}: {error}") from error
+        yield import_module(f"{PACKAGE}.{name}")
+    except (Exception, SystemExit) as error:
+        raise PluginBroken(f"{name}.py cannot be imported: {quoted(error, folders())}") from error
+
+
+def _classes(module: ModuleType, base: type[P]) -> Iterator[type[P]]:
+    return (each for each in list(vars(module).values()) if _is_of(module, each) and issubclass(each, base))
 
 
 def _is_of(module: ModuleType, found: object) -> TypeGuard[type]:
@@ -93,9 +142,15 @@ def _check(plugin: type) -> None:
     if not isinstance(getattr(plugin, "name", None), str):
         raise PluginBroken(f"{where} has no name for specs to use: add name = '…'")
     try:
-        plugin.describe()  # type: ignore[attr-defined]
-    except Exception as error:
-        raise PluginBroken(f"{where} cannot be described: {type(error).__name__}: {error}") from error
+        plugin.Options()  # type: ignore[attr-defined]
+        plugin.describe().model_dump_json()  # type: ignore[attr-defined]
+    except (Exception, SystemExit) as error:
+        raise PluginBroken(f"{where} cannot be described: {quoted(error, folders())}") from error
+
+
+def _name_of(plugin: type) -> str:
+    name = getattr(plugin, "name", None)
+    return name if isinstance(name, str) and name else Path((file_of(plugin) or "").removesuffix("/__init__.py")).stem
 
 
 def _is_abstract(plugin: type, name: str) -> bool:

@@ -1,10 +1,11 @@
 """Plug-ins: each file in a plug-in folder is one plug-in; `external_plugins` imports those outside gaplab."""
 
-from collections.abc import Iterator, Mapping
-from functools import cached_property
+from collections.abc import Container, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from importlib import import_module
 from inspect import getdoc, isabstract
 from pkgutil import iter_modules
+from types import ModuleType
 from typing import Any, ClassVar, Generic, TypeVar
 
 from pydantic import ValidationError
@@ -12,7 +13,8 @@ from pydantic import ValidationError
 from gaplab.schemas.base import Frozen
 from gaplab.schemas.plugin import PluginRead, PluginRef
 from gaplab.services.core import external_plugins
-from gaplab.services.core.errors import InvalidSpec, PluginBroken, Violation, unknown_name
+from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation, unknown_name
+from gaplab.services.core.unusable_plugins import Unusable, quoted, remedied
 
 
 class NoOptions(Frozen):
@@ -56,24 +58,59 @@ class Plugin:
 P = TypeVar("P", bound=Plugin)
 
 
-class Registry(Mapping[str, type[P]], Generic[P]):
-    """The plug-ins of one kind, by name, in alphabetical order.
+@dataclass(frozen=True)
+class _Found(Generic[P]):
+    """The plug-ins of one kind by name, and those that specs cannot use."""
 
-    The first use imports every module of `package` and every external plug-in, and may raise PluginBroken.
+    usable: dict[str, type[P]]
+    unusable: dict[str, Unusable]
+
+
+class Registry(Mapping[str, type[P]], Generic[P]):
+    """The usable plug-ins of one kind, by name, in alphabetical order.
+
+    The first use imports every module of `package` and every external plug-in. A broken external one is `unusable`.
     """
 
     def __init__(self, kind: str, package: str, base: type[P]) -> None:
         self.kind = kind
         self._package = package
         self._base = base
+        self._sorted: tuple[ModuleType | None, _Found[P]] | None = None
 
-    @cached_property
-    def _plugins(self) -> dict[str, type[P]]:
+    @property
+    def unusable(self) -> Mapping[str, str]:
+        """Why specs cannot use an external plug-in, by its name in the catalogue."""
+        return {name: each.why for name, each in self._found.unusable.items()}
+
+    @property
+    def _found(self) -> _Found[P]:
+        """The plug-ins, sorted again after the plug-in folders were set again."""
+        package = external_plugins.package()
+        if self._sorted is None or self._sorted[0] is not package:
+            self._sorted = package, self._sort()
+        return self._sorted[1]
+
+    def _sort(self) -> _Found[P]:
+        usable = self._own()
+        valid, unusable = external_plugins.classes(self._base)
+        unusable += [each for each in external_plugins.loaded().unusable if each.kind in {None, self.kind}]
+        for name in sorted({each.name for each in valid}):
+            files = [external_plugins.file_of(each) or "" for each in valid if each.name == name]
+            others = [*files, *(["gaplab"] if name in usable else [])]
+            if len(others) == 1:
+                usable[name] = next(each for each in valid if each.name == name)
+            else:
+                why = f"{files[0]} has a {self.kind} called {name!r}, but so has {others[1]}: rename one of them"
+                unusable.append(Unusable(files[0], name, self.kind, remedied(why)))
+        return _Found(dict(sorted(usable.items())), _by_name(unusable, usable))
+
+    def _own(self) -> dict[str, type[P]]:
         modules = (
             import_module(f"{self._package}.{info.name}")
             for info in iter_modules(import_module(self._package).__path__)
         )
-        found = {
+        return {
             each.name: each
             for module in modules
             for each in vars(module).values()
@@ -82,23 +119,15 @@ class Registry(Mapping[str, type[P]], Generic[P]):
             and not isabstract(each)
             and hasattr(each, "name")
         }
-        for each in external_plugins.classes(self._base):
-            if each.name in found:
-                file, other = (external_plugins.file_of(plugin) for plugin in (each, found[each.name]))
-                raise PluginBroken(
-                    f"{file} has a {self.kind} called {each.name!r}, but so has {other or 'gaplab'}: rename it"
-                )
-            found[each.name] = each
-        return dict(sorted(found.items()))
 
     def __getitem__(self, name: str) -> type[P]:
-        return self._plugins[name]
+        return self._found.usable[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._plugins)
+        return iter(self._found.usable)
 
     def __len__(self) -> int:
-        return len(self._plugins)
+        return len(self._found.usable)
 
     def check(self, ref: PluginRef, pointer: str = "") -> tuple[type[P], Frozen]:
         """Return the plug-in class that a spec names, and its complete options.
@@ -108,8 +137,11 @@ class Registry(Mapping[str, type[P]], Generic[P]):
             pointer: place in the spec, for errors.
 
         Raises:
-            InvalidSpec: the name is unknown, or the plug-in refuses the options.
+            InvalidSpec: the name is unknown, the plug-in is unusable, or it refuses the options.
         """
+        if (why := self.unusable.get(ref.name)) is not None:
+            message = f"the {self.kind} {ref.name!r} is not available: {why}"
+            raise InvalidSpec([Violation(pointer, ref.name, message, tuple(self))])
         if ref.name not in self:
             raise InvalidSpec([unknown_name(pointer, self.kind, ref.name, list(self))])
         plugin = self[ref.name]
@@ -121,13 +153,41 @@ class Registry(Mapping[str, type[P]], Generic[P]):
             ) from error
 
     def create(self, ref: PluginRef, pointer: str = "") -> P:
-        """Create the plug-in that a spec names; raise as `check` does."""
+        """Create the plug-in that a spec names.
+
+        Raises:
+            InvalidSpec: as by `check`, or because the plug-in raises.
+        """
         plugin, options = self.check(ref, pointer)
-        return plugin(options)
+        try:
+            return plugin(options)
+        except GaplabError:
+            raise
+        except Exception as error:
+            why = quoted(error, external_plugins.folders())
+            message = f"the {self.kind} {ref.name!r} cannot be created with these options: {why}"
+            raise InvalidSpec([Violation(pointer, ref.model_dump(mode="json"), message)]) from error
 
     def describe(self) -> tuple[PluginRead, ...]:
         """Return the catalogue's entries of all plug-ins."""
-        return tuple(plugin.describe() for plugin in self.values())
+        found = self._found
+        entries = [*(plugin.describe() for plugin in found.usable.values()), *map(_entry, found.unusable.items())]
+        return tuple(sorted(entries, key=lambda entry: entry.name))
+
+
+def _by_name(unusable: Iterable[Unusable], usable: Container[str]) -> dict[str, Unusable]:
+    """Return unusable plug-ins by their names in the catalogue: with the file where the name alone is another's."""
+    named: dict[str, Unusable] = {}
+    for each in unusable:
+        named[each.name if each.name not in usable and each.name not in named else f"{each.name} ({each.file})"] = each
+    return named
+
+
+def _entry(named: tuple[str, Unusable]) -> PluginRead:
+    """Return the catalogue's entry of an unusable plug-in."""
+    name, found = named
+    source = f"{found.file} of GAPLAB_PLUGINS"
+    return PluginRead(name=name, summary="", source=source, options={}, available=False, note=found.why)
 
 
 def _source(plugin: type[Plugin]) -> str:

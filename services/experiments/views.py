@@ -10,6 +10,7 @@ from gaplab.schemas.records import ExperimentRead, RepetitionRead, StudyRead
 from gaplab.services.experiments.checks import CheckSummary, summaries
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.progress import mean_best, progress_of
+from gaplab.services.plugins.refusals import tells_unavailable
 from gaplab.services.store.models import ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries.experiments import experiments_of
 from gaplab.services.store.queries.progress import Tally, reasons, tallies
@@ -135,6 +136,8 @@ def _version_warnings(row: ExperimentRow, tally: Tally) -> tuple[str, ...]:
     """Return why the experiment waits, if a supervisor skipped it because its versions differ."""
     if row.refused_by is None or row.state.ended or tally.running:
         return ()
+    if tells_unavailable(row.refused_by):
+        return (f"it waits for a supervisor that can use its plug-ins: {row.refused_by}",)
     return (
         f"its first steps were computed with {row.computed_with}, and a supervisor with {row.refused_by} does not go "
         f"on with it: start one with the same as at first, or accept the others (`gaplab accept-versions {row.id}`)",

@@ -4,7 +4,7 @@ from functools import cache
 from pathlib import Path
 from traceback import walk_tb
 
-from gaplab.services.plugins.external import registries
+from gaplab.services.plugins.external import REGISTRIES
 
 LONGEST = 2_000
 """Characters of a described error."""
@@ -35,7 +35,7 @@ def raised(error: BaseException) -> str:
 def _plugins() -> dict[type | str | None, str]:
     """Return the kind and name of each plug-in, by its class and by its module; of several in a module, the first."""
     found: dict[type | str | None, str] = {}
-    for registry in registries():
+    for registry in REGISTRIES.values():
         for name, plugin in registry.items():
             for place in (plugin, plugin.__module__):
                 found.setdefault(place, f"{registry.kind} {name!r}")

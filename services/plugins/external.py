@@ -1,7 +1,6 @@
-"""Versions of external plug-ins, which are files in the folders of GAPLAB_PLUGINS."""
+"""Versions of external plug-ins, which are files of GAPLAB_PLUGINS, and the plug-ins that a spec names."""
 
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from gaplab.services.core.external_plugins import file_of
@@ -11,20 +10,57 @@ from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.engines import engines
-from gaplab.services.plugins.folders import digest_of
+from gaplab.services.plugins.contents import Contents
+from gaplab.services.plugins.watching import present
+
+REGISTRIES: Mapping[str, Registry[Any]] = {
+    registry.kind: registry for registry in (strategies, robots, engines, tunables, optimizers)
+}
+"""The plug-ins of each kind."""
 
 
-def registries() -> tuple[Registry[Any], ...]:
-    """Return the registries of all kinds."""
-    return strategies, robots, engines, tunables, optimizers
+def external_plugins(contents: Contents | None = None) -> Mapping[str, str]:
+    """Return the files of each external plug-in with their hashes, by its kind and name, as in `"robot hexapod"`.
 
-
-@cache
-def external_plugins() -> Mapping[str, str]:
-    """Return the file and digest of each external plug-in, by its kind and name, as in `"robot hexapod"`."""
-    return {
-        f"{registry.kind} {name}": f"{file} {digest_of(file)}"
-        for registry in registries()
+    Args:
+        contents: of the folders; left out, those of now.
+    """
+    found = present() if contents is None else contents
+    texts = {
+        f"{kind} {name}": found.text_of(file)
+        for kind, registry in REGISTRIES.items()
         for name, plugin in registry.items()
         if (file := file_of(plugin)) is not None
     }
+    return {plugin: text for plugin, text in texts.items() if text is not None}
+
+
+def named_in(spec: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the plug-ins that a resolved spec names, or the spec of a sensitivity check, by kind and name."""
+    return tuple(dict.fromkeys(_named_in(spec)))
+
+
+def unavailable(plugin: str) -> str | None:
+    """Return why this process cannot use a plug-in; None if it can.
+
+    Args:
+        plugin: its kind and name.
+    """
+    kind, _, name = plugin.partition(" ")
+    registry = REGISTRIES[kind]
+    if name not in registry:
+        return registry.unusable.get(name, "it is not installed")
+    if kind == engines.kind and not engines[name].available():
+        return f"not installed: {engines[name].install}"
+    return None
+
+
+def _named_in(spec: Mapping[str, Any]) -> Iterator[str]:
+    yield from (
+        f"{kind} {spec[kind]['name']}" for kind in ("strategy", "robot", "optimizer", "engine") if spec.get(kind)
+    )
+    reality = spec.get("reality") or {}
+    if reality.get("engine"):
+        yield f"engine {reality['engine']['name']}"
+    yield from (f"tunable {ref['name']}" for ref in spec["tunables"])
+    yield from (f"tunable {name}" for name in reality.get("parameters", ()))

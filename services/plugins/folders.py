@@ -4,14 +4,17 @@ Only the environment of a process can name a folder; no spec and no request can.
 itself: services and supervisors at their start, Ray's processes before their first task.
 """
 
+import logging
 import os
 from functools import cache
-from hashlib import sha256
 from pathlib import Path
 
 from gaplab.services.core import external_plugins
+from gaplab.services.plugins.external import REGISTRIES
 
 VARIABLE = "GAPLAB_PLUGINS"
+
+log = logging.getLogger("gaplab.plugins")
 
 
 @cache
@@ -27,44 +30,13 @@ def find() -> None:
     external_plugins.set_folders(folders)
 
 
+@cache
 def load() -> None:
-    """Find and import every plug-in, so that a process with a broken one does not start.
-
-    Raises:
-        PluginBroken: a file cannot be imported, or a class in it is not a valid plug-in.
-    """
-    from gaplab.services.plugins.catalogue import catalogue
-
+    """Find and import every plug-in, and warn of those that cannot be used; later calls do nothing."""
     find()
-    catalogue()
-
-
-def digests() -> dict[str, str]:
-    """Return a short hash of the content of each module in the folders and of each file in their packages.
-
-    Other files, such as a database, are not part of a plug-in: its data belongs into a package.
-    """
-    hashes: dict[str, str] = {}
-    for folder in external_plugins.folders():
-        packages = sorted(path.parent for path in folder.glob("*/__init__.py"))
-        for path in sorted([*folder.glob("*.py"), *(file for package in packages for file in package.rglob("*"))]):
-            parts = path.relative_to(folder).parts
-            if path.is_file() and not any(part.startswith(".") or part == "__pycache__" for part in parts):
-                hashes["/".join(parts)] = sha256(path.read_bytes()).hexdigest()[:12]
-    return hashes
-
-
-def digest_of(file: str) -> str:
-    """Return the digest of a plug-in's module; for a file in a package, that of the whole package."""
-    hashes = digests()
-    package, slash, _ = file.partition("/")
-    if not slash:
-        return hashes[file]
-    inside = sorted(item for item in hashes.items() if item[0].startswith(f"{package}/"))
-    return sha256(repr(inside).encode()).hexdigest()[:12]
-
-
-def digest() -> str:
-    """Return one digest for all external plug-ins, or "none" if there are none."""
-    hashes = digests()
-    return sha256(repr(sorted(hashes.items())).encode()).hexdigest()[:12] if hashes else "none"
+    for folder in external_plugins.named_folders():
+        if not folder.is_dir():
+            log.warning("there is no plug-in folder %s, which %s names", folder, VARIABLE)
+    unusable = {name: why for registry in REGISTRIES.values() for name, why in registry.unusable.items()}
+    for name, why in unusable.items():
+        log.warning("the plug-in %r is not available: %s", name, why)

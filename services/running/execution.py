@@ -8,7 +8,7 @@ All functions raise StoreUnavailable while the database cannot be used; each may
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from sqlalchemy import func, select, update
+from sqlalchemy import ColumnElement, func, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
@@ -72,7 +72,13 @@ def free_hardware(session: Session, claims: Sequence[Claim]) -> None:
     session.execute(update(row).where(_LEASES.of(claims), row.state != State.RUNNING).values(hardware=None))
 
 
-def claim(store: Store, owner: str, limit: int, under: Provenance | None = None) -> tuple[Claim, ...]:
+def claim(
+    store: Store,
+    owner: str,
+    limit: int,
+    under: Provenance | None = None,
+    refused: Mapping[str, str] = provenance.NONE,
+) -> tuple[Claim, ...]:
     """Claim up to `limit` queued repetitions in the order of turns, and return them with their logs.
 
     Args:
@@ -81,9 +87,11 @@ def claim(store: Store, owner: str, limit: int, under: Provenance | None = None)
         limit: largest number of repetitions.
         under: provenance of the supervisor; this process's if left out. An experiment that was begun under another
             engine, plug-in, architecture or version of the spec is left alone, and says so.
+        refused: why processes of the supervisor refuse plug-ins, by kind and name; experiments that name them are left
+            alone as well, and so are those whose plug-ins are not available here.
     """
     try:
-        return store.write(_claim, owner, limit, under or present_provenance()) if limit > 0 else ()
+        return store.write(_claim, owner, limit, under or present_provenance(), refused) if limit > 0 else ()
     except IntegrityError as error:
         if "hardware" not in str(error.orig):
             raise
@@ -111,7 +119,12 @@ def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[Delivere
     return store.write(_record, by_claim) if by_claim else ()
 
 
-def give_way(store: Store, waiting: Iterable[Claim], under: Provenance | None = None) -> tuple[Claim, ...]:
+def give_way(
+    store: Store,
+    waiting: Iterable[Claim],
+    under: Provenance | None = None,
+    refused: Mapping[str, str] = provenance.NONE,
+) -> tuple[Claim, ...]:
     """Hand back claims of repetitions that should not start now, and return them.
 
     The reason is a request to pause or stop, or another experiment's turn.
@@ -120,12 +133,14 @@ def give_way(store: Store, waiting: Iterable[Claim], under: Provenance | None = 
         store: the database.
         waiting: claims whose repetition waits for a core; a running one is never interrupted for another.
         under: as in `claim`.
+        refused: as in `claim`.
     """
     claims = tuple(waiting)
     if not claims:
         return ()
     with store.reading() as session:
-        unwanted = _unwanted(session, claims, under or present_provenance())
+        permitted = provenance.permitted(session, under or present_provenance(), refused) & FREE_HARDWARE
+        unwanted = _unwanted(session, claims, permitted)
     return hand_back(store, *unwanted)
 
 
@@ -143,10 +158,16 @@ def _fail(session: Session, claim: Claim, failure: Failure) -> bool:
     return True
 
 
-def _claim(session: Session, owner: str, limit: int, under: Provenance) -> tuple[Claim, ...]:
-    ids = next_repetitions(session, limit, provenance.permitted(session, under) & FREE_HARDWARE)
+def _claim(
+    session: Session, owner: str, limit: int, under: Provenance, refused: Mapping[str, str] = provenance.NONE
+) -> tuple[Claim, ...]:
+    permitted = provenance.permitted(session, under, refused) & FREE_HARDWARE
+    ids = next_repetitions(session, limit, permitted)
+    while ids and (unusable := provenance.refuse_unusable(session, ids, refused)):
+        permitted &= ExperimentRow.id.not_in(unusable)
+        ids = next_repetitions(session, limit, permitted)
     if len(ids) < limit:
-        provenance.refuse(session, under)
+        provenance.refuse(session, under, refused)
     if not ids:
         return ()
     _LEASES.take(session, ids, owner)
@@ -200,8 +221,8 @@ def _locked_requests(session: Session, claims: Iterable[Claim]) -> dict[str, Sta
     return {experiment: state for experiment, state in states.items() if state in ASKED}
 
 
-def _unwanted(session: Session, waiting: Sequence[Claim], under: Provenance) -> tuple[Claim, ...]:
+def _unwanted(session: Session, waiting: Sequence[Claim], permitted: ColumnElement[bool]) -> tuple[Claim, ...]:
     row, experiments = ExperimentRow, sorted({claim.experiment_id for claim in waiting})
     requested = session.scalars(select(row.id).where(row.id.in_(experiments), row.state.in_(ASKED))).all()
-    gone = {*requested, *ahead(session, experiments, provenance.permitted(session, under) & FREE_HARDWARE)}
+    gone = {*requested, *ahead(session, experiments, permitted)}
     return tuple(claim for claim in waiting if claim.experiment_id in gone)

@@ -2,6 +2,7 @@
 
 An experiment is bound to the versions that computed its first steps: its engines with their libraries, the machine's
 architecture, the version of the spec, its external plug-ins. A supervisor with others skips it until a person accepts.
+A supervisor that cannot use a plug-in skips all experiments that name it; they stay queued, and tell why.
 """
 
 import re
@@ -16,13 +17,21 @@ from gaplab.schemas.provenance import Provenance, ProvenanceRead, ProvenanceUse
 from gaplab.schemas.records import ExperimentRead
 from gaplab.services.core.errors import Conflict
 from gaplab.services.experiments.views import view_experiments
+from gaplab.services.plugins import refusals
+from gaplab.services.plugins.external import named_in, unavailable
 from gaplab.services.store.lease import Claim
 from gaplab.services.store.models import ExperimentProvenanceRow, ExperimentRow, ProvenanceRow, RepetitionRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import get_experiment, lock
 from gaplab.services.store.queries.provenance import id_of, insert_unless_there
 from gaplab.services.store.session import snapshot, transaction
-from gaplab.services.store.statements import insert_new
+from gaplab.services.store.statements import insert_new, storable
+
+NONE: Mapping[str, str] = {}
+"""No plug-in is refused."""
+
+_IMPORTED = re.compile(r", \S+\.py [0-9a-f]{12}(?=[,)])")
+"""A file that a plug-in imports; experiments that began before these were recorded do without."""
 
 
 @snapshot
@@ -69,17 +78,43 @@ def accept_versions(session: Session, experiment_id: str) -> ExperimentRead:
 def decisive(under: Provenance, spec: Mapping[str, Any]) -> str:
     """Return the part of a provenance that all supervisors of an experiment with this spec must share."""
     engines = (_engine(under, name) for name in sorted(_engines(spec)))
-    external = (_external(under, plugin) for plugin in _plugins(spec) if plugin in under.outside)
+    plugins = (plugin for plugin in named_in(spec) if not plugin.startswith("engine "))
+    external = (_external(under, plugin) for plugin in plugins if plugin in under.outside)
     return ", ".join([*engines, *_machine(under), *external])
 
 
-def permitted(session: Session, under: Provenance) -> ColumnElement[bool]:
-    """SQL condition: the experiment has not started, or started under the same provenance; its spec is readable."""
+def permitted(session: Session, under: Provenance, refused: Mapping[str, str] = NONE) -> ColumnElement[bool]:
+    """SQL condition: the supervisor may claim the experiment's repetitions.
+
+    Its spec can be read, its plug-ins can be used, and it has not started, or started with the same versions.
+
+    Args:
+        session: of a transaction.
+        under: provenance of the supervisor.
+        refused: why processes of the supervisor refuse plug-ins, by kind and name.
+    """
     row = ExperimentRow
     begun = row.claimable.is_(True) & row.computed_with.is_not(None)
     used = session.scalars(select(row.computed_with).where(begun).distinct())
     same = row.computed_with.in_([text for text in used if text is not None and _holds(text, under)])
-    return (row.spec_version <= under.spec_version) & (row.computed_with.is_(None) | same)
+    told = [text for text in _told(session) if refusals.still_holds(text, refused)]
+    usable = row.refused_by.is_(None) | row.refused_by.not_in(told)
+    return (row.spec_version <= under.spec_version) & (row.computed_with.is_(None) | same) & usable
+
+
+def refuse_unusable(session: Session, repetitions: Sequence[int], refused: Mapping[str, str]) -> list[str]:
+    """Note on experiments of these repetitions which plug-ins cannot be used, and return those experiments."""
+    row, owners = ExperimentRow, select(RepetitionRow.experiment_id).where(RepetitionRow.id.in_(repetitions))
+    experiments = session.execute(
+        select(row.id, row.spec, row.computed_with, row.refused_by).where(row.id.in_(owners)).order_by(row.id)
+    ).all()
+    reasons = ((each, unusable(each.spec, refused)) for each in experiments)
+    waiting = [(each, storable(refusals.text_of(found))) for each, found in reasons if found]
+    for experiment, text in waiting:
+        session.execute(update(row).where(row.id == experiment.id).values(refused_by=text))
+        if text != experiment.refused_by:
+            _tell(session, experiment.id, experiment.computed_with, text)
+    return [experiment.id for experiment, _ in waiting]
 
 
 def record(session: Session, under: Provenance, claims: Sequence[Claim]) -> None:
@@ -89,9 +124,10 @@ def record(session: Session, under: Provenance, claims: Sequence[Claim]) -> None
     insert_unless_there(session, [{"id": id_, "facts": under.model_dump(mode="json")}])
     uses = [{"experiment_id": each, "provenance_id": id_} for each in specs]
     session.execute(insert_new(session, ExperimentProvenanceRow).values(uses))
+    session.execute(update(experiment).where(experiment.id.in_(specs)).values(refused_by=None))
     for experiment_id, spec in specs.items():
         unbound = update(experiment).where(experiment.id == experiment_id, experiment.computed_with.is_(None))
-        session.execute(unbound.values(computed_with=decisive(under, spec), refused_by=None))
+        session.execute(unbound.values(computed_with=decisive(under, spec)))
     row = RepetitionRow
     session.execute(update(row).where(row.id.in_([claim.id for claim in claims])).values(provenance_id=id_))
     for claim in claims:
@@ -99,18 +135,52 @@ def record(session: Session, under: Provenance, claims: Sequence[Claim]) -> None
         note(session, EventKind.REPETITION_CLAIMED, claim.experiment_id, claim.number, **told)
 
 
-def refuse(session: Session, under: Provenance) -> None:
-    """Record once, on each waiting experiment that this provenance may not claim, the reason."""
+def refuse(session: Session, under: Provenance, refused: Mapping[str, str] = NONE) -> None:
+    """Note once, on each waiting experiment that may not be claimed with this provenance, why that is."""
     row = ExperimentRow
-    waiting = (
-        row.claimable.is_(True) & row.refused_by.is_(None) & row.computed_with.is_not(None) & ~permitted(session, under)
-    )
-    refused = session.execute(select(row.id, row.spec, row.computed_with).where(waiting).order_by(row.id)).all()
-    for experiment, spec, before in refused:
-        theirs = decisive(under, spec)
-        new = update(row).where(row.id == experiment, row.refused_by.is_(None)).values(refused_by=theirs)
+    outdated = [text for text in _told(session) if not refusals.still_holds(text, refused)]
+    untold = row.refused_by.is_(None) | row.refused_by.in_(outdated)
+    waiting = row.claimable.is_(True) & untold & row.computed_with.is_not(None) & ~permitted(session, under, refused)
+    experiments = session.execute(select(row.id, row.spec, row.computed_with).where(waiting).order_by(row.id)).all()
+    for experiment, spec, before in experiments:
+        theirs = storable(refusals.text_of(unusable(spec, refused)) or decisive(under, spec))
+        new = update(row).where(row.id == experiment, untold).values(refused_by=theirs)
         if session.execute(new.returning(row.id)).first() is not None:
-            note(session, EventKind.VERSIONS_REFUSED, experiment, computed_with=before, refused_by=theirs)
+            _tell(session, experiment, before, theirs)
+
+
+@transaction
+def tell_refused(session: Session, experiment_id: str, under: Provenance, refused: Mapping[str, str]) -> None:
+    """Note why experiments wait, now that a process has refused the plug-ins of one of them.
+
+    Unless that one has steps, it is not bound any more to the versions under which it was claimed.
+
+    Raises:
+        StoreUnavailable: the database cannot be used now.
+    """
+    row = ExperimentRow
+    lock(session, [experiment_id])
+    begun = select(RepetitionRow.id).where(RepetitionRow.experiment_id == experiment_id, RepetitionRow.steps > 0)
+    unbound = update(row).where(row.id == experiment_id, row.running == 0, ~begun.exists())
+    session.execute(unbound.values(computed_with=None))
+    refuse(session, under, refused)
+
+
+def _told(session: Session) -> list[str]:
+    """Return the texts by which waiting experiments tell of plug-ins that some supervisor cannot use."""
+    row = ExperimentRow
+    told = select(row.refused_by).where(row.claimable.is_(True), row.refused_by.is_not(None)).distinct()
+    return [text for text in session.scalars(told) if text is not None and refusals.tells_unavailable(text)]
+
+
+def unusable(spec: Mapping[str, Any], refused: Mapping[str, str]) -> dict[str, str]:
+    """Return why plug-ins that a spec names cannot be used by this supervisor, by kind and name."""
+    reasons = ((plugin, unavailable(plugin) or refused.get(plugin)) for plugin in named_in(spec))
+    return {plugin: why for plugin, why in reasons if why is not None}
+
+
+def _tell(session: Session, experiment: str, before: str | None, theirs: str) -> None:
+    note(session, EventKind.VERSIONS_REFUSED, experiment, computed_with=before, refused_by=theirs)
 
 
 def _uses(session: Session, experiment_id: str) -> tuple[ProvenanceUse, ...]:
@@ -135,7 +205,8 @@ def _uses(session: Session, experiment_id: str) -> tuple[ProvenanceUse, ...]:
 def _holds(text: str, under: Provenance) -> bool:
     """Return whether this provenance has each version in a `decisive` text."""
     true = [*(_engine(under, name) for name in under.engines), *_machine(under)]
-    part = "|".join(map(re.escape, [*true, *(_external(under, plugin) for plugin in under.outside)]))
+    true += [_external(under, plugin) for plugin in under.outside]
+    part = "|".join(map(re.escape, [*true, *(_IMPORTED.sub("", text) for text in true)]))
     return re.fullmatch(rf"(?:{part})(?:, (?:{part}))*", text) is not None
 
 
@@ -155,9 +226,3 @@ def _engines(spec: Mapping[str, Any]) -> set[str]:
     """Return the names of the simulators' engine and of reality's engine."""
     chosen = (spec.get("engine"), spec["reality"].get("engine"))
     return {ref["name"] for ref in chosen if ref}
-
-
-def _plugins(spec: Mapping[str, Any]) -> list[str]:
-    """Return the spec's plug-ins except engines, each by kind and name as in `Provenance.outside`."""
-    single = [f"{kind} {spec[kind]['name']}" for kind in ("strategy", "robot", "optimizer")]
-    return [*single, *(f"tunable {ref['name']}" for ref in spec["tunables"])]

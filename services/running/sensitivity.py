@@ -3,7 +3,7 @@
 All functions raise StoreUnavailable while the database cannot be used; each may then be tried again.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
@@ -11,10 +11,13 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.sensitivity import Checked, Sensitivity
 from gaplab.services.experiments import checks
+from gaplab.services.plugins.refusals import text_of
 from gaplab.services.running.leases import Change, Leases
+from gaplab.services.running.provenance import NONE, unusable
 from gaplab.services.store.lease import CheckClaim as CheckClaim
 from gaplab.services.store.models import ExperimentRow, SensitivityRow
 from gaplab.services.store.session import Store, transaction
+from gaplab.services.store.statements import storable
 
 
 class _Checks(Leases[CheckClaim]):
@@ -48,13 +51,23 @@ def complete(store: Store, lease: CheckClaim, found: Sequence[Sensitivity]) -> b
 
 
 @transaction
-def claim(session: Session, owner: str) -> CheckClaim | None:
-    """Claim the oldest queued check that no other supervisor is claiming; None if there is none."""
+def claim(session: Session, owner: str, refused: Mapping[str, str] = NONE) -> CheckClaim | None:
+    """Claim the oldest queued check that no other supervisor is claiming; None if there is none.
+
+    Args:
+        session: of a transaction that writes.
+        owner: the supervisor.
+        refused: why its processes refuse plug-ins, by kind and name; checks that name one stay queued, and tell why.
+    """
     row = SensitivityRow
-    oldest = select(row.id).where(row.state == State.QUEUED).order_by(row.created_at, row.id).limit(1)
-    if (id_ := session.scalar(oldest.with_for_update(skip_locked=True))) is None or not _LEASES.take(
-        session, [id_], owner
-    ):
-        return None
-    check = session.get_one(row, id_, populate_existing=True)
-    return CheckClaim(check.id, check.epoch, Checked.model_validate(check.spec), owner=owner)
+    queued = session.execute(select(row.id, row.spec).where(row.state == State.QUEUED).order_by(row.created_at, row.id))
+    for id_, spec in queued.all():
+        free = select(row).where(row.id == id_, row.state == State.QUEUED).with_for_update(skip_locked=True)
+        if (check := session.scalar(free.execution_options(populate_existing=True))) is None:
+            continue
+        if reasons := unusable(spec, refused):
+            check.error = storable(text_of(reasons))
+        elif _LEASES.take(session, [id_], owner):
+            session.refresh(check)
+            return CheckClaim(check.id, check.epoch, Checked.model_validate(check.spec), owner=owner)
+    return None

@@ -4,17 +4,19 @@ import platform
 import subprocess
 from collections.abc import Mapping
 from contextlib import suppress
-from functools import cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, packages_distributions, version
 from pathlib import Path
+from typing import Any
 
 from gaplab.schemas.provenance import Provenance
 from gaplab.services.core.external_plugins import file_of
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
-from gaplab.services.plugins.external import external_plugins
-from gaplab.services.plugins.folders import digest, digest_of, digests
+from gaplab.services.plugins.contents import Contents
+from gaplab.services.plugins.external import external_plugins, named_in
+from gaplab.services.plugins.watching import present
 from gaplab.services.store.models import SPEC_VERSION
 
 CODE = ("schemas", "services", "workers")
@@ -31,20 +33,53 @@ Versions = dict[str, str]
 
 @cache
 def versions() -> Versions:
-    """Return the versions that two processes must share to compute the same numbers."""
+    """Return what two processes must share to compute the same numbers, except for external plug-ins."""
     return {
         "gaplab": f"{_version('gaplab')} ({_digest()})",
         "Python": platform.python_version(),
         "machine": platform.machine(),
-        "plug-ins": digest(),
         **{name: _version(name) for name in LIBRARIES},
-        **{each.library: _version(each.library) for each in engines.values() if each.library},
+        **{each.library: _version(each.library) for each in engines.values() if each.library and not file_of(each)},
     }
 
 
-@cache
 def provenance() -> Provenance:
-    """Return the software and the machine of this process, for readers of its results."""
+    """Return what this process computes with, for readers of its results; its plug-ins are those of now."""
+    return _provenance(present())
+
+
+def plugin_versions(contents: Contents) -> Versions:
+    """Return the version of each external plug-in of this process, by its kind and name, as in `"robot hexapod"`."""
+    libraries = {f"{engines.kind} {name}": _library(each) for name, each in engines.items()}
+    found = external_plugins(contents)
+    return {plugin: ", ".join(filter(None, (text, libraries.get(plugin)))) for plugin, text in found.items()}
+
+
+def versions_of(under: Provenance) -> Versions:
+    """Return the version that a provenance has of each external plug-in, as `plugin_versions` does."""
+    libraries = {f"{engines.kind} {name}": text for name, text in under.engines.items()}
+    return {plugin: libraries.get(plugin, text) for plugin, text in under.outside.items()}
+
+
+def named_versions(under: Provenance, spec: Mapping[str, Any]) -> Versions:
+    """Return the versions that a provenance has of the external plug-ins that a spec names."""
+    found = versions_of(under)
+    return {plugin: found[plugin] for plugin in named_in(spec) if plugin in found}
+
+
+@lru_cache(maxsize=2)
+def _provenance(contents: Contents) -> Provenance:
+    return _software().model_copy(
+        update={
+            "engines": {name: _engine(each, contents) for name, each in sorted(engines.items())},
+            "plugins": dict(contents.digests),
+            "outside": dict(external_plugins(contents)),
+        }
+    )
+
+
+@cache
+def _software() -> Provenance:
     return Provenance(
         gaplab=_version("gaplab"),
         code=_digest(),
@@ -52,22 +87,23 @@ def provenance() -> Provenance:
         dirty=None if (changed := _git("status", "--porcelain", "--untracked-files=no")) is None else bool(changed),
         python=platform.python_version(),
         libraries={name: _version(name) for name in LIBRARIES},
-        engines={name: _engine(each) for name, each in sorted(engines.items())},
+        engines={},
         architecture=platform.machine(),
         processor=_processor(),
         system=platform.platform(),
         spec_version=SPEC_VERSION,
-        plugins=digests(),
-        outside=external_plugins(),
     )
 
 
-def _engine(engine: type[Engine]) -> str:
-    """Return a text that changes whenever the engine's numbers may change."""
-    library = f"{engine.library} {_version(engine.library)}" if engine.library else None
+def _engine(engine: type[Engine], contents: Contents) -> str:
+    """Return a text that changes when the engine's numbers may."""
     if (file := file_of(engine)) is not None:
-        return f"{file} {digest_of(file)}" + (f", {library}" if library else "")
-    return library or "of gaplab's own"
+        return ", ".join(filter(None, (contents.text_of(file) or "none", _library(engine))))
+    return _library(engine) or "of gaplab's own"
+
+
+def _library(engine: type[Engine]) -> str | None:
+    return f"{engine.library} {_version(engine.library)}" if engine.library else None
 
 
 @cache

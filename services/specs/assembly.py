@@ -2,12 +2,14 @@
 
 from collections.abc import Iterable, Sequence
 from functools import cache, lru_cache, partial
+from types import ModuleType
 
 import numpy as np
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked
+from gaplab.services.core import external_plugins
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters
 from gaplab.services.core.errors import PluginBroken, RealityFailed, gather
 from gaplab.services.core.loop import Setting
@@ -181,12 +183,16 @@ def refuse_missing(spec: ResolvedSpec, *, reality: bool = False) -> None:
 
 
 def engine_of(ref: PluginRef) -> Engine:
-    """Return the engine: one instance in this process for equal options, which keeps its worlds loaded."""
-    return _warm_engine(ref.model_dump_json())
+    """Return the engine: one instance in this process for equal options, which keeps its worlds loaded.
+
+    Raises:
+        InvalidSpec: it is not available here.
+    """
+    return _warm_engine(external_plugins.package(), ref.model_dump_json())
 
 
 @cache
-def _warm_engine(ref: str) -> Engine:
+def _warm_engine(_package: ModuleType | None, ref: str) -> Engine:
     return engines.create(PluginRef.model_validate_json(ref))
 
 

@@ -138,14 +138,22 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
 def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
     """Return the engine if it is installed and can run the robot."""
     engine, _ = engines.check(ref, pointer)
-    able = [name for name, each in engines.items() if each.runs(robot.world)]
-    if not engine.runs(robot.world):
+    able = [name for name, each in engines.items() if _runs(each, robot)]
+    if ref.name not in able:
         message = f"{ref.name} cannot run the {robot.name}; {' and '.join(able)} can"
         raise InvalidSpec([Violation(pointer, ref.name, message, able)])
     if not engine.available():
         installed = [name for name in able if engines[name].available()]
         raise InvalidSpec([Violation(pointer, ref.name, f"not installed: {engine.install}", installed)])
     return engine
+
+
+def _runs(engine: type[Engine], robot: Robot) -> bool:
+    """Return whether the engine can run the robot; one that raises cannot."""
+    try:
+        return engine.runs(robot.world)
+    except Exception:  # noqa: BLE001 - an external engine concerns only the specs that name it
+        return False
 
 
 def _completed(registry: Registry[Any], ref: PluginRef) -> PluginRef:

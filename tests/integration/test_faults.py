@@ -83,8 +83,8 @@ class Unsendable(Exception):
 
 @pytest.fixture(autouse=True)
 def plugins(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setitem(strategies._plugins, "liar", Liar)
-    monkeypatch.setitem(engines._plugins, "bench", Bench)
+    monkeypatch.setitem(strategies._found.usable, "liar", Liar)
+    monkeypatch.setitem(engines._found.usable, "bench", Bench)
     monkeypatch.setattr(Bench, "asked", 0)
     monkeypatch.setattr(Bench, "errors", [])
     monkeypatch.setattr(checkpoints, "PAUSES_S", (0.0, 0.0, 0.0))

@@ -97,7 +97,7 @@ def test_it_knows_the_commit_and_whether_the_code_was_changed_since(
         (tmp_path / "gaplab" / folder).mkdir(parents=True)
     file = tmp_path / "gaplab" / "schemas" / "a.py"
     file.write_text("a = 1\n")
-    fresh = versions.provenance.__wrapped__
+    fresh = versions._software.__wrapped__
 
     assert (fresh().commit, fresh().dirty) == (None, None)
     git("init")

@@ -184,7 +184,7 @@ def test_a_clock_that_was_set_back_by_an_hour_stalls_nothing(store: Store) -> No
     supervisors.heartbeat(store, "crashed")
     for table in ("repetition", "supervisor"):
         ahead = f"UPDATE {table} SET heartbeat_at = {_AHEAD[store._engine.name]}"
-        store.write(lambda session, statement=ahead: session.execute(text(statement)))
+        store.write(lambda session, statement: session.execute(text(statement)), ahead)
 
     requeued = execution.requeue_lost(store)
     (again,) = execution.claim(store, "other", 1)

@@ -348,8 +348,8 @@ def test_a_worker_killed_in_the_middle_of_a_step_goes_on_from_what_the_step_had(
 ) -> None:
     claim, checkpoints = execution.claim, []  # type: ignore[var-annotated]
 
-    def watched(store: Store, owner: Any, limit: Any) -> Any:
-        claims = claim(store, owner, limit)
+    def watched(*given: Any) -> Any:
+        claims = claim(*given)
         checkpoints.extend(len(each.checkpoints) for each in claims)
         return claims
 

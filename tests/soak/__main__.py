@@ -15,9 +15,13 @@ from rich.console import Console
 from rich.table import Table
 
 from tests.soak.databases import Postgres, Sqlite
+from tests.soak.misbehaviour import HARMFUL, HARMLESS
 from tests.soak.soak import soak
 
 KINDS = {"sqlite": Sqlite, "postgres": Postgres}
+
+MISBEHAVIOURS = {"none": (), "harmless": HARMLESS, "all": (*HARMLESS, *HARMFUL)}
+"""Strategies that do harm, by the choice of the command."""
 
 FAULT_S = 5.5
 """That a fault took on two cores, with what came after it, while the other database had its own."""
@@ -29,6 +33,7 @@ def main() -> Any:
     parser.add_argument("--seed", type=int, help="left out: a new one")
     parser.add_argument("--database", choices=KINDS, help="left out: both at once, each in a process")
     parser.add_argument("--at-once", type=int, default=8, help="faults that may come together")
+    parser.add_argument("--plug-ins", choices=MISBEHAVIOURS, default="harmless", help="that misbehave")
     parser.add_argument("--folder", type=Path, help="for logs and histories; left out: they are not kept")
     given = parser.parse_args()
     given.seed = SystemRandom().randrange(10**6) if given.seed is None else given.seed
@@ -45,8 +50,9 @@ def here(given: Any) -> Any:
     console.print(f"{given.faults} faults with --seed {given.seed} on {given.database}: about {_duration(expected)}")
     folder = given.folder / given.database
     folder.mkdir(parents=True)
-    tell = partial(console.print, style="dim")
-    outcome = soak(folder, KINDS[given.database], given.faults, given.seed, given.at_once, tell)
+    chosen = MISBEHAVIOURS[given.plug_ins]
+    kind, tell = KINDS[given.database], partial(console.print, style="dim")
+    outcome = soak(folder, kind, given.faults, given.seed, given.at_once, tell, misbehaviours=chosen)
     show(console, outcome)
     return 1 if outcome.violations else 0
 
@@ -54,6 +60,7 @@ def here(given: Any) -> Any:
 def side_by_side(given: Any) -> Any:
     """Hurt a service on each database, in processes of their own."""
     common = ["--seed", str(given.seed), "--at-once", str(given.at_once), "--folder", str(given.folder)]
+    common += ["--plug-ins", given.plug_ins]
     running = []
     try:
         for index, name in enumerate(KINDS):
@@ -72,7 +79,7 @@ def side_by_side(given: Any) -> Any:
 def show(console: Any, outcome: Any) -> None:
     """The figures of an outcome, and what was violated."""
     table = Table(title=f"{outcome.database}: {outcome.faults} faults in {_duration(outcome.seconds)}")
-    for column in ("fault", "times", "well again after: median", "worst"):
+    for column in ("fault", "times", "all others progress again after: median", "worst"):
         table.add_column(column, justify="left" if column == "fault" else "right")
     every = [each for times in outcome.recoveries.values() for each in times]
     for name, seconds in [*sorted(outcome.recoveries.items()), ("all", every)]:
@@ -80,8 +87,9 @@ def show(console: Any, outcome: Any) -> None:
     console.print(table)
     console.print(
         f"{outcome.acknowledged} acknowledged writes and {outcome.unanswered} without an answer, "
-        f"{outcome.experiments} experiments, {outcome.steps} steps, {outcome.claims} claims, "
-        f"{outcome.given_up} repetitions given up; violations: {len(outcome.violations)}"
+        f"{outcome.experiments} experiments, {outcome.at_fault} of them at fault, "
+        f"{outcome.steps} steps, {outcome.claims} claims, {outcome.given_up} repetitions given up; "
+        f"violations: {len(outcome.violations)}"
     )
     for each in outcome.violations:
         console.print(f"  {each}", markup=False, highlight=False)

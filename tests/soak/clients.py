@@ -39,7 +39,7 @@ QUADRUPED = {
     "budget": {"controller_evaluations": 25, "selection_evaluations": 20, "simulator_evaluations": 20},
 }
 STRATEGIES = ("simulated_fit", "random", "known_fit", "direct")
-TOY_STRATEGIES = (*STRATEGIES, {"name": "simulated_fit_and_informative", "options": {"simulators": 4}})
+TOY_STRATEGIES = (*STRATEGIES, "calm", {"name": "simulated_fit_and_informative", "options": {"simulators": 4}})
 
 
 def specs(rng: Any) -> Iterator[Any]:

@@ -102,6 +102,14 @@ class Postgres:
         for pid in [self._kept.pid, *self._children()]:
             send(pid, signal.SIGKILL)
 
+    def hang_up(self) -> None:
+        """End every connection of clients."""
+        with psycopg.connect(self.url, autocommit=True) as connection:
+            connection.execute(
+                "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
+                "WHERE backend_type = 'client backend' AND pid <> pg_backend_pid()"
+            )
+
     def stall(self, seconds: Any) -> None:
         """Stop the server's processes that answer clients: a disk on which their writes take so long."""
         stopped = [pid for pid in self._children() if send(pid, signal.SIGSTOP)]

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from gaplab.services.store.session import Store
-from tests.soak import witness
+from tests.soak import misbehaviour, plugin_faults, witness
 from tests.soak.stage import send, until
 
 PAST_THE_LEASE = 1.5
@@ -74,20 +74,27 @@ def _kill_database(stage: Any) -> bool:
     return True
 
 
-def faults(database: Any) -> Any:
-    """What can be done to a service on this database."""
+def _hang_up(stage: Any) -> bool:
+    stage.database.hang_up()
+    return True
+
+
+def faults(database: Any, misbehaviours: Any = misbehaviour.HARMLESS) -> Any:
+    """What can be done to a service on this database, and by these strategies in it."""
     found = [make(role) for role in ("api", "supervisor", "worker", "raylet") for make in (_kill, _pause)]
     found.append(Fault("disk slow", _stall))
     if database.disk.small:
         found.append(Fault("disk full", _fill))
     if hasattr(database, "restart"):
         found += [Fault("Postgres restarted", _restart), Fault("SIGKILL Postgres", _kill_database)]
-    return found
+        found.append(Fault("connections ended", _hang_up))
+    found += [Fault("plug-in edited", plugin_faults.edited), Fault("plug-in broken", plugin_faults.broken)]
+    return found + [Fault(f"plug-in {kind}", plugin_faults.submitting(kind)) for kind in misbehaviours]
 
 
-def volleys(database: Any, rng: Any, at_once: Any) -> Iterator[Any]:
+def volleys(kinds: Any, rng: Any, at_once: Any) -> Iterator[Any]:
     """Faults without end, one to so many at a time, each kind in turn, in an order that is shuffled."""
-    kinds, order = faults(database), []  # type: ignore[var-annotated]
+    order = []  # type: ignore[var-annotated]
     while True:
         size = rng.randint(1, at_once)
         while len(order) < size:
@@ -111,7 +118,7 @@ def recovered(stage: Any, store: Store, within_s: Any) -> Any:
     """Seconds until all is well; None if that never came.
 
     That is when the API answers and each of two supervisors has stored a step, and then another: the first may be one
-    that it had in hand when its Ray was hit.
+    that it had in hand when its Ray was hit. Steps of experiments that are themselves at fault do not count.
     """
     begun = time.monotonic()
     for _ in range(2):

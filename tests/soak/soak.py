@@ -1,6 +1,7 @@
 """One soak on one database: faults, then peace, then the check."""
 
 import random
+import shutil
 import time
 from collections import defaultdict
 from dataclasses import dataclass, field
@@ -9,11 +10,13 @@ from typing import Any
 
 import httpx2
 
+from gaplab.services.core import external_plugins
 from gaplab.services.store.session import Store
-from tests.soak import checker, faults
+from tests.soak import checker, faults, misbehaviour
 from tests.soak.clients import Clients
 from tests.soak.evidence import checks_under_way, gather
 from tests.soak.history import History
+from tests.soak.misbehaviour import at_fault
 from tests.soak.stage import Stage, until
 
 LEASE_S = 3
@@ -41,6 +44,7 @@ class Outcome:
     acknowledged: int = 0
     unanswered: int = 0
     experiments: int = 0
+    at_fault: int = 0
     steps: int = 0
     claims: int = 0
     given_up: int = 0
@@ -51,7 +55,16 @@ class Outcome:
         return sum(map(len, self.recoveries.values()))
 
 
-def soak(folder: Path, kind: Any, number: Any, seed: Any, at_once: Any = 4, say: Any = lambda sentence: None) -> Any:
+def soak(
+    folder: Path,
+    kind: Any,
+    number: Any,
+    seed: Any,
+    at_once: Any = 4,
+    say: Any = lambda sentence: None,
+    *,
+    misbehaviours: Any = misbehaviour.HARMLESS,
+) -> Any:
     """Run so many faults on a service in this folder, and check it; the evidence stays there.
 
     Args:
@@ -61,16 +74,20 @@ def soak(folder: Path, kind: Any, number: Any, seed: Any, at_once: Any = 4, say:
         seed: of their order and of what clients do.
         at_once: faults that the service has to bear together.
         say: is told of every volley.
+        misbehaviours: kinds of strategies that do harm.
     """
     folder = Path(folder)
+    plugins = Path(shutil.copytree(misbehaviour.FOLDER, folder / "plugins", ignore=shutil.ignore_patterns("__*")))
+    external_plugins.set_folders((misbehaviour.FOLDER,))  # the checker computes with the strategy that behaves
     begun, database = time.monotonic(), kind(folder)
-    outcome, stage = Outcome(database.name), Stage(folder, database, LEASE_S)
     history, store = History(folder / "history.jsonl"), Store(database.url)
+    outcome, stage = Outcome(database.name), Stage(folder, database, LEASE_S, plugins, history)
+    kinds = faults.faults(database, misbehaviours)
     clients = Clients(stage.url, history, seed)
     try:
         stage.start()
         clients.start()
-        _attack(stage, store, outcome, number, faults.volleys(database, random.Random(seed), at_once), say)
+        _attack(stage, store, outcome, number, faults.volleys(kinds, random.Random(seed), at_once), say)
         clients.stop()
         _peace(clients, store, outcome)
         outcome.violations += stage.stop()
@@ -81,6 +98,7 @@ def soak(folder: Path, kind: Any, number: Any, seed: Any, at_once: Any = 4, say:
         stage.kill()
         store.dispose()
         database.close()
+        external_plugins.set_folders(())
     return outcome
 
 
@@ -114,7 +132,8 @@ def _check(history: Any, evidence: Any, outcome: Any) -> None:
     outcome.acknowledged = sum(each.acknowledged for each in history if each.verb != "read")
     outcome.unanswered = sum(each.status is None for each in history if each.verb != "read")
     outcome.experiments = len(evidence.experiments)
-    repetitions = [each for one in evidence.experiments for each in one.repetitions]
+    outcome.at_fault = sum(at_fault(each.spec) for each in evidence.experiments)
+    repetitions = [each for one in evidence.experiments for each in one.repetitions if not at_fault(one.spec)]
     outcome.steps = sum(each.steps for each in repetitions)
     outcome.claims = sum(each.epoch for each in repetitions)
     outcome.given_up = sum((each.error or "").startswith(checker.GIVEN_UP) for each in repetitions)

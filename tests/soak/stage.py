@@ -22,6 +22,9 @@ from gaplab import migrations
 from gaplab.services.core.errors import StoreUnavailable
 from tests.soak import witness
 
+ROLLOUT_LIMIT_S = 1
+"""In production it is 60 s; a worker without a rollout for 20 times as long counts as hung."""
+
 RESTART_S = 1.0
 """After how long a service manager starts again what has ended."""
 
@@ -81,10 +84,12 @@ class Stage:
         url: of the API.
         database: Sqlite or Postgres, as in `databases`.
         lease_s: for which a supervisor may be silent.
+        plugins: folder of the service's external plug-ins.
+        history: of what clients were told, for faults that are requests.
     """
 
-    def __init__(self, folder: Path, database: Any, lease_s: Any) -> None:
-        self.database, self.lease_s = database, lease_s
+    def __init__(self, folder: Path, database: Any, lease_s: Any, plugins: Any = None, history: Any = None) -> None:
+        self.database, self.lease_s, self.plugins, self.history = database, lease_s, plugins, history
         self._folder = Path(folder)
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
@@ -95,6 +100,8 @@ class Stage:
             "GAPLAB_PORT": str(self._port),
             "GAPLAB_WORKERS": "1",
             "GAPLAB_LEASE_S": str(lease_s),
+            "GAPLAB_PLUGINS": str(plugins or ""),
+            "GAPLAB_ROLLOUT_LIMIT_S": str(ROLLOUT_LIMIT_S),
             "RAY_TMPDIR": mkdtemp(prefix="gaplab-"),  # Ray leaves logs behind; the paths of its sockets must be short
         }
         self._kept: list[Any] = []

@@ -9,6 +9,7 @@ from typing import Any
 from sqlalchemy import text
 
 from gaplab.services.store.session import Store
+from tests.soak.misbehaviour import PREFIX
 
 Move = namedtuple("Move", "id repetition was state epoch_was epoch owner steps_was steps at")
 
@@ -58,7 +59,11 @@ def last(store: Store) -> Any:
 
 
 def owners_since(store: Store, number: Any) -> Any:
-    """Who stored steps after the move of this number."""
-    query = text("SELECT DISTINCT owner FROM witness WHERE id > :number AND steps > steps_was AND owner IS NOT NULL")
+    """Who stored steps after the move of this number, except in experiments that are themselves at fault."""
+    query = text(
+        "SELECT DISTINCT witness.owner FROM witness JOIN repetition ON repetition.id = witness.repetition "
+        "JOIN experiment ON experiment.id = repetition.experiment_id WHERE witness.id > :number "
+        "AND witness.steps > steps_was AND witness.owner IS NOT NULL AND experiment.strategy NOT LIKE :at_fault"
+    )
     with store.reading() as session:
-        return set(session.execute(query, {"number": number}).scalars())
+        return set(session.execute(query, {"number": number, "at_fault": f"{PREFIX}%"}).scalars())

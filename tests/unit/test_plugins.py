@@ -1,9 +1,10 @@
-"""Plug-ins from outside: found in a folder, told apart by their content, refused with a sentence if they are broken."""
+"""Plug-ins from outside: found in a folder, told apart by their content, unavailable with a reason if broken."""
 
 import os
+import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,52 +12,25 @@ import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core import external_plugins
-from gaplab.services.core.errors import PluginBroken
+from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.registry import Registry
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.engines.base import Engine
-from gaplab.services.plugins import folders
+from gaplab.services.plugins import contents
+from tests.fakes import CAREFUL
 
-CAREFUL = '''
-"""A strategy."""
-
-import numpy as np
-
-from gaplab.plugins import Strategy
-
-
-class Careful(Strategy):
-    """Stays in the middle."""
-
-    name = "careful"
-    searches = False
-
-    def select(self, belief, search, rng):
-        return (belief.space.lower + belief.space.upper) / 2
-'''
+ROOT = Path(__file__).parents[2]
 
 Put = Callable[..., Path]
 
 
-@pytest.fixture
-def put(tmp_path: Path) -> Iterator[Put]:
-    """Writes files into a folder, and lets plug-ins be looked for there."""
-
-    def write(folder: str = "mine", /, **files: str) -> Path:
-        home = tmp_path / folder
-        home.mkdir(exist_ok=True)
-        for name, text in files.items():
-            (home / f"{name}.py").write_text(text)
-        external_plugins.set_folders((*external_plugins.folders(), home))
-        return home
-
-    yield write
-    external_plugins.set_folders(())
-
-
 def strategies() -> Registry[Strategy]:
     return Registry("strategy", "gaplab.services.core.strategies", Strategy)  # type: ignore[type-abstract]
+
+
+def tunables() -> Registry[Tunable]:
+    return Registry("tunable", "gaplab.services.core.tunables", Tunable)  # type: ignore[type-abstract]
 
 
 def test_a_file_in_the_folder_is_a_plug_in_among_gaplabs_own(put: Put) -> None:
@@ -75,7 +49,7 @@ def test_a_file_in_the_folder_is_a_plug_in_among_gaplabs_own(put: Put) -> None:
 def test_it_belongs_to_its_kind_only(put: Put) -> None:
     put(careful=CAREFUL)
 
-    assert "careful" not in Registry("tunable", "gaplab.services.core.tunables", Tunable)  # type: ignore[type-abstract]
+    assert "careful" not in tunables()
 
 
 def test_files_import_from_each_other_and_one_with_an_underscore_is_only_for_that(put: Put) -> None:
@@ -96,34 +70,85 @@ def test_folders_are_several_but_a_file_has_one_place(put: Put) -> None:
 
     put("yours", careful=CAREFUL)
 
-    with pytest.raises(PluginBroken, match=r"careful\.py is in .*mine and in .*yours"):
-        list(strategies())
+    found = strategies()
+    assert "careful" not in found
+    assert "brave" in found
+    assert found.unusable["careful"].startswith("careful.py is in mine and in yours: rename one of them")
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("def (", r"broken\.py cannot be imported: SyntaxError"),
-        ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"),
-        ("1 / 0", "ZeroDivisionError"),
-        (CAREFUL.replace('"careful"', '"random"'), "has a strategy called 'random', but so has gaplab"),
-        (CAREFUL.replace("def select", "def choose"), r"Careful in broken\.py does not define select"),
-        (CAREFUL.replace('    name = "careful"\n', ""), "has no name for specs to use"),
-        (CAREFUL.replace("searches = False", "Options = 7"), "cannot be described: AttributeError"),
-    ],
-)
-def test_a_broken_file_is_a_sentence(put: Put, text: str, says: str) -> None:
-    put(broken=text)
+BROKEN = [
+    ("def (", "broken", r"broken\.py cannot be imported: SyntaxError: invalid syntax \(broken\.py, line 1\)"),
+    (CAREFUL.replace("numpy as", "numpy us"), "careful", r"SyntaxError: invalid syntax \(broken\.py, line 4\)"),
+    ("import no_such_module", "broken", "ModuleNotFoundError: No module named 'no_such_module'"),
+    (f"{CAREFUL}\n1 / 0", "careful", r"ZeroDivisionError: division by zero \(broken\.py, line 18\)"),
+    ("raise SystemExit(3)", "broken", "SystemExit: 3"),
+    ("raise ValueError('x' * 9_999)", "broken", "ValueError: x{200,290}…"),
+    (
+        CAREFUL.replace('"careful"', '"random"'),
+        "random (broken.py)",
+        "has a strategy called 'random', but so has gaplab",
+    ),
+    (CAREFUL.replace("def select", "def choose"), "careful", r"Careful in broken\.py does not define select"),
+    (CAREFUL.replace('    name = "careful"\n', ""), "broken", "has no name for specs to use"),
+    (CAREFUL.replace("searches = False", "Options = 7"), "careful", "cannot be described: TypeError"),
+    (CAREFUL.replace("searches = False", "details = {1, 2}.pop"), "careful", "cannot be described: "),
+]
 
-    with pytest.raises(PluginBroken, match=says):
-        list(strategies())
+
+@pytest.mark.parametrize(("text", "name", "says"), BROKEN)
+def test_a_broken_file_is_unavailable_with_the_reason_and_stops_nothing_else(
+    put: Put, text: str, name: str, says: str
+) -> None:
+    put(broken=text, brave=CAREFUL.replace("careful", "brave"))
+
+    found = strategies()
+
+    assert {"brave", "random", "informative"} <= set(found)
+    assert name not in found
+    (entry,) = [each for each in found.describe() if not each.available]
+    assert (entry.name, entry.source) == (name, "broken.py of GAPLAB_PLUGINS")
+    assert re.search(says, entry.note)
+    assert entry.note.endswith("; repair the file, then restart the service")
+    with pytest.raises(InvalidSpec, match=f"'{re.escape(name)}' is not available: ") as refused:
+        found.create(PluginRef(name=name), "/strategy")
+    assert refused.value.violations[0].pointer == "/strategy"
+    assert entry.note in refused.value.violations[0].message
 
 
-def test_a_folder_that_is_not_there_is_a_sentence(tmp_path: Path) -> None:
+def test_a_file_that_is_broken_early_counts_among_the_kind_that_its_text_tells(put: Put) -> None:
+    put(law='class Law(MaterialTunable):\n    name: str = "law"\n    upper = (', unknown="def (")
+
+    assert set(strategies().unusable) == {"unknown"}
+    assert set(tunables().unusable) == {"law", "unknown"}
+
+
+def test_two_files_with_plug_ins_of_one_name_are_both_unavailable(put: Put) -> None:
+    put(first=CAREFUL, second=CAREFUL)
+
+    found = strategies()
+
+    assert "careful" not in found
+    assert found.unusable["careful"].startswith("first.py has a strategy called 'careful', but so has second.py")
+
+
+def test_what_imports_a_broken_file_is_unavailable_as_well(put: Put) -> None:
+    put(_middle="1 / 0", careful=f"from gaplab_plugins._middle import X\n{CAREFUL}")
+
+    assert "ZeroDivisionError: division by zero (_middle.py, line 1)" in strategies().unusable["careful"]
+
+
+def test_a_plug_in_that_cannot_be_created_is_a_violation_of_its_spec(put: Put) -> None:
+    put(careful=CAREFUL + "\n    def __init__(self, options=None):\n        if options: raise KeyError('oops')\n")
+
+    with pytest.raises(InvalidSpec, match=r"'careful' cannot be created .*KeyError: 'oops' \(careful\.py, line 19\)"):
+        strategies().create(PluginRef(name="careful"))
+
+
+def test_a_folder_that_is_not_there_is_empty(tmp_path: Path) -> None:
     external_plugins.set_folders((tmp_path / "nowhere",))
     try:
-        with pytest.raises(PluginBroken, match=r"there is no plug-in folder .*nowhere"):
-            list(strategies())
+        assert strategies().unusable == {}
+        assert contents.read().digests == {}
     finally:
         external_plugins.set_folders(())
 
@@ -131,13 +156,43 @@ def test_a_folder_that_is_not_there_is_a_sentence(tmp_path: Path) -> None:
 def test_what_is_in_the_folder_has_a_hash_and_files_that_python_keeps_have_none(put: Put) -> None:
     home = put(careful=CAREFUL)
     list(strategies())
-    before, digest = folders.digests(), folders.digest()
+    before = contents.read().digests
 
     (home / "careful.py").write_text(CAREFUL + "\n# another\n")
 
     assert set(before) == {"careful.py"}
-    assert folders.digests()["careful.py"] != before["careful.py"]
-    assert folders.digest() != digest
+    assert contents.read().digests["careful.py"] != before["careful.py"]
+
+
+@pytest.mark.parametrize(
+    ("statement", "file"),
+    [
+        ("from gaplab_plugins._middle import X", "_middle.py"),
+        ("from gaplab_plugins import _middle", "_middle.py"),
+        ("import gaplab_plugins._middle as middle", "_middle.py"),
+        ("from ._middle import X", "_middle.py"),
+        ("def later():\n    from . import _middle", "_middle.py"),
+        ("from gaplab_plugins.glide.law import X", "glide/__init__.py"),
+        ("from gaplab_plugins._outer import X", "_middle.py"),
+        ("import_module(name)", "_middle.py"),
+        ("importlib.import_module(name)", "_middle.py"),
+    ],
+)
+def test_the_text_of_a_plug_in_has_all_that_it_imports_from_the_folders(put: Put, statement: str, file: str) -> None:
+    home = put(_middle="X = 1", _outer="from ._middle import X", careful=statement, alone="import numpy, json")
+    (home / "glide").mkdir()
+    (home / "glide" / "__init__.py").write_text("")
+    (home / "glide" / "law.py").write_text("from ..careful import later")
+    before = contents.read()
+
+    edited = home / ("glide/law.py" if file.startswith("glide") else file)
+    edited.write_text(f"{edited.read_text()}\n# another\n")
+    after = contents.read()
+
+    assert f", {file} " in before.text_of("careful.py")
+    assert before.text_of("careful.py") != after.text_of("careful.py")
+    assert before.text_of("alone.py") == after.text_of("alone.py") == f"alone.py {before.digest_of('alone.py')}"
+    assert before.text_of("gone.py") is None
 
 
 def test_data_counts_in_a_package_and_not_beside_modules(put: Put) -> None:
@@ -147,7 +202,7 @@ def test_data_counts_in_a_package_and_not_beside_modules(put: Put) -> None:
         (home / folder / file).write_text("1.0")
     (home / "gaplab.db").write_text("a database")
 
-    assert set(folders.digests()) == {"careful.py", "glide/__init__.py", "glide/friction.csv"}
+    assert set(contents.read().digests) == {"careful.py", "glide/__init__.py", "glide/friction.csv"}
 
 
 def test_a_package_may_have_its_plug_in_in_any_of_its_files(put: Put) -> None:
@@ -159,7 +214,8 @@ def test_a_package_may_have_its_plug_in_in_any_of_its_files(put: Put) -> None:
     found = strategies()["careful"]
 
     assert external_plugins.file_of(found) == "thorough/core.py"
-    assert folders.digest_of("thorough/core.py") == folders.digest_of("thorough/__init__.py")
+    found_here = contents.read()
+    assert found_here.digest_of("thorough/core.py") == found_here.digest_of("thorough/__init__.py")
 
 
 def test_the_content_of_a_package_is_all_that_is_in_it(put: Put) -> None:
@@ -167,24 +223,24 @@ def test_the_content_of_a_package_is_all_that_is_in_it(put: Put) -> None:
     package.mkdir()
     (package / "__init__.py").write_text(GLIDE)
     (package / "law.py").write_text("SPEED = 1.0")
-    before, alone = folders.digest_of("glide/__init__.py"), folders.digest_of("alone.py")
+    before = contents.read()
 
     (package / "law.py").write_text("SPEED = 2.0")
 
-    assert folders.digest_of("glide/__init__.py") != before
-    assert folders.digest_of("alone.py") == alone == folders.digests()["alone.py"]
+    after = contents.read()
+    assert after.digest_of("glide/__init__.py") != before.digest_of("glide/__init__.py")
+    assert after.digest_of("alone.py") == before.digest_of("alone.py") == after.digests["alone.py"]
 
 
 def test_without_folders_there_is_nothing_to_tell() -> None:
-    assert folders.digests() == {}
-    assert folders.digest() == "none"
+    assert contents.read().digests == {}
 
 
 ELSEWHERE = """
 import os
 
 from gaplab.services.plugins import folders
-from gaplab.services.running.versions import provenance, versions
+from gaplab.services.running.versions import named_versions, provenance
 from gaplab.services.plugins.catalogue import catalogue
 from gaplab.services.running.provenance import decisive
 
@@ -193,7 +249,6 @@ folders.find()
 found = provenance()
 print("careful" in [each.name for each in catalogue().strategies])
 print(sorted(found.plugins) == ["careful.py", "glide.py"])
-print(versions()["plug-ins"])
 spec = {
     "engine": {"name": "glide"},
     "reality": {},
@@ -202,7 +257,9 @@ spec = {
     "tunables": [],
 }
 for strategy in ("careful", "random"):
-    print(decisive(found, spec | {"strategy": {"name": strategy}}))
+    named = spec | {"strategy": {"name": strategy}}
+    print(decisive(found, named))
+    print(named_versions(found, named))
 """
 
 GLIDE = '''
@@ -225,7 +282,7 @@ def test_every_process_with_the_variable_has_them_and_their_content_decides_who_
     (home / "glide.py").write_text(GLIDE)
 
     def ask() -> list[str]:
-        environment = os.environ | {"GAPLAB_PLUGINS": "mine", "PYTHONPATH": str(Path(__file__).parents[2])}
+        environment = os.environ | {"GAPLAB_PLUGINS": "mine", "PYTHONPATH": str(ROOT)}
         command = [sys.executable, "-c", ELSEWHERE]
         done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
@@ -238,25 +295,27 @@ def test_every_process_with_the_variable_has_them_and_their_content_decides_who_
     both = ask()
 
     assert before[:2] == careful[:2] == both[:2] == ["True", "True"]
-    assert len({before[2], careful[2], both[2]}) == 3
-    assert before[3].startswith("glide (glide.py ")
-    assert ", strategy careful (careful.py " in before[3]
-    assert len({before[3], careful[3], both[3]}) == 3
-    assert before[4] == careful[4] != both[4]  # of an experiment with a strategy of gaplab's own
+    assert before[2].startswith("glide (glide.py ")
+    assert ", strategy careful (careful.py " in before[2]
+    assert len({before[2], careful[2], both[2]}) == len({before[3], careful[3], both[3]}) == 3
+    assert before[4:] == careful[4:] != both[4:]  # of an experiment with a strategy of gaplab's own
 
 
-@pytest.mark.parametrize("module", ["gaplab.api", "gaplab.workers"])
-def test_a_process_does_not_start_with_a_broken_plug_in(tmp_path: Path, module: str) -> None:
+def test_a_process_starts_with_broken_plug_ins_and_warns_once(tmp_path: Path) -> None:
     (tmp_path / "broken.py").write_text("1 / 0")
-    environment = os.environ | {"GAPLAB_PLUGINS": str(tmp_path), "GAPLAB_DATABASE_URL": "sqlite://", "GAPLAB_PORT": "1"}
-    arguments = ["serve"] if module == "gaplab.workers" else []
+    missing = tmp_path / "nowhere"
+    program = "from gaplab.services.plugins import folders\nfolders.load()\nfolders.load()\nprint('started')"
+    environment = os.environ | {"GAPLAB_PLUGINS": f"{tmp_path}{os.pathsep}{missing}"}
 
     done = subprocess.run(
-        [sys.executable, "-m", module, *arguments], env=environment, capture_output=True, text=True, check=False
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False, cwd=ROOT
     )
 
-    assert done.returncode != 0
-    assert "broken.py cannot be imported: ZeroDivisionError" in done.stderr
+    assert done.stdout == "started\n"
+    assert (
+        done.stderr.count("broken.py cannot be imported: ZeroDivisionError: division by zero (broken.py, line 1)") == 1
+    )
+    assert done.stderr.count(f"there is no plug-in folder {missing}, which GAPLAB_PLUGINS names") == 1
     assert "Traceback" not in done.stderr
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
-from tests.soak.checker import violations
+from tests.soak.checker import ends, results, violations
 from tests.soak.evidence import Evidence, Experiment, Repetition, undisturbed
 from tests.soak.history import Record
 from tests.soak.witness import Move
@@ -208,3 +208,22 @@ def test_what_is_expected_is_computed_once_and_differs_between_repetitions() -> 
     assert undisturbed(SPEC | {"name": "other"}, 0) is first
     assert undisturbed(SPEC, 1) != first
     assert len(set(first)) == len(first)
+
+
+@pytest.mark.parametrize(("strategy", "state", "count"), [("random", "FAILED", 1), ("misbehaving_raises", "FAILED", 0)])
+def test_an_experiment_may_fail_if_it_was_itself_at_fault(strategy: Any, state: Any, count: Any) -> None:
+    failed = (replace(DONE, state=state, error="ValueError: x", log=(), steps=0, places=()),)
+    experiment = replace(EXPERIMENT, state=state, spec=SPEC | {"strategy": {"name": strategy}}, repetitions=failed)
+
+    failures = [each for each in results((), Evidence((experiment,)), expected) if "failed" in each]
+
+    assert len(failures) == count
+
+
+def test_an_experiment_that_was_itself_at_fault_must_end_all_the_same() -> None:
+    running = (replace(DONE, state="RUNNING"),)
+    spec = SPEC | {"strategy": {"name": "misbehaving_hangs"}}
+
+    stuck = [*ends(Evidence((replace(EXPERIMENT, state="RUNNING", spec=spec, repetitions=running),)))]
+
+    assert stuck == ["e1 is stuck: RUNNING", "e1/0 is stuck: RUNNING"]

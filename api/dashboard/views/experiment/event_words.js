@@ -33,7 +33,9 @@ const WORDS = {
   retried: () => "Retried",
   sensitivity_ended: ({ body }) =>
     `Sensitivity check ${String(body.state).toLowerCase()}${body.warnings?.length ? `: ${body.warnings.join(" ")}` : ""}`,
-  versions_refused: ({ body }) => `Refused by a supervisor with other versions: ${body.refused_by}, not ${body.computed_with}`,
+  versions_refused: ({ body }) => / \(unavailable: /.test(body.refused_by)
+    ? `Refused by a supervisor that cannot use its plug-ins: ${body.refused_by}`
+    : `Refused by a supervisor with other versions: ${body.refused_by}, not ${body.computed_with}`,
   versions_accepted: () => "Other versions were accepted: it continues under them",
   repetition_claimed: (event) => `${which(event)} ${event.body.steps ? `continues after ${count(event.body.steps)} steps` : "begins"}`,
   repetition_completed: (event) => `${which(event)} completed`,

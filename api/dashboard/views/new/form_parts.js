@@ -84,10 +84,11 @@ function strategyField(form, strategy) {
     form.remake();
   };
   const { box, element } = tickField([readableName(strategy.name), h("small", {}, plugin?.summary)], Boolean(strategy.on), tick);
+  box.disabled = !strategy.on && plugin?.available === false;
   places.add(pointer, box, room);
   const open = Object.keys(strategy.options).length > 0;
   const more = options && strategy.on ? h("details", { open }, h("summary", {}, "Options"), options, h("p", {}, add, " ", remove)) : null;
-  return h("div", { class: "strategy" }, element, room, more);
+  return h("div", { class: "strategy" }, element, whyUnavailable(plugin), room, more);
 }
 
 /**
@@ -106,7 +107,7 @@ export function simulationPart(form) {
 }
 
 /**
- * Return a list of plug-ins to choose from, and the options of the chosen one. Plug-ins that are not installed say how to install them.
+ * Return a list of plug-ins to choose from, and the options of the chosen one. Unavailable plug-ins say why, and how to get them.
  *
  * @param {Form} form
  * @param {string} label
@@ -118,18 +119,26 @@ export function simulationPart(form) {
 function pluginField(form, label, draft, plugins, pointer, none = null) {
   const chosen = plugins.find(({ name }) => name === draft.name);
   /** @type {Choices} */
-  const choices = plugins.map(({ name, available }) => [name, `${readableName(name)}${available ? "" : ": not installed"}`, !available]);
+  const choices = plugins.map(({ name, available }) => [name, `${readableName(name)}${available ? "" : ": not available"}`, !available]);
   const set = (/** @type {string} */ name) => {
     Object.assign(draft, { name, options: {} });
     form.remake();
   };
   const options = optionFields(chosen, draft.options, () => pointer, form);
-  const missing = plugins.filter(({ available }) => !available).map(({ name, note }) =>
-    h("p", { class: "note" }, `${readableName(name)} is not installed: `, h("code", {}, note)));
   return [
     field({ label, hint: chosen?.summary, value: draft.name, set, pointer, places: form.places, choices: none === null ? choices : [["", none], ...choices] }),
-    ...missing,
+    ...plugins.map(whyUnavailable),
     options ? h("details", { open: Object.keys(draft.options).length > 0 }, h("summary", {}, `Options of ${readableName(draft.name)}`), options) : null];
+}
+
+/**
+ * Return why a plug-in is unavailable; null if it is not.
+ *
+ * @param {Api.PluginRead | undefined} plugin
+ */
+function whyUnavailable(plugin) {
+  return plugin === undefined || plugin.available ? null
+    : h("p", { class: "note" }, `${readableName(plugin.name)} is not available: `, h("code", {}, plugin.note));
 }
 
 /**
@@ -158,6 +167,7 @@ function tunableField(form, tunable) {
     form.remake();
   };
   const { box, element } = tickField([readableName(name), h("small", {}, plugin?.summary)], on, tick);
+  box.disabled = !on && plugin?.available === false;
   const room = errorRoom();
   places.add(pointer, box, room);
   const bound = (/** @type {"lower" | "upper"} */ side, /** @type {string} */ label) => numberField({
@@ -166,7 +176,7 @@ function tunableField(form, tunable) {
   });
   const unit = plugin?.details.unit === "1" ? "" : plugin?.details.unit;
   const bounds = on ? h("div", { class: "bounds" }, bound("lower", "From"), bound("upper", "To"), h("span", { class: "note" }, unit)) : null;
-  return h("div", { class: "tunable" }, element, bounds, room);
+  return h("div", { class: "tunable" }, element, whyUnavailable(plugin), bounds, room);
 }
 
 /**
@@ -176,7 +186,7 @@ function tunableField(form, tunable) {
  */
 export function realityPart(form) {
   const { draft: { realityEngine, realityParameters }, places, catalogue } = form;
-  const fields = catalogue.tunables.map(({ name, details }) => numberField({
+  const fields = catalogue.tunables.filter(({ available }) => available).map(({ name, details }) => numberField({
     label: readableName(name), value: realityParameters[name], set: form.setter(realityParameters, name), places, placeholder: "the robot’s own",
     pointer: `/reality/parameters/${name}`, hint: `${details.least} to ${details.greatest}` }));
   return part("Reality",

@@ -1,0 +1,74 @@
+"""Edits of external plug-ins: the contents of their folders now, and when this process imported them."""
+
+from collections.abc import Callable
+from time import monotonic
+
+from gaplab.services.core import external_plugins
+from gaplab.services.plugins import contents
+from gaplab.services.plugins.contents import Contents
+
+LOOK_S = 1.0
+"""Shortest time between two looks for edited files."""
+
+TRIES = 3
+"""Most imports of files that are edited meanwhile."""
+
+
+class Watch:
+    """The contents of the plug-in folders, read again after an edit.
+
+    Args:
+        clock: seconds.
+    """
+
+    def __init__(self, clock: Callable[[], float] = monotonic) -> None:
+        self._clock = clock
+        self._looked = -LOOK_S
+        self._state: tuple[object, contents.State] | None = None
+        self._contents = Contents()
+
+    def contents(self) -> Contents:
+        """Return the contents, at most `LOOK_S` old; the same object as long as they do not change."""
+        package, now = external_plugins.package(), self._clock()
+        if self._state is None or self._state[0] is not package or now - self._looked >= LOOK_S:
+            self._looked = now
+            state = package, contents.state()
+            if state != self._state:
+                self._state, self._contents = state, contents.read()
+        return self._contents
+
+
+class Imported:
+    """The contents of the plug-in folders as this process imported them."""
+
+    def __init__(self) -> None:
+        self._package: object = None
+        self._contents = Contents()
+
+    def contents(self) -> Contents:
+        """Return the contents of the imported files; the first call imports them."""
+        if self._package is None or self._package is not external_plugins.package():
+            self._contents = _import()
+            self._package = external_plugins.package()
+        return self._contents
+
+    def renewed(self) -> Contents:
+        """Return the contents of the imported files, after another import if one was edited."""
+        if contents.read().digests != self.contents().digests:
+            external_plugins.set_folders(external_plugins.named_folders())
+        return self.contents()
+
+
+def _import() -> Contents:
+    """Import the plug-ins, again if a file is edited meanwhile, and return what was imported."""
+    for _ in range(TRIES):
+        before = contents.read()
+        external_plugins.loaded()
+        if contents.read().digests == before.digests:
+            break
+        external_plugins.set_folders(external_plugins.named_folders())
+    return before
+
+
+present = Watch().contents
+imported = Imported()

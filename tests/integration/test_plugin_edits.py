@@ -1,0 +1,303 @@
+"""External plug-ins that are edited or broken while experiments name them: those wait, and others go on."""
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.sensitivity import SensitivitySpec
+from gaplab.services import events
+from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
+from gaplab.services.core.robots import robots
+from gaplab.services.core.strategies import strategies
+from gaplab.services.events import WantedEvents
+from gaplab.services.experiments import checks, reading, submission
+from gaplab.services.plugins import watching
+from gaplab.services.plugins.watching import Watch
+from gaplab.services.running import execution, provenance, sensitivity, versions
+from gaplab.services.specs.assembly import engine_of
+from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.session import Store
+from gaplab.workers import nodes
+from gaplab.workers.plugins import FIRST_S, LONGEST_S, Plugins
+from tests.experiments import some_log, toy
+from tests.fakes import CAREFUL
+
+EDITED = CAREFUL.replace("the middle", "the very middle")
+TYPO = CAREFUL.replace("rng):", "rng:")
+WHY = "careful.py cannot be imported: SyntaxError: '(' was never closed (careful.py, line 15)"
+SLIPPERY = """
+from gaplab.services.core.robots.toy_function import ToyFunction
+
+
+class Slippery(ToyFunction):
+    name = "slippery"
+"""
+
+
+@pytest.fixture(autouse=True)
+def looks_at_files_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(watching, "LOOK_S", 0)
+
+
+def submit(store: Store, **changes: Any) -> str:
+    return submission.submit_experiment(store, toy(**{"repetitions": 2} | changes)).id
+
+
+def claimed(store: Store, plugins: Plugins | None = None) -> list[str]:
+    """The experiments that a supervisor claims now, with as many claims as it likes."""
+    return sorted({claim.experiment_id for claim in execution.claim(store, "me", 9, *(plugins or Plugins()).present())})
+
+
+def refusals(store: Store) -> list[Any]:
+    return [*events.page(store, 0, WantedEvents(kinds=frozenset({EventKind.VERSIONS_REFUSED})), limit=9).items]
+
+
+def begin(store: Store) -> str:
+    """An experiment with a step, queued again."""
+    id_ = submit(store, strategy="careful")
+    (claim,) = execution.claim(store, "me", 1)
+    execution.record(store, claim, next(some_log()))
+    execution.hand_back(store, claim)
+    return id_
+
+
+def expected(strategy: str = "careful") -> Any:
+    """The versions that a process needs for a spec with this strategy, as this process has them now."""
+    return Plugins(versions.versions()).expected(resolve_experiment(toy(strategy=strategy)))
+
+
+def test_a_new_process_is_refused_for_an_edit_of_a_plug_in_that_the_spec_names_alone(put: Any) -> None:
+    home = put(careful=CAREFUL, brave=CAREFUL.replace("careful", "brave"))
+    wanted, others = expected(), expected("random")
+    nodes.check_here(wanted)
+    (home / "brave.py").write_text("class Brave(")
+    put()
+    nodes.check_here(wanted)
+
+    (home / "careful.py").write_text(EDITED)
+    nodes.check_here(wanted)  # this process has imported what the supervisor has
+    put()
+    nodes.check_here(others)
+
+    with pytest.raises(PluginDiffers) as refused:
+        nodes.check_here(wanted)
+    assert set(refused.value.differences) == {"strategy careful"}
+    assert wanted["plug-in strategy careful"] in str(refused.value)
+    assert str(pickle.loads(pickle.dumps(refused.value))) == str(refused.value)
+
+
+def test_a_process_that_cannot_import_a_named_plug_in_says_why(put: Any) -> None:
+    home = put(careful=CAREFUL)
+    wanted = expected()
+    (home / "careful.py").write_text(TYPO)
+    put()
+
+    with pytest.raises(PluginDiffers, match="SyntaxError"):
+        nodes.check_here(wanted)
+
+
+def test_a_process_imports_edited_files_again_when_the_supervisor_has_the_new_ones(put: Any) -> None:
+    home = put(careful=CAREFUL)
+    nodes.check_here(expected())
+    before = strategies["careful"]
+    (home / "careful.py").write_text(EDITED)
+
+    nodes.check_here(expected())
+
+    assert strategies["careful"] is not before
+    assert strategies["careful"].describe().summary == "Stays in the very middle."
+
+
+def test_an_engine_is_warm_until_its_file_is_edited(put: Any) -> None:
+    text = 'from gaplab.services.engines.analytic import Analytic\n\n\nclass Glide(Analytic):\n    name = "glide"\n'
+    put(glide=text)
+    first, again = engine_of(PluginRef(name="glide")), engine_of(PluginRef(name="glide"))
+    put(glide=f"{text}    usual_rollout_s = 1.0\n")
+
+    assert first is again
+    assert engine_of(PluginRef(name="glide")).usual_rollout_s == 1.0
+
+
+def test_versions_of_gaplab_concern_all_work(put: Any) -> None:
+    put(careful=CAREFUL)
+
+    with pytest.raises(ClusterUnusable, match=r"the supervisor has gaplab 0\.0\.1"):
+        nodes.check_here(expected() | {"gaplab": "0.0.1"})
+
+
+def test_an_edit_holds_up_the_experiments_that_name_the_plug_in_and_no_other(store: Store, put: Any) -> None:
+    home = put(careful=CAREFUL)
+    named, other = begin(store), submit(store, strategy="random")
+
+    (home / "careful.py").write_text(EDITED)
+
+    assert claimed(store) == [other]
+    (warning,) = reading.read_experiment(store, named).warnings
+    assert "strategy careful (careful.py " in warning
+    assert f"gaplab accept-versions {named}" in warning
+    (home / "careful.py").write_text(CAREFUL)
+    assert claimed(store) == [named]
+    assert provenance.read(store, named).refused_by is None
+
+
+def test_accepted_an_edited_plug_in_goes_on_without_a_restart(store: Store, put: Any) -> None:
+    home = put(careful=CAREFUL)
+    named = begin(store)
+    (home / "careful.py").write_text(EDITED)
+    assert claimed(store) == []
+
+    provenance.accept_versions(store, named)
+
+    assert claimed(store) == [named]
+
+
+def test_an_edit_of_what_a_plug_in_imports_counts_as_its_own(store: Store, put: Any) -> None:
+    home = put(_middle="X = 1", careful=f"from ._middle import X\n{CAREFUL}")
+    named = begin(store)
+
+    (home / "_middle.py").write_text("X = 2")
+
+    assert claimed(store) == []
+    (home / "_middle.py").write_text("X = 1")
+    assert claimed(store) == [named]
+
+
+def test_experiments_from_before_imports_were_recorded_go_on(store: Store, put: Any) -> None:
+    put(_middle="X = 1", careful=f"from ._middle import X\n{CAREFUL}")
+    named = begin(store)
+    with store.transaction() as session:
+        row = session.get_one(provenance.ExperimentRow, named)
+        before, row.computed_with = row.computed_with, provenance._IMPORTED.sub("", row.computed_with)
+        assert row.computed_with != before
+
+    assert claimed(store) == [named]
+
+
+@pytest.mark.parametrize("begun", [True, False])
+def test_an_experiment_whose_plug_in_is_broken_stays_queued_and_says_why(store: Store, put: Any, begun: bool) -> None:
+    put(careful=CAREFUL)
+    named = begin(store) if begun else submit(store, strategy="careful")
+    other = submit(store, strategy="random")
+
+    put(careful=TYPO)
+
+    assert claimed(store) == [other]
+    assert claimed(store) == []
+    found = reading.read_experiment(store, named)
+    assert found.state is (State.RUNNING if begun else State.QUEUED)
+    assert [each for each in found.warnings if WHY in each and "restart the service" in each]
+    assert [each.experiment for each in refusals(store)] == [named]
+    put(careful=CAREFUL)
+    assert claimed(store) == [named]
+    assert reading.read_experiment(store, named).warnings == ()
+
+
+def test_an_experiment_whose_plug_in_is_gone_stays_queued_as_well(store: Store, put: Any) -> None:
+    home = put(careful=CAREFUL)
+    named = submit(store, strategy="careful")
+    (home / "careful.py").unlink()
+    put()
+
+    assert claimed(store) == []
+    (warning,) = reading.read_experiment(store, named).warnings
+    assert "strategy careful (unavailable: it is not installed)" in warning
+
+
+def test_a_name_that_reads_like_a_reason_holds_up_nothing(store: Store, put: Any) -> None:
+    put(careful=CAREFUL.replace('"careful"', '"random (unavailable: x"'))
+    submit(store, strategy="random (unavailable: x")
+    put(careful=TYPO)
+
+    assert claimed(store) == []
+    assert claimed(store) == []
+    assert len(refusals(store)) == 1
+
+
+def test_a_check_whose_robot_is_broken_waits_and_others_are_done(store: Store, put: Any) -> None:
+    put(slippery=SLIPPERY)
+    waiting = checks.submit(store, SensitivitySpec(robot="slippery", engine="analytic")).id
+    other = checks.submit(store, SensitivitySpec(robot="toy_function")).id
+
+    put(slippery="1 / 0")
+
+    assert "slippery" not in robots
+    assert sensitivity.claim(store, "me").id == other
+    assert sensitivity.claim(store, "me") is None
+    found = checks.read(store, waiting)
+    assert found.state is State.QUEUED
+    assert "robot slippery (unavailable: slippery.py cannot be imported: ZeroDivisionError" in found.reason
+    put(slippery=SLIPPERY)
+    assert sensitivity.claim(store, "me").id == waiting
+
+
+def refused_by_a_process(store: Store, plugins: Plugins) -> str:
+    """The experiment of a repetition that was claimed, and then refused by its process."""
+    (claim,) = execution.claim(store, "me", 1, *plugins.present())
+    version = versions.versions_of(versions.provenance())["strategy careful"]
+    refused = PluginDiffers({"strategy careful": "a process has another"}, {"strategy careful": version})
+    plugins.hand_back(store, claim, refused)
+    return claim.experiment_id
+
+
+def test_what_a_process_refuses_waits_without_a_hot_loop_and_is_tried_again(store: Store, put: Any) -> None:
+    put(careful=CAREFUL)
+    now = [0.0]
+    plugins = Plugins(clock=lambda: now[0])
+    named, other = submit(store, strategy="careful"), submit(store, strategy="random")
+
+    assert refused_by_a_process(store, plugins) == named
+    assert claimed(store, plugins) == [other]
+    (warning,) = reading.read_experiment(store, named).warnings
+    assert "strategy careful (unavailable: a process has another)" in warning
+    assert provenance.read(store, named).computed_with is None
+    assert [each.state for each in reading.list_repetitions(store, named)] == [State.QUEUED] * 2
+
+    tries = 0
+    while now[0] < 1.9 * LONGEST_S:
+        now[0] += FIRST_S
+        if plugins.present()[1] == {}:
+            assert refused_by_a_process(store, plugins) == named
+            tries += 1
+    assert 4 <= tries <= 6
+    now[0] += LONGEST_S
+    assert claimed(store, plugins) == [named]
+
+
+def test_a_refused_version_is_forgotten_with_the_next_edit(store: Store, put: Any) -> None:
+    home = put(careful=CAREFUL)
+    plugins = Plugins()
+    named = submit(store, strategy="careful")
+    refused_by_a_process(store, plugins)
+    assert claimed(store, plugins) == []
+
+    (home / "careful.py").write_text(EDITED)
+
+    assert claimed(store, plugins) == [named]
+
+
+def test_folders_are_looked_at_once_a_second(put: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()
+    now = [0.0]
+    home = put(careful=CAREFUL)
+    watch = Watch(lambda: now[0])
+    first = watch.contents()
+
+    (home / "careful.py").write_text(EDITED)
+
+    assert watch.contents() is first
+    now[0] += watching.LOOK_S
+    assert watch.contents().digests != first.digests
+    assert watch.contents() is watch.contents()
+
+
+def test_a_file_that_an_editor_replaces_meanwhile_stops_nothing(put: Any) -> None:
+    home = put(careful=CAREFUL)
+    Path(home / "broken.py").symlink_to(home / "nowhere.py")
+    (home / "folder.py").mkdir()
+
+    assert set(Watch().contents().digests) == {"careful.py"}
