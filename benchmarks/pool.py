@@ -80,8 +80,7 @@ def rows(rounds: int) -> list[Row]:
     with cluster(Settings(workers=2)):
         bare(2)()  # load the engines
         if on_all_cores() != alone():
-            msg = "the service's task computes other steps than the repetition"
-            raise RuntimeError(msg)
+            raise RuntimeError("the service's task computes other steps than the repetition")
         for _ in range(rounds):
             for name, work in competitors.items():
                 taken[name].append(settled(work))

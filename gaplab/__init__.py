@@ -40,8 +40,7 @@ __all__ = sorted(_MODULES)
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - a class or a function
     """Import a name when it is first used: a worker that loads a plug-in needs no client."""
     if name not in _MODULES:
-        msg = f"module {__name__!r} has no attribute {name!r}"
-        raise AttributeError(msg)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_MODULES[name]), name)
 
 

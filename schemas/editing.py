@@ -23,9 +23,7 @@ class Edit(Frozen):
     @model_validator(mode="after")
     def _something_changes(self) -> "Edit":
         if not self.model_fields_set:
-            msg = "nothing to change: give a name, notes, or both"
-            raise ValueError(msg)
+            raise ValueError("nothing to change: give a name, notes, or both")
         if "name" in self.model_fields_set and self.name is None:
-            msg = "the name is null, but must be text: a name can be changed, not removed"
-            raise ValueError(msg)
+            raise ValueError("the name is null, but must be text: a name can be changed, not removed")
         return self

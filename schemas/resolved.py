@@ -19,8 +19,7 @@ class ResolvedTunable(TunableRef):
     @model_validator(mode="after")
     def _check_the_bounds(self) -> "ResolvedTunable":
         if self.lower >= self.upper:
-            msg = f"lower must be below upper, not {self.lower:g} and {self.upper:g}"
-            raise ValueError(msg)
+            raise ValueError(f"lower must be below upper, not {self.lower:g} and {self.upper:g}")
         return self
 
 

@@ -91,8 +91,7 @@ def revoke_token(session: Session, token_id: str) -> TokenRead:
     row, id_ = TokenRow, storable(token_id)
     session.execute(update(row).where(row.id == id_).values(revoked_at=func.coalesce(row.revoked_at, now())))
     if (token := session.get(row, id_, populate_existing=True)) is None:
-        msg = f"there is no token {token_id!r}"
-        raise NotFound(msg)
+        raise NotFound(f"there is no token {token_id!r}")
     return _view(token)
 
 
@@ -126,8 +125,7 @@ def demand(caller: Caller, role: Role, what: str) -> None:
     """
     if not caller.role.permits(role):
         held = f"this token is a {caller.role.value}'s" if caller.token else "none was shown"
-        msg = f"{what} requires the token of {_article(role)}; {held}"
-        raise Forbidden(msg)
+        raise Forbidden(f"{what} requires the token of {_article(role)}; {held}")
 
 
 def demand_token_beyond_loopback(store: Store, host: str) -> None:
@@ -140,8 +138,7 @@ def demand_token_beyond_loopback(store: Store, host: str) -> None:
         return
     with store.reading() as session:
         if session.scalar(select(TokenRow.id).where(TokenRow.revoked_at.is_(None)).limit(1)) is None:
-            msg = f"{host} is reachable from other machines, but no token is valid yet: {MAKE_ONE}"
-            raise Unauthenticated(msg)
+            raise Unauthenticated(f"{host} is reachable from other machines, but no token is valid yet: {MAKE_ONE}")
 
 
 def is_loopback(host: str) -> bool:
@@ -160,8 +157,7 @@ def _known(store: Store, shown: str) -> Caller:
         token, present = session.get(TokenRow, parts[1]) if parts else None, moment(session)
     genuine = hmac.compare_digest(_digest(parts[2] if parts else ""), token.digest if token else _NO_DIGEST)
     if token is None or not genuine or token.revoked_at is not None:
-        msg = "this token is not valid: it is unknown here, or was revoked"
-        raise Unauthenticated(msg)
+        raise Unauthenticated("this token is not valid: it is unknown here, or was revoked")
     if token.last_used_at is None or present - token.last_used_at > NOTED_EVERY:
         with suppress(StoreUnavailable):  # the note of its use is welcome, but no reason to refuse
             store.write(_note_use, token.id)

@@ -35,8 +35,7 @@ class _Environment(BaseSettings):
         except ValidationError as error:
             (first, *_) = error.errors()
             variable = f"{cls.model_config['env_prefix']}{first['loc'][0]}".upper()
-            msg = f"{variable} is {first['input']!r}; it must be a whole number of at least 1"
-            raise ValueError(msg) from error
+            raise ValueError(f"{variable} is {first['input']!r}; it must be a whole number of at least 1") from error
 
 
 class Settings(_Environment):

@@ -42,8 +42,7 @@ class WaitingLine:
             LimitReached: too many wait, or the wait was too long.
         """
         if not self._places.acquire(blocking=False):
-            msg = f"{self._length} requests wait for {self._what} already; try again soon"
-            raise LimitReached(msg, RETRY_AFTER_S)
+            raise LimitReached(f"{self._length} requests wait for {self._what} already; try again soon", RETRY_AFTER_S)
         try:
             if not self.lock.acquire(timeout=self._longest_s):
                 msg = f"other {self._what} have been computed for {self._longest_s:g} s; try again soon"

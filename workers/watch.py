@@ -42,14 +42,11 @@ class Watch:
             RayGone: a part of Ray died on this machine, or Ray does not answer; only a new process gets another.
         """
         if self._own and (dead := [kind for kind, _ in _node().dead_processes() if kind in _VITAL]):
-            msg = f"Ray died on this machine: its {' and '.join(dead)} ended"
-            raise RayGone(msg)
+            raise RayGone(f"Ray died on this machine: its {' and '.join(dead)} ended")
         if not self._is_alive:
-            msg = "Ray died on this machine"
-            raise RayGone(msg)
+            raise RayGone("Ray died on this machine")
         if (silence_s := monotonic() - self._answered) > SILENT_S:
-            msg = f"Ray does not answer: it was last heard of {silence_s:.0f} s ago"
-            raise RayGone(msg)
+            raise RayGone(f"Ray does not answer: it was last heard of {silence_s:.0f} s ago")
         return self._cores
 
     def stop(self) -> None:

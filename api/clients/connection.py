@@ -78,8 +78,7 @@ class Connection:
                 trust_env=httpx2.URL(url).host not in LOOPBACK,
             )
         except (httpx2.InvalidURL, UnicodeEncodeError) as error:
-            msg = f"{url!r} is not the address of a service: {error}"
-            raise ServiceUnreachable(msg) from error
+            raise ServiceUnreachable(f"{url!r} is not the address of a service: {error}") from error
 
     def close(self) -> None:
         """Close the connection."""

@@ -43,8 +43,7 @@ class Figure:
     def content(self, format: str) -> bytes:  # noqa: A002 - as the API says
         """Return the content of a file in this format: svg, png, pdf, html or json."""
         if format not in FORMATS:
-            msg = f"unknown figure format {format!r}; available: {', '.join(FORMATS)}"
-            raise ValueError(msg)
+            raise ValueError(f"unknown figure format {format!r}; available: {', '.join(FORMATS)}")
         if format not in self._drawn:
             self._drawn[format] = self._draw(format)
         return self._drawn[format]

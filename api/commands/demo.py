@@ -77,8 +77,7 @@ def _run_study(name: str, spec: dict[str, Any], client: Client, folder: Path, co
     study = client.study(study.id)
     if study.state is not State.COMPLETED:
         reasons = sorted({reason for experiment in study.experiments for reason in experiment.reasons})
-        msg = f"the study {name} ended as {study.state}: {'; '.join(reasons) or 'cancelled'}"
-        raise CommandError(msg, Exit.FAILED)
+        raise CommandError(f"the study {name} ended as {study.state}: {'; '.join(reasons) or 'cancelled'}", Exit.FAILED)
     console.print(f"{name}: {counts(study.progress)}")
     _show(name, study, client, folder, console)
 
@@ -113,8 +112,7 @@ def _print(line: str, console: Console, style: str = "none") -> None:
 
 def _spec(path: Path) -> dict[str, Any]:
     if not path.is_file():
-        msg = f"{path} does not exist; run the demo from a clone of the repository"
-        raise CommandError(msg, Exit.FILE)
+        raise CommandError(f"{path} does not exist; run the demo from a clone of the repository", Exit.FILE)
     return dict(json.loads(path.read_text("utf-8")))
 
 

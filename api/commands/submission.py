@@ -58,8 +58,7 @@ def sensitivity(spec: SpecFile, as_json: AsJson = False, url: Url = None) -> Non
     if as_json:
         print_json(check)
     if check.state is not State.COMPLETED:
-        msg = f"the check {check.id} ended as {check.state}: {check.reason}"
-        raise CommandError(msg, Exit.FAILED)
+        raise CommandError(f"the check {check.id} ended as {check.state}: {check.reason}", Exit.FAILED)
     if not as_json:
         console().print(tables.sensitivity(check))
         for warning in check.warnings:
@@ -94,17 +93,13 @@ def _read(name: str) -> dict[str, Any]:
         text = sys.stdin.read() if name == "-" else Path(name).read_text("utf-8")
         spec = json.loads(text, parse_constant=_refuse)
     except OSError as error:
-        msg = f"{name}: {error.strerror or error}"
-        raise CommandError(msg, Exit.FILE) from error
+        raise CommandError(f"{name}: {error.strerror or error}", Exit.FILE) from error
     except (ValueError, RecursionError) as error:
-        msg = f"{name} is not JSON: {error}"
-        raise CommandError(msg, Exit.FILE) from error
+        raise CommandError(f"{name} is not JSON: {error}", Exit.FILE) from error
     if not isinstance(spec, dict):
-        msg = f'{name} holds no JSON object; write one, like {{"strategy": "simulated_fit"}}'
-        raise CommandError(msg, Exit.FILE)
+        raise CommandError(f'{name} holds no JSON object; write one, like {{"strategy": "simulated_fit"}}', Exit.FILE)
     return spec
 
 
 def _refuse(constant: str) -> NoReturn:
-    msg = f"JSON has no {constant}; use a number or null"
-    raise ValueError(msg)
+    raise ValueError(f"JSON has no {constant}; use a number or null")

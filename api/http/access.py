@@ -125,8 +125,7 @@ def _refuse_other_sites(request: Request) -> None:
     """
     host = request.headers.get("host", "")
     if not is_loopback(_without_port(host)):
-        msg = f"without tokens, the host must be 127.0.0.1, [::1] or localhost, not {host[:100]!r}"
-        raise Forbidden(msg)
+        raise Forbidden(f"without tokens, the host must be 127.0.0.1, [::1] or localhost, not {host[:100]!r}")
     origin = request.headers.get("origin")
     if origin is not None and origin.partition("://")[2] != host:
         msg = f"without tokens, pages of other sites have no access; this request comes from {origin[:100]!r}"

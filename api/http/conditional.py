@@ -46,8 +46,7 @@ def starting_from(if_match: str | None) -> Collection[int] | None:
         ConditionMissing: the request has no `If-Match`.
     """
     if if_match is None:
-        msg = "an edit needs the header If-Match: the ETag of what you edit, or * for any version"
-        raise ConditionMissing(msg)
+        raise ConditionMissing("an edit needs the header If-Match: the ETag of what you edit, or * for any version")
     if if_match.strip() == "*":
         return None
     return {int(match[1]) for match in map(_TAG.fullmatch, _listed(if_match)) if match}

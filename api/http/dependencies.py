@@ -46,8 +46,7 @@ def _store(request: Request) -> Store:
 def _plausible(text: str) -> str:
     """Return a text that can be an id; any other is not found, and never reaches the database."""
     if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}", text):
-        msg = f"there is nothing with the id {text[:64]!r}"
-        raise NotFound(msg)
+        raise NotFound(f"there is nothing with the id {text[:64]!r}")
     return text
 
 

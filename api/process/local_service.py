@@ -85,8 +85,7 @@ def _wait_until_ready(url: str, process: "subprocess.Popen[bytes]", log: Path) -
         while not client.ready():
             if process.poll() is not None or time.monotonic() > deadline:
                 lines = log.read_text("utf-8", "replace").strip().splitlines() or ["its log is empty"]
-                msg = f"the service does not start: {lines[-1]} ({log} says more)"
-                raise CommandError(msg)
+                raise CommandError(f"the service does not start: {lines[-1]} ({log} says more)")
             time.sleep(0.2)
 
 

@@ -31,15 +31,13 @@ def listen(host: str, port: int) -> socket.socket:
         CommandError: the address is invalid or taken, most often by a service that already runs.
     """
     if not 0 <= port < 2**16:
-        msg = f"cannot serve on {host}:{port}: ports go from 0 to {2**16 - 1}"
-        raise CommandError(msg)
+        raise CommandError(f"cannot serve on {host}:{port}: ports go from 0 to {2**16 - 1}")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)
     except OSError as error:
         reason = str(error.strerror or error).split(" (while")[0]
-        msg = f"cannot serve on {host}:{port}: {reason.lower()}"
-        raise CommandError(msg) from error
+        raise CommandError(f"cannot serve on {host}:{port}: {reason.lower()}") from error
 
 
 def serve_api(settings: Settings, listener: socket.socket, supervisor: SupervisorProcess | None = None) -> None:

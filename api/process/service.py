@@ -77,8 +77,7 @@ def migrate(database_url: str) -> None:
     except Exception as error:  # each database driver has errors of its own
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         url = re.sub(r"(://[^:/@]*):[^@]*@", r"\1:…@", database_url)  # without the password
-        msg = f"the database {url} cannot be migrated: {reason}"
-        raise StoreUnavailable(msg) from error
+        raise StoreUnavailable(f"the database {url} cannot be migrated: {reason}") from error
 
 
 def warn_of_readers(database_url: str) -> None:

@@ -55,8 +55,7 @@ class CurvesDrawing(Drawing):
     @model_validator(mode="after")
     def _something_is_drawn(self) -> "CurvesDrawing":
         if not self.experiment and not self.study:
-            msg = "name an experiment or a study, as in ?study=… or ?experiment=…&experiment=…"
-            raise ValueError(msg)
+            raise ValueError("name an experiment or a study, as in ?study=… or ?experiment=…&experiment=…")
         return self
 
 
@@ -129,8 +128,7 @@ def install(app: FastAPI) -> None:
 def _refuse_unknown(kind: str, request: Request) -> None:
     prefix = f"{router.prefix}/"
     kinds = sorted(path.removeprefix(prefix) for path in request.app.openapi()["paths"] if path.startswith(prefix))
-    msg = f"unknown figure {kind[:64]!r}; permitted: {', '.join(kinds)}"
-    raise NotFound(msg)
+    raise NotFound(f"unknown figure {kind[:64]!r}; permitted: {', '.join(kinds)}")
 
 
 def _title(store: Store, query: ExperimentDrawing) -> str:

@@ -123,8 +123,7 @@ def _insert(session: Session, table: str, rows: Iterable[Row]) -> None:
     try:
         archives.insert_rows(session, table, rows)
     except (*archives.Refused, KeyError) as error:
-        msg = "its rows contradict each other: one occurs twice, or belongs to a missing row"
-        raise InvalidArchive(msg) from error
+        raise InvalidArchive("its rows contradict each other: one occurs twice, or belongs to a missing row") from error
 
 
 def _arriving(table: str, row: Row, experiments: Mapping[str, Row], now: datetime) -> Row:

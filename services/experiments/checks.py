@@ -114,8 +114,7 @@ def get(session: Session, id_: str) -> SensitivityRow:
         NotFound: there is none.
     """
     if (check := session.get(SensitivityRow, storable(id_), populate_existing=True)) is None:
-        msg = f"there is no sensitivity check {id_!r}"
-        raise NotFound(msg)
+        raise NotFound(f"there is no sensitivity check {id_!r}")
     return check
 
 

@@ -54,6 +54,5 @@ def _edit(session: Session, row: ExperimentRow | StudyRow, edit: Edit, starting_
     if starting_from is not None:
         statement = statement.where(table.edits.in_(sorted(starting_from)))
     if session.execute(statement.returning(table.id)).first() is None:
-        msg = f"{row.id!r} was changed by someone else since you read it; read it again, and then decide"
-        raise Changed(msg)
+        raise Changed(f"{row.id!r} was changed by someone else since you read it; read it again, and then decide")
     session.refresh(row)

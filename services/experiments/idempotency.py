@@ -67,8 +67,7 @@ def once(store: Store, admitted: Admission, asked: Frozen, kind: type[R], work: 
             return Once(answer)
         known = session.execute(select(row.digest, row.answer).where(ours)).one()
         if known.digest != digest:
-            msg = f"the idempotency key {key!r} was used for another request; a new request needs a new key"
-            raise KeyReused(msg)
+            raise KeyReused(f"the idempotency key {key!r} was used for another request; a new request needs a new key")
         return Once(kind.model_validate(known.answer), replayed=True)
 
     return store.write(transaction)

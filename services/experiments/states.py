@@ -83,8 +83,7 @@ def _settle(session: Session, experiment: str, requested: State | None) -> None:
     if following is stored:
         session.execute(update(row).where(row.id == experiment).values(values))
     elif not move(session, row, row.id == experiment, following, **values):
-        msg = f"experiment {experiment!r} is {stored} and cannot become {following}"
-        raise Conflict(msg)
+        raise Conflict(f"experiment {experiment!r} is {stored} and cannot become {following}")
 
 
 def _following(state: State, queued: int, running: int, states: set[State]) -> State:

@@ -66,8 +66,7 @@ def accept_versions(session: Session, experiment_id: str) -> ExperimentRead:
             if experiment.state.ended
             else "has not started, so it has no versions yet"
         )
-        msg = f"experiment {experiment_id!r} {why}; there is nothing to accept"
-        raise Conflict(msg)
+        raise Conflict(f"experiment {experiment_id!r} {why}; there is nothing to accept")
     told = {"computed_with": experiment.computed_with, "refused_by": experiment.refused_by}
     note(session, EventKind.VERSIONS_ACCEPTED, experiment_id, **told)
     experiment.computed_with = experiment.refused_by = None

@@ -102,8 +102,7 @@ def _refuse_unfinished(session: Session, which: ColumnElement[bool]) -> None:
     ).first()
     if unfinished is not None:
         number, experiment, missing = unfinished
-        msg = f"repetition {number} of {experiment!r} is not complete: {missing} iterations are missing"
-        raise Conflict(msg)
+        raise Conflict(f"repetition {number} of {experiment!r} is not complete: {missing} iterations are missing")
 
 
 def pause(session: Session, experiment: str, reason: str) -> None:

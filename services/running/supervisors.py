@@ -33,8 +33,7 @@ def heartbeat(session: Session, owner: str, last: datetime | None = None) -> dat
     if (present := session.scalar(noted)) is not None:
         return present
     if last is not None:
-        msg = "the database lacks this supervisor's latest heartbeat: it was replaced or restored"
-        raise StoreChanged(msg)
+        raise StoreChanged("the database lacks this supervisor's latest heartbeat: it was replaced or restored")
     present = moment(session)
     forgotten = (row.heartbeat_at < present - FORGET_AFTER) | (row.heartbeat_at > present + FORGET_AFTER)
     session.execute(delete(row).where(forgotten))

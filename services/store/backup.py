@@ -37,8 +37,7 @@ def backup(url: str, file: Path) -> int:
         raise Unsupported(msg)
     source = engine.url.database
     if source is None or not Path(source).is_file():
-        msg = f"there is no database at {source or 'no place'}, so there is nothing to copy"
-        raise StoreUnavailable(msg)
+        raise StoreUnavailable(f"there is no database at {source or 'no place'}, so there is nothing to copy")
     try:
         with appearing(file, 0o600) as part, database_errors.named(), engine.connect() as connection:
             source_connection = connection.connection.driver_connection
@@ -65,5 +64,4 @@ def copy_checked(source: sqlite3.Connection, part: Path) -> None:
         msg = f"the database cannot be copied: {error}"
         raise (StoreDamaged if is_damage(error) else StoreUnavailable)(msg) from error
     if found != "ok":
-        msg = f"the copy is damaged, and so is the database: {found}"
-        raise StoreDamaged(msg)
+        raise StoreDamaged(f"the copy is damaged, and so is the database: {found}")

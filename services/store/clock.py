@@ -26,8 +26,7 @@ class UtcDateTime(TypeDecorator[datetime]):
         if value is None:
             return None
         if value.tzinfo is None:
-            msg = f"a time needs a time zone: {value!r} has none"
-            raise ValueError(msg)
+            raise ValueError(f"a time needs a time zone: {value!r} has none")
         return value.astimezone(UTC)
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002  # the base's signature

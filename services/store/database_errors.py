@@ -29,18 +29,15 @@ def named() -> Iterator[None]:
     try:
         yield
     except PoolExhausted as error:
-        msg = "all connections to the database are in use"
-        raise StoreUnavailable(msg) from error
+        raise StoreUnavailable("all connections to the database are in use") from error
     except DBAPIError as error:
         if _lacks_schema(error):
             raise StoreUnavailable(WRONG_SCHEMA) from error
         if is_damage(error.orig):
-            msg = f"the database is damaged: {_first_line(error)}"
-            raise StoreDamaged(msg) from error
+            raise StoreDamaged(f"the database is damaged: {_first_line(error)}") from error
         unusable = isinstance(error, OperationalError | InterfaceError) or type(error) is DatabaseError
         if unusable or error.connection_invalidated:
-            msg = f"the database cannot be used now: {_first_line(error)}"
-            raise StoreUnavailable(msg) from error
+            raise StoreUnavailable(f"the database cannot be used now: {_first_line(error)}") from error
         raise
 
 

@@ -59,8 +59,7 @@ def parse(url: str) -> URL:
     if parsed.drivername in {"postgres", "postgresql"}:
         return parsed.set(drivername="postgresql+psycopg")
     if parsed.get_backend_name() not in {"sqlite", "postgresql"}:
-        msg = f"the database is {parsed.get_backend_name()!r}; it may be sqlite or postgresql"
-        raise StoreUnavailable(msg)
+        raise StoreUnavailable(f"the database is {parsed.get_backend_name()!r}; it may be sqlite or postgresql")
     return parsed
 
 

@@ -49,8 +49,7 @@ class Guard:
         if (found := identity(self._file)) is None:
             lost = "is gone" if self._known else "does not exist"
             remedy = "put it back, or run `gaplab restore BACKUP` or `python -m migrations`"
-            msg = f"the database cannot be used now: {self._file} {lost}; {remedy}"
-            raise StoreUnavailable(msg)
+            raise StoreUnavailable(f"the database cannot be used now: {self._file} {lost}; {remedy}")
         if found != self._known or self._damaged:
             with self._lock:
                 self._look_again(found)

@@ -65,13 +65,11 @@ def _place(url: str, source: Path) -> Path:
         )
         raise Unsupported(msg)
     if (file := file_of(parsed)) is None:
-        msg = f"{url} names no file, so nothing can be restored to it"
-        raise StoreUnavailable(msg)
+        raise StoreUnavailable(f"{url} names no file, so nothing can be restored to it")
     if not source.is_file():
         raise FileNotFoundError(None, "there is no such file", str(source))
     if file.exists() and file.samefile(source):
-        msg = f"{source} is the database itself, not a backup of it"
-        raise StoreUnavailable(msg)
+        raise StoreUnavailable(f"{source} is the database itself, not a backup of it")
     return file
 
 
@@ -81,11 +79,9 @@ def _copy(source: Path, part: Path) -> None:
         with closing(sqlite3.connect(f"{source.absolute().as_uri()}?mode=ro", uri=True)) as connection:
             copy_checked(connection, part)
     except StoreDamaged as error:
-        msg = f"{source} is damaged, or no database: {error}"
-        raise StoreDamaged(msg) from error
+        raise StoreDamaged(f"{source} is damaged, or no database: {error}") from error
     except sqlite3.Error as error:
-        msg = f"{source} cannot be read: {error}"
-        raise StoreUnavailable(msg) from error
+        raise StoreUnavailable(f"{source} cannot be read: {error}") from error
 
 
 def _check(source: Path, copy: Path) -> str:
@@ -95,8 +91,7 @@ def _check(source: Path, copy: Path) -> str:
             (revision,) = connection.execute("SELECT version_num FROM alembic_version").fetchone() or ("none",)
             connection.execute("SELECT count(*) FROM experiment, repetition")
         except sqlite3.OperationalError as error:
-            msg = f"{source} is no database of gaplab: {error}"
-            raise StoreUnavailable(msg) from error
+            raise StoreUnavailable(f"{source} is no database of gaplab: {error}") from error
         if revision > REVISION:
             msg = f"{source} is of a later version of gaplab: its revision is {revision}, this version knows {REVISION}"
             raise StoreUnavailable(msg)

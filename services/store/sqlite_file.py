@@ -73,13 +73,11 @@ def refuse_damaged(file: Path) -> None:
         with closing(sqlite3.connect(file, timeout=30)) as connection:
             (found,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     except sqlite3.OperationalError as error:
-        msg = f"the database {file} cannot be read: {error}"
-        raise StoreUnavailable(msg) from error
+        raise StoreUnavailable(f"the database {file} cannot be read: {error}") from error
     except sqlite3.DatabaseError as error:
         found = str(error)
     if found != "ok":
-        msg = f"the database {file} is damaged ({found}): {HINT}"
-        raise StoreDamaged(msg)
+        raise StoreDamaged(f"the database {file} is damaged ({found}): {HINT}")
 
 
 @contextmanager
@@ -91,8 +89,7 @@ def in_use(file: Path | None) -> Iterator[None]:
     """
     with _locked(file, exclusive=False) as held:
         if not held:
-            msg = f"the database {file} is being restored: start again when that is done"
-            raise StoreUnavailable(msg)
+            raise StoreUnavailable(f"the database {file} is being restored: start again when that is done")
         yield
 
 
@@ -105,8 +102,7 @@ def unused(file: Path) -> Iterator[None]:
     """
     with _locked(file, exclusive=True) as held:
         if not held:
-            msg = f"a service runs on the database {file}: end it first"
-            raise StoreUnavailable(msg)
+            raise StoreUnavailable(f"a service runs on the database {file}: end it first")
         yield
 
 

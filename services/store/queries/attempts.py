@@ -70,8 +70,7 @@ def attempts_of(session: Session, experiment: str, number: int, *, secret: bool 
     """
     repetition = select(RepetitionRow.id).filter_by(experiment_id=experiment, number=number)
     if (id_ := session.scalar(repetition)) is None:
-        msg = f"experiment {experiment!r} has no repetition {number}"
-        raise NotFound(msg)
+        raise NotFound(f"experiment {experiment!r} has no repetition {number}")
     row = AttemptRow
     return tuple(
         AttemptRead(

@@ -118,8 +118,7 @@ def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow
     named = ExperimentRow.id.in_([storable(each) for each in ids])
     found = {row.id: row for row in session.scalars(select(ExperimentRow).where(named))}
     if missing := [each for each in ids if each not in found]:
-        msg = f"there is no experiment {', '.join(map(repr, missing))}"
-        raise NotFound(msg)
+        raise NotFound(f"there is no experiment {', '.join(map(repr, missing))}")
     return tuple(found[each] for each in ids)
 
 
@@ -170,8 +169,7 @@ def lock(session: Session, experiments: Sequence[str]) -> dict[str, State]:
 
 def _get(session: Session, table: type[R], noun: str, id_: str) -> R:
     if (found := session.get(table, storable(id_))) is None:
-        msg = f"there is no {noun} {id_!r}"
-        raise NotFound(msg)
+        raise NotFound(f"there is no {noun} {id_!r}")
     return found
 
 

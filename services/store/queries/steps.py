@@ -54,8 +54,7 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
     fresh = {claim: _new(claim, lengths[claim][0], each) for claim, each in deliveries.items() if claim in lengths}
     moving = [_move(claim, lengths[claim][0], steps) for claim, steps in fresh.items() if steps]
     if moving and session.connection().execute(_ADVANCE, moving).rowcount != len(moving):
-        msg = "a log has new steps although it was locked"
-        raise Conflict(msg)
+        raise Conflict("a log has new steps although it was locked")
     batch = StepRows()
     for claim, steps in fresh.items():
         for each in steps:
