@@ -10,7 +10,7 @@ from gaplab.api.http import documentation, problems
 from gaplab.api.http.access import Access
 from gaplab.api.http.dependencies import refuse_repeated_parameters
 from gaplab.api.http.event_feed import EventFeed
-from gaplab.api.http.limits import BodyLimit, Streams
+from gaplab.api.http.limits import SPARE, BodyLimit, RequestLimit, Streams, most_requests
 from gaplab.api.http.metrics import Metrics, RequestCounter
 from gaplab.api.http.security_headers import SecurityHeaders
 from gaplab.api.routes import (
@@ -97,6 +97,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     )
     limits = limits or Limits()
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
+    app.state.connections = most_requests(limits) + SPARE
     app.state.feed = EventFeed(store)
     app.state.rollout_process = RolloutProcess()
     app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
@@ -104,6 +105,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     app.add_middleware(GZipMiddleware, minimum_size=20_000, compresslevel=4)
     app.add_middleware(BodyLimit, most_bytes=limits.body_bytes)
     app.add_middleware(Access, settings=settings)
+    app.add_middleware(RequestLimit, most=most_requests(limits))
     app.add_middleware(SecurityHeaders)
     app.add_middleware(RequestCounter, metrics=app.state.metrics)
     problems.install(app)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from sqlalchemy import select
 
 from gaplab.schemas.events import EventKind, EventPage, EventRead
+from gaplab.services.core.errors import Conflict
 from gaplab.services.store.models import EventCounterRow, EventRow, ExperimentRow
 from gaplab.services.store.queries.experiments import get_experiment, get_study
 from gaplab.services.store.session import Session, snapshot
@@ -62,12 +63,19 @@ def latest(session: Session) -> int:
 
 
 @snapshot
-def check(session: Session, wanted: WantedEvents) -> None:
-    """Refuse a selection whose experiment or study does not exist.
+def check(session: Session, wanted: WantedEvents, after: int = 0) -> None:
+    """Refuse a selection whose experiment, study or preceding event does not exist.
 
     Raises:
         NotFound: no such experiment, or no such study.
+        Conflict: there are fewer events than `after`.
     """
+    if after > (newest := _latest(session)):
+        msg = (
+            f"there is no event {after}; the latest is {newest}. The database may have been replaced by another, or by "
+            f"an earlier backup: continue after {newest}, or begin with 0"
+        )
+        raise Conflict(msg)
     if wanted.experiment is not None:
         get_experiment(session, wanted.experiment)
     if wanted.study is not None:

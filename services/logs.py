@@ -8,7 +8,10 @@ import json
 import logging
 import re
 import sys
+from collections import Counter
+from collections.abc import Callable
 from datetime import UTC, datetime
+from time import monotonic
 from typing import Any, TextIO
 
 HIDDEN = "…"
@@ -17,6 +20,7 @@ _NAME = r"(?<![\w-])(?=[\w-]*(?:token|password|passwd|secret|api_?key))[\w-]*+"
 """A pattern that starts only at words and takes whole words: an address may be one very long word."""
 
 _SECRETS = (
+    (re.compile(r"(?i)\bgaplab_[a-z0-9]{1,32}_[0-9a-f]{8,}"), f"gaplab_{HIDDEN}"),
     (re.compile(r"(?i)(authorization\W{1,6})(?:(?:bearer|basic|token)\s+)?[^\s'\",;)}\]]+"), rf"\1{HIDDEN}"),
     (re.compile(r"(?i)\b(bearer|basic)\s+[\w.~+/=-]{6,}"), rf"\1 {HIDDEN}"),
     (re.compile(rf"(?i)({_NAME}['\"]?\s?[=:]\s?['\"]?)[^\s&'\",;)}}\]]+"), rf"\1{HIDDEN}"),
@@ -27,6 +31,8 @@ _PLACE = ("experiment", "repetition")
 _REQUEST = ("method", "path", "status")
 
 _ACCESS = "uvicorn.access"
+_REPEATING, _MOST_ALIKE, _WINDOW_S = {"asyncio", "uvicorn.error"}, 5, 60.0
+_LONGEST = 1_000_000
 _PROBES = {"/livez", "/readyz", "/metrics"}
 _EXPERIMENT = re.compile(r"^/experiments/([\w-]{1,64})")
 
@@ -37,6 +43,7 @@ def configure(stream: TextIO | None = None) -> None:
     handler = logging.StreamHandler(target)
     handler.setFormatter(Readable() if target.isatty() else Json())
     handler.addFilter(_rewrite_requests)
+    handler.addFilter(Repeats())
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
     for noisy in ("alembic", "uvicorn.error", "httpx", "httpx2", "asyncio"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
@@ -51,10 +58,40 @@ def adopt(name: str) -> None:
 
 
 def without_secrets(text: str) -> str:
-    """Return the text without anything that looks like a secret."""
+    """Return the text without what looks like a secret; a very long text is cut, which would take minutes to search."""
+    if len(text) > _LONGEST:
+        text = f"{text[:_LONGEST]}… ({len(text) - _LONGEST:,} more characters were not logged)"
     for pattern, replacement in _SECRETS:
         text = pattern.sub(replacement, text)
     return text
+
+
+class Repeats(logging.Filter):
+    """Drops repeated records of the libraries that serve requests: clients could fill the disk with them.
+
+    Args:
+        clock: returns seconds.
+    """
+
+    def __init__(self, clock: Callable[[], float] = monotonic) -> None:
+        super().__init__()
+        self._clock = clock
+        self._began = clock()
+        self._seen: Counter[str] = Counter()
+        self._dropped: Counter[str] = Counter()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Return whether to log the record; the first one of the next minute says how many were dropped."""
+        if record.name not in _REPEATING:
+            return True
+        if self._clock() - self._began >= _WINDOW_S:
+            self._began = self._clock()
+            self._dropped, self._seen = self._seen - Counter(dict.fromkeys(self._seen, _MOST_ALIKE)), Counter()
+        kind = f"{record.name}: {str(record.msg).partition(chr(10))[0]}"
+        self._seen[kind] += 1
+        if dropped := self._dropped.pop(kind, 0):
+            record.msg, record.args = f"{record.getMessage()} ({dropped} more like this were not logged)", ()
+        return self._seen[kind] <= _MOST_ALIKE
 
 
 class Readable(logging.Formatter):

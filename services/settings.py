@@ -82,6 +82,8 @@ class Limits(_Environment):
         rollouts: remaining rollouts of all tokens, in experiments that have not ended.
         streams_per_token: open event streams of one token in one API process, including requests that wait for events.
         streams: open event streams of all tokens in one API process.
+        imported_rows: rows of one imported archive. On SQLite other writers wait some seconds for as many.
+        requests: requests that one API process serves at once; fewer if it may open fewer than twice as many files.
     """
 
     model_config = SettingsConfigDict(env_prefix="GAPLAB_MAX_")
@@ -95,6 +97,8 @@ class Limits(_Environment):
     rollouts: PositiveInt = 1_000_000_000_000
     streams_per_token: PositiveInt = 20
     streams: PositiveInt = 200
+    imported_rows: PositiveInt = 250_000
+    requests: PositiveInt = 1_000
 
 
 def address(host: str, port: int) -> str:

@@ -76,7 +76,6 @@ class HereRepetitions(Repetitions):
         for run in self.runs:
             if not run.over:
                 run.receive()
-        self._note_measuring()
 
 
 class Here(Supervisor):

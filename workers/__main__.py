@@ -9,39 +9,86 @@ from secrets import token_hex
 from threading import Event
 
 from gaplab.services import logs
-from gaplab.services.core.errors import ClusterUnusable, StoreUnavailable
+from gaplab.services.core.errors import ClusterUnusable, RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.plugins import folders
+from gaplab.services.running.pulse import Pulse
 from gaplab.services.settings import Settings
-from gaplab.services.store.session import Store
+from gaplab.services.store.session import ANSWER_S, Store
+from gaplab.services.store.sqlite_file import in_use
+
+SHORTEST_ANSWER_S = 5.0
+"""Least time for a statement in Postgres, however short a lease is."""
+
+RAY_NOTICES = {
+    "RAY_gcs_rpc_server_reconnect_timeout_s": "20",
+    "RAY_health_check_timeout_ms": "5000",
+    "RAY_health_check_failure_threshold": "4",
+}
+"""Settings of a Ray of our own, which then gives up a part that died within half a minute instead of a whole one."""
 
 
 def serve(settings: Settings) -> int:
-    """Work until SIGTERM or SIGINT; return 1 if there is no cluster to work on."""
+    """Work until SIGTERM or SIGINT; return 1 if there is no cluster to work on, or the database was changed."""
     choose_authentication(settings)
-    from gaplab.workers.cluster import cluster  # Ray takes a second to import
-    from gaplab.workers.patience import Patience
-    from gaplab.workers.supervisor import Supervisor
-
+    pulse = Pulse.inherited()
     logs.adopt("ray")
     logs.configure()
     folders.load()
-    store, stop = Store(settings.database_url), Event()
+    store = Store(settings.database_url, answer_s=_answer_s(settings.lease_s), pinned=True)
     try:
-        with cluster(settings) as joined:
-            for signum in (signal.SIGTERM, signal.SIGINT):  # only now, for Ray has put handlers of its own in place
-                signal.signal(signum, lambda *_: stop.set())
-            logging.getLogger("gaplab.supervisor").info("ready for %d repetitions at once", joined.capacity())
-            patience = Patience(settings.rollout_limit_s, settings.step_limit_s)
-            supervisor = Supervisor(
-                store, joined.capacity, joined.versions, lease_s=settings.lease_s, patience=patience
-            )
-            supervisor.serve(stop)
-    except ClusterUnusable as error:
+        with in_use(store.file):
+            _work(store, settings, pulse)
+    except (ClusterUnusable, StoreUnavailable) as error:
+        pulse.explain(str(error))
         sys.stderr.write(f"{error}\n")
+        if isinstance(error, RayGone):
+            sys.stderr.flush()
+            os._exit(1)  # what Ray does at exit waits for a Ray that does not answer
         return 1
     finally:
         store.dispose()
     return 0
+
+
+def _work(store: Store, settings: Settings, pulse: Pulse) -> None:
+    """Run what is queued until a signal.
+
+    Raises:
+        ClusterUnusable: there is no cluster, a node has other versions, or Ray died.
+        StoreChanged: the database has another schema, or is another one than at the start.
+    """
+    from gaplab.workers.cluster import cluster  # Ray takes a second to import
+    from gaplab.workers.patience import Patience
+    from gaplab.workers.supervisor import Supervisor
+
+    _refuse_other_schema(store)
+    stop = Event()
+    with cluster(settings) as joined:
+        for signum in (signal.SIGTERM, signal.SIGINT):  # only now, for Ray has put handlers of its own in place
+            signal.signal(signum, lambda *_: stop.set())
+        logging.getLogger("gaplab.supervisor").info("ready for %d repetitions at once", joined.capacity())
+        patience = Patience(settings.rollout_limit_s, settings.step_limit_s)
+        supervisor = Supervisor(store, joined.capacity, joined.versions, lease_s=settings.lease_s, patience=patience)
+        supervisor.serve(stop, pulse)
+
+
+def _refuse_other_schema(store: Store) -> None:
+    """Check the schema before anything is started; a database that is away is waited for later.
+
+    Raises:
+        StoreChanged: it is of another version.
+    """
+    try:
+        store.check()
+    except StoreChanged:
+        raise
+    except StoreUnavailable as error:
+        logging.getLogger("gaplab.supervisor").warning("the database cannot be used yet: %s", error)
+
+
+def _answer_s(lease_s: float) -> float:
+    """Return the longest time of a statement, after which a lease is not yet lost."""
+    return min(ANSWER_S, max(SHORTEST_ANSWER_S, lease_s / 2))
 
 
 def choose_authentication(settings: Settings) -> None:
@@ -55,6 +102,8 @@ def choose_authentication(settings: Settings) -> None:
     else:
         os.environ["RAY_AUTH_MODE"] = "token"
         os.environ["RAY_AUTH_TOKEN"] = token_hex(32)
+        for name, value in RAY_NOTICES.items():
+            os.environ.setdefault(name, value)
 
 
 def check(settings: Settings) -> int:

@@ -5,14 +5,18 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 import ray
 from ray._private import ray_constants
 from ray.exceptions import RayError
 
-from gaplab.services.core.errors import ClusterUnusable
+from gaplab.services.core.errors import ClusterUnusable, RayGone
 from gaplab.services.settings import Settings
 from gaplab.workers.nodes import Versions, check_nodes, versions
+from gaplab.workers.output import limit_files
+from gaplab.workers.ray_folder import ray_folder
+from gaplab.workers.watch import Watch, kill_ray
 
 OBJECT_STORE_BYTES = 100 * 2**20
 """Steps are small: nothing here needs a large object store."""
@@ -26,10 +30,12 @@ class Cluster:
         workers: largest number of repetitions at once; None for the number of cores.
         versions: versions that a process must have to run a repetition. Even a Ray on this machine starts processes
             later, and files may be edited meanwhile.
+        watch: watch on Ray.
     """
 
     workers: int | None
     versions: Versions
+    watch: Watch
 
     def capacity(self) -> int:
         """Return the number of repetitions to submit to Ray at once; it changes as nodes join or leave.
@@ -37,17 +43,18 @@ class Cluster:
         There are two for each core: while one runs, the next one waits in Ray, so no core idles between them.
 
         Raises:
-            ClusterUnusable: this process lost its node, and cannot run anything.
+            RayGone: this process can run nothing any more.
         """
-        _refuse_dead_node()
-        return self.workers or 2 * int(ray.cluster_resources().get("CPU", 0))
+        cores = self.watch.cores()
+        return self.workers or 2 * cores
 
 
 @contextmanager
 def cluster(settings: Settings) -> Iterator[Cluster]:
     """Open a connection to Ray for as long as the context lasts.
 
-    A Ray that this process starts listens on loopback only, has no dashboard, and ends with the process.
+    A Ray that this process starts listens on loopback only, has no dashboard, keeps its files in a private folder, and
+    ends with the process.
 
     Args:
         settings: `ray_address` names an existing cluster; `workers` limits the cores of a Ray of our own, and how many
@@ -57,30 +64,45 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
         ClusterUnusable: the cluster cannot be joined, a node has other versions, or authentication is switched off.
     """
     logging.getLogger("ray").setLevel(logging.ERROR)
+    with _joined(settings.ray_address) if settings.ray_address else _started(settings.workers):
+        watch = Watch(own=settings.ray_address is None)
+        try:
+            yield Cluster(settings.workers if settings.ray_address else None, versions(), watch)
+        finally:
+            watch.stop()
+
+
+@contextmanager
+def _started(cores: int | None) -> Iterator[None]:
+    """Start a Ray for as long as the context lasts."""
+    with ray_folder() as folder:
+        try:
+            _start(cores, folder)
+            yield
+        except RayGone:
+            kill_ray()  # a shutdown would wait for what does not answer
+            raise
+        except BaseException:
+            ray.shutdown()
+            raise
+        ray.shutdown()
+
+
+@contextmanager
+def _joined(address: str) -> Iterator[None]:
+    """Join a Ray for as long as the context lasts."""
     try:
-        if settings.ray_address:
-            _join(settings.ray_address)
-            workers = settings.workers
-        else:
-            _start(settings.workers)
-            workers = None
-        yield Cluster(workers, versions())
+        _join(address)
+        yield
     finally:
         ray.shutdown()
 
 
-def _refuse_dead_node() -> None:
-    """Refuse to continue if this node's Ray has died; only a new process can start another."""
-    here = ray.get_runtime_context().get_node_id()
-    if any(node["NodeID"] == here and not node["Alive"] for node in ray.nodes()):
-        msg = "Ray died on this machine"
-        raise ClusterUnusable(msg)
-
-
-def _start(cores: int | None) -> None:
+def _start(cores: int | None, folder: Path) -> None:
     if os.environ.get("RAY_AUTH_MODE") == "disabled":  # Ray reads it when it is imported
         msg = "RAY_AUTH_MODE is 'disabled': anyone who reaches a Ray without a token can run any code; unset it"
         raise ClusterUnusable(msg)
+    limit_files()
     with _on_loopback():
         ray.init(
             address="local",  # not another Ray on this machine
@@ -90,6 +112,7 @@ def _start(cores: int | None) -> None:
             configure_logging=False,
             object_store_memory=OBJECT_STORE_BYTES,
             _node_ip_address="127.0.0.1",
+            _temp_dir=str(folder),
         )
 
 

@@ -22,6 +22,7 @@ from gaplab.services.plugins.watching import imported, present
 from gaplab.services.running.versions import Versions as Versions
 from gaplab.services.running.versions import named_versions, plugin_versions
 from gaplab.services.running.versions import versions as versions
+from gaplab.workers.output import limit_prints
 
 ANSWER_S = 60.0
 """Longest wait for a node to start a process and name its versions."""
@@ -50,6 +51,7 @@ def check_here(expected: Versions) -> None:
         ClusterUnusable: it lacks versions of gaplab or its libraries; the message says which.
         PluginDiffers: it lacks versions of plug-ins.
     """
+    limit_prints()
     folders.find()
     _compare(platform.node(), versions(), _shared(expected))
     wanted = {name.removeprefix(PLUGIN): text for name, text in expected.items() if name.startswith(PLUGIN)}

@@ -111,13 +111,14 @@ class Repetitions:
             ready, _ = ray.wait(list(streams), num_returns=1, timeout=WAIT_S)
         for stream in ready:
             streams[stream].receive()
-        self._note_measuring()
 
     def store_received(self) -> None:
-        """Record the received deliveries, and stop the runs whose claim is no longer valid."""
-        filled = [run for run in self.runs if run.received]
-        if not filled:
-            return
+        """Record the received deliveries and measurements that began; stop the runs whose claim is no longer valid."""
+        if filled := [run for run in self.runs if run.received]:
+            self._record(filled)
+        self._note_measuring()
+
+    def _record(self, filled: list[Run]) -> None:
         try:
             held = execution.record_all(self._store, [(run.claim, run.received) for run in filled])
         except StoreUnavailable:

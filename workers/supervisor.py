@@ -8,12 +8,15 @@ import os
 import socket
 from collections.abc import Callable
 from contextlib import suppress
+from datetime import datetime
+from functools import partial
 from secrets import token_hex
 from threading import Event
 from time import monotonic
 
-from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.core.errors import RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.running import execution, supervisors
+from gaplab.services.running.pulse import Pulse
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.nodes import Versions
@@ -62,42 +65,69 @@ class Supervisor:
         self._checks = Checks(store, self._owner, lease_s, versions, patience)
         self._lease_s = lease_s
         self._beat = -lease_s
+        self._noted: datetime | None = None
+        self._pulse = Pulse()
 
     @property
     def busy(self) -> bool:
         """Whether repetitions are running."""
         return bool(self._repetitions.runs)
 
-    def serve(self, stop: Event) -> None:
+    def serve(self, stop: Event, pulse: Pulse | None = None) -> None:
         """Work until told to stop; then hand back unfinished repetitions, each after one more delivery.
 
+        Args:
+            stop: is set to end the work.
+            pulse: to the process that keeps this one; None if no process does.
+
         Raises:
-            ClusterUnusable: a node would compute other numbers; this ends the work as well.
+            ClusterUnusable: a node would compute other numbers, or Ray died; this ends the work as well.
+            StoreChanged: the database was replaced, restored or migrated; nothing more is written to it.
         """
+        self._pulse = pulse or self._pulse
+        self._pulse.name(self._owner)
+        ending = self._hand_back
         try:
             while not stop.is_set():
                 try:
                     self.step()
+                except StoreChanged:
+                    raise
                 except StoreUnavailable as error:
                     log.warning("waiting: %s", error)
                     stop.wait(RETRY_S)
             self._wind_down()
+        except RayGone as error:
+            ending = partial(self._abandon, str(error))
+            raise
         finally:
-            self._repetitions.hand_back(self._repetitions.runs)
-            with suppress(StoreUnavailable):  # then their leases will run out
-                execution.hand_back_unheard(self._store, self._owner, ())
-            with suppress(StoreUnavailable):
-                self._checks.hand_back()
-            with suppress(StoreUnavailable):  # then it counts as lost, which it nearly is
-                supervisors.end(self._store, self._owner)
+            ending()
+
+    def _hand_back(self) -> None:
+        """Return all leases, and forget this supervisor."""
+        self._repetitions.hand_back(self._repetitions.runs)
+        with suppress(StoreUnavailable):  # then their leases will run out
+            execution.hand_back_unheard(self._store, self._owner, ())
+        with suppress(StoreUnavailable):
+            self._checks.hand_back()
+        with suppress(StoreUnavailable):  # then it counts as lost, which it nearly is
+            supervisors.end(self._store, self._owner)
+
+    def _abandon(self, reason: str) -> None:
+        """Queue the work again that a dead Ray held; its tasks cannot be ended, for nothing answers."""
+        self._repetitions.runs.clear()
+        with suppress(StoreUnavailable):  # then the leases will run out
+            supervisors.release(self._store, self._owner, reason)
 
     def step(self) -> None:
         """Do one round: heartbeat, claim, receive, store; sensitivity checks before repetitions.
 
         Raises:
             StoreUnavailable: the database cannot be used; received deliveries are stored in a later round.
+            StoreChanged: it is not the database that this supervisor knows; what was received is void.
             ClusterUnusable: a node that joined has other versions; its deliveries are not stored.
         """
+        self._pulse.beat()
         self._heartbeat()
         self._checks.step()
         self._repetitions.claim(self._capacity)
@@ -108,7 +138,8 @@ class Supervisor:
     def _heartbeat(self) -> None:
         if monotonic() - self._beat < self._lease_s / HEARTBEATS:
             return
-        supervisors.heartbeat(self._store, self._owner)
+        self._store.check()
+        self._noted = supervisors.heartbeat(self._store, self._owner, self._noted)
         self._repetitions.heartbeat()
         self._checks.heartbeat()
         if requeued := execution.requeue_lost(self._store, stale_after_s=self._lease_s):
@@ -120,12 +151,15 @@ class Supervisor:
         repetitions, until = self._repetitions, monotonic() + GRACE_S
         repetitions.hand_back([run for run in repetitions.runs if not run.begun])
         while repetitions.runs and monotonic() < until:
+            self._pulse.beat()
             try:
                 self._heartbeat()
                 repetitions.receive()
                 delivered = [run for run in repetitions.runs if run.received]
                 repetitions.store_received()
                 repetitions.end()
+            except StoreChanged:
+                raise
             except StoreUnavailable as error:
                 log.warning("waiting: %s", error)
                 Event().wait(RETRY_S)

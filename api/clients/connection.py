@@ -11,7 +11,7 @@ from uuid import uuid4
 import httpx2
 from pydantic import TypeAdapter, ValidationError
 
-from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, UnknownService, problem_of
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, UnknownService, error_of
 from gaplab.schemas.records import Page
 from gaplab.services.settings import Settings
 
@@ -26,6 +26,9 @@ PAUSES_S = (0.2, 1.0, 3.0)
 
 PASSING = {502, 503, 504}
 """Statuses of passing failures: the database does not answer, or the service behind a proxy does not."""
+
+BUSY = 429
+"""Status of a GET whose turn has not come: others compute replays or draw figures. The answer says how long to wait."""
 
 
 class Request(TypedDict, total=False):
@@ -115,7 +118,7 @@ class Connection:
             with self._http.stream(method, path, **request) as answer:
                 if not answer.is_success:
                     answer.read()
-                    raise ServiceError(problem_of(answer))
+                    raise error_of(answer)
                 yield answer
         except (httpx2.RequestError, httpx2.InvalidURL) as error:
             msg = f"no service answers at {self.url} ({type(error).__name__}); start one with `gaplab serve`"
@@ -140,7 +143,9 @@ class Connection:
                 if isinstance(error.__cause__, httpx2.ConnectError | httpx2.InvalidURL | httpx2.UnsupportedProtocol):
                     raise
             except ServiceError as error:
-                if error.problem.status not in PASSING:
+                if method == "GET" and error.problem.status == BUSY and error.retry_after_s is not None:
+                    pause_s = max(pause_s, error.retry_after_s)
+                elif error.problem.status not in PASSING:
                     raise
             time.sleep(pause_s)
         return self._send(method, path, **request)

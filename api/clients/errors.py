@@ -10,11 +10,13 @@ from gaplab.schemas.records import ExperimentRead, StudyRead
 class ServiceError(Exception):
     """The service refused a request or failed; `problem` is its answer.
 
-    The message is the problem's detail, or a line for each mistake in the request.
+    The message is the problem's detail, or a line for each mistake in the request. `retry_after_s` says when to try
+    again, if the service knows.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, retry_after_s: float | None = None) -> None:
         self.problem = problem
+        self.retry_after_s = retry_after_s
         super().__init__("\n".join(lines_of(problem)) if len(problem.errors) > 1 else problem.detail)
 
 
@@ -51,6 +53,12 @@ def is_final(error: Exception) -> bool:
 def lines_of(problem: Problem) -> list[str]:
     """Return a problem in words: a line for each mistake in the request, or its detail."""
     return [f"{error.pointer or '(the whole)'}: {error.message}" for error in problem.errors] or [problem.detail]
+
+
+def error_of(answer: httpx2.Response) -> ServiceError:
+    """Return the error for an answer that is not a success."""
+    after = answer.headers.get("retry-after", "")
+    return ServiceError(problem_of(answer), float(after) if after.isdecimal() else None)
 
 
 def problem_of(answer: httpx2.Response) -> Problem:

@@ -10,6 +10,8 @@ from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.services.settings import Settings
 from gaplab.services.store.atomic_files import appearing
 from gaplab.services.store.backup import backup as copy
+from gaplab.services.store.restore import restore as put_back
+from gaplab.services.store.sqlite_file import PRIVATE
 
 
 @app.command()
@@ -22,7 +24,7 @@ def export(
     """Export a study or an experiment into one archive of JSON and Parquet."""
     with connect(url) as client:
         file = to or Path(f"gaplab-{client.find(id).id}.zip")  # the service's id, never a path that was typed
-        with appearing(file) as part, part.open("wb") as target:
+        with appearing(file, PRIVATE) as part, part.open("wb") as target:
             client.export(id, target)
     print_result({"file": str(file), "bytes": file.stat().st_size}, f"Wrote {file}.", as_json=as_json)
 
@@ -47,3 +49,14 @@ def backup(file: Annotated[Path, typer.Argument(help="new file for the copy")], 
     """Copy the SQLite database of GAPLAB_DATABASE_URL into a file, even while the service writes to it."""
     size = copy(Settings.from_environment().database_url, file)
     print_result({"file": str(file), "bytes": size}, f"Wrote {file}: {size:,} bytes, checked.", as_json=as_json)
+
+
+@app.command()
+def restore(
+    file: Annotated[Path, typer.Argument(help="a backup, which stays as it is")], as_json: AsJson = False
+) -> None:
+    """Put a backup in the place of the SQLite database of GAPLAB_DATABASE_URL, which is kept under another name."""
+    done = put_back(Settings.from_environment().database_url, file)
+    kept = f" The former database is now {done.kept}." if done.kept else ""
+    found = {"file": str(done.file), "kept": str(done.kept) if done.kept else None, "revision": done.revision}
+    print_result(found, f"Restored {file} to {done.file}, checked.{kept}", as_json=as_json)

@@ -3,6 +3,7 @@
 
 import { unreachable } from "./lib/api.js";
 import { byId, h } from "./lib/dom.js";
+import { watchHealth } from "./lib/health.js";
 import { empty, failed, loading } from "./lib/placeholders.js";
 import { switchTheme } from "./lib/theme.js";
 
@@ -112,3 +113,4 @@ addEventListener("hashchange", () => {
   showView().then(() => byId("main").focus({ preventScroll: true }));
 });
 showView();
+watchHealth();

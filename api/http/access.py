@@ -1,14 +1,17 @@
 """Access control: a request is authenticated before any other code sees it.
 
+A request that lasts, like a stream, is authenticated again and again.
+
 Methods that only read need a reader's token, all others a runner's. The method alone decides, so that no new route can
 forget it; the exception is a POST that only asks.
 """
 
+import asyncio
 from urllib.parse import urlsplit
 
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from gaplab.api.http import problems
 from gaplab.schemas.access import Role
@@ -24,6 +27,9 @@ ASSETS = "/assets/"
 
 WITHOUT_A_STORE = "/metrics"
 """The path that needs no token while the database does not answer, since it then says only that."""
+
+RECHECK_S = 10.0
+"""Pause between checks of the caller of a request that lasts; less than the pause between signs of life of a stream."""
 
 READING = {"GET", "HEAD", "OPTIONS"}
 
@@ -46,19 +52,57 @@ class Access:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request if its caller may send it."""
+        path = scope.get("path", "")
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        request, path = Request(scope), scope["path"]
+        request = Request(scope)
         request.state.caller = ANYONE
-        if not (path in OPEN or path == "/" or path.startswith(ASSETS)):
+        if path in OPEN or path == "/" or path.startswith(ASSETS):
+            await self.app(scope, receive, send)
+            return
+        try:
+            request.state.caller = await run_in_threadpool(self._authenticate, request)
+        except GaplabError as error:
+            if not (isinstance(error, StoreUnavailable) and path == WITHOUT_A_STORE):
+                await problems.of_gaplab(request, error)(scope, receive, send)
+                return
+        await self._serve(request, receive, send)
+
+    async def _serve(self, request: Request, receive: Receive, send: Send) -> None:
+        """Serve a request for as long as its caller has access; then an answer that has begun is broken off."""
+        lost: list[GaplabError] = []
+        has_begun = False
+
+        async def noting(message: Message) -> None:
+            nonlocal has_begun
+            has_begun = True
+            await send(message)
+
+        try:
+            async with asyncio.timeout(None) as interruption:
+                checking = asyncio.create_task(self._recheck(request, lost, interruption))
+                try:
+                    await self.app(request.scope, receive, noting)
+                finally:
+                    checking.cancel()
+        except TimeoutError:
+            if not lost:  # then it is an error of the application
+                raise
+            if not has_begun:
+                await problems.of_gaplab(request, lost[0])(request.scope, receive, send)
+
+    async def _recheck(self, request: Request, lost: list[GaplabError], interruption: asyncio.Timeout) -> None:
+        """Interrupt the request once its caller has lost access, and add the reason to `lost`."""
+        while not lost:
+            await asyncio.sleep(RECHECK_S)
             try:
-                request.state.caller = await run_in_threadpool(self._authenticate, request)
+                await run_in_threadpool(self._authenticate, request)
+            except StoreUnavailable:
+                continue
             except GaplabError as error:
-                if not (isinstance(error, StoreUnavailable) and path == WITHOUT_A_STORE):
-                    await problems.of_gaplab(request, error)(scope, receive, send)
-                    return
-        await self.app(scope, receive, send)
+                lost.append(error)
+        interruption.reschedule(0.0)
 
     def _authenticate(self, request: Request) -> Caller:
         scheme, _, credentials = request.headers.get("authorization", "").partition(" ")

@@ -38,6 +38,7 @@ class EventFeed:
         self._every_s = every_s
         self._recent: deque[EventRead] = deque(maxlen=kept)
         self._head: int | None = None
+        self._databases = 0
         self._news = asyncio.Event()
         self._reader: asyncio.Task[None] | None = None
         self._open = 0
@@ -49,9 +50,13 @@ class EventFeed:
         return self._open
 
     async def follow(self, after: int, which: WantedEvents) -> AsyncIterator[EventRead]:
-        """Yield the selected events after that number, in order and each once, until the feed is closed."""
+        """Yield the selected events after that number, in order and each once, until the feed is closed.
+
+        It also ends if the database was replaced by one with fewer events: numbers then have another meaning.
+        """
         with self._counted():
-            while not (self._closed or self._reader is None or self._reader.done()):
+            databases = self._databases
+            while not (self._closed or self._reader is None or self._reader.done() or self._databases > databases):
                 news, recent = self._news, self._after(after)
                 if recent is None:
                     page = await self._page(after, which)
@@ -104,7 +109,8 @@ class EventFeed:
     async def _read(self) -> None:
         while not self._closed:
             try:
-                await self._read_once()
+                if not await self._read_once():
+                    return
                 await asyncio.sleep(self._every_s)
             except StoreUnavailable as error:
                 log.warning("event streams wait for the database: %s", error)
@@ -116,16 +122,24 @@ class EventFeed:
             log.error("event streams end: their reader failed", exc_info=error)
             self._wake()
 
-    async def _read_once(self) -> None:
+    async def _read_once(self) -> bool:
+        """Read what is new, and return whether the database is still the same; else the streams end."""
         if self._head is None:
             self._head = await run_sync(lambda: events.latest(self._store))
             self._wake()
         head = self._head
         page = await run_sync(lambda: events.page(self._store, head, WantedEvents(), limit=PAGE))
-        if page.items:
+        if page.latest < head:
+            log.warning("event streams end: the database has fewer events than before, so it was replaced or restored")
+            self._databases += 1
+            self._head = None
+            self._recent.clear()
+            self._wake()
+        elif page.items:
             self._recent.extend(page.items)
             self._head = page.items[-1].number
             self._wake()
+        return True
 
     def _wake(self) -> None:
         """Wake all waiting streams once."""

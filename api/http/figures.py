@@ -14,6 +14,7 @@ from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.figures.plotly.chart import chart
 from gaplab.services.figures.plotly.html import render_html
 from gaplab.services.figures.words import TITLE
+from gaplab.services.waiting_line import WaitingLine
 
 MEDIA_TYPES = {
     "json": "application/json",
@@ -22,6 +23,9 @@ MEDIA_TYPES = {
     "png": "image/png",
     "pdf": "application/pdf",
 }
+
+_DRAWING = WaitingLine("figures")
+"""Of one process: Matplotlib draws one figure at a time."""
 
 _FORMATS = "a self-contained page, JSON for Plotly, or a file for a paper"
 
@@ -40,13 +44,18 @@ class Drawing(Parameters):
 
 
 def answer(figure: FigureDefinition, query: Drawing) -> Response:
-    """Return the figure in the requested format."""
+    """Return the figure in the requested format.
+
+    Raises:
+        LimitReached: too many files are being drawn.
+    """
     if query.format == "html":
         return page(render_html(figure))
     media_type = MEDIA_TYPES[query.format]
     if query.format == "json":
         return Response(read(figure).model_dump_json(), media_type=media_type)
-    drawn = render_file(figure, query.format, width_in=query.width, caption=query.caption)
+    with _DRAWING.turn():
+        drawn = render_file(figure, query.format, width_in=query.width, caption=query.caption)
     disposition = {"Content-Disposition": f'inline; filename="gaplab-{figure.name}.{query.format}"'}
     return Response(drawn, media_type=media_type, headers=disposition)
 
@@ -65,7 +74,7 @@ def read(figure: FigureDefinition) -> FigureRead:
 
 
 def responses(*statuses: int) -> Responses:
-    """Return the documented responses of a figure's endpoint; `statuses` are its problems, by default 404 and 422."""
+    """Return the documented responses of a figure's endpoint; `statuses` are its problems besides 404, 422 and 429."""
     text, binary = {"type": "string"}, {"type": "string", "format": "binary"}
     content = {
         "text/html": {"schema": text, "example": "<!doctype html><html lang='en'>…"},
@@ -73,4 +82,4 @@ def responses(*statuses: int) -> Responses:
         "image/png": {"schema": binary, "example": "PNG…"},
         "application/pdf": {"schema": binary, "example": "%PDF…"},
     }
-    return {200: {"description": _FORMATS.capitalize(), "content": content}, **documented(*(statuses or (404, 422)))}
+    return {200: {"description": _FORMATS.capitalize(), "content": content}, **documented(404, 422, 429, *statuses)}

@@ -1,5 +1,6 @@
-"""Limits on the size of a request, and on the number of open streams."""
+"""Limits on the size of a request, on the number of requests at once, and on the number of open streams."""
 
+import resource
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +16,11 @@ from gaplab.services.settings import Limits, variable_of
 
 RETRY_AFTER_S = 10
 """Streams end when the pages that show them are closed."""
+
+SPARE = 16
+"""Connections beyond the most requests at once, which are answered with a problem, or learn that the process lives."""
+
+ALIVE = "/livez"
 
 MOST_BYTES_OF = {"/import": 64 * 2**20}
 """Limits of the addresses that take more than a spec."""
@@ -60,6 +66,42 @@ def _counted(receive: Receive, most: int, detail: str) -> Receive:
         return message
 
     return count
+
+
+def most_requests(limits: Limits) -> int:
+    """Return the most requests to serve at once: the limit, or what half of the files that may be open permit."""
+    files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return limits.requests if files == resource.RLIM_INFINITY else min(limits.requests, max(1, files // 2 - SPARE))
+
+
+class RequestLimit:
+    """Middleware that answers 503 beyond the most requests at once, but always says that the process lives.
+
+    Args:
+        app: the application to protect.
+        most: requests at once.
+    """
+
+    def __init__(self, app: ASGIApp, most: int) -> None:
+        self.app = app
+        self._most = most
+        self._open = 0
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request unless too many are being served."""
+        if scope["type"] != "http" or scope["path"] == ALIVE:
+            await self.app(scope, receive, send)
+            return
+        if self._open >= self._most:
+            detail = f"{self._open} requests are being served; at most {self._most} may be ({variable_of('requests')})"
+            refusal = response(problem(503, "busy", "The service is busy", detail), {"Retry-After": "5"})
+            await refusal(scope, receive, send)
+            return
+        self._open += 1
+        try:
+            await self.app(scope, receive, send)
+        finally:
+            self._open -= 1
 
 
 class Streams:

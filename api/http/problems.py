@@ -10,6 +10,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from gaplab.api.http.violations import MOST_ERRORS, explain, finite, without_consequences
 from gaplab.schemas.problems import Problem, SpecError
@@ -27,9 +28,11 @@ from gaplab.services.core.errors import (
     LimitReached,
     NotFound,
     StoreUnavailable,
+    SupervisorUnavailable,
     Unauthenticated,
     Violation,
 )
+from gaplab.services.store.texts import brief
 
 Responses = dict[int | str, dict[str, Any]]
 """Documented responses of an endpoint, by status, as FastAPI takes them."""
@@ -48,6 +51,7 @@ KINDS: dict[type[GaplabError], tuple[int, str, str]] = {
     Forbidden: (403, "forbidden", "The token does not permit this"),
     InvalidArchive: (422, "invalid-archive", "The archive is invalid"),
     StoreUnavailable: (503, "store-unavailable", "The database is unavailable"),
+    SupervisorUnavailable: (503, "supervisor-unavailable", "Experiments do not run"),
     EngineUnavailable: (422, "engine-unavailable", "An engine is not installed here"),
     EngineInterrupted: (503, "engine-interrupted", "The simulation was interrupted"),
 }
@@ -76,6 +80,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(GaplabError, of_gaplab)
     app.add_exception_handler(RequestValidationError, _of_validation)
     app.add_exception_handler(HTTPException, _of_framework)
+    app.add_exception_handler(ClientDisconnect, _of_absent_client)
     app.add_exception_handler(Exception, _of_bug)
 
 
@@ -89,7 +94,7 @@ def response(problem: Problem, headers: dict[str, str] | None = None) -> JSONRes
 def problem(status: int, kind: str, title: str, detail: str, errors: Sequence[SpecError] = ()) -> Problem:
     """Return a problem with at most `MOST_ERRORS` errors."""
     name = f"urn:gaplab:problem:{kind}"
-    return Problem(type=name, title=title, status=status, detail=detail, errors=tuple(errors[:MOST_ERRORS]))
+    return Problem(type=name, title=title, status=status, detail=brief(detail), errors=tuple(errors[:MOST_ERRORS]))
 
 
 def documented(*statuses: int) -> Responses:
@@ -132,7 +137,7 @@ def _spec_error(violation: Violation) -> SpecError:
     return SpecError(
         pointer=violation.pointer,
         value=finite(violation.value),
-        message=violation.message,
+        message=brief(violation.message),
         permitted=permitted if isinstance(permitted, str | None) else tuple(permitted),
         nearest=violation.nearest,
     )
@@ -169,6 +174,11 @@ def _of_framework(request: Request, error: Exception) -> JSONResponse:
     template = DETAILS.get(error.status_code, str(error.detail).replace("{", "{{").replace("}", "}}"))
     detail = template.format(path=finite(request.url.path), method=request.method)
     return response(problem(*kind, detail), dict(error.headers or {}))
+
+
+def _of_absent_client(request: Request, error: Exception) -> JSONResponse:  # noqa: ARG001 - a handler's signature
+    """Return what the client no longer receives; that it left in the middle of its request is no incident."""
+    return response(problem(*FRAMEWORK[400], "The request ended before its body did."))
 
 
 def _of_bug(request: Request, error: Exception) -> JSONResponse:

@@ -9,13 +9,18 @@ import signal
 import subprocess
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import IO
 
 PR_SET_PDEATHSIG = 1  # Source: man 2 prctl
 
 
 def start(
-    module: str, *arguments: str, environment: Mapping[str, str] | None = None, log: IO[bytes] | None = None
+    module: str,
+    *arguments: str,
+    environment: Mapping[str, str] | None = None,
+    log: IO[bytes] | None = None,
+    keep_open: tuple[int, ...] = (),
 ) -> "subprocess.Popen[bytes]":
     """Start a Python module in a separate process and session, which gets SIGTERM if the calling thread ends.
 
@@ -24,6 +29,7 @@ def start(
         arguments: arguments of the module.
         environment: variables to add to the caller's.
         log: receives the output; left out: the caller's output.
+        keep_open: descriptors that the process inherits.
     """
     command = [sys.executable, "-m", "gaplab.api.process.child_process", str(os.getpid()), module, *arguments]
     return subprocess.Popen(  # noqa: S603 - our own modules
@@ -32,6 +38,7 @@ def start(
         stdin=subprocess.DEVNULL,
         stdout=log,
         stderr=subprocess.STDOUT if log else None,
+        pass_fds=keep_open,
         start_new_session=True,  # Ctrl-C reaches the caller alone, which then ends this process in order
     )
 
@@ -45,6 +52,13 @@ def end(process: "subprocess.Popen[bytes]", *, patience_s: float = 30.0) -> None
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
+
+
+def kill(process: "subprocess.Popen[bytes]") -> None:
+    """Kill the process and what it started, even if it stands still, and wait for its end."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)  # it leads a group of its own
+    process.wait()
 
 
 def _become(parent: int, module: str, arguments: list[str]) -> None:

@@ -11,9 +11,13 @@ from gaplab.api.process.errors import CommandError
 from gaplab.services.access import authenticate
 from gaplab.services.core.errors import Unauthenticated
 from gaplab.services.plugins.folders import VARIABLE
+from gaplab.services.store.atomic_files import private
 from gaplab.services.store.session import Store
 
 START_WITHIN_S = 120.0
+
+LARGEST_LOG = 10_000_000
+"""Bytes of a log that is continued; a larger one becomes the old log, of which there is one."""
 
 
 class LocalService(Client):
@@ -51,7 +55,7 @@ def start_service(
 
     Args:
         database_url: its database; a service without workers does not migrate it.
-        log: receives the output of the service.
+        log: receives the output of the service; a large one is renamed first.
         workers: whether it also runs experiments.
         plugins: a folder with your own plug-ins; left out: GAPLAB_PLUGINS.
 
@@ -63,7 +67,9 @@ def start_service(
     environment = {"GAPLAB_DATABASE_URL": database_url, "GAPLAB_PORT": str(port), "GAPLAB_HOST": "127.0.0.1"}
     if plugins is not None:
         environment[VARIABLE] = str(Path(plugins).absolute())
-    with log.open("ab") as output:
+    if log.exists() and log.stat().st_size > LARGEST_LOG:
+        log.replace(log.with_name(f"{log.name}.old"))
+    with open(log, "ab", opener=private) as output:
         process = start(*(("gaplab", "serve") if workers else ("gaplab.api",)), environment=environment, log=output)
     try:
         _wait_until_ready(url, process, log)

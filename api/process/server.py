@@ -8,14 +8,20 @@ import uvicorn
 from fastapi import FastAPI
 
 from gaplab.api.app import create_app
+from gaplab.api.process.connections import TimedConnection
 from gaplab.api.process.errors import CommandError
+from gaplab.api.process.supervisor_process import SupervisorProcess
 from gaplab.services.access import demand_token_beyond_loopback
 from gaplab.services.plugins import folders
 from gaplab.services.settings import Limits, Settings
 from gaplab.services.store.session import Store
+from gaplab.services.store.sqlite_file import in_use
 
 GRACE_S = 5
 """Time that requests under way have to finish when the service ends."""
+
+BACKLOG = 256
+"""Connections that are taken at once, before any of them counts."""
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -36,8 +42,13 @@ def listen(host: str, port: int) -> socket.socket:
         raise CommandError(msg) from error
 
 
-def serve_api(settings: Settings, listener: socket.socket) -> None:
+def serve_api(settings: Settings, listener: socket.socket, supervisor: SupervisorProcess | None = None) -> None:
     """Serve until SIGINT or SIGTERM, then finish the requests under way.
+
+    Args:
+        settings: of the service.
+        listener: where requests come in.
+        supervisor: that this process keeps, whose troubles `/readyz` tells.
 
     Raises:
         Unauthenticated: other machines can reach the host, and no token exists.
@@ -48,7 +59,10 @@ def serve_api(settings: Settings, listener: socket.socket) -> None:
     require_token(settings)
     store = Store(settings.database_url)
     try:
-        Server(create_app(store, settings, Limits.from_environment())).run([listener])
+        with in_use(store.file):
+            app = create_app(store, settings, Limits.from_environment())
+            app.state.supervisor, app.state.lease_s = supervisor, settings.lease_s
+            Server(app).run([listener])
     finally:
         store.dispose()
 
@@ -71,7 +85,15 @@ class Server(uvicorn.Server):
     """Uvicorn that ends event streams at shutdown, rather than waiting for them forever."""
 
     def __init__(self, app: FastAPI) -> None:
-        config = uvicorn.Config(app, log_config=None, server_header=False, timeout_graceful_shutdown=GRACE_S)
+        config = uvicorn.Config(
+            app,
+            http=TimedConnection,
+            limit_concurrency=app.state.connections,
+            backlog=BACKLOG,
+            log_config=None,
+            server_header=False,
+            timeout_graceful_shutdown=GRACE_S,
+        )
         super().__init__(config)
         self._app = app
 

@@ -5,30 +5,20 @@ The supervisor that runs them is a separate process. The two meet only in the da
 
 import logging
 import re
-from collections.abc import Mapping
-from threading import Event, Thread
-from time import monotonic
+from collections.abc import Iterator
+from contextlib import contextmanager
 
-from gaplab.api.process.child_process import end, start
 from gaplab.api.process.server import exit_on_signals, listen, require_token, serve_api
+from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
 from gaplab.services import logs
 from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.plugins import folders
 from gaplab.services.settings import Settings, address
+from gaplab.services.store.engine import parse
+from gaplab.services.store.session import Store
+from gaplab.services.store.sqlite_file import file_of, is_open_to_others
 
 log = logging.getLogger("gaplab.service")
-
-LONG_LIFE_S = 15.0
-"""A supervisor that lived longer is restarted after the shortest pause: its start succeeded."""
-
-LONGEST_PAUSE_S = 30.0
-"""Together with the start of Ray, the service recovers within a minute."""
-
-GRACE_S = 24.0
-"""Time for the supervisor to store its last steps and stop Ray.
-
-Together with the grace of the API's requests, the service ends within half a minute.
-"""
 
 
 def serve(settings: Settings, *, workers: bool = True) -> None:
@@ -49,16 +39,27 @@ def serve(settings: Settings, *, workers: bool = True) -> None:
     listener = listen(settings.host, settings.port)
     migrate(settings.database_url)
     require_token(settings)
+    warn_of_readers(settings.database_url)
     url = address(settings.host, settings.port)
     log.info("gaplab serves on %s (/docs documents the API; Ctrl-C ends the service)", url)
-    supervisor = SupervisorProcess(environment_of(settings)) if workers else None
-    try:
-        if supervisor:
-            supervisor.start()
+    if not workers:
         serve_api(settings, listener)
+        return
+    with _kept_supervisor(settings) as supervisor:
+        serve_api(settings, listener, supervisor)
+
+
+@contextmanager
+def _kept_supervisor(settings: Settings) -> Iterator[SupervisorProcess]:
+    """Keep a supervisor for as long as the context lasts."""
+    store = Store(settings.database_url)
+    supervisor = SupervisorProcess(environment_of(settings), silence=Silence.of(settings), store=store)
+    supervisor.start()
+    try:
+        yield supervisor
     finally:
-        if supervisor:
-            supervisor.stop()
+        supervisor.stop()
+        store.dispose()
 
 
 def migrate(database_url: str) -> None:
@@ -80,6 +81,13 @@ def migrate(database_url: str) -> None:
         raise StoreUnavailable(msg) from error
 
 
+def warn_of_readers(database_url: str) -> None:
+    """Log a warning if other users of the machine may read the database; a new one is the owner's alone."""
+    file = file_of(parse(database_url))
+    if file and is_open_to_others(file):
+        log.warning("other users of this machine can open the database %s: `chmod 600 %s` keeps them out", file, file)
+
+
 def environment_of(settings: Settings) -> dict[str, str]:
     """Return the settings as environment variables for a child process."""
     values = {
@@ -91,41 +99,3 @@ def environment_of(settings: Settings) -> dict[str, str]:
         "GAPLAB_PORT": settings.port,
     }
     return {name: str(value) for name, value in values.items() if value is not None}
-
-
-class SupervisorProcess:
-    """A supervisor that is restarted when it dies, after a pause that doubles while it keeps dying."""
-
-    def __init__(self, environment: Mapping[str, str], module: str = "gaplab.workers") -> None:
-        self._environment = environment
-        self._module = module
-        self._stopping = Event()
-        self._thread = Thread(target=self._keep_running, name="supervisor process", daemon=True)
-
-    def start(self) -> None:
-        """Start the supervisor, and restart it whenever it dies."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """End the supervisor in order."""
-        self._stopping.set()
-        self._thread.join()
-
-    def _keep_running(self) -> None:
-        pause_s = 1.0
-        while not self._stopping.is_set():
-            began = monotonic()
-            code = self._run_once()
-            if self._stopping.is_set():
-                return
-            pause_s = 1.0 if monotonic() - began > LONG_LIFE_S else min(2 * pause_s, LONGEST_PAUSE_S)
-            log.warning("the supervisor ended by itself (exit code %s); another starts in %.0f s", code, pause_s)
-            self._stopping.wait(pause_s)
-
-    def _run_once(self) -> int:
-        """Run one supervisor until it ends or is told to; return its exit code."""
-        process = start(self._module, "serve", environment=self._environment)
-        while process.poll() is None and not self._stopping.wait(0.2):
-            pass
-        end(process, patience_s=GRACE_S)
-        return process.returncode

@@ -12,6 +12,7 @@ from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.archives import ImportRead
 from gaplab.services import archives
 from gaplab.services.archives import Archive
+from gaplab.services.settings import Limits
 
 router = APIRouter(tags=["archives"])
 
@@ -61,7 +62,8 @@ async def import_archive(store: StoreDep, request: Request, response: Response) 
         async for chunk in request.stream():
             file.write(chunk)
         file.seek(0)
-        stored = await run_in_threadpool(archives.import_archive, store, file)
+        limits: Limits = request.app.state.limits
+        stored = await run_in_threadpool(archives.import_archive, store, file, most_rows=limits.imported_rows)
     route, id = ("read_study", stored.study) if stored.study else ("read_experiment", stored.experiments[0])
     response.headers["Location"] = str(request.app.url_path_for(route, id=id))
     return stored

@@ -1,7 +1,7 @@
 """Events: what happens to experiments, as a stream or page by page."""
 
 import asyncio
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
 from contextlib import suppress
 from typing import Annotated
 
@@ -62,16 +62,21 @@ FeedDep = Annotated[EventFeed, Depends(_feed)]
 StreamsDep = Annotated[Streams, Depends(_streams)]
 
 
-def _count_stream(streams: StreamsDep, caller: CallerDep) -> Iterator[None]:
+async def _count_stream(streams: StreamsDep, caller: CallerDep) -> AsyncIterator[None]:
     """Count one more open stream until the response ends."""
     with streams.open(caller.token):
         yield
 
 
-def _checked(store: StoreDep, query: Annotated[EventFilter, Query()]) -> WantedEvents:
-    """Check the filter before the stream begins, while a problem can still be answered."""
-    events.check(store, query.which())
-    return query.which()
+def _after(
+    store: StoreDep,
+    query: Annotated[EventFilter, Query()],
+    last_event_id: Annotated[After | None, Header(description="like `after`, which it overrides")] = None,
+) -> int:
+    """Return the number to stream after; check the query before the stream begins, while a problem can be answered."""
+    after = query.after if last_event_id is None else last_event_id
+    events.check(store, query.which(), after)
+    return after
 
 
 @router.get(
@@ -79,22 +84,19 @@ def _checked(store: StoreDep, query: Annotated[EventFilter, Query()]) -> WantedE
     response_class=EventSourceResponse,
     summary="Stream events",
     response_description="Server-sent events: `id` is the number, `event` the kind, `data` the whole event",
-    responses=_STREAM | documented(404, 422, 429),
+    responses=_STREAM | documented(404, 409, 422, 429),
     dependencies=[Depends(_count_stream)],
 )
 async def stream_events(
-    query: Annotated[EventFilter, Query()],
-    which: Annotated[WantedEvents, Depends(_checked)],
-    feed: FeedDep,
-    last_event_id: Annotated[After | None, Header(description="like `after`, which it overrides")] = None,
+    query: Annotated[EventFilter, Query()], after: Annotated[int, Depends(_after)], feed: FeedDep
 ) -> AsyncIterator[ServerSentEvent]:
     """Stream every event after `Last-Event-ID` or `after`, then each new one; a comment keeps the stream open.
 
     Event numbers have no gaps, so a stream that resumes after its last number misses nothing. A filter skips the
-    numbers of other events. Clients that cannot hold a stream open use `GET /events/page`.
+    numbers of other events. A number beyond the latest is answered with 409: the database was replaced. Clients that
+    cannot hold a stream open use `GET /events/page`.
     """
-    after = query.after if last_event_id is None else last_event_id
-    async for event in feed.follow(after, which):
+    async for event in feed.follow(after, query.which()):
         yield ServerSentEvent(raw_data=event.model_dump_json(), event=event.kind.value, id=str(event.number))
 
 
@@ -102,7 +104,7 @@ async def stream_events(
     "/page",
     summary="List events",
     response_description="By number",
-    responses=documented(404, 422, 429),
+    responses=documented(404, 409, 422, 429),
 )
 async def list_events(
     store: StoreDep,
@@ -116,7 +118,7 @@ async def list_events(
     A waiting request counts as an open stream.
     """
     which = query.which()
-    await run_sync(lambda: events.check(store, which))
+    await run_sync(lambda: events.check(store, which, query.after))
     page = await run_sync(lambda: events.page(store, query.after, which, limit=query.limit))
     if page.items or not query.wait_s:
         return page

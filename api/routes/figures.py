@@ -106,7 +106,7 @@ def draw_simulators(store: StoreDep, query: Annotated[SimulatorsDrawing, Query()
     "/predictions",
     summary="Draw what simulators predicted",
     response_model=FigureRead,
-    responses=responses(404, 422, 429),
+    responses=responses(),
 )
 def draw_predictions(
     store: StoreDep, process: RolloutProcessDep, query: Annotated[ExperimentDrawing, Query()]

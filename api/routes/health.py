@@ -1,28 +1,61 @@
 """Health checks, for whatever keeps the service alive."""
 
-from fastapi import APIRouter
+from typing import Literal
+
+from fastapi import APIRouter, Request
 from pydantic import Field
 
 from gaplab.api.http.dependencies import StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.base import Frozen
+from gaplab.services import health
+from gaplab.services.core.errors import SupervisorUnavailable
 
 router = APIRouter(tags=["health"])
 
+SILENT_S = 30.0
+"""Seconds without a heartbeat after which a supervisor counts as lost, where no setting says otherwise."""
+
+
+class Alive(Frozen):
+    """The answer of a process that lives."""
+
+    status: Literal["ok"] = Field(examples=["ok"])
+
 
 class Health(Frozen):
-    """The answer of a healthy service; a service that is not healthy answers with a problem."""
+    """The answer of a service that serves requests; any other service answers with a problem.
 
-    status: str = Field(examples=["ok"])
+    Attributes:
+        status: `degraded` if requests are served but experiments may not run.
+        warnings: why, a sentence each; left out if all is well.
+    """
+
+    status: Literal["ok", "degraded"] = Field(examples=["ok"])
+    warnings: tuple[str, ...] = ()
 
 
 @router.get("/livez", summary="Check that the process lives")
-def live() -> Health:
-    """Answer as long as the process lives, with or without a database."""
-    return Health(status="ok")
+async def live() -> Alive:
+    """Answer as long as the process lives, with or without a database; no other request delays it."""
+    return Alive(status="ok")
 
 
-@router.get("/readyz", summary="Check that requests are served", responses=documented())
-def ready(store: StoreDep) -> Health:  # noqa: ARG001 - the dependency is the check
-    """Answer if the database answers and has the schema of this version."""
-    return Health(status="ok")
+@router.get(
+    "/readyz",
+    summary="Check that requests are served and experiments run",
+    responses=documented(),
+    response_model_exclude_defaults=True,
+)
+def ready(store: StoreDep, request: Request) -> Health:
+    """Answer if the database can be used, has the schema of this version, and the supervisor of `gaplab serve` runs.
+
+    Supervisors that other processes keep are only warned about: requests are served without them.
+    """
+    kept = getattr(request.app.state, "supervisor", None)
+    if kept and (trouble := kept.trouble):
+        raise SupervisorUnavailable(trouble)
+    found = health.warnings(store, getattr(request.app.state, "lease_s", SILENT_S))
+    if kept and kept.warning:
+        found = (kept.warning, *found)
+    return Health(status="degraded" if found else "ok", warnings=found)

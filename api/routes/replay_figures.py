@@ -34,7 +34,7 @@ class ToyDrawing(Drawing):
     )
 
 
-@router.get("/gait", summary="Draw a gait", response_model=FigureRead, responses=responses(404, 409, 422, 429))
+@router.get("/gait", summary="Draw a gait", response_model=FigureRead, responses=responses(409))
 def draw_gait(store: StoreDep, process: RolloutProcessDep, query: Annotated[GaitDrawing, Query()]) -> Response:
     """Draw a controller's footfalls, height and speed over time, in its simulator and in reality.
 

@@ -63,6 +63,8 @@ def checked(table: str, file: Path, count: int) -> Iterator[Row]:
     model, columns, number = _model(table), None, 0
     with file.open(encoding="ascii", errors="surrogateescape") as lines:
         for number, line in enumerate(_lines(lines, table), 1):
+            if number > count:
+                _refuse(table, f"has more than the {count} rows that the manifest states")
             place = f"{table}, row {number}"
             row = _row(line, place)
             columns = columns or list(row)

@@ -7,7 +7,7 @@ reads Parquet.
 import json
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from errno import EINVAL
 from hashlib import sha256
@@ -24,6 +24,7 @@ from gaplab.services.archives.checking import Row, checked, first_error
 from gaplab.services.archives.columns import EXPORTED
 from gaplab.services.archives.members import CURVES, MANIFEST, member_of
 from gaplab.services.core.errors import InvalidArchive
+from gaplab.services.settings import variable_of
 
 MOST_BYTES = 512 * 2**20
 """Size of all members, unpacked; a study of the paper's size has about ten million bytes."""
@@ -55,8 +56,13 @@ class OpenedArchive:
             yield from checked(table, self.files[table], self.manifest.members[member_of(table)].rows)
 
 
-def open_archive(file: IO[bytes], folder: Path) -> OpenedArchive:
+def open_archive(file: IO[bytes], folder: Path, most_rows: int) -> OpenedArchive:
     """Unpack an archive into an empty folder.
+
+    Args:
+        file: the archive.
+        folder: receives its members.
+        most_rows: rows of all tables together.
 
     Raises:
         InvalidArchive: the file is damaged, harmful, not an archive, or written by a later version.
@@ -65,6 +71,7 @@ def open_archive(file: IO[bytes], folder: Path) -> OpenedArchive:
         with ZipFile(file) as archive:
             members = _members(archive)
             manifest = _manifest(archive, members)
+            _refuse_too_many_rows(manifest, most_rows)
             files = {
                 name: _unpack(archive, info, manifest.members[name], folder / name)
                 for name, info in members.items()
@@ -76,7 +83,7 @@ def open_archive(file: IO[bytes], folder: Path) -> OpenedArchive:
         if error.errno != EINVAL:  # a place before the file's beginning
             raise
         raise InvalidArchive("it is not a readable zip: its directory points outside of it") from error
-    _read_parquet([file for name, file in files.items() if name.endswith(".parquet")])
+    _read_parquet({file: manifest.members[name].rows for name, file in files.items() if name.endswith(".parquet")})
     tables = {table: _lines_of(files[member_of(table)]) for table in EXPORTED if member_of(table) in files}
     return OpenedArchive(manifest, tables)
 
@@ -115,6 +122,13 @@ def _manifest(archive: ZipFile, members: dict[str, ZipInfo]) -> Manifest:
     return manifest
 
 
+def _refuse_too_many_rows(manifest: Manifest, most: int) -> None:
+    rows = sum(member.rows for name, member in manifest.members.items() if name != CURVES)
+    if rows > most:
+        permitted = f"{most:,} are permitted ({variable_of('imported_rows')})"
+        raise InvalidArchive(f"it has {rows:,} rows; {permitted}: export its experiments one by one")
+
+
 def _unpack(archive: ZipFile, info: ZipInfo, promised: Member, target: Path) -> Path:
     """Unpack a member into a file, and check its size and digest against the manifest."""
     hashed, size = sha256(), 0
@@ -127,14 +141,15 @@ def _unpack(archive: ZipFile, info: ZipInfo, promised: Member, target: Path) -> 
     return target
 
 
-def _read_parquet(files: Sequence[Path]) -> None:
-    """Write the rows of each Parquet file as JSON Lines, into a file beside it."""
-    paths = [str(path) for file in files for path in (file, _lines_of(file))]
-    command = [sys.executable, "-I", str(_UNPACKING), *paths]
+def _read_parquet(files: Mapping[Path, int]) -> None:
+    """Write the rows of each Parquet file, which has as many as stated, as JSON Lines into a file beside it."""
+    arguments = [str(each) for file, rows in files.items() for each in (file, _lines_of(file), rows)]
+    command = [sys.executable, "-I", str(_UNPACKING), *arguments]
     ended = subprocess.run(command, stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL, check=False)  # noqa: S603 - ours
     if ended.returncode != 0:
-        which = files[ended.returncode - 1].name if 0 < ended.returncode <= len(files) else "a member"
-        raise InvalidArchive(f"{which} is not readable Parquet, or has values that an archive cannot have")
+        which = [*files][ended.returncode - 1].name if 0 < ended.returncode <= len(files) else "a member"
+        msg = f"{which} is not readable Parquet, has other rows than the manifest states, or values that JSON has not"
+        raise InvalidArchive(msg)
 
 
 def _lines_of(file: Path) -> Path:

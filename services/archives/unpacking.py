@@ -1,4 +1,4 @@
-"""Parquet to JSON Lines, as a program: `python -I unpacking.py PARQUET LINES [PARQUET LINES]...`.
+"""Parquet to JSON Lines, as a program: `python -I unpacking.py PARQUET LINES ROWS [PARQUET LINES ROWS]...`.
 
 A harmful file can only end this process, or exhaust its limits of memory, time and disk.
 """
@@ -22,7 +22,7 @@ MOST: dict[int, int] = {
 _AT_ONCE = 500
 
 
-def main(paths: list[str]) -> int:
+def main(arguments: list[str]) -> int:
     """Convert each Parquet file to JSON Lines.
 
     Returns:
@@ -31,8 +31,9 @@ def main(paths: list[str]) -> int:
     for limit, most in MOST.items():
         _restrict(limit, most)
     left = MOST[resource.RLIMIT_FSIZE]
-    for number, (source, target) in enumerate(zip(paths[::2], paths[1::2], strict=True), 1):
-        if not convert(source, target):
+    files = zip(arguments[::3], arguments[1::3], arguments[2::3], strict=True)
+    for number, (source, target, rows) in enumerate(files, 1):
+        if not convert(source, target, int(rows)):
             return number
         left -= Path(target).stat().st_size
         _restrict(resource.RLIMIT_FSIZE, left)  # the system limits each file by itself
@@ -44,14 +45,16 @@ def _restrict(limit: int, most: int) -> None:
         resource.setrlimit(limit, (most, most))
 
 
-def convert(source: str, target: str) -> bool:
-    """Write each row of one file as a line of JSON, and return whether that succeeded."""
+def convert(source: str, target: str, rows: int) -> bool:
+    """Write each row of one file as a line of JSON, and return whether that succeeded and the file has these rows."""
     import pyarrow as arrow  # within the limits
     from pyarrow import parquet
 
     arrow.set_cpu_count(1)
     try:
         with parquet.ParquetFile(source) as file, open(target, "x") as lines:
+            if file.metadata.num_rows != rows:
+                return False
             for batch in file.iter_batches(_AT_ONCE, use_threads=False):
                 for row in batch.to_pylist():
                     lines.write(json.dumps(row, default=_plain, allow_nan=False) + "\n")

@@ -10,10 +10,14 @@
     ├── LimitReached         too much work is in progress
     ├── Unauthenticated      no token, or an invalid one
     ├── Forbidden            the role of the token does not permit the request
-    ├── StoreUnavailable     the database is unreachable, or has another schema
+    ├── StoreUnavailable     the database is unreachable
+    │   ├── StoreChanged         it was replaced, restored or migrated under the process
+    │   └── StoreDamaged         its file is damaged
+    ├── SupervisorUnavailable   the supervisor hangs, or ends again and again
     ├── InvalidArchive       a file is not an archive of gaplab, or is damaged or malicious
     ├── Unsupported          the request needs another kind of database
     ├── ClusterUnusable      Ray is unreachable, or a node would compute other numbers
+    │   └── RayGone              Ray died or stands still; only a new process gets another
     ├── PluginBroken         an external plug-in file is unusable, or a plug-in breaks its contract
     ├── PluginDiffers        a process has other versions of plug-ins than the supervisor
     ├── RealityFailed        the code of reality raised an error
@@ -112,6 +116,18 @@ class StoreUnavailable(GaplabError):
     """The database is not usable now."""
 
 
+class StoreChanged(StoreUnavailable):
+    """The database is no longer the one that the process knows, or has another schema; only a new process may go on."""
+
+
+class StoreDamaged(StoreUnavailable):
+    """The file of the database is damaged; the message says what to do."""
+
+
+class SupervisorUnavailable(GaplabError):
+    """Experiments do not run; the message says why."""
+
+
 class InvalidArchive(GaplabError):
     """The file is not a valid archive; the message says where."""
 
@@ -122,6 +138,10 @@ class Unsupported(GaplabError):
 
 class ClusterUnusable(GaplabError):
     """Ray is unreachable, or one of its nodes would compute other numbers or fail."""
+
+
+class RayGone(ClusterUnusable):
+    """The Ray of this process died or does not answer; calls to it may never return."""
 
 
 class PluginBroken(GaplabError):

@@ -8,27 +8,29 @@ from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from threading import Lock
+from threading import Lock, Thread
 from typing import Any, TypeAlias, TypeVar
 
 from cachetools import LRUCache
 
-from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
+from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable
 from gaplab.services.plugins import folders
+from gaplab.services.store.texts import brief
+from gaplab.services.waiting_line import WaitingLine
 
 T = TypeVar("T")
 
 LONGEST_S = 120.0
 """Time limit of one call, after which its process is killed. The first call of a process loads all libraries."""
 
-QUEUE_S = 20.0
-"""Time limit of the wait for earlier calls."""
-
 NICENESS = 10
 """Replays and predictions yield the processor to the service."""
 
 MOST_BYTES = 50_000_000
 """Memory for cached answers."""
+
+MOST_OUTPUT = 10_000
+"""Bytes of what a call prints that are logged: a plug-in may print without end."""
 
 Key: TypeAlias = tuple[str | int | None, ...]
 
@@ -65,19 +67,20 @@ class RolloutProcess:
 
     Args:
         longest_s: time limit of one call.
-        queue_s: time limit of the wait for earlier calls.
+        line: of callers.
 
     Attributes:
         answers: a cache for the callers.
     """
 
-    def __init__(self, longest_s: float = LONGEST_S, queue_s: float = QUEUE_S) -> None:
+    def __init__(self, longest_s: float = LONGEST_S, line: WaitingLine | None = None) -> None:
         self.answers = AnswerCache()
-        self._longest_s, self._queue_s = longest_s, queue_s
-        self._lock = Lock()
+        self._longest_s = longest_s
+        self._line = line or WaitingLine("replays and predictions")
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
         self._closed = False
+        self._unlogged = 0
 
     @property
     def pid(self) -> int | None:
@@ -94,23 +97,18 @@ class RolloutProcess:
         Raises:
             EngineInterrupted: the process died or took too long, or `close` was called.
             EngineUnavailable: the library of an engine is not installed.
-            LimitReached: earlier calls took too long.
+            LimitReached: too many callers wait, or earlier calls took too long.
             RuntimeError: the function raised another error; the message quotes it.
         """
-        if not self._lock.acquire(timeout=self._queue_s):
-            msg = f"other replays and predictions have been computed for {self._queue_s:g} s; try again soon"
-            raise LimitReached(msg, retry_after_s=5)
-        try:
+        with self._line.turn():
             return self._call(function, arguments)
-        finally:
-            self._lock.release()
 
     def close(self) -> None:
         """Kill the process, even in the middle of a call; later calls are refused."""
         self._closed = True
         if (process := self._process) is not None:
             process.kill()
-        with self._lock:
+        with self._line.lock:
             self._discard()
 
     def _discard(self) -> None:
@@ -123,6 +121,7 @@ class RolloutProcess:
     def _call(self, function: Callable[..., T], arguments: tuple[Any, ...]) -> T:
         try:
             pipe = self._started()
+            self._unlogged = MOST_OUTPUT
             pipe.send((function, arguments))
             if not pipe.poll(self._longest_s):
                 raise TimeoutError
@@ -146,15 +145,29 @@ class RolloutProcess:
         if self._pipe is None:
             context = get_context("spawn")
             ours, theirs = context.Pipe()
-            process = context.Process(target=_serve, args=(theirs,), name="rollouts", daemon=True)
+            printed, output = context.Pipe(duplex=False)
+            process = context.Process(target=_serve, args=(theirs, output), name="rollouts", daemon=True)
             process.start()  # if this raises, the next call tries again
             theirs.close()
+            output.close()
+            Thread(target=self._log_output, args=(printed,), name="output of rollouts", daemon=True).start()
             self._process, self._pipe = process, ours
         return self._pipe
 
+    def _log_output(self, printed: Connection) -> None:
+        """Log the beginning of what each call prints, until the process ends."""
+        with printed:
+            while part := os.read(printed.fileno(), 2**16):
+                kept, self._unlogged = part[: self._unlogged], max(0, self._unlogged - len(part))
+                if kept:
+                    rest = "" if self._unlogged else " (no more of this call is logged)"
+                    log.info("printed by a rollout: %s%s", kept.decode(errors="replace"), rest)
 
-def _serve(pipe: Connection) -> None:
-    """Execute calls until the other end of the pipe closes."""
+
+def _serve(pipe: Connection, output: Connection) -> None:
+    """Execute calls until the other end of the pipe closes, and write what they print to `output`."""
+    for descriptor in (1, 2):
+        os.dup2(output.fileno(), descriptor)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which closes the pipe
     os.nice(NICENESS)
     folders.find()
@@ -164,5 +177,6 @@ def _serve(pipe: Connection) -> None:
             try:
                 answer = (True, function(*arguments))
             except Exception as error:  # noqa: BLE001 - the caller raises it
-                answer = (False, (type(error).__name__, str(error)))
+                answer = (False, (type(error).__name__, brief(str(error))))
+            print(end="", flush=True)  # noqa: T201 - what the call printed
             pipe.send(answer)

@@ -18,6 +18,9 @@ from gaplab.services.store.session import Session, Store
 
 COLUMNS = ("experiment", "name", "strategy", "repetition", "evaluations", "fitness")
 
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""First characters of a formula. Source: https://owasp.org/www-community/attacks/CSV_Injection"""
+
 
 def curve(store: Store, experiment_id: str) -> Curve:
     """Return the curve of an experiment so far.
@@ -96,18 +99,27 @@ def compare(
 
 
 def curves_csv(curves: Sequence[Curve]) -> str:
-    """Return the values of curves as CSV: a line for each repetition at each number of real-world evaluations."""
+    """Return the values of curves as CSV: a line for each repetition at each number of real-world evaluations.
+
+    A text that a spreadsheet would take for a formula begins with an apostrophe. Numbers are numbers, also negative.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     writer.writerows(
-        (each.experiment, each.name, each.strategy, repetition, point.evaluations, value)
+        (each.experiment, _cell(each.name), _cell(each.strategy), repetition, point.evaluations, value)
         for each in curves
         for point in each.points
         for repetition, value in enumerate(point.values)
         if value is not None
     )
     return text.getvalue()
+
+
+def _cell(text: str) -> str:
+    """Return the text as it is written: no formula, and without the line break that `csv` does not quote."""
+    lines = text.replace("\r\n", "\n").replace("\r", "\n")
+    return f"'{lines}" if text.startswith(_FORMULA) else lines
 
 
 def _recorded(session: Session, ids: Sequence[str]) -> tuple[tuple[ExperimentRow, ...], dict[str, FloatArray]]:

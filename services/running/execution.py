@@ -44,6 +44,7 @@ release = _LEASES.release
 hand_back = _LEASES.hand_back
 hand_back_unheard = _LEASES.hand_back_unheard
 requeue_lost = _LEASES.requeue_lost
+release_all = _LEASES.release_all
 
 
 def fail(store: Store, claim: Claim, failure: Failure) -> bool:
@@ -182,15 +183,15 @@ def _claim(
 def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
     row = RepetitionRow
     rows = session.execute(
-        select(row.id, row.epoch, row.experiment_id, row.number, ExperimentRow.spec)
+        select(row.id, row.epoch, row.experiment_id, row.number, ExperimentRow.spec, row.owner)
         .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
         .where(row.id.in_(ids))
     ).all()
-    specs = {experiment: ResolvedSpec.model_validate(spec) for _, _, experiment, _, spec in rows}
+    specs = {experiment: ResolvedSpec.model_validate(spec) for _, _, experiment, _, spec, _ in rows}
     past, parts = logs(session, ids), checkpoints.stored(session, ids)
     claims = {
-        id_: Claim(id_, epoch, experiment, number, specs[experiment], past[id_], parts[id_])
-        for id_, epoch, experiment, number, _ in rows
+        id_: Claim(id_, epoch, experiment, number, specs[experiment], past[id_], parts[id_], owner=owner)
+        for id_, epoch, experiment, number, _, owner in rows
     }
     return tuple(claims[id_] for id_ in ids)
 

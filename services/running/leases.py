@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from datetime import timedelta
 from typing import Any, ClassVar, Generic, TypeVar
 
-from sqlalchemy import ColumnElement, func, tuple_, update
+from sqlalchemy import ColumnElement, func, true, tuple_, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import Ending, State
@@ -103,8 +103,19 @@ class Leases(Generic[L]):
         return len(store.write(self._hand_back, (self.table.owner == owner) & self.table.id.not_in(ids)))
 
     def requeue_lost(self, store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:
-        """Queue work again whose holder was silent for too long, and return the number of rows."""
+        """Queue work again whose holder was silent for too long, and return the number of rows.
+
+        A heartbeat from the future was sent before the clock was set back, and says nothing about the present.
+        """
         return len(store.write(self._requeue_lost, stale_after_s))
+
+    def release_all(self, store: Store, owner: str, reason: str) -> int:
+        """Queue the work of a supervisor again whose process has ended, and return the number of rows."""
+        return len(store.write(self.lose, (self.table.owner == owner) & self.releasable(), storable(reason)))
+
+    def releasable(self) -> ColumnElement[bool]:
+        """Return the SQL condition: the work may go to others before its lease expires; always by default."""
+        return true()
 
     def take(self, session: Session, ids: Sequence[int | str], owner: str) -> list[Any]:
         """Begin a lease on each of these queued rows, and return the ids of those that were still free."""
@@ -160,10 +171,14 @@ class Leases(Generic[L]):
         return self.end(session, which, Change(State.QUEUED, Ending.HANDED_BACK, values=values))
 
     def _requeue_lost(self, session: Session, stale_after_s: float) -> list[Any]:
-        stale = self.table.heartbeat_at < moment(session) - timedelta(seconds=stale_after_s)
-        self.free_lost(session, stale)
-        return self.lose(session, stale, f"its worker was not heard of for {stale_after_s:g} s")
+        beat, present, patience = self.table.heartbeat_at, moment(session), timedelta(seconds=stale_after_s)
+        silent, ahead = beat < present - patience, beat > present + patience
+        self.free_lost(session, silent | ahead)
+        lost = self.lose(session, silent, f"its worker was not heard of for {stale_after_s:g} s")
+        return lost + self.lose(session, ahead, "the clock was set back since its heartbeat")
 
     def of(self, leases: Sequence[L]) -> ColumnElement[bool]:
-        """Return the SQL condition: the row's lease is one of these."""
-        return tuple_(self.table.id, self.table.epoch).in_([(lease.id, lease.epoch) for lease in leases])
+        """Return the SQL condition: the row's lease is one of these; an ended lease may have no owner."""
+        row, owners = self.table, {lease.owner for lease in leases}
+        held = tuple_(row.id, row.epoch).in_([(lease.id, lease.epoch) for lease in leases])
+        return held & (row.owner.is_(None) | row.owner.in_(owners))

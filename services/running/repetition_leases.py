@@ -52,6 +52,10 @@ class RepetitionLeases(Leases[Claim]):
                 pause(session, experiment, f"a measurement was cut off {losses} times; the last time {reason}")
         return queued + super().lose(session, which, reason)
 
+    def releasable(self) -> ColumnElement[bool]:
+        """Return the SQL condition: the repetition holds no hardware, which its worker may still drive for a moment."""
+        return self.table.hardware.is_(None)
+
     def free_lost(self, session: Session, stale: ColumnElement[bool]) -> None:
         """Free the hardware of ended leases whose supervisor never reported that its worker has stopped."""
         row = self.table

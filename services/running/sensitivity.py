@@ -42,6 +42,7 @@ fail = _LEASES.fail
 release = _LEASES.release
 hand_back = _LEASES.hand_back
 requeue_lost = _LEASES.requeue_lost
+release_all = _LEASES.release_all
 
 
 def complete(store: Store, lease: CheckClaim, found: Sequence[Sensitivity]) -> bool:
@@ -68,5 +69,5 @@ def claim(session: Session, owner: str, refused: Mapping[str, str] = NONE) -> Ch
             check.error = storable(text_of(reasons))
         elif _LEASES.take(session, [id_], owner):
             session.refresh(check)
-            return CheckClaim(check.id, check.epoch, Checked.model_validate(check.spec))
+            return CheckClaim(check.id, check.epoch, Checked.model_validate(check.spec), owner=owner)
     return None

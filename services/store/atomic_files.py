@@ -1,10 +1,15 @@
-"""Files that appear under their name when complete, and never replace another file."""
+"""Files that appear under their name when complete."""
 
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
+
+
+def private(path: str, flags: int) -> int:
+    """Open a file as `open(…, opener=private)` does; if it is new, only its owner may read it."""
+    return os.open(path, flags, 0o600)
 
 
 @contextmanager
@@ -22,8 +27,7 @@ def appearing(file: Path, mode: int = 0o666) -> Iterator[Path]:
     """
     if file.exists():
         raise _taken(file)
-    part = file.with_name(f"{file.name}.{token_hex(4)}.part")
-    os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
+    part = _part_of(file, mode)
     try:
         yield part
         _sync(part)
@@ -31,6 +35,33 @@ def appearing(file: Path, mode: int = 0o666) -> Iterator[Path]:
     finally:
         part.unlink(missing_ok=True)
     _sync(file.parent)
+
+
+@contextmanager
+def replacing(file: Path, mode: int) -> Iterator[Path]:
+    """Open a part file to write into; it takes the name, from another file too, when the context ends well.
+
+    Args:
+        file: its name.
+        mode: permissions, restricted by the process's umask.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    part = _part_of(file, mode)
+    try:
+        yield part
+        _sync(part)
+        part.replace(file)
+    finally:
+        part.unlink(missing_ok=True)
+    _sync(file.parent)
+
+
+def _part_of(file: Path, mode: int) -> Path:
+    part = file.with_name(f"{file.name}.{token_hex(4)}.part")
+    os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
+    return part
 
 
 def _name(part: Path, file: Path) -> None:

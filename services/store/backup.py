@@ -5,10 +5,11 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 
-from gaplab.services.core.errors import StoreUnavailable, Unsupported
+from gaplab.services.core.errors import StoreDamaged, StoreUnavailable, Unsupported
 from gaplab.services.store import database_errors
 from gaplab.services.store.atomic_files import appearing
 from gaplab.services.store.engine import open_engine
+from gaplab.services.store.sqlite_file import is_damage
 
 PG_DUMP = 'pg_dump --format=custom --file={file} "postgresql:${{GAPLAB_DATABASE_URL#*:}}"'
 """The URL may name a driver before its first colon, as in postgresql+psycopg://; pg_dump accepts none."""
@@ -26,7 +27,8 @@ def backup(url: str, file: Path) -> int:
 
     Raises:
         Unsupported: the database is a Postgres; the message names the tool that copies one.
-        StoreUnavailable: there is no database, it is in use for too long, or it is corrupt.
+        StoreUnavailable: there is no database, or it is in use for too long.
+        StoreDamaged: the database is damaged.
         OSError: the file exists already, or cannot be written.
     """
     engine = open_engine(url)
@@ -39,22 +41,29 @@ def backup(url: str, file: Path) -> int:
         raise StoreUnavailable(msg)
     try:
         with appearing(file, 0o600) as part, database_errors.named(), engine.connect() as connection:
-            _copy(connection.connection.driver_connection, part)
+            source_connection = connection.connection.driver_connection
+            assert source_connection is not None
+            source_connection.rollback()  # the engine began a transaction, in which nothing was read
+            copy_checked(source_connection, part)
     finally:
         engine.dispose()
     return file.stat().st_size
 
 
-def _copy(source: sqlite3.Connection | None, part: Path) -> None:
-    assert source is not None
+def copy_checked(source: sqlite3.Connection, part: Path) -> None:
+    """Copy a database as of one moment into a file, and check the copy.
+
+    Raises:
+        StoreUnavailable: it cannot be read, or is in use for too long.
+        StoreDamaged: it is damaged.
+    """
     try:
-        source.rollback()  # the engine began a transaction, in which nothing was read; the copy has one of its own
         with closing(sqlite3.connect(part)) as target:
             source.backup(target)
             (found,) = target.execute("PRAGMA integrity_check").fetchone()
     except sqlite3.Error as error:
         msg = f"the database cannot be copied: {error}"
-        raise StoreUnavailable(msg) from error
+        raise (StoreDamaged if is_damage(error) else StoreUnavailable)(msg) from error
     if found != "ok":
-        msg = f"the copy is corrupt, and so is the database: {found}"
-        raise StoreUnavailable(msg)
+        msg = f"the copy is damaged, and so is the database: {found}"
+        raise StoreDamaged(msg)

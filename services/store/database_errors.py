@@ -6,7 +6,8 @@ from contextlib import contextmanager
 from sqlalchemy.exc import DatabaseError, DBAPIError, InterfaceError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolExhausted
 
-from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.core.errors import StoreDamaged, StoreUnavailable
+from gaplab.services.store.sqlite_file import is_damage
 
 _CLASHES = {"40001", "40P01"}
 """Postgres aborted one of two conflicting transactions: serialization failure, deadlock."""
@@ -22,7 +23,8 @@ def named() -> Iterator[None]:
     """Turn errors of the database into one sentence without its password.
 
     Raises:
-        StoreUnavailable: the database is unreachable, locked for too long, not a database, or has another schema.
+        StoreUnavailable: the database is unreachable, locked for too long, or has another schema.
+        StoreDamaged: SQLite found the file damaged, or not a database.
     """
     try:
         yield
@@ -32,7 +34,11 @@ def named() -> Iterator[None]:
     except DBAPIError as error:
         if _lacks_schema(error):
             raise StoreUnavailable(WRONG_SCHEMA) from error
-        if isinstance(error, OperationalError | InterfaceError) or type(error) is DatabaseError:
+        if is_damage(error.orig):
+            msg = f"the database is damaged: {_first_line(error)}"
+            raise StoreDamaged(msg) from error
+        unusable = isinstance(error, OperationalError | InterfaceError) or type(error) is DatabaseError
+        if unusable or error.connection_invalidated:
             msg = f"the database cannot be used now: {_first_line(error)}"
             raise StoreUnavailable(msg) from error
         raise

@@ -7,15 +7,14 @@ from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
 from sqlalchemy.exc import ArgumentError
 
 from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.store import sqlite_file
+from gaplab.services.store.postgres import postgres_engine
 
 WRITES = "gaplab_writes"
 """Execution option of a connection whose transactions will write."""
 
 PATIENCE_S = 30
-"""Longest wait of a transaction for another's lock."""
-
-CONNECT_S = 5
-"""Longest wait for a Postgres server to answer a connection."""
+"""Longest wait of a transaction for another's lock, in SQLite."""
 
 _WAL_IS_SOUND = (3, 51, 3)
 """Before this, SQLite's write-ahead log can be corrupted when it is reset. Source: https://sqlite.org/wal.html.
@@ -25,7 +24,7 @@ reappear after a power loss, and then undoes the last transaction. Source: https
 """
 
 
-def open_engine(url: str, *, enforce_foreign_keys: bool = True) -> Engine:
+def open_engine(url: str, *, enforce_foreign_keys: bool = True, answer_s: float | None = None) -> Engine:
     """Return the engine of a SQLite or Postgres URL, without connecting.
 
     Its errors contain no values, since a logged spec would reveal reality's parameters.
@@ -33,22 +32,25 @@ def open_engine(url: str, *, enforce_foreign_keys: bool = True) -> Engine:
     Args:
         url: SQLAlchemy URL; Postgres without a driver gets psycopg 3.
         enforce_foreign_keys: enforce them in SQLite; False in a migration that rebuilds tables.
+        answer_s: longest time of a statement in Postgres; None for any time.
 
     Raises:
         StoreUnavailable: no such kind of database.
     """
-    parsed = _parse(url)
+    parsed = parse(url)
     if parsed.get_backend_name() == "postgresql":
-        patience = {"connect_timeout": CONNECT_S}
-        return create_engine(
-            parsed, pool_pre_ping=True, pool_size=10, max_overflow=20, connect_args=patience, hide_parameters=True
-        )
+        return postgres_engine(parsed, answer_s=answer_s)
     engine = create_engine(parsed, pool_pre_ping=True, connect_args={"timeout": PATIENCE_S}, hide_parameters=True)
     _prepare_sqlite(engine, enforce_foreign_keys=enforce_foreign_keys)
     return engine
 
 
-def _parse(url: str) -> URL:
+def parse(url: str) -> URL:
+    """Return a database URL with its driver.
+
+    Raises:
+        StoreUnavailable: it is no URL, or of another kind of database.
+    """
     try:
         parsed = make_url(url)
     except ArgumentError as error:
@@ -69,6 +71,11 @@ def _prepare_sqlite(engine: Engine, *, enforce_foreign_keys: bool) -> None:
     waiting. So the driver begins nothing, and a transaction that will write begins IMMEDIATE.
     """
     journal = "WAL" if sqlite3.sqlite_version_info >= _WAL_IS_SOUND else "PERSIST"
+    if file := sqlite_file.file_of(engine.url):
+
+        @event.listens_for(engine, "do_connect")
+        def keep_private(*_: object) -> None:
+            sqlite_file.create(file)
 
     @event.listens_for(engine, "connect")
     def configure(connection: Any, record: object) -> None:  # noqa: ANN401, ARG001  # SQLAlchemy's hook

@@ -27,15 +27,17 @@ class Checkpoint:
 
 @dataclass(frozen=True)
 class Lease:
-    """The right of one supervisor to a piece of work; a write with an old epoch is refused.
+    """The right of one supervisor to a piece of work; a write with an old epoch or another owner is refused.
 
     Attributes:
         id: id of the work.
         epoch: number of the lease among the leases of this work, from 1.
+        owner: the supervisor. Its name is unique, so a lease never fits work of the same id in another database.
     """
 
     id: int | str
     epoch: int
+    owner: str = field(default="", kw_only=True, compare=False)
 
 
 @dataclass(frozen=True)

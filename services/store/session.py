@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
+from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
 
 from sqlalchemy import event, text
@@ -11,31 +12,45 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session as Session
 from sqlalchemy.orm import sessionmaker
 
-from gaplab.services.core.errors import StoreUnavailable
+from gaplab.services.core.errors import StoreDamaged, StoreUnavailable
 from gaplab.services.store import database_errors
 from gaplab.services.store.engine import WRITES, open_engine
-from gaplab.services.store.models import REVISION
+from gaplab.services.store.guard import Guard
+from gaplab.services.store.models import REVISION, Base
 from gaplab.services.store.queries import events
+from gaplab.services.store.sqlite_file import file_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 _TRIES = 5
 
+ANSWER_S = 60.0
+"""Longest time of a statement in Postgres."""
+
 
 class Store:
     """One SQLite or Postgres database; safe to share between threads, and opened without connecting.
 
-    It recovers by itself: a connection that died is replaced at its next use.
+    It recovers by itself: a connection that died is replaced at its next use, and one that says nothing is closed.
+
+    Args:
+        url: of the database.
+        answer_s: longest time of a statement in Postgres.
+        pinned: whether a file that replaces the database, or another schema, is refused for good, as by a supervisor,
+            whose claims would be void; else the new file is opened.
 
     Attributes:
+        file: of a SQLite database; None for Postgres.
         errors: number of times that the database could not be used.
         retries: number of transactions that Postgres aborted for others, and that ran again.
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, *, answer_s: float = ANSWER_S, pinned: bool = False) -> None:
         self.errors = self.retries = 0
-        self._engine = open_engine(url)
+        self._engine = open_engine(url, answer_s=answer_s)
+        self._guard = Guard(self._engine, pinned=pinned)
+        self.file = file_of(self._engine.url)
         snapshot = {"isolation_level": "REPEATABLE READ"} if self._engine.name == "postgresql" else {}
         self._writer = sessionmaker(self._engine.execution_options(**{WRITES: True}), expire_on_commit=False)
         event.listen(self._writer, "before_commit", events.write)
@@ -86,21 +101,27 @@ class Store:
         """Check that the database can be used and has the schema of this version.
 
         Raises:
-            StoreUnavailable: it cannot be used, or has another schema; the message says what to do.
+            StoreUnavailable: it cannot be used now.
+            StoreChanged: it has another schema; the message says what to do.
         """
         with self.reading() as session:
             revisions = session.scalars(text("SELECT version_num FROM alembic_version")).all()
         if list(revisions) != [REVISION]:
             found = ", ".join(revisions) or "none"
-            msg = f"the database is at revision {found}, this version needs {REVISION}: run `python -m migrations`"
-            raise StoreUnavailable(msg)
+            later = all(revision > REVISION for revision in revisions) and revisions
+            what = "use the version of gaplab that it is of" if later else "run `python -m migrations`"
+            self._guard.change(f"the database is at revision {found}, this version needs {REVISION}: {what}")
 
     @contextmanager
     def _named(self) -> Iterator[None]:
         """Name and count errors of the database."""
         try:
-            with database_errors.named():
-                yield
+            self._guard.admit()
+            try:
+                with database_errors.named():
+                    yield
+            except StoreDamaged as error:
+                self._guard.damage(error)
         except StoreUnavailable:
             self.errors += 1
             raise
@@ -108,6 +129,22 @@ class Store:
     def dispose(self) -> None:
         """Close the idle connections; the store may be used again."""
         self._engine.dispose()
+
+
+@contextmanager
+def private_store(file: Path) -> Iterator[Store]:
+    """Open a new SQLite database with the present tables, for a computation that no other process sees.
+
+    Args:
+        file: does not exist; the caller deletes it.
+    """
+    store = Store(f"sqlite:///{file}")
+    try:
+        with store.transaction() as session:
+            Base.metadata.create_all(session.connection())
+        yield store
+    finally:
+        store.dispose()
 
 
 def transaction(work: Callable[Concatenate[Session, P], T]) -> Callable[Concatenate[Store, P], T]:

@@ -6,6 +6,7 @@ from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
 from gaplab.services.store.models import Base
+from gaplab.services.store.texts import storable as storable
 
 _INSERT: dict[str, Callable[..., postgresql.Insert | sqlite.Insert]] = {
     "sqlite": sqlite.insert,
@@ -16,8 +17,3 @@ _INSERT: dict[str, Callable[..., postgresql.Insert | sqlite.Insert]] = {
 def insert_new(session: Session, table: type[Base]) -> postgresql.Insert | sqlite.Insert:
     """Return an INSERT that skips rows whose key exists already."""
     return _INSERT[session.get_bind().dialect.name](table).on_conflict_do_nothing()
-
-
-def storable(text: str) -> str:
-    """Return the text with NUL characters and lone surrogates replaced, which databases refuse."""
-    return text.encode(errors="replace").decode().replace("\0", "\N{REPLACEMENT CHARACTER}")

@@ -10,7 +10,10 @@ from sqlalchemy import JSON, BigInteger, Boolean, Integer, String
 from sqlalchemy import Column as TableColumn
 
 from gaplab.services.store.clock import UtcDateTime
-from gaplab.services.store.models import Base, Number
+from gaplab.services.store.models import Base, Number, Reason
+
+LONGEST_TEXT = 100_000
+"""Characters of a text for which the database itself has no limit, such as notes."""
 
 
 class Kind(StrEnum):
@@ -33,7 +36,7 @@ class Column:
         nullable: null is permitted.
         required: an insert must give a value, since there is no default.
         generated: the database itself numbers the rows.
-        longest: most characters of a text; None if there is no limit.
+        longest: most characters of a text; None if a longer one is cut when it is stored.
         large: a whole number of 64 bits, rather than 32.
         choices: the only permitted texts; empty if all are.
     """
@@ -62,7 +65,7 @@ def _column(column: TableColumn[Any]) -> Column:
         nullable=bool(column.nullable),
         required=not column.nullable and column.default is None and column.server_default is None,
         generated=column.table.autoincrement_column is column,
-        longest=column.type.length if isinstance(column.type, String) and not choices else None,
+        longest=column.type.length or LONGEST_TEXT if isinstance(column.type, String) and not choices else None,
         large=isinstance(column.type, BigInteger),
         choices=choices,
     )
@@ -75,6 +78,7 @@ def _kind(column: TableColumn[Any]) -> Kind:
         Integer: Kind.WHOLE,
         Number: Kind.REAL,
         String: Kind.TEXT,
+        Reason: Kind.TEXT,
         JSON: Kind.VECTOR if _is_vector(column) else Kind.NESTED,
     }
     return next(kind for type_, kind in kinds.items() if isinstance(column.type, type_))

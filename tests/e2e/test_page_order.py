@@ -163,6 +163,25 @@ def test_a_stream_that_is_refused_is_not_a_service_that_is_away(visit: Any, arch
     page.get_by_text("Live updates are refused: 20 streams are open; trying again…").wait_for()
 
 
+@pytest.mark.parametrize("status", [401, 409])
+def test_a_page_that_no_longer_holds_is_loaded_again(visit: Any, archive: Any, status: int) -> None:
+    visit.forgive("40")
+    page = visit(f"{archive.url}/{QUIET}")
+    refusals = iter([{"status": status, "title": "Over", "detail": "The database was replaced."}])
+
+    def refuse_once(route: Any) -> None:
+        if (refusal := next(refusals, None)) is None:
+            route.continue_()
+        else:
+            route.fulfill(status=status, json=refusal)
+
+    page.route(re.compile("/events(\\?|$)"), refuse_once)
+    with page.expect_event("load"):
+        page.evaluate("() => { location.hash = '#/'; }")
+
+    page.locator("tr.study").first.wait_for()
+
+
 def test_a_list_that_did_not_come_is_not_said_to_be_empty_and_comes_by_itself(visit: Any, archive: Any) -> None:
     visit.forgive("ERR_FAILED")
     page = visit(f"{archive.url}/#/?show=experiments")

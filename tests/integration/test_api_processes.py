@@ -14,12 +14,13 @@ from pathlib import Path
 import pytest
 
 from gaplab.api.clients.client import Client
-from gaplab.api.process import service
+from gaplab.api.process import local_service, supervisor_process
 from gaplab.api.process.child_process import end, start
 from gaplab.api.process.errors import CommandError
 from gaplab.api.process.local_service import start_service
 from gaplab.api.process.server import listen, require_token
-from gaplab.api.process.service import SupervisorProcess, environment_of, migrate
+from gaplab.api.process.service import environment_of, migrate
+from gaplab.api.process.supervisor_process import SupervisorProcess
 from gaplab.schemas.access import Role
 from gaplab.services.access import create_token, revoke_token
 from gaplab.services.core.errors import StoreUnavailable, Unauthenticated
@@ -148,7 +149,7 @@ def test_a_database_that_cannot_be_migrated_is_a_sentence_without_its_password(u
 def test_a_supervisor_that_dies_is_started_again_and_it_is_said(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(service, "LONGEST_PAUSE_S", 0.1)
+    monkeypatch.setattr(supervisor_process, "LONGEST_PAUSE_S", 0.1)
     supervisor = SupervisorProcess({}, module="this")
 
     supervisor.start()
@@ -222,5 +223,7 @@ def test_the_token_of_another_service_is_not_shown_to_one_of_ones_own(
         found = client.studies()
 
     monkeypatch.setenv("GAPLAB_TOKEN", create_token(sqlite_store, Role.READER).secret)
+    monkeypatch.setattr(local_service, "LARGEST_LOG", 0)
     with start_service(sqlite_url, tmp_path / "log", workers=False) as client:
         assert client.studies() == found
+    assert (tmp_path / "log.old").exists()  # it was too large

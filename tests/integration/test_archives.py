@@ -22,6 +22,7 @@ from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export_experiment, export_study, import_archive, opening, unpacking
+from gaplab.services.archives import reading as importing
 from gaplab.services.archives.columns import EXPORTED
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict, NotFound
@@ -126,7 +127,7 @@ def unpacked_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Parquet is read in this process, without its limits, which saves a second each time."""
 
     def read(files: Any) -> None:
-        assert all(unpacking.convert(str(each), str(opening._lines_of(each))) for each in files)
+        assert all(unpacking.convert(str(each), str(opening._lines_of(each)), rows) for each, rows in files.items())
 
     monkeypatch.setattr(opening, "_read_parquet", read)
 
@@ -357,6 +358,24 @@ def test_times_keep_their_microseconds(store: Store, other: Any) -> None:
     import_archive(other, BytesIO(exported(export_experiment(store, submitted))))
 
     assert reading.read_experiment(other, submitted).created_at == moment
+
+
+def test_others_write_while_an_archive_is_checked(
+    store: Store, other: Any, monkeypatch: pytest.MonkeyPatch, unpacked_here: None
+) -> None:
+    submitted, check_logs = finished(store), importing.check_logs
+    archive = exported(export_experiment(store, submitted))
+
+    def check_slowly(*given: Any) -> None:
+        submission.submit_experiment(other, toy(name="meanwhile"))
+        check_logs(*given)
+
+    monkeypatch.setattr(importing, "check_logs", check_slowly)
+    with ThreadPoolExecutor(1) as pool:
+        imported = pool.submit(import_archive, other, BytesIO(archive)).result(timeout=20)  # SQLite waits 30 s
+
+    assert imported.experiments == (submitted,)
+    assert {each.name for each in listing.list_experiments(other).items} == {"meanwhile", "simulated_fit"}
 
 
 def test_memory_does_not_grow_with_what_is_exported(sqlite_store: Store) -> None:

@@ -49,7 +49,7 @@ def unpacked_here(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def read(files: Any) -> None:
         for file in files:
-            if not unpacking.convert(str(file), str(opening._lines_of(file))):
+            if not unpacking.convert(str(file), str(opening._lines_of(file)), files[file]):
                 raise InvalidArchive(f"{file.name} is no Parquet")
 
     monkeypatch.setattr(opening, "_read_parquet", read)
@@ -146,6 +146,30 @@ def test_more_than_is_permitted_when_it_is_unpacked(
     assert len(bomb) < 100_000
 
     refused(sqlite_store, bomb, "unpacked it has 2,0", "1,000,000 are permitted")
+
+
+def test_more_rows_than_are_permitted(sqlite_store: Store, good: Any, unpacked_here: Any) -> None:
+    archive = packed(good)
+    rows = sum(each["rows"] for name, each in members_of(good).items() if name != "curves.json")
+
+    with pytest.raises(
+        InvalidArchive, match=rf"it has {rows} rows; {rows - 1} are permitted \(GAPLAB_MAX_IMPORTED_ROWS\)"
+    ):
+        import_archive(sqlite_store, BytesIO(archive), most_rows=rows - 1)
+    assert import_archive(sqlite_store, BytesIO(archive), most_rows=rows).experiments
+
+
+@pytest.mark.parametrize("name", ["simulator.parquet", "experiment.jsonl"])
+def test_more_rows_than_the_manifest_states(sqlite_store: Store, good: Any, name: str) -> None:
+    manifest = json.loads(good["manifest.json"])
+    manifest["members"][name]["rows"] -= 1
+    lying = good | {"manifest.json": json.dumps(manifest).encode()}
+
+    refused(sqlite_store, packed(lying, honest=False), name.split(".")[0], "manifest states")
+
+
+def members_of(good: Any) -> Any:
+    return json.loads(good["manifest.json"])["members"]
 
 
 def test_more_than_its_directory_says(sqlite_store: Store, good: Any) -> None:
@@ -357,11 +381,12 @@ sys.exit(unpacking.main(sys.argv[3:]))
 def test_what_is_written_of_all_tables_together_is_limited(good: Any, tmp_path: Path, room: Any, ended: Any) -> None:
     table, paths = tmp_path / "simulator.parquet", [str(tmp_path / name) for name in ("first", "second", "third")]
     table.write_bytes(good["simulator.parquet"])
-    assert unpacking.convert(str(table), str(tmp_path / "alone"))
+    rows = rows_of("simulator.parquet", good["simulator.parquet"])
+    assert unpacking.convert(str(table), str(tmp_path / "alone"), rows)
     size = (tmp_path / "alone").stat().st_size
 
     folder = str(Path(unpacking.__file__).parent)
-    tables = [path for target in paths for path in (str(table), target)]
+    tables = [path for target in paths for path in (str(table), target, str(rows))]
     command = [sys.executable, "-I", "-c", WITH_ROOM_FOR, folder, str(room * size), *tables]
 
     assert subprocess.run(command, check=False).returncode == ended

@@ -162,13 +162,13 @@ def test_the_command_copies_the_database_of_the_environment(
 def test_a_file_that_appears_meanwhile_is_not_written_over(
     sqlite_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    copied = backing_up._copy
+    copied = backing_up.copy_checked
 
     def slowly(source: Any, part: Any) -> None:
         copied(source, part)
         (tmp_path / "copy.db").write_text("mine")
 
-    monkeypatch.setattr(backing_up, "_copy", slowly)
+    monkeypatch.setattr(backing_up, "copy_checked", slowly)
 
     with pytest.raises(FileExistsError, match="there already"):
         backing_up.backup(sqlite_url, tmp_path / "copy.db")
@@ -186,7 +186,7 @@ def test_what_a_copy_left_that_was_killed_is_in_no_ones_way(
         raise Killed
 
     with monkeypatch.context() as patch:
-        patch.setattr(backing_up, "_copy", die)
+        patch.setattr(backing_up, "copy_checked", die)
         patch.setattr("pathlib.Path.unlink", lambda *_, **__: None)
         with pytest.raises(Killed):
             backup(sqlite_url, tmp_path / "copy.db")

@@ -41,6 +41,7 @@ class InProcess(httpx2.BaseTransport):
         self.asked: list[str] = []
         self.lost = 0
         self.busy = 0
+        self.status, self.retry_after = 503, "5"
 
     def close(self) -> None:
         self._process.close()
@@ -49,7 +50,8 @@ class InProcess(httpx2.BaseTransport):
         self.asked.append(f"{request.method} {request.url.path}")
         if self.busy:
             self.busy -= 1
-            return httpx2.Response(503, json={"type": "about:blank", "title": "t", "status": 503, "detail": "busy"})
+            problem = {"type": "about:blank", "title": "t", "status": self.status, "detail": "busy"}
+            return httpx2.Response(self.status, json=problem, headers={"Retry-After": self.retry_after})
         headers = {name: value for name, value in request.headers.items() if name != "host"}
         url = request.url.raw_path.decode()
         answer = self._client.request(request.method, url, content=request.read(), headers=headers)
@@ -404,6 +406,18 @@ def test_events_and_lists_are_values_that_json_can_hold(client: Client) -> None:
     assert kinds.count("submitted") == 2
     assert [each.number for each in client.events(follow=False, after=1)] == [2]
     assert json.dumps([each.model_dump(mode="json") for each in client.studies().items])
+
+
+def test_a_read_waits_for_its_turn_and_a_submission_is_refused(client: Client, network: InProcess) -> None:
+    network.busy, network.status, network.retry_after = 2, 429, "0"
+    assert client.studies().items == ()
+
+    network.busy = 1
+    with pytest.raises(ServiceError, match="busy") as refused:
+        client.submit(BOTH)
+
+    assert refused.value.retry_after_s == 0.0
+    assert len(network.asked) == 4
 
 
 def test_what_cannot_be_unpacked_is_no_answer() -> None:

@@ -5,7 +5,7 @@ import json
 import random
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from itertools import count
@@ -13,18 +13,23 @@ from typing import Any
 
 import httpx2
 import pytest
+from fastapi import FastAPI
+from fastapi.responses import StreamingResponse
 from fastapi.testclient import TestClient
+from sqlalchemy import delete, update
 
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.errors import ServiceError
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
+from gaplab.api.http import access as http_access
 from gaplab.api.http import event_feed as feeding
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.process.server import Server, listen
+from gaplab.schemas.access import Role
 from gaplab.schemas.events import EventKind, EventPage, EventRead
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.schedule import ExtensionSpec
-from gaplab.services import archives, events
+from gaplab.services import access, archives, events
 from gaplab.services.core.errors import NotFound
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import extension, lifecycle, submission
@@ -34,6 +39,7 @@ from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.running.versions import provenance as own
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.lease import Failure
+from gaplab.services.store.models import EventCounterRow, EventRow
 from gaplab.services.store.queries.events import note, write
 from gaplab.services.store.queries.experiments import insert_experiment
 from gaplab.services.store.session import Store
@@ -290,12 +296,19 @@ def test_supervisors_that_record_claim_and_end_at_once_do_not_wait_for_each_othe
 def served(store: Store, port: int = 0) -> Iterator[tuple[str, EventFeed]]:
     """A service in a thread, ended as the real one is."""
     app = create_app(store)
+    with serving(app, port) as url:
+        yield url, app.state.feed
+
+
+@contextmanager
+def serving(app: FastAPI, port: int = 0) -> Iterator[str]:
+    """The address of a service of this app in a thread."""
     listener = listen("127.0.0.1", port)
     server = Server(app)
     thread = threading.Thread(target=server.run, args=([listener],))
     thread.start()
     try:
-        yield f"http://127.0.0.1:{listener.getsockname()[1]}", app.state.feed
+        yield f"http://127.0.0.1:{listener.getsockname()[1]}"
     finally:
         server.should_exit = True
         thread.join(DEADLINE_S)
@@ -541,3 +554,109 @@ def test_events_of_a_study_are_those_of_its_experiments(sqlite_store: Store) -> 
     assert found[0].study == study.id
     with pytest.raises(NotFound, match="there is no study"):
         events.check(sqlite_store, WantedEvents(study="none"))
+
+
+@pytest.fixture
+def rechecked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Callers are checked often."""
+    monkeypatch.setattr(http_access, "RECHECK_S", 0.1)
+
+
+@pytest.mark.usefixtures("rechecked")
+def test_a_stream_ends_when_its_token_is_revoked_and_those_of_others_go_on(store: Store) -> None:
+    revoked, valid = (access.create_token(store, Role.READER) for _ in range(2))
+    submission.submit_experiment(store, toy())
+    with served(store) as (url, feed), Client(url, token=valid.secret) as other:
+        kept = other.events()
+        take(kept, 1)
+        with Client(url, token=revoked.secret) as client:
+            stream = client.events(patience_s=0.0)
+            take(stream, 1)
+            access.revoke_token(store, revoked.token.id)
+            with pytest.raises((ServiceError, ServiceUnreachable)):
+                next(stream)
+            with pytest.raises(ServiceError, match="this token is not valid"):
+                next(client.events())
+        assert within(lambda: feed.open == 1)
+        submission.submit_experiment(store, toy())
+        assert take(kept, 1)[0].number == 2
+
+
+@pytest.mark.usefixtures("rechecked")
+def test_a_stream_without_a_token_ends_when_tokens_are_needed(sqlite_store: Store) -> None:
+    with served(sqlite_store) as (url, feed), httpx2.Client(base_url=url, timeout=DEADLINE_S) as http:
+        with http.stream("GET", "/events") as answer:
+            assert within(lambda: feed.open == 1)
+            access.create_token(sqlite_store, Role.ADMIN)
+            with suppress(httpx2.RemoteProtocolError):
+                list(answer.iter_lines())
+        assert within(lambda: feed.open == 0)
+        assert http.get("/events").status_code == 401
+
+
+@pytest.mark.usefixtures("rechecked")
+def test_who_waits_for_events_is_refused_when_the_token_is_revoked(sqlite_store: Store) -> None:
+    token = access.create_token(sqlite_store, Role.READER)
+    headers = {"Authorization": f"Bearer {token.secret}"}
+    with (
+        served(sqlite_store) as (url, feed),
+        httpx2.Client(base_url=url, timeout=DEADLINE_S) as http,
+        ThreadPoolExecutor(1) as pool,
+    ):
+        answer = pool.submit(http.get, "/events/page?wait_s=60", headers=headers)
+        assert within(lambda: feed.open == 1)
+        access.revoke_token(sqlite_store, token.token.id)
+        refused = answer.result(DEADLINE_S)
+
+    assert refused.status_code == 401
+    assert refused.json()["type"] == "urn:gaplab:problem:unauthenticated"
+
+
+@pytest.mark.usefixtures("rechecked")
+def test_a_download_is_broken_off_when_its_token_is_revoked(sqlite_store: Store) -> None:
+    token = access.create_token(sqlite_store, Role.READER)
+    app = create_app(sqlite_store)
+
+    @app.get("/long")
+    async def long() -> StreamingResponse:
+        async def parts() -> AsyncIterator[bytes]:
+            while True:
+                yield b"x" * 100
+                await asyncio.sleep(0.02)
+
+        return StreamingResponse(parts(), headers={"Content-Length": str(10**9)})
+
+    headers = {"Authorization": f"Bearer {token.secret}"}
+    with serving(app) as url, httpx2.stream("GET", f"{url}/long", headers=headers, timeout=DEADLINE_S) as answer:
+        parts = answer.iter_raw()
+        assert next(parts)
+        access.revoke_token(sqlite_store, token.token.id)
+        with pytest.raises(httpx2.RemoteProtocolError):
+            list(parts)
+
+
+def test_a_number_beyond_the_latest_event_is_refused_with_both(store: Store) -> None:
+    submission.submit_experiment(store, toy())
+    with TestClient(create_app(store)) as api:
+        answers = [
+            api.get("/events", headers={"Last-Event-ID": "2"}),
+            api.get("/events", params={"after": 2}),
+            api.get("/events/page", params={"after": 2, "wait_s": 60}),
+        ]
+
+    assert [each.status_code for each in answers] == [409] * 3
+    assert all(each.json()["detail"].startswith("there is no event 2; the latest is 1.") for each in answers)
+
+
+def test_streams_end_when_the_database_is_replaced_by_an_earlier_one(store: Store) -> None:
+    for _ in range(3):
+        submission.submit_experiment(store, toy())
+    with served(store) as (url, _), Client(url) as client:
+        stream = client.events()
+        take(stream, 3)
+        with store.transaction() as session:
+            session.execute(delete(EventRow).where(EventRow.number > 1))
+            session.execute(update(EventCounterRow).values(latest=1))
+
+        with pytest.raises(ServiceError, match="there is no event 3; the latest is 1"):
+            next(stream)

@@ -4,17 +4,21 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
+from sqlalchemy import text
 
 from gaplab.schemas.lifecycle import State
+from gaplab.services import events
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Cost
-from gaplab.services.experiments import listing, reading, submission
-from gaplab.services.running import execution
+from gaplab.services.events import WantedEvents
+from gaplab.services.experiments import checks, listing, reading, submission
+from gaplab.services.running import execution, sensitivity
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
+from gaplab.services.store.texts import LONGEST_REASON
 from tests.experiments import cancel, run, same, some_log, toy
 
 
@@ -265,6 +269,35 @@ def test_an_experiment_fails_when_all_of_its_repetitions_do_and_says_each_reason
     found = reading.read_experiment(store, submitted.id)
     assert found.state is State.FAILED
     assert found.reasons == ("zero division", "a key")
+
+
+def test_a_long_reason_is_stored_and_shown_as_its_beginning(store: Store) -> None:
+    """Also one that an earlier version stored as a whole."""
+    long = "unstable: " + "x" * 5_000_000
+    id_ = submission.submit_experiment(store, toy(repetitions=3)).id
+    fails, lost, earlier = execution.claim(store, "me", 3)
+    check = sensitivity.claim(store, "me")
+    assert check is not None
+
+    assert execution.fail(store, fails, Failure(long, long))
+    assert execution.release(store, lost, long)
+    assert sensitivity.fail(store, check, long)
+    assert execution.fail(store, earlier, Failure("short"))
+    with store.transaction() as session:
+        session.execute(text("UPDATE repetition SET error = :long WHERE number = 2"), {"long": long})
+        stored = session.scalars(text("SELECT length(error) FROM repetition WHERE number < 2")).all()
+
+    told = events.page(store, 0, WantedEvents(), limit=100).items
+    shown = [
+        *reading.read_experiment(store, id_).reasons,
+        *(each.error for each in reading.list_repetitions(store, id_)),
+        *(reading.list_attempts(store, id_, number)[0].reason for number in (0, 1)),
+        *(each.body["reason"] for each in told if each.body.get("reason")),
+        checks.read(store, check.id).reason,
+    ]
+    assert len(shown) == 11
+    assert {each for each in shown if not each.startswith("unstable: x")} == {"short"}
+    assert max(map(len, shown)) <= LONGEST_REASON >= max(stored)
 
 
 def test_repetitions_that_end_at_once_end_their_experiment(store: Store) -> None:

@@ -2,22 +2,27 @@
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from io import BytesIO
+from itertools import islice
 
+import httpx2
 import matplotlib.image
 import pytest
 from fastapi.testclient import TestClient
 from plotly.graph_objects import Figure
 
 from gaplab.api.app import create_app
+from gaplab.api.http import figures
 from gaplab.api.http.figures import MEDIA_TYPES
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.experiments import submission
+from gaplab.services.figures.matplotlib import files
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.session import Store
+from gaplab.services.waiting_line import LENGTH, WaitingLine
 from tests.experiments import run
 
 STUDY = {
@@ -31,6 +36,7 @@ STUDY = {
 }
 KINDS = ["curves", "simulators", "squared-error"]
 HIDDEN = 0.7319462853
+DEADLINE_S = 120.0
 
 
 @pytest.fixture
@@ -74,6 +80,26 @@ def test_every_kind_is_served_in_every_format(api: TestClient, experiment: str, 
     assert matplotlib.image.imread(BytesIO(answers["png"].content)).shape[1] == pytest.approx(1050, abs=1)
     assert answers["pdf"].headers["content-disposition"] == f'inline; filename="gaplab-{kind}.pdf"'
     assert found["caption"].split(".")[0] in answers["html"].text
+
+
+def test_while_many_files_are_drawn_others_are_served(
+    url: str, experiment: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sixty readers want a PDF, and the first takes long to draw: most are refused, and no thread is missing."""
+    monkeypatch.setattr(figures, "_DRAWING", WaitingLine("figures", longest_s=DEADLINE_S))
+    asked = {"experiment": experiment, "format": "pdf"}
+    with httpx2.Client(base_url=url, timeout=DEADLINE_S) as http, ThreadPoolExecutor(60) as readers:
+        with files._matplotlib:
+            answers = [readers.submit(http.get, "/figures/curves", params=asked) for _ in range(60)]
+            refused = [each.result() for each in islice(as_completed(answers), 60 - 1 - LENGTH)]
+            others = [http.get(path).status_code for path in ("/livez", "/readyz", "/experiments")]
+        drawn = [each.result() for each in answers if each.result() not in refused]
+
+    assert {each.status_code for each in refused} == {429}
+    assert all(int(each.headers["retry-after"]) > 0 for each in refused)
+    assert others == [200] * 3
+    assert {each.status_code for each in drawn} == {200}
+    assert len({each.content for each in drawn}) == 1
 
 
 def test_curves_are_drawn_against_rollouts_and_time_and_with_each_repetition(api: TestClient, experiment: str) -> None:

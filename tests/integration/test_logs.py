@@ -17,6 +17,7 @@ from gaplab.services import logs
 from tests.integration.test_api_processes import within
 
 SECRET = "Zm9vYmFyLTEyMzQ1"
+TOKEN = "0123456789abcdef" * 4
 
 
 class Terminal(io.StringIO):
@@ -79,10 +80,15 @@ def test_anything_else_gets_json() -> None:
         f"RAY_AUTH_TOKEN={SECRET}",
         f'{{"api_key": "{SECRET}"}}',
         f"GAPLAB_TOKEN: '{SECRET}'",
+        f"GET /experiments/gaplab_0a1b2c_{TOKEN} 404",
+        f"there is nothing with the id 'gaplab_0a1b2c_{TOKEN[:40]}'",
     ],
 )
 def test_what_looks_like_a_secret_is_left_out(message: Any, kind: Any) -> None:
-    assert SECRET not in logged(kind(), "%s", message)
+    said = logged(kind(), "%s", message)
+
+    assert SECRET not in said
+    assert TOKEN[:16] not in said
 
 
 @pytest.mark.usefixtures("restored")
@@ -116,6 +122,13 @@ def test_a_very_long_word_is_looked_through_in_no_time(word: str) -> None:
     assert SECRET not in found
 
 
+def test_a_message_of_any_length_is_logged_in_little_time_and_space() -> None:
+    said = logs.without_secrets("unstable; " * 6_000_000 + SECRET)
+
+    assert 1_000_000 < len(said) < 1_000_100
+    assert said.endswith("(59,000,016 more characters were not logged)")
+
+
 def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_carry_to_itself(tmp_path: Path) -> None:
     """The real process: every line of it is JSON, probes are left out, and no secret that it was given is in any."""
     log = tmp_path / "log"
@@ -137,6 +150,8 @@ def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_car
             assert http.get("/experiments/abc", headers=secret).status_code == 401
             assert http.get("/experiments/abc").status_code == 404
             assert http.get("/experiments", params={"token": SECRET, "x": SECRET}).status_code == 422
+            assert http.get(f"/experiments/gaplab_abc_{TOKEN}/curve").status_code == 404
+            assert http.get(f"/gaplab%5Fabc%5F{TOKEN}", params={"gaplab_abc_": TOKEN}).status_code == 404
     finally:
         process.terminate()
         process.wait(60)
@@ -144,9 +159,12 @@ def test_the_service_logs_requests_with_their_experiment_and_keeps_what_they_car
     said = log.read_text()
     lines = [json.loads(line) for line in said.splitlines()]
     assert SECRET not in said
+    assert TOKEN[:16] not in said
     assert lines[0]["message"].startswith("gaplab serves on http://")
     assert [(each["path"], each["status"], each.get("experiment")) for each in lines[1:]] == [
         ("/experiments/abc", 401, "abc"),
         ("/experiments/abc", 404, "abc"),
         ("/experiments", 422, None),
+        ("/experiments/gaplab_…/curve", 404, "gaplab_…"),
+        ("/gaplab_…", 404, None),
     ]

@@ -1,6 +1,7 @@
 """A Ray of our own lets nobody in but us: it listens on loopback only, and asks for its token."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -21,6 +22,7 @@ from gaplab.workers.__main__ import choose_authentication
 choose_authentication(Settings())
 import ray
 from gaplab.workers.cluster import cluster
+from gaplab.workers.output import limit_prints
 
 def listening():
     sockets = {}
@@ -38,6 +40,17 @@ def listening():
                 yield local.partition(":")[0]
 
 with cluster(Settings(workers=1)):
+    @ray.remote
+    def talk():
+        limit_prints()
+        for _ in range(3_000):
+            print("x" * 9_000)
+        print("y" * 50_000_000, file=sys.stderr)
+        sys.stdout.write("z" * 50_000_000)
+
+    ray.get(talk.remote())
+    logs = ray._private.worker._global_node.get_logs_dir_path()
+    print("LOGS", sum(each.stat().st_size for each in os.scandir(logs)) // 1_000_000)
     address = ray.get_runtime_context().gcs_address
     print("AT", address, *sorted(set(listening())))
     token = os.environ["RAY_AUTH_TOKEN"].encode()
@@ -74,6 +87,7 @@ def test_our_own_ray_listens_on_loopback_and_refuses_a_stranger_whatever_the_env
     assert set(found) <= LOOPBACK
     assert done.stdout.count("REFUSED\n") == 2, done.stdout
     assert "SECRET\n" in done.stdout
+    assert int(re.search(r"LOGS (\d+)", done.stdout)[1]) < 10, done.stdout
     assert not (tmp_path / ".ray").exists()  # where Ray keeps a token that everybody may read
 
 

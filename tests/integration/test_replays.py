@@ -16,6 +16,8 @@ from gaplab.services.core.arrays import frozen
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.types import Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
+from gaplab.services.engines import engines
+from gaplab.services.engines.pybullet.engine import PyBullet
 from gaplab.services.experiments import submission
 from gaplab.services.replay.predictions import predictions
 from gaplab.services.running import execution
@@ -97,6 +99,25 @@ def test_a_transferred_controller_walks_in_its_simulator_and_in_reality_as_it_wa
         assert all(len(feet) > 2 for feet in world.contacts)
         counted = [speed for time, speed in zip(shown.times_s, world.speeds_m_s, strict=True) if time >= 0.5]
         assert np.mean(counted) == pytest.approx(world.fitness, rel=0.2)
+
+
+class Lab(PyBullet):
+    """Hardware, as far as gaplab knows; the process that computes replays does not have it."""
+
+    name = "lab"
+    repeatable = False
+
+
+def test_no_replay_moves_hardware(sqlite_store: Store, api: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(engines._plugins, "lab", Lab)  # type: ignore[attr-defined]
+    experiment, log, _ = walked(sqlite_store, reality={"engine": "lab", "parameters": HIDDEN})
+    monkeypatch.setattr(Lab, "rollout", lambda *_: pytest.fail("it moved"))
+
+    replay = api.get(f"/experiments/{experiment}/replay?iteration=1&kind=transfer")
+    gait = api.get(f"/figures/gait?experiment={experiment}&iteration=1&kind=transfer")
+
+    assert (replay.json()["reality"], replay.json()["simulation"]["fitness"]) == (None, log[6].fitness)
+    assert gait.status_code == 200, gait.text
 
 
 def test_a_sample_is_shown_in_the_simulator_that_it_was_selected_in_or_in_any_other(

@@ -1,6 +1,7 @@
 """Curves and comparisons read from the store."""
 
 import csv
+import io
 from typing import Any
 
 import pytest
@@ -127,6 +128,18 @@ def test_a_comparison_needs_two_experiments(sqlite_store: Store) -> None:
     for ids in ([], [one], [one, one]):
         with pytest.raises(InvalidSpec, match="two or more"):
             curves.compare(sqlite_store, ids)
+
+
+@pytest.mark.parametrize("name", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "=cmd|' /C calc'!A0"])
+def test_a_name_in_the_csv_is_no_formula(sqlite_store: Store, name: str) -> None:
+    id_ = submission.submit_experiment(sqlite_store, toy(name=name, repetitions=1)).id
+    (claim,) = execution.claim(sqlite_store, "me", 1)
+    run(sqlite_store, claim, some_log(recorded=-2.0))
+
+    lines = list(csv.DictReader(io.StringIO(curves.curves_csv([curves.curve(sqlite_store, id_)]), newline="")))
+
+    assert {each["name"] for each in lines} == {f"'{name}".replace("\r", "\n")}
+    assert lines[0]["fitness"] == "-2.0"
 
 
 def test_the_csv_has_a_line_for_each_value(sqlite_store: Store) -> None:

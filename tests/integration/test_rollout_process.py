@@ -8,12 +8,14 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import pytest
 
 from gaplab.services.core.errors import EngineInterrupted, EngineUnavailable, LimitReached
-from gaplab.services.replay.process import NICENESS, AnswerCache, RolloutProcess
+from gaplab.services.replay.process import MOST_OUTPUT, NICENESS, AnswerCache, RolloutProcess
+from gaplab.services.waiting_line import WaitingLine
 
 DEADLINE_S = 120.0
 
@@ -109,12 +111,32 @@ def _unavailable() -> None:
     raise EngineUnavailable("pip install it")
 
 
+def test_of_what_a_call_prints_the_beginning_is_logged(rollouts: Any, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO")
+
+    for word in ("first", "second"):
+        assert rollouts.call(_print, word) == word
+        wait_until(lambda word=word: f"{word} to stderr" in caplog.text)
+    assert rollouts.call(os.write, 1, b"x" * 10_000_000) == 10_000_000
+    wait_until(lambda: "no more of this call is logged" in caplog.text)
+
+    assert "first to stdout" in caplog.text
+    assert len(caplog.text) < 3 * MOST_OUTPUT
+
+
+def _print(word: str) -> str:
+    sys.stdout.write(f"{word} to stdout\n")
+    sys.stdout.flush()
+    sys.stderr.write(f"{word} to stderr\n")
+    return word
+
+
 def test_a_call_that_waits_too_long_for_others_is_refused() -> None:
-    rollouts = RolloutProcess(queue_s=0.1)
+    rollouts = RolloutProcess(line=WaitingLine("replays", longest_s=0.1))
     rollouts.call(abs, -1)
     with ThreadPoolExecutor(1) as other:
         slow = other.submit(rollouts.call, time.sleep, DEADLINE_S)
-        wait_until(rollouts._lock.locked)
+        wait_until(rollouts._line.lock.locked)
 
         with pytest.raises(LimitReached, match="try again soon"):
             rollouts.call(abs, -1)
@@ -124,6 +146,25 @@ def test_a_call_that_waits_too_long_for_others_is_refused() -> None:
             slow.result(DEADLINE_S)
     with pytest.raises(EngineInterrupted, match="shutting down"):
         rollouts.call(abs, -1)
+
+
+def test_beyond_its_length_a_line_refuses_at_once_and_has_room_again_later() -> None:
+    line, free = WaitingLine("figures", longest_s=DEADLINE_S, length=2), Event()
+
+    def work(_: int) -> bool:
+        with line.turn():
+            return free.wait(DEADLINE_S)
+
+    with ThreadPoolExecutor(3) as others:
+        served = others.map(work, range(3))
+        wait_until(lambda: line._places._value == 0)
+        with pytest.raises(LimitReached, match="2 requests wait for figures already") as refused, line.turn():
+            pass
+        free.set()
+        assert all(served)
+
+    assert refused.value.retry_after_s
+    assert work(0)
 
 
 def test_the_process_ends_with_its_parent_even_if_that_is_killed() -> None:

@@ -1,47 +1,181 @@
 """The supervisor as a process: when it gives up, and when it takes what another has lost."""
 
 import os
+import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from gaplab.services.experiments import submission
+import pytest
+from sqlalchemy import select
+
+from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
+from gaplab.services.core.errors import RayGone
+from gaplab.services.experiments import reading, submission
 from gaplab.services.running import execution
 from gaplab.services.settings import Settings
+from gaplab.services.store.models import SupervisorRow
 from gaplab.services.store.session import Store
+from gaplab.workers import watch
 from gaplab.workers.cluster import cluster
+from gaplab.workers.ray_folder import PREFIX, ray_folder
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import toy
 
 DEADLINE_S = 180
 
 
-def raylet_of(process: Any) -> Any:
-    """The raylet that a process started, once it is there."""
-    for path in Path(f"/proc/{process.pid}/task").glob("*/children"):
+def part_of(pid: int, name: str) -> Any:
+    """The process of a part of Ray that a process started."""
+    for path in Path(f"/proc/{pid}/task").glob("*/children"):
         for child in path.read_text().split():
-            if b"/raylet\0" in Path(f"/proc/{child}/cmdline").read_bytes():
+            if f"/{name}\0".encode() in Path(f"/proc/{child}/cmdline").read_bytes():
                 return int(child)
     return None
 
 
-def test_a_supervisor_whose_ray_died_ends_so_that_another_is_started(sqlite_url: str, tmp_path: Path) -> None:
-    environment = os.environ | {"GAPLAB_DATABASE_URL": sqlite_url, "GAPLAB_WORKERS": "1"}
-    log, deadline = tmp_path / "log", time.monotonic() + DEADLINE_S
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    return tmp_path / "log"
+
+
+@pytest.fixture
+def supervisor(sqlite_url: str, log: Path) -> Iterator["subprocess.Popen[bytes]"]:
+    """A supervisor that is ready to work."""
+    environment = os.environ | {"GAPLAB_DATABASE_URL": sqlite_url, "GAPLAB_WORKERS": "1", "GAPLAB_LEASE_S": "3"}
     with log.open("wb") as output:
         command = [sys.executable, "-m", "gaplab.workers", "serve"]
         process = subprocess.Popen(command, env=environment, stdout=output, stderr=output)
-    while b"ready for" not in log.read_bytes():
+    wait(lambda: b"ready for" in log.read_bytes(), log)
+    yield process
+    process.kill()
+    process.wait()
+
+
+def wait(until: Any, log: Path) -> None:
+    deadline = time.monotonic() + DEADLINE_S
+    while not until():
         assert time.monotonic() < deadline, log.read_text()
         time.sleep(0.1)
 
-    os.kill(raylet_of(process), signal.SIGKILL)
 
-    assert process.wait(DEADLINE_S) == 1, log.read_text()
-    assert "Ray died on this machine" in log.read_text()
+@pytest.mark.parametrize("part", ["raylet", "gcs_server"])
+def test_a_supervisor_whose_ray_died_ends_so_that_another_is_started(supervisor: Any, log: Path, part: str) -> None:
+    os.kill(part_of(supervisor.pid, part), signal.SIGKILL)
+
+    assert supervisor.wait(DEADLINE_S) == 1, log.read_text()
+    assert f"Ray died on this machine: its {part} ended" in log.read_text()
+
+
+def test_a_ray_that_stands_still_is_told_from_one_that_works(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(watch, "LOOK_S", 0.1)
+    with cluster(Settings(workers=1)) as joined:
+        gcs = part_of(os.getpid(), "gcs_server")
+        capacity = joined.capacity()
+        os.kill(gcs, signal.SIGSTOP)
+        try:
+            monkeypatch.setattr(watch, "SILENT_S", 1.0)
+            time.sleep(1.5)
+            with pytest.raises(RayGone, match="does not answer"):
+                joined.capacity()
+        finally:
+            os.kill(gcs, signal.SIGCONT)
+
+    assert capacity == 2
+
+
+def test_ray_keeps_its_files_where_only_their_owner_looks_and_removes_them(tmp_path: Path) -> None:
+    with ray_folder() as folder:
+        (folder / "session").mkdir()
+        mode = folder.stat().st_mode & 0o777
+
+    assert mode == 0o700
+    assert not folder.exists()
+
+
+def test_what_a_killed_supervisor_left_of_its_ray_is_removed_at_the_next_start(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with TemporaryDirectory(prefix="g-", dir="/tmp") as parent:
+        monkeypatch.setenv("RAY_TMPDIR", parent)
+        left, starting = (Path(parent) / f"{PREFIX}{name}" for name in ("left", "starting"))
+        for folder in (left, starting):
+            folder.mkdir()
+            (folder / "lock").touch()
+        os.utime(left, (0, 0))
+        with ray_folder() as held:
+            os.utime(held, (0, 0))
+            with ray_folder():
+                found = sorted(Path(parent).iterdir())
+
+    assert left not in found
+    assert {held, starting} <= set(found)
+
+
+def test_sockets_fit_into_a_folder_with_a_long_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RAY_TMPDIR", str(tmp_path / ("long" * 20)))
+
+    with ray_folder() as folder:
+        assert folder.parent == Path("/tmp")
+
+
+@pytest.mark.parametrize("how", ["migrated", "replaced", "restored in place"])
+def test_a_supervisor_whose_database_is_changed_under_it_writes_nothing_more_and_ends(
+    supervisor: Any, log: Path, sqlite_store: Store, sqlite_url: str, sqlite_template: Path, how: str
+) -> None:
+    file = Path(sqlite_url.removeprefix("sqlite:///"))
+    wait(lambda: owners(sqlite_store), log)
+    if how == "migrated":
+        with sqlite3.connect(file, timeout=60) as connection:
+            connection.execute("UPDATE alembic_version SET version_num = '9999'")
+        connection.close()
+    elif how == "replaced":
+        copy = shutil.copy(sqlite_template, file.with_suffix(".new"))
+        Path(copy).replace(file)
+    else:
+        shutil.copyfile(sqlite_template, file)
+
+    assert supervisor.wait(DEADLINE_S) == 1, log.read_text()
+    said = log.read_text().splitlines()[-1]
+    expected = {"migrated": "revision 9999", "replaced": "replaced by another file", "restored in place": "heartbeat"}
+    assert expected[how] in said
+    with sqlite3.connect(file) as connection:
+        assert connection.execute("SELECT count(*) FROM supervisor").fetchone() == (int(how == "migrated"),)
+    connection.close()
+
+
+def test_a_supervisor_that_is_stopped_is_killed_and_another_goes_on(
+    sqlite_url: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    store = Store(sqlite_url)
+    experiment = submission.submit_experiment(store, toy(repetitions=1)).id
+    environment = {"GAPLAB_DATABASE_URL": sqlite_url, "GAPLAB_WORKERS": "1"}
+    kept = SupervisorProcess(environment, silence=Silence(told_s=1, killed_s=15), store=store)
+    kept.start()
+    try:
+        wait(lambda: owners(store), tmp_path / "none")
+        (first,) = owners(store)
+        os.kill(int(first.split(":")[1]), signal.SIGSTOP)
+        wait(lambda: kept.trouble, tmp_path / "none")
+        wait(lambda: owners(store) - {first}, tmp_path / "none")
+        wait(lambda: reading.read_experiment(store, experiment).state.ended, tmp_path / "none")
+    finally:
+        kept.stop()
+
+    assert not Path(f"/proc/{first.split(':')[1]}").exists()
+    assert "did not answer" in capfd.readouterr().err + str(kept.warning)
+    store.dispose()
+
+
+def owners(store: Store) -> set[str]:
+    with store.reading() as session:
+        return set(session.scalars(select(SupervisorRow.owner)))
 
 
 def test_work_goes_to_another_when_its_holder_was_silent_for_as_long_as_a_lease_is_set_to(store: Store) -> None:

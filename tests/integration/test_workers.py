@@ -1,9 +1,11 @@
 """The supervisor on a real Ray: the same numbers as in one process, whatever happens on the way."""
 
+import ctypes
 import os
 import signal
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -18,6 +20,8 @@ from gaplab.services.core.errors import ClusterUnusable, StoreUnavailable
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
+from gaplab.services.engines import engines
+from gaplab.services.engines.analytic import Analytic
 from gaplab.services.experiments import checks, reading, submission
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.settings import Settings
@@ -30,6 +34,8 @@ from gaplab.workers import sensitivity as checking
 from gaplab.workers import task
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.cluster import cluster
+from gaplab.workers.patience import Patience
+from gaplab.workers.permits import PermittedReality
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import cancel
 from tests.fakes import flat
@@ -130,6 +136,89 @@ def test_a_repetition_whose_code_raises_is_failed_with_the_reason_and_the_others
     assert states == [State.COMPLETED, State.FAILED, State.COMPLETED]
     assert (read.state, read.progress.failed) == (State.COMPLETED, 1)
     assert read.reasons == ("ZeroDivisionError: the second one is broken",)
+
+
+def test_a_worker_that_hangs_is_ended_with_the_reason_even_if_it_holds_the_interpreter(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
+    def hanging(claim: Any, *_: Any) -> Iterator[Any]:
+        yield ()
+        if claim.number == 1:
+            ctypes.PyDLL(None).sleep(3600)  # with Python's lock
+        yield from task.delivered(lambda: setting(claim.spec, claim.number), claim, 10.0)
+
+    monkeypatch.setattr(task, "run", hanging)
+    experiment = submission.submit_experiment(sqlite_store, toy()).id
+    patience = Patience(rollout_s=0.25)
+
+    run(Supervisor(sqlite_store, lambda: 3, lease_s=3.0, patience=patience), sqlite_store, experiment)
+
+    states = [each.state for each in reading.list_repetitions(sqlite_store, experiment)]
+    assert states == [State.COMPLETED, State.FAILED, State.COMPLETED]
+    assert "GAPLAB_ROLLOUT_LIMIT_S is 0.25 s" in reading.read_experiment(sqlite_store, experiment).reasons[0]
+
+
+class Bench(Analytic):
+    """Hardware, as far as gaplab knows."""
+
+    name = "bench"
+    repeatable = False
+
+
+def moving(told: Path) -> Any:
+    """A task that moves hardware for an hour; it writes what happens to it into a file."""
+
+    def say(word: str) -> None:
+        with told.open("a") as file:
+            file.write(f"{word}\n")
+
+    def measure(genome: Any) -> float:
+        say("moves")
+        time.sleep(3600)
+        return 0.0
+
+    @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
+    def task_(claim: Any, expected: Any, checkpoint_s: Any, permits: Any) -> Iterator[Any]:
+        def prepared() -> Any:
+            computed = claim.spec.reality.model_copy(update={"engine": claim.spec.engine})
+            whole = setting(claim.spec.model_copy(update={"reality": computed}), claim.number)
+            left = lambda: ray.get(permits.left.remote((claim.id, claim.epoch)))  # noqa: E731
+            return replace(whole, reality=PermittedReality(measure, lambda: say("stops"), left))
+
+        yield ()
+        yield from task.delivered(prepared, claim, 10.0)
+
+    return task_
+
+
+@pytest.mark.parametrize("cancelled", [True, False])
+def test_hardware_stops_when_its_experiment_is_cancelled_or_its_supervisor_stands_still(
+    sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, cancelled: bool
+) -> None:
+    told = tmp_path / "told"
+    monkeypatch.setitem(engines._plugins, "bench", Bench)  # type: ignore[attr-defined]
+    monkeypatch.setattr(task, "run", moving(told))
+    experiment = submission.submit_experiment(sqlite_store, toy(reality={"engine": "bench"})).id
+    other = submission.submit_experiment(sqlite_store, toy(reality={"engine": "bench"})).id
+    supervisor = Supervisor(sqlite_store, lambda: 3, lease_s=3.0)
+
+    run(supervisor, sqlite_store, experiment, until=told.exists)
+    (moves, *waiting) = reading.list_repetitions(sqlite_store, experiment)
+    stopped = lambda: told.read_text().startswith("moves\nstops\n")  # noqa: E731
+    if cancelled:
+        cancel(sqlite_store, experiment)
+        run(supervisor, sqlite_store, other, until=stopped)
+    until(stopped)
+    assert moves.measuring_at is not None
+    assert {each.state for each in waiting} == {State.QUEUED}
+
+
+def until(true: Any) -> None:
+    deadline = time.monotonic() + DEADLINE_S
+    while not true():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
 
 
 def delivering(left_out: Any, attempts: Any) -> Any:

@@ -34,11 +34,6 @@ def own_ray() -> Iterator[None]:
         yield
 
 
-@pytest.fixture(params=["one worker", "two workers"])
-def at_once(request: pytest.FixtureRequest) -> Any:
-    return 1 if request.param == "one worker" else 2
-
-
 def submit(store: Store, found: Any) -> Any:
     """Submit the kept specs; the ids of their experiments."""
     return [
@@ -70,7 +65,8 @@ def assert_kept(computed: Any, kept: Any) -> None:
     assert computed == kept
 
 
-def test_any_number_of_workers_computes_the_kept_numbers(store: Store, at_once: Any) -> None:
+def test_any_number_of_workers_computes_the_kept_numbers(store: Store, store_url: str) -> None:
+    at_once = 2 if store_url.startswith("sqlite") else 1
     studies = [members(archive(name)) for name in ("analytic", "cma_es", "options")]
     ids = [submit(store, found) for found in studies]
 

@@ -2,17 +2,21 @@
 /** Requests to the service, and the stream of its events. */
 
 import { parse, stringify } from "./json.js";
+import { rest } from "./rest.js";
 import { token } from "./token.js";
 import { abortWhenHidden, untilVisible } from "./visibility.js";
 
 const RECONNECT_MS = 1500;
+const MOST_TRIES = 10;
+const OVER = new Set([401, 403, 409]);  // statuses of a stream that cannot be resumed
 
 /** A problem that the service answered with; status 0 means that it did not answer. */
 export class Problem extends Error {
-  /** @param {Partial<Api.Problem> & { retry?: () => void }} problem */
-  constructor({ status = 0, title = "The service does not answer", detail, errors, retry }) {
+  /** @param {Partial<Api.Problem> & { retry?: () => void, retryAfterS?: number }} problem */
+  constructor({ status = 0, title = "The service does not answer", detail, errors, retry, retryAfterS = 0 }) {
     super(detail || title);
     this.status = status;
+    this.retryAfterS = retryAfterS;
     this.title = title;
     this.errors = errors ?? [];
     this.retry = retry;
@@ -27,7 +31,7 @@ export class Problem extends Error {
  * @param {AbortSignal} [signal]
  * @returns {Promise<any>}
  */
-export const get = async (path, query = {}, signal = undefined) => (await request(path + queryString(query), { signal })).json();
+export const get = async (path, query = {}, signal = undefined) => (await requestPatiently(path + queryString(query), { signal })).json();
 
 /**
  * Return the JSON at a path, with its tag.
@@ -43,7 +47,7 @@ export const getTagged = async (path, signal = undefined) => tagged(await reques
  * @param {string} path
  * @param {Page.Query} [query]
  */
-export const getFile = async (path, query = {}) => (await request(path + queryString(query), {})).blob();
+export const getFile = async (path, query = {}) => (await requestPatiently(path + queryString(query), {})).blob();
 
 /**
  * Send a POST, and return the JSON of the answer.
@@ -93,6 +97,23 @@ function send(method, path, body, headers) {
 }
 
 /**
+ * Send a request that only reads. While the service is busy with others, wait as long as it says, and ask again.
+ *
+ * @param {string} path
+ * @param {RequestInit} options
+ */
+async function requestPatiently(path, options) {
+  for (let tries = 1; ; tries += 1) {
+    try {
+      return await request(path, options);
+    } catch (error) {
+      if (error.status !== 429 || !error.retryAfterS || tries === MOST_TRIES) throw error;
+      await rest(1000 * error.retryAfterS, options.signal ?? undefined);
+    }
+  }
+}
+
+/**
  * Send a request, and throw a Problem unless it succeeds. Addresses are relative, so that the service may live below a prefix.
  *
  * @param {string} path
@@ -108,7 +129,8 @@ async function request(path, options) {
     throw unreachable();
   }
   if (answer.ok) return answer;
-  throw new Problem(await answer.json().catch(() => ({ status: answer.status, title: answer.statusText })));
+  const problem = await answer.json().catch(() => ({ status: answer.status, title: answer.statusText }));
+  throw new Problem({ ...problem, retryAfterS: Number(answer.headers.get("Retry-After")) || 0 });
 }
 
 /**
@@ -123,6 +145,7 @@ export const unreachable = (retry = undefined) =>
  * Follow the server-sent events after number `query.after`, or from now on, until `signal`.
  *
  * A stream that breaks off is resumed without a gap. While the page is hidden the stream is closed, and `connected` is not told.
+ * A Problem is thrown when what the page shows no longer holds: the token is not valid, or the database was replaced.
  *
  * @param {Page.Query} query
  * @param {(event: Page.ServerEvent) => void} handler
@@ -149,13 +172,13 @@ export async function streamEvents(query, handler, connected, signal) {
     } catch (error) {
       if (signal.aborted) return;
       if (visible?.signal.aborted) continue;
-      if (error.status === 401 || error.status === 403) throw error;
+      if (OVER.has(error.status)) throw error;
       if (error.status < 500 && error.status > 0) reason = error.message;
     } finally {
       visible?.abort();
     }
     connected(false, reason);
-    await new Promise((resume) => setTimeout(resume, RECONNECT_MS));
+    await rest(RECONNECT_MS, signal);
   }
 }
 

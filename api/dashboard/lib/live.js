@@ -12,7 +12,7 @@ const MOST_EVENTS = 1000;
  *
  * No events are given after a break of the stream, or if there were too many to look at one by one: then everything may have
  * changed. Calls do not overlap; one that failed is repeated. A hidden page waits until it is visible. The bar at the top says
- * when the service is away.
+ * when the service is away. The page is loaded again when the token is no longer valid, or the database was replaced.
  *
  * @param {Page.Query} query
  * @param {(events: Page.ServerEvent[]) => Promise<void>} refresh
@@ -69,7 +69,7 @@ export function follow(query, refresh, signal) {
     clearTimeout(timer ?? undefined);
     showConnection(true);
   });
-  streamEvents(query, happened, connected, signal).catch(() => {});
+  streamEvents(query, happened, connected, signal).catch(() => location.reload());
 }
 
 /**

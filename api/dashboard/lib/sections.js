@@ -2,6 +2,7 @@
 /** Sections of a view that load when they come into sight, and again after events that change them. */
 
 import { failed, loading } from "./placeholders.js";
+import { rest } from "./rest.js";
 
 const REST_FACTOR = 4;
 const RETRY_MS = 1000;
@@ -76,13 +77,3 @@ export function sections(signal) {
     },
   };
 }
-
-/**
- * @param {number} ms
- * @param {AbortSignal} signal
- * @returns {Promise<void>}
- */
-const rest = (ms, signal) => new Promise((resume) => {
-  const timer = setTimeout(resume, ms);
-  signal.addEventListener("abort", () => { clearTimeout(timer); resume(); }, { once: true });
-});

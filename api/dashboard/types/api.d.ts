@@ -1,6 +1,9 @@
 /* Made by `make docs` from the OpenAPI document; what is changed here is lost. */
 
 declare namespace Api {
+  interface Alive {
+    status: string;
+  }
   interface AttemptRead {
     number: number;
     owner: string;
@@ -175,7 +178,8 @@ declare namespace Api {
     table: TableRead | null;
   }
   interface Health {
-    status: string;
+    status: "ok" | "degraded";
+    warnings: Array<string>;
   }
   interface ImportRead {
     study: string | null;

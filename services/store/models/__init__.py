@@ -24,6 +24,7 @@ from gaplab.services.store.models.base import REVISION as REVISION
 from gaplab.services.store.models.base import SPEC_VERSION as SPEC_VERSION
 from gaplab.services.store.models.base import Base as Base
 from gaplab.services.store.models.base import Number as Number
+from gaplab.services.store.models.base import Reason as Reason
 from gaplab.services.store.models.checkpoints import CheckpointRow as CheckpointRow
 from gaplab.services.store.models.events import EventCounterRow as EventCounterRow
 from gaplab.services.store.models.events import EventRow as EventRow

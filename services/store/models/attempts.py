@@ -2,11 +2,11 @@
 
 from datetime import datetime
 
-from sqlalchemy import ForeignKey, String, Text
+from sqlalchemy import ForeignKey, String
 from sqlalchemy.orm import Mapped, mapped_column
 
 from gaplab.schemas.lifecycle import Ending
-from gaplab.services.store.models.base import Base
+from gaplab.services.store.models.base import Base, Reason
 
 
 class AttemptRow(Base):
@@ -27,5 +27,5 @@ class AttemptRow(Base):
     started_at: Mapped[datetime]
     ended_at: Mapped[datetime | None]
     ending: Mapped[Ending | None]
-    reason: Mapped[str | None] = mapped_column(Text)
-    hidden_reason: Mapped[str | None] = mapped_column(Text)
+    reason: Mapped[str | None] = mapped_column(Reason)
+    hidden_reason: Mapped[str | None] = mapped_column(Reason)

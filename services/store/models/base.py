@@ -4,12 +4,13 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any, ClassVar
 
-from sqlalchemy import JSON, Dialect, Double, Enum, MetaData, TypeDecorator
+from sqlalchemy import JSON, Dialect, Double, Enum, MetaData, Text, TypeDecorator
 from sqlalchemy.orm import DeclarativeBase
 
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.store.clock import UtcDateTime
+from gaplab.services.store.texts import brief, storable
 
 REVISION = "0009"
 """The revision with these tables; a database at any other revision is refused."""
@@ -39,6 +40,21 @@ class Number(TypeDecorator[float]):
     def process_bind_param(self, value: float | None, dialect: Dialect) -> float | None:  # noqa: ARG002
         """Replace -0.0 by 0.0."""
         return None if value is None else value + 0.0
+
+
+class Reason(TypeDecorator[str]):
+    """Why something failed, often in the words of a plug-in: stored and read without what exceeds a few lines."""
+
+    impl = Text
+    cache_ok = True
+
+    def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:  # noqa: ARG002
+        """Return the text as it is stored."""
+        return None if value is None else brief(storable(value))
+
+    def process_result_value(self, value: str | None, dialect: Dialect) -> str | None:  # noqa: ARG002
+        """Return the text as it is read: an earlier version may have stored a longer one."""
+        return None if value is None else brief(value)
 
 
 class Base(DeclarativeBase):

@@ -7,7 +7,7 @@ from sqlalchemy import BigInteger, ForeignKey, Index, String, Text, UniqueConstr
 from sqlalchemy.orm import Mapped, mapped_column
 
 from gaplab.schemas.lifecycle import State
-from gaplab.services.store.models.base import SPEC_VERSION, Base
+from gaplab.services.store.models.base import SPEC_VERSION, Base, Reason
 from gaplab.services.store.models.leased import LeasedRow
 
 
@@ -77,7 +77,7 @@ class ExperimentRow(Base):
     claimable: Mapped[bool] = mapped_column(default=True)
     computed_with: Mapped[str | None] = mapped_column(Text)
     refused_by: Mapped[str | None] = mapped_column(Text)
-    paused_because: Mapped[str | None] = mapped_column(Text)
+    paused_because: Mapped[str | None] = mapped_column(Reason)
     hardware: Mapped[str | None] = mapped_column(String(32), index=True)
     sensitivity_id: Mapped[str | None] = mapped_column(String(32), index=True)
     token_id: Mapped[str | None] = mapped_column(String(32))
@@ -122,5 +122,5 @@ class RepetitionRow(LeasedRow):
     seconds: Mapped[float] = mapped_column(default=0.0)
     provenance_id: Mapped[str | None] = mapped_column(String(32))
     measuring_at: Mapped[datetime | None]
-    hidden_error: Mapped[str | None] = mapped_column(Text)
+    hidden_error: Mapped[str | None] = mapped_column(Reason)
     hardware: Mapped[str | None] = mapped_column(String(32))

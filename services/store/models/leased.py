@@ -3,11 +3,11 @@
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import String, Text
+from sqlalchemy import String
 from sqlalchemy.orm import Mapped, mapped_column
 
 from gaplab.schemas.lifecycle import State
-from gaplab.services.store.models.base import Base
+from gaplab.services.store.models.base import Base, Reason
 
 
 class LeasedRow(Base):
@@ -31,6 +31,6 @@ class LeasedRow(Base):
     heartbeat_at: Mapped[datetime | None]
     attempts: Mapped[int] = mapped_column(default=0)
     losses: Mapped[int] = mapped_column(default=0)
-    error: Mapped[str | None] = mapped_column(Text)
+    error: Mapped[str | None] = mapped_column(Reason)
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]

@@ -17,6 +17,7 @@ from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Claim, TimedStep
 from gaplab.services.store.models import EventCounterRow, EventRow
 from gaplab.services.store.queries.step_rows import finite
+from gaplab.services.store.texts import brief
 
 _NOTED = "events"
 
@@ -45,9 +46,10 @@ def note(session: Session, kind: EventKind, experiment: str, repetition: int | N
         kind: kind of the event.
         experiment: id of the experiment.
         repetition: number of the repetition, for an event of a repetition.
-        body: a few JSON values; never reality's parameters.
+        body: a few JSON values, of which long texts are cut; never reality's parameters.
     """
-    values = {"kind": kind.value, "experiment_id": experiment, "repetition": repetition, "body": body}
+    short = {name: brief(value) if isinstance(value, str) else value for name, value in body.items()}
+    values = {"kind": kind.value, "experiment_id": experiment, "repetition": repetition, "body": short}
     session.info.setdefault(_NOTED, []).append(values)
 
 

@@ -71,15 +71,15 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
 
 def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, tuple[int, int]]:
     """Lock the repetitions whose claims are valid; return their numbers of steps, and of checkpoints of the next."""
-    by_key = {(each.id, each.epoch): each for each in claims}
+    by_key: dict[tuple[int, int, str | None], Claim] = {(each.id, each.epoch, each.owner): each for each in claims}
     row = RepetitionRow
     found = session.execute(
-        select(row.id, row.epoch, row.steps, row.checkpoints)
-        .where(tuple_(row.id, row.epoch).in_(list(by_key)), row.state == State.RUNNING)
+        select(row.id, row.epoch, row.owner, row.steps, row.checkpoints)
+        .where(tuple_(row.id, row.epoch, row.owner).in_(list(by_key)), row.state == State.RUNNING)
         .order_by(row.id)
         .with_for_update()
     )
-    return {by_key[repetition, epoch]: (steps, parts) for repetition, epoch, steps, parts in found}
+    return {by_key[id_, epoch, owner]: (steps, parts) for id_, epoch, owner, steps, parts in found}
 
 
 def _new(claim: Claim, length: int, delivered: Iterable[Delivered]) -> list[TimedStep]:

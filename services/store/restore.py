@@ -1,0 +1,118 @@
+"""A backup put in the place of a SQLite database."""
+
+import os
+import shlex
+import sqlite3
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from gaplab.services.core.errors import StoreDamaged, StoreUnavailable, Unsupported
+from gaplab.services.store.atomic_files import replacing
+from gaplab.services.store.backup import copy_checked
+from gaplab.services.store.engine import parse
+from gaplab.services.store.models import REVISION
+from gaplab.services.store.sqlite_file import COMPANIONS, PRIVATE, file_of, unused
+
+PG_RESTORE = 'pg_restore --clean --if-exists --dbname="postgresql:${{GAPLAB_DATABASE_URL#*:}}" {file}'
+
+
+@dataclass(frozen=True)
+class Restored:
+    """A restored database.
+
+    Attributes:
+        file: the database.
+        kept: what was there before, under another name; None if nothing was.
+        revision: of its schema; an older one than this version's is migrated by the next `gaplab serve`.
+    """
+
+    file: Path
+    kept: Path | None
+    revision: str
+
+
+def restore(url: str, source: Path) -> Restored:
+    """Put a backup in the place of the database, which keeps its content under another name.
+
+    The backup is copied, and checked, before anything is replaced. A crash leaves either the former database or the
+    restored one under the name.
+
+    Args:
+        url: of the database.
+        source: the backup, which stays as it is.
+
+    Raises:
+        Unsupported: the database is a Postgres; the message says what restores one.
+        StoreUnavailable: a service runs on the database, or the file is no backup that this version can use.
+        StoreDamaged: the backup is damaged.
+        OSError: the file is absent, or the database's folder cannot be written.
+    """
+    file = _place(url, source)
+    with unused(file), replacing(file, PRIVATE) as part:
+        _copy(source, part)
+        revision = _check(source, part)
+        kept = _set_aside(file) if file.exists() else None
+    return Restored(file, kept, revision)
+
+
+def _place(url: str, source: Path) -> Path:
+    parsed = parse(url)
+    if parsed.get_backend_name() != "sqlite":
+        msg = (
+            f"a Postgres database is restored by Postgres' own tool: {PG_RESTORE.format(file=shlex.quote(str(source)))}"
+        )
+        raise Unsupported(msg)
+    if (file := file_of(parsed)) is None:
+        msg = f"{url} names no file, so nothing can be restored to it"
+        raise StoreUnavailable(msg)
+    if not source.is_file():
+        raise FileNotFoundError(None, "there is no such file", str(source))
+    if file.exists() and file.samefile(source):
+        msg = f"{source} is the database itself, not a backup of it"
+        raise StoreUnavailable(msg)
+    return file
+
+
+def _copy(source: Path, part: Path) -> None:
+    """Copy what the backup holds, including transactions that are still in its journal."""
+    try:
+        with closing(sqlite3.connect(f"{source.absolute().as_uri()}?mode=ro", uri=True)) as connection:
+            copy_checked(connection, part)
+    except StoreDamaged as error:
+        msg = f"{source} is damaged, or no database: {error}"
+        raise StoreDamaged(msg) from error
+    except sqlite3.Error as error:
+        msg = f"{source} cannot be read: {error}"
+        raise StoreUnavailable(msg) from error
+
+
+def _check(source: Path, copy: Path) -> str:
+    """Return the revision of the copy's schema, if it is a whole database of gaplab."""
+    with closing(sqlite3.connect(copy)) as connection:
+        try:
+            (revision,) = connection.execute("SELECT version_num FROM alembic_version").fetchone() or ("none",)
+            connection.execute("SELECT count(*) FROM experiment, repetition")
+        except sqlite3.OperationalError as error:
+            msg = f"{source} is no database of gaplab: {error}"
+            raise StoreUnavailable(msg) from error
+        if revision > REVISION:
+            msg = f"{source} is of a later version of gaplab: its revision is {revision}, this version knows {REVISION}"
+            raise StoreUnavailable(msg)
+        if broken := connection.execute("PRAGMA foreign_key_check").fetchone():
+            msg = f"{source} is damaged: a row of {broken[0]} refers to a row of {broken[2]} that is missing"
+            raise StoreDamaged(msg)
+    return str(revision)
+
+
+def _set_aside(file: Path) -> Path:
+    """Give the database a second name, and take its journals away from the first; return the second name."""
+    with suppress(sqlite3.Error), closing(sqlite3.connect(file)) as connection:
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")  # opening it has brought its journals in
+    kept = file.with_name(f"{file.name}.replaced-{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}")
+    os.link(file, kept)
+    for ending in COMPANIONS:
+        with suppress(FileNotFoundError):
+            file.with_name(file.name + ending).rename(kept.with_name(kept.name + ending))
+    return kept

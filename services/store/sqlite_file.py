@@ -1,0 +1,140 @@
+"""The file of a SQLite database: who may read it, whether it is the same as before, and whether it is whole."""
+
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+
+from sqlalchemy import URL
+
+from gaplab.services.core.errors import StoreDamaged, StoreUnavailable
+
+try:
+    import fcntl
+except ImportError:  # not on Windows
+    fcntl = None  # type: ignore[assignment]
+
+HINT = "end the service and run `gaplab restore BACKUP`"
+"""What to do about a database that is gone or damaged."""
+
+PRIVATE = 0o600
+"""Permissions of what holds results: the owner's alone."""
+
+_DAMAGED = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
+
+COMPANIONS = ("-journal", "-wal", "-shm")
+"""Endings of the files that SQLite keeps beside a database; the first two hold transactions that are not in it yet."""
+
+
+def file_of(url: URL) -> Path | None:
+    """Return the file of a SQLite URL; None for Postgres, and for a database in memory."""
+    name = url.database or ""
+    if url.get_backend_name() != "sqlite" or name in {"", ":memory:"} or name.startswith("file:"):
+        return None
+    return Path(name)
+
+
+def identity(file: Path) -> tuple[int, int] | None:
+    """Return what tells a file from another of the same name; None if there is none."""
+    try:
+        found = file.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
+
+
+def create(file: Path) -> None:
+    """Create an absent file for its owner alone; SQLite gives its companions the same permissions."""
+    with suppress(OSError):  # SQLite says what is wrong
+        os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, PRIVATE))
+
+
+def is_damage(error: BaseException | None) -> bool:
+    """Return whether SQLite found a file damaged, or no database at all."""
+    return getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED  # the low byte is the kind of error
+
+
+def is_open_to_others(file: Path) -> bool:
+    """Return whether other users of the machine may read or write the file."""
+    return file.is_file() and bool(file.stat().st_mode & 0o077)
+
+
+def refuse_damaged(file: Path) -> None:
+    """Check the structure of a database that may be absent; it reads the whole file.
+
+    Raises:
+        StoreDamaged: it is damaged, or no database; the message says what to do.
+        StoreUnavailable: it cannot be read now.
+    """
+    if not file.is_file() or not file.stat().st_size:
+        return
+    try:
+        with closing(sqlite3.connect(file, timeout=30)) as connection:
+            (found,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+    except sqlite3.OperationalError as error:
+        msg = f"the database {file} cannot be read: {error}"
+        raise StoreUnavailable(msg) from error
+    except sqlite3.DatabaseError as error:
+        found = str(error)
+    if found != "ok":
+        msg = f"the database {file} is damaged ({found}): {HINT}"
+        raise StoreDamaged(msg)
+
+
+@contextmanager
+def in_use(file: Path | None) -> Iterator[None]:
+    """Mark the database as used by a service for as long as the context lasts, so that no restore replaces it.
+
+    Raises:
+        StoreUnavailable: a restore replaces it right now.
+    """
+    with _locked(file, exclusive=False) as held:
+        if not held:
+            msg = f"the database {file} is being restored: start again when that is done"
+            raise StoreUnavailable(msg)
+        yield
+
+
+@contextmanager
+def unused(file: Path) -> Iterator[None]:
+    """Keep services from the database for as long as the context lasts.
+
+    Raises:
+        StoreUnavailable: a service runs on it.
+    """
+    with _locked(file, exclusive=True) as held:
+        if not held:
+            msg = f"a service runs on the database {file}: end it first"
+            raise StoreUnavailable(msg)
+        yield
+
+
+@contextmanager
+def _locked(file: Path | None, *, exclusive: bool) -> Iterator[bool]:
+    """Hold a lock on a file beside the database; the kernel drops it when the process ends, however that happens.
+
+    The database itself must not be opened for it: closing it again would drop SQLite's own locks.
+    """
+    descriptor = _lock_file(file)
+    if descriptor is None:
+        yield True
+        return
+    try:
+        fcntl.flock(descriptor, (fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH) | fcntl.LOCK_NB)
+        held = True
+    except OSError:
+        held = False
+    try:
+        yield held
+    finally:
+        os.close(descriptor)
+
+
+def _lock_file(file: Path | None) -> int | None:
+    """Return the open lock file of a database; None where there can be none, as in a folder that is read only."""
+    if file is None or fcntl is None:
+        return None
+    with suppress(OSError):
+        return os.open(file.with_name(f"{file.name}.lock"), os.O_CREAT | os.O_RDWR, PRIVATE)
+    return None

@@ -1,0 +1,18 @@
+"""Texts as a database takes them."""
+
+LONGEST_REASON = 2_000
+"""Characters of a reason; lists of experiments have those of every failed repetition."""
+
+_BEGINNING = LONGEST_REASON - 100
+
+
+def storable(text: str) -> str:
+    """Return the text with NUL characters and lone surrogates replaced, which databases refuse."""
+    return text.encode(errors="replace").decode().replace("\0", "\N{REPLACEMENT CHARACTER}")
+
+
+def brief(text: str) -> str:
+    """Return the text, or its beginning if it has more than `LONGEST_REASON` characters."""
+    if len(text) <= LONGEST_REASON:
+        return text
+    return f"{text[:_BEGINNING]}… (the beginning of {len(text):,} characters, which are in the log)"

@@ -1,0 +1,214 @@
+"""A backup put back: only a whole database of gaplab, only while no service runs, and nothing is lost by it."""
+
+import os
+import shutil
+import sqlite3
+import stat
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gaplab.api.commands.cli import main
+from gaplab.services.core.errors import StoreDamaged, StoreUnavailable, Unsupported
+from gaplab.services.experiments import listing, submission
+from gaplab.services.store import restore as restoring
+from gaplab.services.store.backup import backup
+from gaplab.services.store.restore import restore
+from gaplab.services.store.session import Store
+from gaplab.services.store.sqlite_file import in_use
+from tests.experiments import toy
+
+
+@pytest.fixture
+def url(sqlite_template: Path, tmp_path: Path) -> str:
+    """A database with one experiment."""
+    url = f"sqlite:///{shutil.copy(sqlite_template, tmp_path / 'gaplab.db')}"
+    submit(url)
+    return url
+
+
+@pytest.fixture
+def copied(url: str, tmp_path: Path) -> Path:
+    """A backup of it, after which a second experiment was submitted."""
+    backup(url, tmp_path / "backup.db")
+    submit(url)
+    return tmp_path / "backup.db"
+
+
+def submit(url: str) -> None:
+    store = Store(url)
+    submission.submit_experiment(store, toy())
+    store.dispose()
+
+
+def count(file: Path) -> int:
+    store = Store(f"sqlite:///{file}")
+    store.check()
+    found = len(listing.list_experiments(store).items)
+    store.dispose()
+    return found
+
+
+def test_a_restored_database_is_the_backup_and_the_former_one_is_kept(url: str, copied: Path, tmp_path: Path) -> None:
+    done = restore(url, copied)
+
+    assert done.kept is not None
+    assert [count(file) for file in (tmp_path / "gaplab.db", done.kept, copied)] == [1, 2, 1]
+    assert stat.S_IMODE((tmp_path / "gaplab.db").stat().st_mode) == 0o600
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_where_there_is_no_database_the_backup_becomes_one(copied: Path, tmp_path: Path) -> None:
+    done = restore(f"sqlite:///{tmp_path / 'new.db'}", copied)
+
+    assert done.kept is None
+    assert count(tmp_path / "new.db") == 1
+
+
+def test_nothing_is_restored_while_a_service_runs_on_the_database(url: str, copied: Path, tmp_path: Path) -> None:
+    with in_use(tmp_path / "gaplab.db"), pytest.raises(StoreUnavailable, match="a service runs on the database"):
+        restore(url, copied)
+
+    assert count(tmp_path / "gaplab.db") == 2
+    restore(url, copied)
+
+
+@pytest.mark.parametrize("damage", ["a page", "half of it", "a row", "text", "another database", "of the future"])
+def test_what_is_no_whole_backup_of_this_version_is_refused_and_nothing_is_touched(
+    url: str, copied: Path, tmp_path: Path, damage: str
+) -> None:
+    spoil(copied, damage)
+    before = (tmp_path / "gaplab.db").read_bytes()
+
+    with pytest.raises(StoreUnavailable, match=r"damaged|no database of gaplab|later version"):
+        restore(url, copied)
+
+    assert (tmp_path / "gaplab.db").read_bytes() == before
+    assert not [*tmp_path.glob("*.part"), *tmp_path.glob("*.replaced-*")]
+
+
+def spoil(file: Path, damage: str) -> None:
+    """Do to a database what a bad disk, a bad copy or a mistake does."""
+    content = file.read_bytes()
+    if damage == "a page":
+        file.write_bytes(content[: len(content) // 2] + os.urandom(8192) + content[len(content) // 2 + 8192 :])
+    elif damage == "half of it":
+        file.write_bytes(content[: len(content) // 2])
+    elif damage == "text":
+        file.write_text("this is no database" * 100)
+    else:
+        statement = {
+            "a row": "DELETE FROM experiment",
+            "another database": "DROP TABLE alembic_version",
+            "of the future": "UPDATE alembic_version SET version_num = '9999'",
+        }
+        connection = sqlite3.connect(file)
+        with connection:
+            connection.execute(statement[damage])
+        connection.close()
+
+
+def test_a_damaged_database_can_be_replaced_too(url: str, copied: Path, tmp_path: Path) -> None:
+    file = tmp_path / "gaplab.db"
+    spoil(file, "a page")
+    damaged = file.read_bytes()
+
+    done = restore(url, copied)
+
+    assert done.kept is not None
+    assert done.kept.read_bytes() == damaged
+    assert count(file) == 1
+
+
+def left_by_a_kill(file: Path, target: Path) -> None:
+    """Copy a database as a killed process leaves one: its latest transaction is in the write-ahead log alone."""
+    source = sqlite3.connect(shutil.copy(file, file.with_name("wal.db")))
+    source.execute("PRAGMA journal_mode=WAL")
+    source.execute("PRAGMA wal_autocheckpoint=0")
+    with source:
+        source.execute("UPDATE experiment SET name = 'in the journal'")
+    for ending in ("", "-wal"):
+        shutil.copy(file.with_name(f"wal.db{ending}"), target.with_name(target.name + ending))
+    source.close()
+
+
+def names(file: Path) -> set[str]:
+    store = Store(f"sqlite:///{file}")
+    found = {each.name for each in listing.list_experiments(store).items}
+    store.dispose()
+    return found
+
+
+def test_journals_of_the_former_database_go_with_it(url: str, copied: Path, tmp_path: Path) -> None:
+    file = tmp_path / "gaplab.db"
+    left_by_a_kill(file, file)
+
+    done = restore(url, copied)
+
+    assert done.kept is not None
+    assert names(done.kept) == {"in the journal"}
+    assert names(file) == {"simulated_fit"}
+
+
+def test_a_backup_with_transactions_in_its_journal_is_restored_with_them(url: str, tmp_path: Path) -> None:
+    left_by_a_kill(tmp_path / "gaplab.db", tmp_path / "backup.db")
+
+    restore(url, tmp_path / "backup.db")
+
+    assert names(tmp_path / "gaplab.db") == {"in the journal"}
+
+
+def test_a_crash_in_the_middle_leaves_the_former_database(
+    url: str, copied: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Killed(BaseException):
+        """Stands for a death after which nothing is tidied up."""
+
+    def die(*_: Any) -> None:
+        raise Killed
+
+    monkeypatch.setattr(restoring.os, "link", die)
+    with pytest.raises(Killed):
+        restore(url, copied)
+
+    assert count(tmp_path / "gaplab.db") == 2
+
+
+def test_a_database_is_no_backup_of_itself(url: str, tmp_path: Path) -> None:
+    with pytest.raises(StoreUnavailable, match="the database itself"):
+        restore(url, tmp_path / "gaplab.db")
+
+
+def test_of_postgres_it_says_what_restores_one(copied: Path) -> None:
+    with pytest.raises(Unsupported, match="pg_restore --clean") as refusal:
+        restore("postgresql://me:secret@127.0.0.1/gaplab", copied)
+
+    assert "secret" not in str(refusal.value)
+
+
+def test_the_command_says_what_it_did(
+    url: str, copied: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("GAPLAB_DATABASE_URL", url)
+
+    codes = []
+    for arguments in (["restore", str(copied)], ["restore", str(copied), "--json"], ["restore", "gone.db"]):
+        monkeypatch.setattr(sys, "argv", ["gaplab", *arguments])
+        with pytest.raises(SystemExit) as end:
+            main()
+        codes.append(end.value.code)
+
+    said = capsys.readouterr()
+    assert codes == [0, 0, 7]
+    assert "gaplab.db.replaced-" in said.out
+    assert '"revision"' in said.out
+    assert "gone.db" in said.err
+
+
+def test_a_damaged_copy_is_named_damaged(url: str, copied: Path) -> None:
+    spoil(copied, "half of it")
+
+    with pytest.raises(StoreDamaged):
+        restore(url, copied)

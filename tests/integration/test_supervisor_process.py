@@ -1,0 +1,205 @@
+"""A supervisor that hangs is killed, one that dies is replaced at once, and `/readyz` tells of both."""
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi import FastAPI
+from fastapi.testclient import TestClient
+from sqlalchemy import text
+
+from gaplab.api.app import create_app
+from gaplab.api.process import supervisor_process
+from gaplab.api.process.supervisor_process import Silence, SupervisorProcess
+from gaplab.schemas.lifecycle import Ending
+from gaplab.services.experiments import reading, submission
+from gaplab.services.running import execution, supervisors
+from gaplab.services.store.session import Store
+from tests.experiments import toy
+from tests.integration.test_api_processes import within
+
+SOON = Silence(told_s=1, killed_s=3)
+
+BEATING = """
+import os, signal, sys, time
+from gaplab.services.running import execution
+from gaplab.services.running.pulse import Pulse
+from gaplab.services.store.session import Store
+
+pulse = Pulse.inherited()
+pulse.name("kept")
+with open(os.environ["NOTES"], "a") as notes:
+    notes.write(f"{os.getpid()}\\n")
+"""
+STANDS_STILL = """
+execution.claim(Store(os.environ["GAPLAB_DATABASE_URL"]), "kept", 1)
+pulse.beat()
+os.kill(os.getpid(), signal.SIGSTOP)
+"""
+DIES = """
+pulse.beat()
+pulse.explain("Ray died on this machine")
+sys.exit(1)
+"""
+LIVES = """
+while True:
+    pulse.beat()
+    time.sleep(0.1)
+"""
+
+
+@pytest.fixture
+def notes(tmp_path: Path) -> Path:
+    """Where each supervisor notes its process id."""
+    return tmp_path / "notes"
+
+
+@pytest.fixture
+def keep(tmp_path: Path, notes: Path, sqlite_store: Store) -> Iterator[Callable[[str], SupervisorProcess]]:
+    """Keeps a supervisor that does what a script says."""
+    kept: list[SupervisorProcess] = []
+
+    def keep(script: str) -> SupervisorProcess:
+        (tmp_path / "scripted.py").write_text(BEATING + script)
+        root = Path(__file__).parents[2]
+        environment = {"PYTHONPATH": f"{tmp_path}:{root}", "NOTES": str(notes)}
+        environment["GAPLAB_DATABASE_URL"] = f"sqlite:///{sqlite_store.file}"
+        kept.append(SupervisorProcess(environment, module="scripted", silence=SOON, store=sqlite_store))
+        kept[-1].start()
+        return kept[-1]
+
+    yield keep
+    for each in kept:
+        each.stop()
+
+
+@pytest.fixture
+def app(sqlite_store: Store) -> FastAPI:
+    return create_app(sqlite_store)
+
+
+def pids(notes: Path) -> list[int]:
+    return [int(line) for line in notes.read_text().split()] if notes.exists() else []
+
+
+def readyz(app: FastAPI) -> Any:
+    return TestClient(app).get("/readyz")
+
+
+def test_a_supervisor_that_stands_still_is_killed_and_its_work_goes_to_another(
+    keep: Callable[[str], SupervisorProcess], notes: Path, app: FastAPI, sqlite_store: Store
+) -> None:
+    experiment = submission.submit_experiment(sqlite_store, toy(repetitions=1)).id
+    app.state.supervisor = keep(STANDS_STILL)
+
+    assert within(60, lambda: readyz(app).status_code == 503)
+    told = readyz(app).json()
+    assert within(60, lambda: len(pids(notes)) > 1)
+
+    assert told["type"] == "urn:gaplab:problem:supervisor-unavailable"
+    assert "has not answered for" in told["detail"]
+    assert "killed and started again" in told["detail"]
+    assert not Path(f"/proc/{pids(notes)[0]}").exists()
+    attempt = reading.list_attempts(sqlite_store, experiment, 0)[0]
+    assert attempt.ending is Ending.LOST
+    assert "did not answer" in str(attempt.reason)
+
+
+def test_one_that_dies_again_and_again_is_told_with_its_reason(
+    keep: Callable[[str], SupervisorProcess], notes: Path, app: FastAPI, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervisor_process, "LONGEST_PAUSE_S", 0.1)
+    app.state.supervisor = keep(DIES)
+
+    assert within(60, lambda: len(pids(notes)) > 1)
+    early = readyz(app)
+    assert within(60, lambda: readyz(app).status_code == 503)
+
+    assert "Ray died on this machine" in early.text
+    assert "times in a row" in readyz(app).json()["detail"]
+    assert "exit code 1: Ray died on this machine" in readyz(app).json()["detail"]
+
+
+def test_after_a_long_life_the_trouble_is_forgotten(
+    keep: Callable[[str], SupervisorProcess], notes: Path, app: FastAPI, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervisor_process, "LONG_LIFE_S", 1.0)
+    monkeypatch.setattr(supervisor_process, "LONGEST_PAUSE_S", 0.1)
+    app.state.supervisor = keep(LIVES)
+    assert within(60, lambda: len(pids(notes)) == 1)
+
+    os.kill(pids(notes)[0], signal.SIGKILL)
+    assert within(60, lambda: "exit code -9" in readyz(app).text)
+
+    assert within(60, lambda: readyz(app).json() == {"status": "ok"})
+    assert len(pids(notes)) == 2
+
+
+def test_a_silent_supervisor_of_another_process_is_told_as_a_warning(sqlite_store: Store, app: FastAPI) -> None:
+    supervisors.heartbeat(sqlite_store, "elsewhere")
+    well = readyz(app)
+    app.state.lease_s = 0.1
+    time.sleep(0.2)
+
+    assert well.json() == {"status": "ok"}
+    told = readyz(app)
+    assert (told.status_code, told.json()["status"]) == (200, "degraded")
+    assert "no supervisor has been heard of for" in told.json()["warnings"][0]
+
+
+def test_work_without_any_supervisor_is_told(sqlite_store: Store, app: FastAPI) -> None:
+    submission.submit_experiment(sqlite_store, toy())
+
+    assert "no supervisor runs them" in readyz(app).json()["warnings"][0]
+
+
+def test_supervisors_that_die_again_and_again_elsewhere_are_told(store: Store) -> None:
+    app = create_app(store)
+    for name in ("first", "second", "third"):
+        supervisors.heartbeat(store, name)
+    store.write(lambda session: session.execute(text(_AGED[session.get_bind().dialect.name])))
+    supervisors.heartbeat(store, "fourth")
+
+    assert "3 supervisors died" in readyz(app).json()["warnings"][0]
+    store.dispose()
+
+
+_AGED = {
+    "sqlite": "UPDATE supervisor SET heartbeat_at = strftime('%Y-%m-%d %H:%M:%f', 'now', '-2 minutes') || '000'",
+    "postgresql": "UPDATE supervisor SET heartbeat_at = heartbeat_at - interval '2 minutes'",
+}
+_AHEAD = {
+    "sqlite": "strftime('%Y-%m-%d %H:%M:%f', 'now', '+1 hour') || '000'",
+    "postgresql": "clock_timestamp() + interval '1 hour'",
+}
+
+
+def test_a_clock_that_was_set_back_by_an_hour_stalls_nothing(store: Store) -> None:
+    experiment = submission.submit_experiment(store, toy(repetitions=1)).id
+    (claim,) = execution.claim(store, "crashed", 1)
+    supervisors.heartbeat(store, "crashed")
+    for table in ("repetition", "supervisor"):
+        ahead = f"UPDATE {table} SET heartbeat_at = {_AHEAD[store._engine.name]}"
+        store.write(lambda session, statement: session.execute(text(statement)), ahead)
+
+    requeued = execution.requeue_lost(store)
+    (again,) = execution.claim(store, "other", 1)
+
+    assert requeued == 1
+    assert again.epoch == claim.epoch + 1
+    assert reading.list_attempts(store, experiment, 0)[0].reason == "the clock was set back since its heartbeat"
+    assert execution.heartbeat(store, [claim]) == ()
+    told = readyz(create_app(store)).json()["warnings"][0]
+    assert "no supervisor has been heard of" in told
+
+
+def test_a_clock_that_goes_back_a_little_loses_no_lease(store: Store) -> None:
+    submission.submit_experiment(store, toy(repetitions=1))
+    (claim,) = execution.claim(store, "me", 1)
+
+    assert execution.requeue_lost(store, stale_after_s=5) == 0
+    assert execution.heartbeat(store, [claim]) == (claim,)

@@ -1,0 +1,75 @@
+"""The folder of a Ray that this process starts: private, and removed with it."""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from time import time
+
+try:
+    import fcntl
+except ImportError:  # not on Windows
+    fcntl = None  # type: ignore[assignment]
+
+PREFIX = "gaplab-ray-"
+
+LONGEST_PARENT = 24
+"""Characters of the parent's path: the path of a socket has at most 107, and Ray and the folder's name take 83.
+
+Source: man 7 unix.
+"""
+
+STARTING_S = 60.0
+"""Age before which a folder without a holder may be one that is just being made."""
+
+
+@contextmanager
+def ray_folder() -> Iterator[Path]:
+    """Make a folder that only this user can enter, and remove it when the context ends.
+
+    Ray's own default is one that all users of the machine share, where others could connect to its sockets. Folders of
+    processes that were killed are removed at the next start.
+    """
+    parent = _parent()
+    _sweep(parent)
+    folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))  # with mode 0700
+    held = _hold(folder)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if held is not None:
+            os.close(held)
+
+
+def _parent() -> Path:
+    """Return the folder for temporary files, or /tmp if its path is too long for the sockets."""
+    wanted = Path(os.environ.get("RAY_TMPDIR") or tempfile.gettempdir()).absolute()
+    return wanted if len(str(wanted)) <= LONGEST_PARENT else Path("/tmp")  # noqa: S108 - the folder in it is private
+
+
+def _sweep(parent: Path) -> None:
+    """Remove the folders of this user whose process has ended."""
+    for folder in parent.glob(f"{PREFIX}*"):
+        with suppress(OSError):
+            found = folder.lstat()
+            if found.st_uid != os.geteuid() or time() - found.st_mtime < STARTING_S:
+                continue
+            if (held := _hold(folder)) is not None:
+                shutil.rmtree(folder, ignore_errors=True)
+                os.close(held)
+
+
+def _hold(folder: Path) -> int | None:
+    """Lock the folder for as long as this process lives, and return the descriptor; None if another holds it."""
+    if fcntl is None:
+        return None
+    descriptor = os.open(folder / "lock", os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(descriptor)
+        return None
+    return descriptor
