@@ -193,7 +193,7 @@ def test_accepted_it_goes_on_from_its_log_and_both_are_recorded(store: Store) ->
 def test_there_is_nothing_to_accept_before_it_has_begun_or_after_it_has_ended(store: Store) -> None:
     id_ = submission.submit_experiment(store, toy(repetitions=1)).id
 
-    with pytest.raises(Conflict, match="has not begun"):
+    with pytest.raises(Conflict, match="has not started"):
         provenance.accept_versions(store, id_)
     run(store, execution.claim(store, "me", 1)[0])
     with pytest.raises(Conflict, match="has ended: it is COMPLETED"):

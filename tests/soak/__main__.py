@@ -33,7 +33,7 @@ def main() -> Any:
     parser.add_argument("--seed", type=int, help="left out: a new one")
     parser.add_argument("--database", choices=KINDS, help="left out: both at once, each in a process")
     parser.add_argument("--at-once", type=int, default=8, help="faults that may come together")
-    parser.add_argument("--plug-ins", choices=MISBEHAVIOURS, default="harmless", help="that misbehave")
+    parser.add_argument("--plug-ins", choices=MISBEHAVIOURS, default="all", help="that misbehave")
     parser.add_argument("--folder", type=Path, help="for logs and histories; left out: they are not kept")
     given = parser.parse_args()
     given.seed = SystemRandom().randrange(10**6) if given.seed is None else given.seed

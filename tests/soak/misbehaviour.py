@@ -9,10 +9,10 @@ PREFIX = "misbehaving"
 FOLDER = Path(__file__).parent / "plugins"
 
 HARMLESS = ("raises", "prints", "ends_process")
-"""Those that the service bears."""
+"""Those that end by themselves, and soon."""
 
 HARMFUL = ("exits", "hangs", "returns_row", "returns_scalar", "returns_nothing", "returns_nan")
-"""Those that need limits and checks in the worker; `--plug-ins all` injects them too."""
+"""Those that the checks and limits of the worker end."""
 
 
 def at_fault(spec: Any) -> bool:
