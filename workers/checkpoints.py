@@ -40,7 +40,6 @@ def recorded(
     log: Sequence[Step],
     checkpoints: Sequence[Checkpoint],
     every_s: float = CHECKPOINT_S,
-    pauses_s: Sequence[float] = PAUSES_S,
 ) -> Iterator[Delivered | Pulse]:
     """Yield the steps that follow the log, checkpoints of long steps as soon as they exist, and signs of life.
 
@@ -49,7 +48,6 @@ def recorded(
         log: its steps so far.
         checkpoints: checkpoints of the next step.
         every_s: seconds between checkpoints of a step.
-        pauses_s: pauses before each repetition of a step whose error may pass.
     """
     items: SimpleQueue[Delivered | Pulse | None] = SimpleQueue()
     unwanted = Event()
@@ -60,7 +58,7 @@ def recorded(
         items.put(item)
 
     recorder = StepRecorder(emit, every_s, log, checkpoints)
-    thread = _Computation(lambda: recorder.run(setting, pauses_s), lambda: items.put(None))
+    thread = _Computation(lambda: recorder.run(setting), lambda: items.put(None))
     thread.start()
     try:
         while (item := _next(items, recorder)) is not None:
@@ -92,7 +90,7 @@ class StepRecorder:
         self._rollout_s = 0.0
         self._measuring = False
 
-    def run(self, setting: Setting, pauses_s: Sequence[float]) -> None:
+    def run(self, setting: Setting) -> None:
         """Compute the repetition to its end; repeat a step after a pause if its error may pass."""
         watched = replace(setting, reality=lambda genome: self._measured(setting, genome))
         tries, steps = 0, len(self._log)
@@ -103,10 +101,10 @@ class StepRecorder:
             except Exception as error:
                 tries = tries + 1 if len(self._log) == steps else 1
                 steps = len(self._log)
-                if not may_pass(error) or tries > len(pauses_s):
+                if not may_pass(error) or tries > len(PAUSES_S):
                     raise
-                self._answers, self._progressed = [], perf_counter() + pauses_s[tries - 1]
-                sleep(pauses_s[tries - 1])
+                self._answers, self._progressed = [], perf_counter() + PAUSES_S[tries - 1]
+                sleep(PAUSES_S[tries - 1])
             else:
                 return
 
