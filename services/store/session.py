@@ -18,7 +18,7 @@ from gaplab.services.store.engine import WRITES, open_engine
 from gaplab.services.store.guard import Guard
 from gaplab.services.store.models import REVISION, Base
 from gaplab.services.store.queries import events
-from gaplab.services.store.sqlite_file import file_of
+from gaplab.services.store.sqlite_file import create, file_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -138,6 +138,7 @@ def private_store(file: Path) -> Iterator[Store]:
     Args:
         file: does not exist; the caller deletes it.
     """
+    create(file)
     store = Store(f"sqlite:///{file}")
     try:
         with store.transaction() as session:
