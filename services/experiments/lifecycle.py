@@ -113,7 +113,12 @@ def get_permitting(session: Session, experiment_id: str, verb: Verb) -> Experime
     lock(session, [experiment.id])
     session.refresh(experiment)
     if experiment.state not in PERMITTED[verb]:
-        able = [other.value for other in Verb if experiment.state in PERMITTED[other]]
+        failed = with_failures(session, [experiment.id])
+        able = [
+            other.value
+            for other in Verb
+            if experiment.state in PERMITTED[other] and (other is not Verb.RETRY or failed)
+        ]
         msg = (
             f"experiment {experiment_id!r} is {experiment.state} and cannot be {_PARTICIPLES[verb]}; "
             f"permitted: {', '.join(able) or 'nothing'}"
