@@ -98,13 +98,16 @@ def test_every_command_prints_one_document_and_nothing_else(
     live_and_die(ask, finish)
     look(ask, *(each["id"] for each in said["list"][::-1]))
     keep(ask, said["list"][-1]["id"], tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setenv("GAPLAB_DATABASE_URL", f"sqlite:///{tmp_path / 'restored.db'}")
+        assert ask("restore", str(tmp_path / "copy.db"))["file"] == str(tmp_path / "restored.db")
     token = ask("token create", "--role", "reader", "--name", "me")
     monkeypatch.setenv("GAPLAB_TOKEN", ask("token create", "--role", "admin")["secret"])
     assert token["token"]["id"] in {each["id"] for each in ask("token list")}
     assert ask("token revoke", token["token"]["id"]) == {"id": token["token"]["id"], "revoked": True}
     assert set(ask("help")) == {str(each.value) for each in Exit}
 
-    elsewhere = {"sensitivity", "accept-versions"}  # want a worker, and an experiment under way
+    elsewhere = {"sensitivity", "accept-versions", "retry"}  # want a worker, an experiment under way, and a failed one
     assert set(said) | elsewhere == set(NAMES) - UNTIL_STOPPED
 
 
@@ -164,10 +167,12 @@ def test_a_failed_experiment_is_a_document_and_still_a_failure_for_the_shell(
         execution.fail(sqlite_store, claim, Failure("ValueError: the robot fell apart"))
 
     said = gaplab("watch", study, "--json")
+    retried = gaplab("retry", study, "--json")
 
     assert said.code == Exit.FAILED
     assert json.loads(said.out)["state"] == "FAILED"
     assert "the robot fell apart" in said.err
+    assert json.loads(retried.out)["state"] == "QUEUED"
 
 
 def test_help_explains_every_exit_code(gaplab: Gaplab) -> None:
