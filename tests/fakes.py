@@ -4,12 +4,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
+from gaplab.services.core.registry import Plugin, Registry
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.types import Budget, Space
+from gaplab.services.plugins import blame
+from gaplab.services.running import versions
 
 TRUTH = np.array([0.7, 0.2])
 
@@ -95,3 +99,11 @@ class Careful(Strategy):
         return (belief.space.lower + belief.space.upper) / 2
 '''
 """A file with a strategy of one's own."""
+
+
+def install(monkeypatch: pytest.MonkeyPatch, registry: Registry[Any], plugin: type[Plugin]) -> None:
+    """Let this process have one more plug-in until the end of the test."""
+    monkeypatch.setitem(registry._found.usable, plugin.name, plugin)
+    for module, name in ((blame, "_plugins"), (versions, "_provenance")):  # without their caches
+        cached = getattr(module, name)
+        monkeypatch.setattr(module, name, getattr(cached, "__wrapped__", cached))

@@ -1,6 +1,5 @@
 """Faults of plug-ins, of reality and of hardware: each concerns the repetitions that it hits, and nothing else."""
 
-from collections.abc import Iterator
 from threading import Event, Lock
 from types import SimpleNamespace
 from typing import Any, ClassVar
@@ -17,7 +16,6 @@ from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.experiments import checks, lifecycle, reading, submission
-from gaplab.services.plugins import blame
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.running.execution import Failure
 from gaplab.services.running.leases import MAX_LOSSES
@@ -30,7 +28,7 @@ from gaplab.services.store.session import Store
 from gaplab.workers import checkpoints, permits, supervisor
 from gaplab.workers.patience import Patience
 from gaplab.workers.run import Run
-from tests.fakes import flat
+from tests.fakes import flat, install
 from tests.without_ray import Here
 
 SMALL = {
@@ -82,16 +80,13 @@ class Unsendable(Exception):
 
 
 @pytest.fixture(autouse=True)
-def plugins(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setitem(strategies._found.usable, "liar", Liar)
-    monkeypatch.setitem(engines._found.usable, "bench", Bench)
+def plugins(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, strategies, Liar)
+    install(monkeypatch, engines, Bench)
     monkeypatch.setattr(Bench, "asked", 0)
     monkeypatch.setattr(Bench, "errors", [])
     monkeypatch.setattr(checkpoints, "PAUSES_S", (0.0, 0.0, 0.0))
     monkeypatch.setattr(supervisor, "HEARTBEATS", 10**9)
-    blame._plugins.cache_clear()
-    yield
-    blame._plugins.cache_clear()
 
 
 def small(**changes: Any) -> ExperimentSpec:

@@ -70,4 +70,4 @@ def test_a_refusal_is_shown_and_can_be_lifted(sqlite_store: Store, gaplab: Gapla
     assert (code, accepted) == (0, f"{id_} continues under the versions of the next supervisor.\n")
     assert silent == ""
     assert refused == Exit.CONFLICT
-    assert "has not begun" in why
+    assert "has not started" in why

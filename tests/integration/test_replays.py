@@ -25,6 +25,7 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.store.queries.experiments import get_experiment
 from gaplab.services.store.session import Store
 from tests.experiments import run, toy
+from tests.fakes import install
 
 UNTUNED, BEST = (0.5, 0.3), (1.1, 0.7)
 HIDDEN = {"static_friction": 0.9, "dynamic_friction": 0.6}
@@ -109,7 +110,7 @@ class Lab(PyBullet):
 
 
 def test_no_replay_moves_hardware(sqlite_store: Store, api: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(engines._plugins, "lab", Lab)  # type: ignore[attr-defined]
+    install(monkeypatch, engines, Lab)
     experiment, log, _ = walked(sqlite_store, reality={"engine": "lab", "parameters": HIDDEN})
     monkeypatch.setattr(Lab, "rollout", lambda *_: pytest.fail("it moved"))
 

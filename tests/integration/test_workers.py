@@ -38,7 +38,7 @@ from gaplab.workers.patience import Patience
 from gaplab.workers.permits import PermittedReality
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import cancel
-from tests.fakes import flat
+from tests.fakes import flat, install
 from tests.processes import processes_of_ray
 
 DEADLINE_S = 180
@@ -197,7 +197,7 @@ def test_hardware_stops_when_its_experiment_is_cancelled_or_its_supervisor_stand
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, cancelled: bool
 ) -> None:
     told = tmp_path / "told"
-    monkeypatch.setitem(engines._plugins, "bench", Bench)  # type: ignore[attr-defined]
+    install(monkeypatch, engines, Bench)
     monkeypatch.setattr(task, "run", moving(told))
     experiment = submission.submit_experiment(sqlite_store, toy(reality={"engine": "bench"})).id
     other = submission.submit_experiment(sqlite_store, toy(reality={"engine": "bench"})).id
