@@ -6,7 +6,6 @@ import signal
 import sys
 from collections.abc import Callable
 from secrets import token_hex
-from threading import Event
 
 from gaplab.services import logs
 from gaplab.services.core.errors import ClusterUnusable, RayGone, StoreChanged, StoreUnavailable
@@ -59,10 +58,11 @@ def _work(store: Store, settings: Settings, pulse: Pulse) -> None:
     """
     from gaplab.workers.cluster import cluster  # Ray takes a second to import
     from gaplab.workers.patience import Patience
+    from gaplab.workers.stop import Stop
     from gaplab.workers.supervisor import Supervisor
 
     _refuse_other_schema(store)
-    stop = Event()
+    stop = Stop()
     with cluster(settings) as joined:
         for signum in (signal.SIGTERM, signal.SIGINT):  # only now, for Ray has put handlers of its own in place
             signal.signal(signum, lambda *_: stop.set())

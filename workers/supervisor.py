@@ -23,6 +23,7 @@ from gaplab.workers.nodes import Versions
 from gaplab.workers.patience import Patience
 from gaplab.workers.repetitions import Repetitions
 from gaplab.workers.sensitivity import Checks
+from gaplab.workers.stop import Stop
 
 HEARTBEATS = 6
 """Number of heartbeats within the time after which a lease without one is lost."""
@@ -73,7 +74,7 @@ class Supervisor:
         """Whether repetitions are running."""
         return bool(self._repetitions.runs)
 
-    def serve(self, stop: Event, pulse: Pulse | None = None) -> None:
+    def serve(self, stop: Stop | Event, pulse: Pulse | None = None) -> None:
         """Work until told to stop; then hand back unfinished repetitions, each after one more delivery.
 
         Args:
