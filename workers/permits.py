@@ -8,7 +8,7 @@ from time import monotonic, sleep
 from typing import Any, TypeAlias
 
 import ray
-from ray.exceptions import RayError
+from ray.exceptions import GetTimeoutError, RayError
 
 from gaplab.services.core.arrays import Genome
 from gaplab.services.core.ports import Reality
@@ -18,6 +18,9 @@ SHARE = 0.8
 
 POLL_S = 0.25
 """Seconds between questions for a permit."""
+
+ANSWER_S = 0.5
+"""Seconds that an answer may take; a process that stands still gives none, and the permit must expire all the same."""
 
 Key: TypeAlias = tuple[int, int]
 """A repetition's id, and the epoch of its lease."""
@@ -42,13 +45,21 @@ class Permits:
         return self._until.get(key, 0.0) - monotonic()
 
 
+def asking(permits: Handle, key: Key) -> Callable[[], float]:
+    """Return a function that asks for the seconds that are left of a permit.
+
+    It raises GetTimeoutError if there is no answer in time, and another RayError if the permits died.
+    """
+    return lambda: float(ray.get(permits.left.remote(key), timeout=ANSWER_S))
+
+
 class PermittedReality:
     """A Reality that moves hardware only with a permit; if the permit expires, it stops the hardware and its process.
 
     Args:
         reality: the hardware.
         stop: stops the hardware at once; called from another thread.
-        left: returns the seconds until the permit expires.
+        left: returns the seconds until the permit expires, or raises as `asking` says.
         end: ends this process.
     """
 
@@ -63,21 +74,26 @@ class PermittedReality:
 
     def __call__(self, genome: Genome) -> float:
         """Return the fitness of the genome `(g,)` in reality, once it is permitted to ask."""
-        while self._left() <= 0.0:
+        while (until := self._expiry(0.0)) <= monotonic():
             sleep(POLL_S)
         answered = Event()
-        Thread(target=self._watch, args=(answered,), name="permit", daemon=True).start()
+        Thread(target=self._watch, args=(answered, until), name="permit", daemon=True).start()
         try:
             return self._reality(genome)
         finally:
             answered.set()
 
-    def _watch(self, answered: Event) -> None:
-        until = monotonic() + self._left()
+    def _expiry(self, known: float) -> float:
+        """Return when the permit expires; what is known, if nobody answers."""
+        asked = monotonic()
+        with suppress(GetTimeoutError):
+            return asked + self._left()
+        return known
+
+    def _watch(self, answered: Event, until: float) -> None:
         while not answered.wait(POLL_S):
-            asked = monotonic()
             with suppress(RayError):  # the permits died: the last one holds
-                until = asked + self._left()
+                until = self._expiry(until)
             if monotonic() > until:
                 with suppress(Exception):
                     self._stop()

@@ -18,7 +18,7 @@ from gaplab.services.specs.assembly import engine_of, setting
 from gaplab.services.store.lease import Claim, Delivered, Failure, Pulse, TimedStep
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.nodes import Versions, check_here
-from gaplab.workers.permits import Handle, PermittedReality
+from gaplab.workers.permits import Handle, PermittedReality, asking
 from gaplab.workers.pool import Pool
 
 BATCH_S = 0.2
@@ -70,7 +70,7 @@ def _prepared(claim: Claim, expected: Versions, permits: Handle | None) -> Setti
 
 def _permitted(reality: Reality, claim: Claim, permits: Handle) -> PermittedReality:
     key, engine = (claim.id, claim.epoch), engine_of(claim.spec.reality.engine)
-    return PermittedReality(reality, engine.stop, lambda: float(ray.get(permits.left.remote(key))))
+    return PermittedReality(reality, engine.stop, asking(permits, key))
 
 
 def failure_of(error: BaseException) -> Failure:

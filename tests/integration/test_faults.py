@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from ray.exceptions import GetTimeoutError
 
 from gaplab.schemas.lifecycle import Ending, State, Verb
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
@@ -367,6 +368,24 @@ def test_hardware_stops_when_its_permit_runs_out(monkeypatch: pytest.MonkeyPatch
     reality(np.zeros(1))
 
     assert events == ["moves", "stops", "ends"]
+
+
+def test_a_permit_runs_out_although_nobody_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(permits, "POLL_S", 0.001)
+    answers, done = [0.05], Event()
+
+    def moving(genome: Any) -> float:
+        assert done.wait(60)
+        return 1.0
+
+    def silent() -> float:
+        if answers:
+            return answers.pop()
+        raise GetTimeoutError
+
+    permits.PermittedReality(moving, lambda: None, silent, done.set)(np.zeros(1))
+
+    assert done.is_set()
 
 
 def test_a_check_that_no_experiment_needs_any_more_ends(store: Store) -> None:

@@ -1,10 +1,8 @@
 """Connections to Postgres that die silently, behind a proxy that accepts bytes and forwards none."""
 
-import select
 import socket
 import time
 from collections.abc import Callable, Iterator
-from threading import Event, Thread
 from typing import Any
 
 import pytest
@@ -16,53 +14,9 @@ from gaplab.services.store import postgres as connections
 from gaplab.services.store.session import Store
 from tests.conftest import Postgres
 from tests.postgres import PORT
+from tests.proxy import Proxy
 
 ANSWER_S = 0.5
-
-
-class Proxy:
-    """Forwards TCP connections of loopback to a Unix socket.
-
-    Attributes:
-        port: that it listens on.
-    """
-
-    def __init__(self, target: str) -> None:
-        self._target, self._listener = target, socket.create_server(("127.0.0.1", 0))
-        self.port = self._listener.getsockname()[1]
-        self._hung = Event()
-        Thread(target=self._accept, daemon=True).start()
-
-    def hang(self) -> None:
-        """Forward nothing of the present connections; later ones are forwarded."""
-        self._hung.set()
-        self._hung = Event()
-
-    def close(self) -> None:
-        self._listener.close()
-
-    def _accept(self) -> None:
-        while True:
-            try:
-                client, _ = self._listener.accept()
-            except OSError:
-                return
-            Thread(target=self._forward, args=(client, self._hung), daemon=True).start()
-
-    def _forward(self, client: Any, hung: Event) -> None:
-        server = socket.socket(socket.AF_UNIX)
-        server.connect(self._target)
-        with client, server:
-            while True:
-                for ready in select.select([client, server], [], [], 0.1)[0]:
-                    data = ready.recv(65536)
-                    if hung.is_set():
-                        if ready is client and not data:
-                            return
-                        continue
-                    if not data:
-                        return
-                    (server if ready is client else client).sendall(data)
 
 
 @pytest.fixture

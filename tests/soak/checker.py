@@ -5,6 +5,7 @@ Each check takes the history and the evidence and gives a sentence for each viol
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 from gaplab.schemas.lifecycle import State
@@ -33,6 +34,7 @@ def violations(history: Any, evidence: Any, expected: Any = undisturbed) -> Any:
         *ends(evidence),
         *results(history, evidence, expected),
         *epochs(evidence),
+        *drives(evidence),
         *evidence.complaints,
     ]
 
@@ -192,6 +194,16 @@ def epochs(evidence: Any) -> Iterator[Any]:
         for each in experiment.repetitions:
             if each.steps != steps[each.id]:
                 yield f"{experiment.id}/{each.number}: {each.steps} steps, and {steps[each.id]} by its moves"
+
+
+def drives(evidence: Any) -> Iterator[Any]:
+    """One program drives the robot at a time."""
+    ended: set[str] = set()
+    for (_, before), (at, drive) in pairwise(evidence.commands):
+        if drive != before:
+            ended.add(before)
+        if drive in ended:
+            yield f"{drive} drove the robot at {at}, after another had begun"
 
 
 def _of_state(move: Any, winners: Any) -> Iterator[Any]:

@@ -7,8 +7,9 @@ is for the checker to find out.
 import random
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from itertools import count
-from threading import Event, Thread
+from threading import Event, Lock, Thread
 from typing import Any
 
 import httpx2
@@ -69,6 +70,7 @@ class Clients:
         self._known: list[Any] = []
         self._open = 0
         self._verbs: list[Any] = []
+        self._turns = [Lock() for _ in range(number)]
         self._threads = [
             Thread(target=self._use, args=(name, random.Random(f"{seed}-{name}")), daemon=True)
             for name in range(number)
@@ -80,6 +82,14 @@ class Clients:
         self._verbs = [verb for verb in VERBS if f"/experiments/{{id}}/{verb}" in paths]
         for thread in self._threads:
             thread.start()
+
+    @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """Ask for nothing within the block."""
+        with ExitStack() as stack:
+            for turn in self._turns:
+                stack.enter_context(turn)
+            yield
 
     def stop(self) -> None:
         """Ask for nothing more."""
@@ -113,12 +123,13 @@ class Clients:
         for number in count():
             if self._stopping.wait(rng.uniform(0.1, 0.6)):
                 return
-            self._look(rng)
-            if self._open < OPEN:
-                path, spec = next(wanted)
-                self._submit(path, spec | {"name": f"client {name}, number {number}"})
-            if self._known and rng.random() < 0.1:
-                self._move(rng)
+            with self._turns[name]:
+                self._look(rng)
+                if self._open < OPEN:
+                    path, spec = next(wanted)
+                    self._submit(path, spec | {"name": f"client {name}, number {number}"})
+                if self._known and rng.random() < 0.1:
+                    self._move(rng)
 
     def _look(self, rng: Any) -> None:
         """Read something that exists, and what is under way."""

@@ -1,20 +1,37 @@
 """The two databases on a small disk, and what can be done to each."""
 
 import os
+import shutil
 import signal
 import sqlite3
 import subprocess
 import time
 from contextlib import suppress
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import psycopg
+from sqlalchemy import select
 
-from tests.postgres import Installation, answers, url
+from gaplab.services.store.models import RepetitionRow, SensitivityRow, SupervisorRow
+from gaplab.services.store.session import Store
+from tests.postgres import PORT, Installation, answers, url
+from tests.proxy import Proxy
 from tests.soak.stage import Kept, send
 
-MIB = 2**20
+CLOCK_JUMP = timedelta(hours=1)
+
+
+def _shift_heartbeats(url: str, by: timedelta) -> None:
+    store = Store(url)
+    try:
+        with store.transaction() as session:
+            for model in (RepetitionRow, SensitivityRow, SupervisorRow):
+                for row in session.scalars(select(model).where(model.heartbeat_at.is_not(None))).all():
+                    row.heartbeat_at += by
+    finally:
+        store.dispose()
 
 
 class SmallDisk:
@@ -54,7 +71,8 @@ class Sqlite:
     def __init__(self, folder: Path) -> None:
         self.disk = SmallDisk(Path(folder) / "disk", 64)
         self._file = self.disk.folder / "gaplab.db"
-        self.url = f"sqlite:///{self._file}"
+        self._backup = Path(folder) / "backup.db"
+        self.url = self.url_of_service = f"sqlite:///{self._file}"
 
     def stall(self, seconds: Any) -> None:
         """Hold the exclusive lock for seconds: a disk on which a commit takes so long."""
@@ -65,6 +83,20 @@ class Sqlite:
             connection.execute("ROLLBACK")
         finally:
             connection.close()
+
+    def set_clock(self, by: timedelta) -> None:
+        """Let all holders' heartbeats have been given before the clock was set."""
+        _shift_heartbeats(self.url, -by)
+
+    def restore(self, stage: Any, meanwhile: Any) -> None:
+        """Back up, end the service some time later, restore the backup, and start the service again."""
+        stage.command("backup", self._backup)
+        meanwhile()
+        with stage.resting():
+            stage.command("restore", self._backup)
+        self._backup.unlink()
+        for former in self.disk.folder.glob("*.replaced-*"):
+            former.unlink()
 
     def complaints(self) -> Any:
         """What the database's own check of its file finds."""
@@ -88,7 +120,9 @@ class Postgres:
         self.disk = SmallDisk(folder / "disk", 256)
         installation, data = Installation(folder), self.disk.folder / "data"
         installation.initialise(data)
-        self.url = url(data)
+        self.url, self._data, self._backup = url(data), data, folder / "backup"
+        self._proxy = Proxy(f"{data}/.s.PGSQL.{PORT}")
+        self.url_of_service = f"postgresql://postgres@127.0.0.1:{self._proxy.port}/postgres"
         command = installation.command(data, max_wal_size="64MB", min_wal_size="32MB")
         self._kept = Kept(command, folder / "postgres.log", user=installation.user)
         self._wait()
@@ -109,6 +143,26 @@ class Postgres:
                 "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
                 "WHERE backend_type = 'client backend' AND pid <> pg_backend_pid()"
             )
+
+    def fall_silent(self) -> None:
+        """Let every connection of the service die without a word to either side."""
+        self._proxy.hang()
+
+    def set_clock(self, by: timedelta) -> None:
+        """Let all holders' heartbeats have been given before the clock was set."""
+        _shift_heartbeats(self.url, -by)
+
+    def restore(self, stage: Any, meanwhile: Any) -> None:
+        """Copy the server's files, and some time later put the copy in their place; the service runs all the time."""
+        with self._kept.resting():
+            subprocess.run(["cp", "--archive", self._data, self._backup], check=True)
+        self._wait()
+        meanwhile()
+        with self._kept.resting():
+            shutil.rmtree(self._data)
+            subprocess.run(["cp", "--archive", self._backup, self._data], check=True)
+        self._wait()
+        shutil.rmtree(self._backup)
 
     def stall(self, seconds: Any) -> None:
         """Stop the server's processes that answer clients: a disk on which their writes take so long."""
@@ -132,6 +186,7 @@ class Postgres:
         return found
 
     def close(self) -> None:
+        self._proxy.close()
         self._kept.stop(signal.SIGINT)
         self.disk.remove()
 

@@ -4,6 +4,7 @@ import json
 from dataclasses import dataclass, field
 from functools import cache
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import select
@@ -17,6 +18,7 @@ from gaplab.services.store.queries import step_rows as mapping
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from tests.soak import witness
+from tests.soak.hardware_faults import commands
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ class Evidence:
         studies: names by id.
         moves: of all repetitions, as the witness saw them.
         complaints: of the database about itself.
+        commands: that the robot got, in their order: seconds, and the drive that gave it.
     """
 
     experiments: tuple[Experiment, ...] = ()
@@ -62,15 +65,23 @@ class Evidence:
     checks: dict[str, str] = field(default_factory=dict)
     moves: tuple[witness.Move, ...] = ()
     complaints: tuple[str, ...] = ()
+    commands: tuple[tuple[float, str], ...] = ()
 
 
-def gather(store: Store, database: Any) -> Evidence:
+def gather(store: Store, database: Any, journal: Path) -> Evidence:
     """Read everything."""
     with store.reading() as session:
         studies = dict(session.execute(select(StudyRow.id, StudyRow.name)).all())
         checks = dict(session.execute(select(SensitivityRow.id, SensitivityRow.state)).all())
         experiments = tuple(_experiment(session, row) for row in session.scalars(select(ExperimentRow)).all())
-    return Evidence(experiments, studies, checks, tuple(witness.moves(store)), tuple(database.complaints()))  # type: ignore[arg-type]
+    return Evidence(
+        experiments,
+        studies,  # type: ignore[arg-type]
+        checks,  # type: ignore[arg-type]
+        tuple(witness.moves(store)),
+        tuple(database.complaints()),
+        tuple(commands(journal)),
+    )
 
 
 def checks_under_way(store: Store) -> bool:

@@ -9,16 +9,17 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from gaplab.services.store.session import Store
-from tests.soak import misbehaviour, plugin_faults, witness
-from tests.soak.stage import send, until
-
-PAST_THE_LEASE = 1.5
-"""For how many leases a process is stopped."""
+from tests.soak import hardware_faults, misbehaviour, plugin_faults, witness
+from tests.soak.databases import CLOCK_JUMP
+from tests.soak.stage import PAST_THE_LEASE, send, until
 
 DISK_S = 3.0
 """For how long the disk is full, or slow."""
 
-Fault = namedtuple("Fault", "name inflict")
+EARLIER_S = 3.0
+"""Age of the state that is restored."""
+
+Fault = namedtuple("Fault", "name inflict alone", defaults=(False,))
 
 
 def _kill(role: Any) -> Any:
@@ -79,6 +80,26 @@ def _hang_up(stage: Any) -> bool:
     return True
 
 
+def _fall_silent(stage: Any) -> bool:
+    stage.database.fall_silent()
+    return True
+
+
+def _set_clock(by: Any) -> Any:
+    def inflict(stage: Any) -> bool:
+        stage.database.set_clock(by)
+        return _signal(stage, "supervisor", signal.SIGKILL) is not None
+
+    return inflict
+
+
+def _restore(stage: Any) -> bool:
+    """Put an earlier state back, between which and now no client was told anything."""
+    with stage.clients.waiting():
+        stage.database.restore(stage, lambda: time.sleep(EARLIER_S))
+    return True
+
+
 def faults(database: Any, misbehaviours: Any = misbehaviour.HARMLESS) -> Any:
     """What can be done to a service on this database, and by these strategies in it."""
     found = [make(role) for role in ("api", "supervisor", "worker", "raylet") for make in (_kill, _pause)]
@@ -87,20 +108,24 @@ def faults(database: Any, misbehaviours: Any = misbehaviour.HARMLESS) -> Any:
         found.append(Fault("disk full", _fill))
     if hasattr(database, "restart"):
         found += [Fault("Postgres restarted", _restart), Fault("SIGKILL Postgres", _kill_database)]
-        found.append(Fault("connections ended", _hang_up))
+        found += [Fault("connections ended", _hang_up), Fault("connections silent", _fall_silent)]
+    found += [Fault("clock set back", _set_clock(-CLOCK_JUMP)), Fault("clock set ahead", _set_clock(CLOCK_JUMP))]
+    found += [Fault("earlier state restored", _restore, alone=True), Fault("two drivers", hardware_faults.two_drivers)]
     found += [Fault("plug-in edited", plugin_faults.edited), Fault("plug-in broken", plugin_faults.broken)]
     return found + [Fault(f"plug-in {kind}", plugin_faults.submitting(kind)) for kind in misbehaviours]
 
 
 def volleys(kinds: Any, rng: Any, at_once: Any) -> Iterator[Any]:
     """Faults without end, one to so many at a time, each kind in turn, in an order that is shuffled."""
-    order = []  # type: ignore[var-annotated]
+    together, alone = [each for each in kinds if not each.alone], [each for each in kinds if each.alone]
     while True:
-        size = rng.randint(1, at_once)
-        while len(order) < size:
-            order += rng.sample(kinds, len(kinds))
-        yield order[:size]
-        order = order[size:]
+        order = rng.sample(together, len(together))
+        parts = [[each] for each in alone]
+        while order:
+            size = rng.randint(1, at_once)
+            parts.append(order[:size])
+            order = order[size:]
+        yield from rng.sample(parts, len(parts))
 
 
 def strike(stage: Any, volley: Any) -> Any:

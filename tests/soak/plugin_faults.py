@@ -29,15 +29,18 @@ def submitting(kind: Any) -> Any:
     """Submit an experiment with such a strategy before all others, and wait until it has begun."""
 
     def inflict(stage: Any) -> bool:
-        spec = SPEC | {"strategy": f"{PREFIX}_{kind}", "name": f"fault {next(_numbers)}: {kind}"}
-        with httpx2.Client(base_url=stage.url, timeout=8, trust_env=False) as http:
-            record = stage.history.ask(http, "submit", "POST", "/experiments", spec)
-            if not record.acknowledged:
-                return False
-            path = f"/experiments/{record.answer['id']}"
-            return until(lambda: _state(http, path) not in {"QUEUED", None}, 60)
+        one = submitted(stage, {"strategy": f"{PREFIX}_{kind}"}, kind)
+        return one is not None and until(lambda: _state(stage, one) not in {"QUEUED", None}, 60)
 
     return inflict
+
+
+def submitted(stage: Any, spec: Any, name: Any) -> Any:
+    """Submit an experiment before all others, and return its id; None if that was not acknowledged."""
+    with httpx2.Client(base_url=stage.url, timeout=8, trust_env=False) as http:
+        body = SPEC | spec | {"name": f"fault {next(_numbers)}: {name}"}
+        record = stage.history.ask(http, "submit", "POST", "/experiments", body)
+    return record.answer["id"] if record.acknowledged else None
 
 
 def edited(stage: Any) -> bool:
@@ -63,8 +66,8 @@ def _changed(stage: Any, addition: Any, role: Any) -> bool:
     return hit
 
 
-def _state(http: Any, path: Any) -> Any:
+def _state(stage: Any, experiment: Any) -> Any:
     try:
-        return http.get(path).json().get("state")
+        return httpx2.get(f"{stage.url}/experiments/{experiment}", timeout=8, trust_env=False).json().get("state")
     except (httpx2.HTTPError, ValueError):
         return None

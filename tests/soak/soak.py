@@ -86,12 +86,13 @@ def soak(
     clients = Clients(stage.url, history, seed)
     try:
         stage.start()
+        stage.clients = clients
         clients.start()
         _attack(stage, store, outcome, number, faults.volleys(kinds, random.Random(seed), at_once), say)
         clients.stop()
         _peace(clients, store, outcome)
         outcome.violations += stage.stop()
-        _check(history.records(), gather(store, database), outcome)
+        _check(history.records(), gather(store, database, stage.journal), outcome)
         outcome.seconds = time.monotonic() - begun
     finally:
         clients.close()

@@ -10,7 +10,8 @@ import socket
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from tempfile import mkdtemp
 from threading import Event, Thread
@@ -24,6 +25,9 @@ from tests.soak import witness
 
 ROLLOUT_LIMIT_S = 1
 """In production it is 60 s; a worker without a rollout for 20 times as long counts as hung."""
+
+PAST_THE_LEASE = 1.5
+"""For how many leases a process is stopped."""
 
 RESTART_S = 1.0
 """After how long a service manager starts again what has ended."""
@@ -39,9 +43,7 @@ class Kept:
     def __init__(self, command: Any, log: Any, environment: Any = None, user: Any = None) -> None:
         self._command, self._log, self._environment, self._user = command, log, environment, user
         self._stopping = Event()
-        self._process = self._start()
-        self._thread = Thread(target=self._keep, daemon=True)
-        self._thread.start()
+        self._begin()
 
     @property
     def pid(self) -> Any:
@@ -58,6 +60,19 @@ class Kept:
         self._process.kill()
         self._process.wait()
         return False
+
+    @contextmanager
+    def resting(self) -> Iterator[None]:
+        """End it in order, and start it again at the end of the block."""
+        assert self.stop(), f"{self._command} did not end"
+        yield
+        self._stopping.clear()
+        self._begin()
+
+    def _begin(self) -> None:
+        self._process = self._start()
+        self._thread = Thread(target=self._keep, daemon=True)
+        self._thread.start()
 
     def _keep(self) -> None:
         while not self._stopping.wait(0.1):
@@ -86,17 +101,23 @@ class Stage:
         lease_s: for which a supervisor may be silent.
         plugins: folder of the service's external plug-ins.
         history: of what clients were told, for faults that are requests.
+        clients: that use the service.
+        journal: of the commands that the robot got.
     """
+
+    clients: Any
 
     def __init__(self, folder: Path, database: Any, lease_s: Any, plugins: Any = None, history: Any = None) -> None:
         self.database, self.lease_s, self.plugins, self.history = database, lease_s, plugins, history
         self._folder = Path(folder)
+        self.journal = self._folder / "journal.txt"
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self._port = probe.getsockname()[1]
         self.url = f"http://127.0.0.1:{self._port}"
         self._environment = os.environ | {
-            "GAPLAB_DATABASE_URL": database.url,
+            "GAPLAB_DATABASE_URL": database.url_of_service,
+            "GAPLAB_SOAK_JOURNAL": str(self.journal),
             "GAPLAB_PORT": str(self._port),
             "GAPLAB_WORKERS": "1",
             "GAPLAB_LEASE_S": str(lease_s),
@@ -121,6 +142,20 @@ class Stage:
         if not until(lambda: not self.processes(), 60):
             left += [f"left running: {pid} {command}" for pid, command in self.processes().items()]
         return left
+
+    @contextmanager
+    def resting(self) -> Iterator[None]:
+        """End the service's processes in order, and start them again at the end of the block."""
+        with ExitStack() as stack:
+            for each in self._kept:
+                stack.enter_context(each.resting())
+            yield
+
+    def command(self, *words: Any) -> None:
+        """Run a command of gaplab on the service's database."""
+        command = [sys.executable, "-m", "gaplab", *map(str, words)]
+        done = subprocess.run(command, env=self._environment, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
 
     def kill(self) -> None:
         """End what is left outright, and remove what it left."""

@@ -1,96 +1,20 @@
-"""Evidence that the quadruped is worth tuning: each command prints one table of docs/robot.md.
+"""One function for each table; ratios are to the direct baseline, the fitness of controllers evolved in reality."""
 
-The code of experiments computes all numbers, with addressed random streams, so a command always prints the same ones.
-Ratios are to the direct baseline: the mean fitness of controllers evolved in reality on the same budget.
-"""
-
-from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from argparse import Namespace
+from collections.abc import Iterable
 
 import numpy as np
 
+from benchmarks.robot.laboratory import EPISODE_S, NAMES, SAMPLING_S, Laboratory, tilts
+from benchmarks.robot.text import bar, mean_and_sd, numbers, table
 from gaplab.services.core.answers import Answers
-from gaplab.services.core.arrays import FloatArray, Genome
+from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.optimizers.steady_state import SteadyState
-from gaplab.services.core.robots.quadruped import BODY_M, COUNTED_S, PERIOD_S, SETTLING_S, Quadruped, QuadrupedOptions
-from gaplab.services.core.search import maximise
+from gaplab.services.core.robots.quadruped import BODY_M, COUNTED_S, PERIOD_S, SETTLING_S
 from gaplab.services.core.streams import stream
-from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuning import Misfit, squared_errors, tune
-from gaplab.services.core.types import Sample, Space
+from gaplab.services.core.types import Sample
 from gaplab.services.core.world import Motion
-from gaplab.services.engines.pybullet import PyBullet
-from gaplab.services.specs.assembly import Simulation
-
-NAMES = ("static_friction", "dynamic_friction", "restitution")
-EPISODE_S = SETTLING_S + COUNTED_S
-SAMPLING_S = 0.05
-"""Interval between observations of a robot."""
-
-
-class Laboratory:
-    """The robot in reality and in simulators with three tunables.
-
-    Args:
-        evaluations: evaluations of each search for a controller.
-        folder: folder for evolved controllers, shared with later tables and other processes.
-    """
-
-    def __init__(self, evaluations: int, folder: Path) -> None:
-        self.evaluations = evaluations
-        self.folder = folder
-        self.robot = Quadruped()
-        self.engine = PyBullet()
-        edits = [tunables[name]() for name in NAMES]
-        self.simulate = Simulation(self.robot, self.engine, edits)
-        self.truth = np.array([edit.read(self.robot.world) for edit in edits])
-        self.parameters = Space.box([edit.lower for edit in edits], [edit.upper for edit in edits])
-
-    def real(self, genome: Genome) -> float:
-        """Return the fitness of the genome `(g,)` in reality."""
-        return float(self.simulate(genome[None], self.truth[None])[0, 0])
-
-    def random(self, seed: int) -> FloatArray:
-        """Return a simulator `(3,)`, drawn uniformly within the bounds of the tunables."""
-        drawn: FloatArray = self.parameters.draw(1, stream(seed, "random simulator"))[0]
-        return drawn
-
-    def in_reality(self, seed: int) -> Genome:
-        """Return a controller evolved in reality."""
-        return self.evolve(self.truth, "direct", seed)
-
-    def in_random(self, seed: int) -> Genome:
-        """Return a controller evolved in a random simulator."""
-        return self.evolve(self.random(seed), "random", seed)
-
-    def evolve(self, parameters: FloatArray, *address: str | int) -> Genome:
-        """Return the fittest controller that the budget finds in a simulator `(3,)`."""
-        file = self.folder / f"{self.evaluations}-{'-'.join(map(str, address))}.npy"
-        if not file.exists():
-            fittest = maximise(
-                SteadyState(),
-                self.robot.space,
-                lambda asked: self.simulate(asked.genomes, parameters[None])[:, 0],
-                self.evaluations,
-                stream(0, *address),
-            )
-            np.save(file, fittest.genomes[0])
-        genome: Genome = np.load(file)
-        return genome
-
-    def direct(self, seeds: int) -> list[float]:
-        """Return the fitness of controllers evolved in reality."""
-        return [self.real(self.in_reality(seed)) for seed in range(seeds)]
-
-    def observe(self, genome: Genome, duration_s: float) -> tuple[FloatArray, FloatArray]:
-        """Return positions `(t, 3)` and tilts `(t,)` in degrees, from time 0 on, in reality."""
-        robot = Quadruped(QuadrupedOptions(counted_s=duration_s - SETTLING_S))
-        motion = replace(robot.motion(genome), observe_s=np.arange(0.0, duration_s + SAMPLING_S / 2, SAMPLING_S))
-        trajectory = self.engine.rollout(robot.world, motion)
-        return trajectory.positions_m, tilts(trajectory.orientations)
 
 
 def stands(laboratory: Laboratory, _: Namespace) -> None:
@@ -196,62 +120,6 @@ def identifiable(laboratory: Laboratory, arguments: Namespace) -> None:
         print(f"{count} samples: median |error| {numbers(off, ', ')}; real fitness over direct {mean_and_sd(ratios)}.")
 
 
-def table(head: str, rows: Iterable[str]) -> None:
-    """Print a Markdown table, row by row."""
-    print(f"\n| {head} |\n|{'---|' * (head.count('|') + 1)}")
-    for row in rows:
-        print(f"| {row} |", flush=True)
-    print()
-
-
-def tilts(orientations: FloatArray) -> FloatArray:
-    """Return the angles between the robot's vertical axis and the world's, in degrees."""
-    x, y = orientations[..., 0], orientations[..., 1]
-    return np.degrees(np.arccos(np.clip(1 - 2 * (x**2 + y**2), -1, 1)))
-
-
 def distance(positions_m: FloatArray) -> float:
     """Return the distance over ground from the first to the last of positions `(t, 3)`."""
     return float(np.linalg.norm((positions_m[-1] - positions_m[0])[:2]))
-
-
-def mean_and_sd(values: Sequence[float]) -> str:
-    """Return mean ± standard deviation and number of values, as text."""
-    return f"{np.mean(values):.3f} ± {np.std(values, ddof=1):.3f} (n = {len(values)})"
-
-
-def numbers(values: FloatArray, between: str = " | ") -> str:
-    """Return numbers as text."""
-    return between.join(f"{value:.2f}" for value in values)
-
-
-def bar(share: float) -> str:
-    """Return a bar of text, with a block for each hundredth."""
-    return "▪" * round(100 * share)
-
-
-COMMANDS: dict[str, Callable[[Laboratory, Namespace], None]] = {
-    function.__name__: function for function in (stands, walks, gap, known, smooth, identifiable)
-}
-
-
-def main() -> None:
-    """Print the requested tables; tables of one call share evolved controllers."""
-    parser = ArgumentParser(prog="python -m benchmarks.robot", description=__doc__)
-    parser.add_argument("tables", nargs="+", choices=COMMANDS)
-    parser.add_argument("--seeds", type=int, default=10, help="controllers evolved in reality")
-    parser.add_argument("--evaluations", type=int, default=2_000, help="evaluations of each search for a controller")
-    parser.add_argument("--samples", type=int, nargs="+", default=[1, 3, 10], help="identifiable: numbers of samples")
-    parser.add_argument("--tunings", type=int, default=3, help="identifiable: tunings with each number of samples")
-    parser.add_argument("--tuning", type=int, default=2_000, help="identifiable: evaluations of a tuning")
-    parser.add_argument("--keep", type=Path, help="folder for evolved controllers, shared with other calls")
-    arguments = parser.parse_args()
-    with TemporaryDirectory() as temporary:
-        folder = arguments.keep or Path(temporary)
-        folder.mkdir(parents=True, exist_ok=True)
-        for name in arguments.tables:
-            COMMANDS[name](Laboratory(arguments.evaluations, folder), arguments)
-
-
-if __name__ == "__main__":
-    main()
