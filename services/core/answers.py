@@ -18,12 +18,13 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes, Parameters
-from gaplab.services.core.ports import Simulate
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes, Outcomes, Parameters
+from gaplab.services.core.errors import PluginBroken
+from gaplab.services.core.ports import Sense, Simulate
 from gaplab.services.core.types import Cost
 
 Answer: TypeAlias = tuple[bytes, FloatArray]
-"""The key of a genome in a block of m simulators, and its `(m,)` fitnesses there."""
+"""The key of a genome in a block of m simulators, and its `(m,)` fitnesses there, or its `(m · (1 + q),)` outcomes."""
 
 Following: TypeAlias = Callable[[int], Genomes]
 """A function that returns up to n genomes of the next questions, probably, `(≤ n, g)`."""
@@ -32,6 +33,9 @@ BLOCK = 100
 """Most simulators in one call. It is the smallest part of a question that a checkpoint can hold."""
 
 _DIGEST_BYTES = 16
+_SENSED = b"sensed"
+"""Part of the keys of answers with readings, which are longer."""
+
 _HEADER = Struct("<II")
 _FLOAT = np.dtype("<f8")
 
@@ -43,8 +47,8 @@ class Recorder(Protocol):
         """Return how many genomes to simulate in the next call, in this number of simulators; at least 1."""
         ...
 
-    def record(self, answers: Sequence[Answer]) -> None:
-        """Record the answers of that call."""
+    def record(self, answers: Sequence[Answer], rollouts: int) -> None:
+        """Record the answers of that call, and how many rollouts it had."""
         ...
 
 
@@ -60,7 +64,8 @@ class Answers:
         simulate: the simulation.
         batch_size: returns how many rollouts a call should ask for now to keep all cores busy.
         checkpoints: answers of this step from before an interruption, each as `pack` returns them.
-        recorder: records what `simulate` returns.
+        recorder: records what `simulate` and `sense` return.
+        sense: the simulation with readings; None if there is none.
     """
 
     def __init__(
@@ -69,8 +74,10 @@ class Answers:
         batch_size: Callable[[], int] = lambda: 1,
         checkpoints: Iterable[bytes] = (),
         recorder: Recorder | None = None,
+        sense: Sense | None = None,
     ) -> None:
         self._simulate = simulate
+        self._with_readings = sense
         self._batch_size = batch_size
         self._recorder = recorder
         self._ahead = {key: row for packed in checkpoints for key, row in unpack(packed)}
@@ -84,7 +91,7 @@ class Answers:
             parameters: parameters of the simulators.
             following: returns the genomes of the next questions, probably, in the same simulators.
         """
-        blocks = [parameters[start : start + BLOCK] for start in range(0, len(parameters), BLOCK)]
+        blocks = _blocks(parameters)
         keys = [_keys(genomes, block) for block in blocks]
         answers = self._ahead
         if not all(key in answers for column in keys for key in column):
@@ -98,6 +105,19 @@ class Answers:
         self._rollouts += fitnesses.size
         self._failures += int(np.isnan(fitnesses).sum())
         return fitnesses
+
+    def sense(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
+        """Return fitness and readings `(n, m, 1 + q)` of genomes `(n, g)` in simulators `(m, p)`; nan where it failed.
+
+        Raises:
+            PluginBroken: the robot has no sensors.
+        """
+        if self._with_readings is None:
+            raise PluginBroken("readings are asked for, and the robot has no sensors")
+        outcomes = np.concatenate([self._sensed(genomes, block) for block in _blocks(parameters)], axis=1)
+        self._rollouts += outcomes[:, :, 0].size
+        self._failures += int(np.isnan(outcomes[:, :, 0]).sum())
+        return outcomes
 
     def cost_of(self, budget: int) -> Cost:
         """Return the cost of the step so far; `budget` is the number of rollouts that it was given."""
@@ -115,18 +135,34 @@ class Answers:
             wanted = asked + _keys(more, block)
             answers.update((key, self._ahead[key]) for key in wanted if key in self._ahead)
             missing = [index for index, key in enumerate(wanted) if key not in answers]
-            answers.update(self._simulated(together[missing], block, [wanted[index] for index in missing]))
+            keys_of = [wanted[index] for index in missing]
+            answers.update(self._computed(self._simulate, together[missing], block, keys_of))
         return answers
 
-    def _simulated(self, genomes: Genomes, parameters: Parameters, keys: list[bytes]) -> Iterator[Answer]:
+    def _sensed(self, genomes: Genomes, block: Parameters) -> Outcomes:
+        """Return the outcomes of the genomes in one block of simulators."""
+        keys = _keys(genomes, block, _SENSED)
+        answers = {key: self._ahead.pop(key) for key in dict.fromkeys(keys) if key in self._ahead}
+        missing = [index for index, key in enumerate(keys) if key not in answers]
+        answers.update(self._computed(self._flat, genomes[missing], block, [keys[index] for index in missing]))
+        return np.array([answers[key] for key in keys]).reshape(len(genomes), len(block), -1)
+
+    def _flat(self, genomes: Genomes, parameters: Parameters) -> FloatArray:
+        """Return the outcomes as one row for each genome, `(n, m · (1 + q))`."""
+        assert self._with_readings is not None
+        return self._with_readings(genomes, parameters).reshape(len(genomes), -1)
+
+    def _computed(
+        self, compute: Simulate, genomes: Genomes, parameters: Parameters, keys: list[bytes]
+    ) -> Iterator[Answer]:
         """Yield the answers of the simulation, call by call."""
         done = 0
         while done < len(genomes):
             count = self._recorder.genomes_per_call(len(parameters)) if self._recorder else len(genomes)
-            fitnesses = self._simulate(genomes[done : done + count], parameters)
-            answers = list(zip(keys[done : done + count], fitnesses, strict=True))
+            rows = compute(genomes[done : done + count], parameters)
+            answers = list(zip(keys[done : done + count], rows, strict=True))
             if self._recorder:
-                self._recorder.record(answers)
+                self._recorder.record(answers, len(rows) * len(parameters))
             yield from answers
             done += count
 
@@ -154,8 +190,12 @@ def unpack(packed: bytes) -> Iterator[Answer]:
             yield packed[key : key + _DIGEST_BYTES], row
 
 
-def _keys(genomes: Genomes, parameters: Parameters) -> list[bytes]:
-    simulators = blake2b(np.ascontiguousarray(parameters).tobytes(), digest_size=_DIGEST_BYTES)
+def _blocks(parameters: Parameters) -> list[Parameters]:
+    return [parameters[start : start + BLOCK] for start in range(0, len(parameters), BLOCK)]
+
+
+def _keys(genomes: Genomes, parameters: Parameters, kind: bytes = b"") -> list[bytes]:
+    simulators = blake2b(np.ascontiguousarray(parameters).tobytes() + kind, digest_size=_DIGEST_BYTES)
     keys = []
     for genome in genomes:
         digest = simulators.copy()

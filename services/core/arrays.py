@@ -20,8 +20,24 @@ Fitnesses: TypeAlias = FloatArray
 """`(n, m)`: the fitness of n controllers in m simulators; nan where the physics failed."""
 
 
+Readings: TypeAlias = FloatArray
+"""`(q,)`: what the sensors said during one rollout, each divided by its noise; nan where it failed."""
+
+Outcomes: TypeAlias = FloatArray
+"""`(n, m, 1 + q)`: the fitness of n controllers in m simulators, and the readings of their sensors."""
+
+
 def frozen(values: object) -> FloatArray:
     """Return a read-only float64 copy, for arrays in frozen values."""
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
     return array
+
+
+NO_READINGS: Readings = frozen([])
+"""Readings of a robot without sensors."""
+
+
+def no_readings() -> Readings:
+    """Return the readings of a robot without sensors, for fields of frozen values."""
+    return NO_READINGS

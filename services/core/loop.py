@@ -6,20 +6,24 @@ never stopped.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.random import Generator
 
 from gaplab.services.core.answers import Answers
-from gaplab.services.core.arrays import Genome, Parameters
+from gaplab.services.core.arrays import FloatArray, Genome, Parameters, no_readings
+from gaplab.services.core.discrepancies.base import Discrepancy
+from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.optimizers.base import Optimizer
-from gaplab.services.core.ports import Reality, Simulate
+from gaplab.services.core.ports import Reality, Sense, Simulate
 from gaplab.services.core.search import maximise
 from gaplab.services.core.strategies.base import Score, Search, Strategy
 from gaplab.services.core.streams import stream
-from gaplab.services.core.tuning import Misfit, draw_simulators, tune
+from gaplab.services.core.tuners.base import Task, Tuner
+from gaplab.services.core.tuners.search import Search as SearchTuner
+from gaplab.services.core.tuning import Misfit, draw_simulators
 from gaplab.services.core.types import (
     Belief,
     Budget,
@@ -53,6 +57,10 @@ class Setting:
         seed: seed of the experiment.
         repetition: number of the repetition, from 0.
         batch_size: returns how many rollouts a call of `simulate` should have at present; it changes no number.
+        sense: simulation with readings; None if the robot has no sensors.
+        reading_times_s: `(q,)`: time of each reading.
+        discrepancy: what tuning minimises.
+        tuner: finds simulators.
     """
 
     simulate: Simulate
@@ -67,6 +75,10 @@ class Setting:
     seed: int
     repetition: int
     batch_size: Callable[[], int] = lambda: 1
+    sense: Sense | None = None
+    reading_times_s: FloatArray = field(default_factory=no_readings)
+    discrepancy: Discrepancy = field(default_factory=SquaredFitness)
+    tuner: Tuner = field(default_factory=SearchTuner)
 
     def stream(self, iteration: int, phase: str) -> Generator:
         """Return the random stream of one phase of one iteration."""
@@ -74,7 +86,7 @@ class Setting:
 
     def answers(self) -> Answers:
         """Return the answers of one step, which count and prefetch its rollouts."""
-        return Answers(self.simulate, self.batch_size)
+        return Answers(self.simulate, self.batch_size, sense=self.sense)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +147,7 @@ def next_step(setting: Setting, history: History, answers: Answers) -> Step | No
         case Probed(iteration=iteration) if iteration < setting.iterations:
             return _select(setting, history, iteration + 1, answers)
         case Selected(iteration=iteration, genome=genome):
-            return Measured(iteration, Sample(genome, setting.reality(genome)))
+            return Measured(iteration, Sample(genome, *setting.reality(genome)))
         case Measured(iteration=iteration):
             return _tune(setting, history, iteration, answers)
     return None
@@ -194,10 +206,15 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
     if not samples:
         return Tuned(iteration, draw_simulators(setting.parameters, ensemble, rng), Cost(saved=budget))
     optimizer = setting.optimizer.diverse(ensemble) if ensemble > 1 else setting.optimizer
-    found = tune(Misfit(answers, samples), setting.parameters, optimizer, evaluations, rng)
-    for simulator in found[:ensemble]:
-        setting.parameters.check(simulator.parameters, f"optimizer {setting.optimizer.name!r}")
-    return Tuned(iteration, found[:ensemble], answers.cost_of(budget))
+    misfit = Misfit(answers, samples, setting.discrepancy, setting.reading_times_s)
+    task = Task(misfit, setting.parameters, optimizer, ensemble, evaluations, history.simulators)
+    found = setting.tuner.tune(task, rng)
+    source = f"tuner {setting.tuner.name!r} with optimizer {setting.optimizer.name!r}"
+    if not 1 <= len(found) <= ensemble:
+        raise PluginBroken(f"{source} returned {len(found)} simulators; permitted: {ensemble}")
+    for simulator in found:
+        setting.parameters.check(simulator.parameters, source)
+    return Tuned(iteration, found, answers.cost_of(budget))
 
 
 def _transfer(setting: Setting, history: History, iteration: int, answers: Answers) -> Transferred:
@@ -217,8 +234,8 @@ def _transfer(setting: Setting, history: History, iteration: int, answers: Answe
 
 
 def _probe(setting: Setting, history: History, iteration: int, genome: Genome) -> Probed:
-    fitness = setting.reality(genome)
-    return Probed(iteration, fitness, recorded_fitness(fitness, history.samples))
+    fitness, readings = setting.reality(genome)
+    return Probed(iteration, fitness, recorded_fitness(fitness, history.samples), readings)
 
 
 def recorded_fitness(probe: float, samples: Iterable[Sample]) -> float:

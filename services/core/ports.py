@@ -1,8 +1,9 @@
-"""The two ways to evaluate a controller. The reality gap is the difference between these two types."""
+"""The ways to evaluate a controller. The reality gap is the difference between simulation and reality."""
 
 from typing import Protocol
 
-from gaplab.services.core.arrays import Fitnesses, Genome, Genomes, Parameters
+from gaplab.services.core.arrays import Fitnesses, Genome, Genomes, Outcomes, Parameters
+from gaplab.services.core.types import Outcome
 
 
 class Simulate(Protocol):
@@ -16,9 +17,19 @@ class Simulate(Protocol):
         ...
 
 
+class Sense(Protocol):
+    """The same with the readings of the robot's sensors. The fitness is that of Simulate, to the last bit."""
+
+    def __call__(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
+        """Return fitness and readings `(n, m, 1 + q)` of genomes `(n, g)` in simulators `(m, p)`; all nan where the
+        physics failed.
+        """
+        ...
+
+
 class Reality(Protocol):
     """The real world: slow and hidden; evaluates one genome at a time, and each evaluation counts."""
 
-    def __call__(self, genome: Genome) -> float:
-        """Return the fitness of the genome `(g,)` in reality; nan if the measurement failed."""
+    def __call__(self, genome: Genome) -> Outcome:
+        """Return fitness and readings of the genome `(g,)` in reality; a nan fitness if the measurement failed."""
         ...

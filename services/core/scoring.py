@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes
-from gaplab.services.core.types import Sample
+from gaplab.services.core.types import Sample, Simulator
 
 NEAREST = 1e-6
 """Smallest distance between a controller and a sample: at 0 the paper's 1/d is infinite."""
@@ -73,6 +73,14 @@ def simulator_weights(squared_errors: FloatArray, floor: float) -> FloatArray:
     weights = 1.0 / np.maximum(squared_errors, floor)
     total = weights.sum()
     return weights / total if total > 0 else np.full(len(weights), 1.0 / len(weights))
+
+
+def weights_of(simulators: Sequence[Simulator], floor: float) -> FloatArray:
+    """Return weights `(m,)` of tuned simulators, with sum 1: their posterior shares, or else `simulator_weights`."""
+    shares = [each.weight for each in simulators if each.weight is not None]
+    if len(shares) == len(simulators):
+        return np.array(shares) / np.sum(shares)
+    return simulator_weights(np.array([each.squared_error for each in simulators]), floor)
 
 
 def _weighty(fitnesses: Fitnesses, weights: FloatArray) -> Fitnesses:

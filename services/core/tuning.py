@@ -1,24 +1,34 @@
-"""Simulator tuning: the search for simulators that reproduce the real fitness of the samples."""
+"""What simulator tuning minimises: the discrepancy of simulators from the samples."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.random import Generator
 
-from gaplab.services.core.answers import Answers, Following
-from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes, Parameters
-from gaplab.services.core.optimizers.base import Optimizer
-from gaplab.services.core.search import Question, maximise
+from gaplab.services.core.answers import Answers, Following, nothing
+from gaplab.services.core.arrays import NO_READINGS, Fitnesses, FloatArray, Genomes, Outcomes, Parameters
+from gaplab.services.core.discrepancies.base import Discrepancy
+from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
+from gaplab.services.core.search import Question
 from gaplab.services.core.types import Sample, Simulator, Space
 
 ROUNDING = 1e-9
 """Relative excess of a partial sum over a limit: from it on, the whole sum exceeds the limit in spite of rounding."""
 
 
+def summed(terms: FloatArray) -> FloatArray:
+    """Return the sum over samples of terms `(n, m)` for each simulator, `(m,)`; inf where the physics failed on one.
+
+    The samples are added one by one, so that the sum of a simulator does not depend on the others in the call.
+    """
+    total = np.zeros(terms.shape[1])
+    for row in terms:
+        total = total + row
+    return np.where(np.isnan(total), np.inf, total)
+
+
 def squared_errors(fitnesses: Fitnesses, measured: FloatArray) -> FloatArray:
     """Return Σ (f_sim − f_real)² over samples for each simulator, `(m,)`; inf where the physics failed on one.
-
-    The samples are added one by one, so that the error of a simulator does not depend on the others in the call.
 
     Source: paper, section 2: the denominator of f(sim).
 
@@ -26,10 +36,7 @@ def squared_errors(fitnesses: Fitnesses, measured: FloatArray) -> FloatArray:
         fitnesses: `(n, m)` of n samples in m simulators.
         measured: `(n,)` fitnesses in reality.
     """
-    errors = np.zeros(fitnesses.shape[1])
-    for row in (fitnesses - measured[:, None]) ** 2:
-        errors = errors + row
-    return np.where(np.isnan(errors), np.inf, errors)
+    return summed((fitnesses - measured[:, None]) ** 2)
 
 
 def simulator_fitness(squared_error: FloatArray) -> FloatArray:
@@ -44,7 +51,7 @@ def draw_simulators(space: Space, count: int, rng: Generator) -> tuple[Simulator
 
 
 class Misfit:
-    """−Σe² of simulators on samples; the sum stops as soon as it is certain to be below a threshold.
+    """Minus the discrepancy of simulators from all samples; its sum stops once it is certain to be below a threshold.
 
     The samples with the largest errors so far come first. The sum itself is in the order of the samples, and only the
     rollouts that were needed count. So no number, not even a count, depends on how many rollouts run at once.
@@ -52,63 +59,85 @@ class Misfit:
     Args:
         answers: answers of the simulators.
         samples: at least one sample; all measurements succeeded.
+        discrepancy: how much an answer differs from a sample; default: the squared difference in fitness.
+        times_s: `(q,)`: time of each reading.
     """
 
-    def __init__(self, answers: Answers, samples: Sequence[Sample]) -> None:
+    def __init__(
+        self,
+        answers: Answers,
+        samples: Sequence[Sample],
+        discrepancy: Discrepancy | None = None,
+        times_s: FloatArray = NO_READINGS,
+    ) -> None:
+        self.discrepancy = discrepancy or SquaredFitness()
         self._answers = answers
+        self._times_s = times_s
         self._genomes = np.array([sample.genome for sample in samples])
-        self._measured = np.array([sample.fitness for sample in samples])
+        self._measured = np.array([self._seen(sample) for sample in samples])
         self._erred = np.zeros(len(samples))
         self._asked = np.zeros(len(samples))
 
     def __call__(self, question: Question) -> FloatArray:
-        """Return −Σe², `(m,)`, of simulators `(m, p)`; -inf where it is below the threshold."""
+        """Return minus the discrepancy, `(m,)`, of simulators `(m, p)`; -inf where it is below the threshold."""
         simulators, thresholds = question.genomes, question.thresholds
         if np.all(np.isneginf(thresholds)):
-            fitnesses = self._answers(self._genomes, simulators)
-            for index, row in enumerate(fitnesses):
-                self._learn(index, row)
-            return -squared_errors(fitnesses, self._measured)
+            return -self.of(simulators)
         return np.array([self._one(row[None, :], -least) for row, least in zip(simulators, thresholds, strict=True)])
 
+    @property
+    def samples(self) -> int:
+        """Return the number of samples, k: a simulator costs so many rollouts."""
+        return len(self._measured)
+
+    @property
+    def noise(self) -> float:
+        """Return the variance of a difference of the right simulator, as far as it is known; else 0."""
+        return self.discrepancy.noise(self._measured, self._times_s)
+
+    def of(self, parameters: Parameters) -> FloatArray:
+        """Return the whole discrepancy, `(m,)`, of simulators `(m, p)`; inf where the physics failed on a sample."""
+        terms = self._terms(self._outcomes(self._genomes, parameters), self._measured)
+        for index, row in enumerate(terms):
+            self._learn(index, row)
+        return summed(terms)
+
+    def residuals(self, parameters: Parameters) -> FloatArray:
+        """Return `(m, r)`: all differences of simulators `(m, p)`, whose squares sum to the discrepancy."""
+        outcomes = self._outcomes(self._genomes, parameters)
+        found = self.discrepancy.residuals(outcomes, self._measured, self._times_s)
+        return np.moveaxis(found, 1, 0).reshape(len(parameters), -1)
+
     def _one(self, parameters: Parameters, limit: float) -> float:
-        """Return −Σe² of one simulator `(1, p)`, or -inf if Σe² exceeds the limit."""
-        fitnesses = np.empty((len(self._measured), 1))
+        """Return minus the discrepancy of one simulator `(1, p)`, or -inf if the discrepancy exceeds the limit."""
+        terms = np.empty((len(self._measured), 1))
         order = np.argsort(-self._erred / np.maximum(self._asked, 1.0), kind="stable")
         genomes, partial = self._genomes[order], 0.0
         for place, index in enumerate(order):
-            one = genomes[place : place + 1]
-            fitnesses[index] = self._answers(one, parameters, _first_of(genomes[place + 1 :]))
-            partial += self._learn(int(index), fitnesses[index])
+            outcomes = self._outcomes(genomes[place : place + 1], parameters, _first_of(genomes[place + 1 :]))
+            terms[index] = self._terms(outcomes, self._measured[index : index + 1])
+            partial += self._learn(int(index), terms[index])
             if not partial <= limit * (1.0 + ROUNDING):
                 return -np.inf
-        return -float(squared_errors(fitnesses, self._measured)[0])
+        return -float(summed(terms)[0])
 
-    def _learn(self, sample: int, fitnesses: FloatArray) -> float:
-        """Remember how far simulators err on a sample, and return the sum of their squared errors."""
-        squares = (fitnesses - self._measured[sample]) ** 2
-        self._erred[sample] += np.nansum(squares)
-        self._asked[sample] += len(squares)
-        return float(squares.sum())
+    def _outcomes(self, genomes: Genomes, parameters: Parameters, following: Following = nothing) -> Outcomes:
+        if self.discrepancy.senses:
+            return self._answers.sense(genomes, parameters)
+        return self._answers(genomes, parameters, following)[..., None]
+
+    def _terms(self, outcomes: Outcomes, measured: FloatArray) -> FloatArray:
+        return self.discrepancy.terms(outcomes, measured, self._times_s)
+
+    def _seen(self, sample: Sample) -> FloatArray:
+        return sample.outcome if self.discrepancy.senses else np.array([sample.fitness])
+
+    def _learn(self, sample: int, terms: FloatArray) -> float:
+        """Remember how far simulators err on a sample, and return the sum of their terms."""
+        self._erred[sample] += np.nansum(terms)
+        self._asked[sample] += len(terms)
+        return float(terms.sum())
 
 
 def _first_of(genomes: Genomes) -> Following:
     return lambda count: genomes[:count]
-
-
-def tune(misfit: Misfit, space: Space, optimizer: Optimizer, evaluations: int, rng: Generator) -> tuple[Simulator, ...]:
-    """Return the final population of simulators, best first, after a search from scratch.
-
-    The optimizer maximises −Σe². It ranks simulators as f(sim) = 1/Σe² does, and is finite at a perfect fit.
-
-    Args:
-        misfit: misfit to the samples so far.
-        space: bounds of the tunables.
-        optimizer: optimizer of the search; a diverse one keeps an ensemble.
-        evaluations: number of simulators to evaluate.
-        rng: all randomness of the search.
-    """
-    found = maximise(optimizer, space, misfit, evaluations, rng)
-    return tuple(
-        Simulator(parameters, float(-value)) for parameters, value in zip(found.genomes, found.fitness, strict=True)
-    )

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Parameters, frozen
+from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genome, Genomes, Parameters, Readings, frozen, no_readings
 from gaplab.services.core.errors import PluginBroken
 
 
@@ -90,25 +90,54 @@ class Space:
         return np.where(self.periodic, wrapped, clipped)
 
 
+class Outcome(NamedTuple):
+    """What reality answers about one genome.
+
+    Attributes:
+        fitness: its fitness; nan if the measurement failed.
+        readings: `(q,)`: what the sensors said, each divided by its noise; empty if the robot has none.
+    """
+
+    fitness: float
+    readings: Readings = NO_READINGS
+
+
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """A genome with its fitness in reality; nan if the measurement failed, which counts but is not learned from."""
+    """A genome with its outcome in reality.
+
+    Attributes:
+        genome: `(g,)`.
+        fitness: nan if the measurement failed, which counts but is not learned from.
+        readings: `(q,)`: what the sensors said, each divided by its noise; empty if there are none.
+    """
 
     genome: Genome
     fitness: float
+    readings: Readings = field(default_factory=no_readings)
+
+    @property
+    def outcome(self) -> FloatArray:
+        """Return `(1 + q,)`: fitness, then readings."""
+        return np.append(self.fitness, self.readings)
 
 
 @dataclass(frozen=True, eq=False)
 class Simulator:
-    """One setting of the tunables, with Σ(f_sim − f_real)² over the samples it was tuned on.
+    """One setting of the tunables, with its discrepancy from the samples that it was tuned on.
 
     Attributes:
         parameters: `(p,)`, in the order of the spec's tunables.
-        squared_error: at least 0; 0 before any sample, inf where the physics failed on one.
+        squared_error: the discrepancy, by default Σ(f_sim − f_real)²; at least 0; 0 before any sample, inf where the
+            physics failed on one.
+        interval: `(p, 2)`: least and greatest value of each tunable within 95 % confidence; None if the tuner gives none.
+        weight: share of the posterior probability; None if the tuner gives none.
     """
 
     parameters: FloatArray
     squared_error: float = 0.0
+    interval: FloatArray | None = None
+    weight: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,11 +249,13 @@ class Probed:
     Attributes:
         fitness: fitness in reality; nan if the measurement failed.
         recorded: the larger of this and the best sample's fitness, which the curve shows. Source: section 3.
+        readings: `(q,)`: what the sensors said, each divided by its noise; empty if there are none.
     """
 
     iteration: int
     fitness: float
     recorded: float
+    readings: Readings = field(default_factory=no_readings, compare=False)
 
 
 Step: TypeAlias = Selected | Measured | Tuned | Transferred | Probed

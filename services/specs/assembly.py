@@ -1,6 +1,7 @@
 """Assembly: from a resolved spec to the simulation and the reality of its repetitions."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import cache, lru_cache, partial
 from types import ModuleType
 
@@ -10,19 +11,20 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked
 from gaplab.services.core import external_plugins
-from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters, frozen
+from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.errors import PluginBroken, RealityFailed, gather
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.optimizers import optimizers
-from gaplab.services.core.ports import Simulate
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.sensitivity import Subject
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.base import Tunable
-from gaplab.services.core.types import Budget, Space
-from gaplab.services.core.world import Recording, World
+from gaplab.services.core.tuners import tuners
+from gaplab.services.core.types import Budget, Outcome, Space
+from gaplab.services.core.world import Recording, Trajectory, World
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 
@@ -45,9 +47,33 @@ class Simulation:
         """
         worlds = [self._world(tuple(row)) for row in parameters.tolist()]
         motions = [self._robot.motion(genome) for genome in genomes]
-        fitnesses = self._robot.fitness(self._engine.rollouts(worlds, motions))
-        if np.shape(fitnesses) != (len(genomes), len(parameters)):
-            expected = f"the fitness of {len(genomes)} genomes in {len(parameters)} simulators"
+        return self._fitnesses(self._engine.rollouts(worlds, motions), len(genomes), len(parameters))
+
+    def sense(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
+        """Return fitness and readings `(n, m, 1 + q)`: the fitness as a call returns it, then each reading over its noise.
+
+        A robot without sensors has no readings.
+        """
+        sensors = self._robot.sensors
+        worlds = [self._world(tuple(row)) for row in parameters.tolist()]
+        motions = [self._robot.motion(genome) for genome in genomes]
+        observed_s = motions[0].observe_s
+        often_s = np.union1d(observed_s, sensors.times_s)
+        seen = self._engine.rollouts(worlds, [replace(motion, observe_s=often_s) for motion in motions])
+        fitnesses = self._fitnesses(_at(seen, observed_s), len(genomes), len(parameters))
+        if not sensors.size:
+            return fitnesses[..., None]
+        values = self._robot.sense(_at(seen, sensors.times_s))
+        expected = (len(genomes), len(parameters), len(sensors.times_s), len(sensors.names))
+        if np.shape(values) != expected:
+            raise PluginBroken(f"robot {self._robot.name!r} returned {np.shape(values)} readings; permitted: {expected}")
+        failed = np.isnan(fitnesses)[..., None]
+        return np.concatenate([fitnesses[..., None], np.where(failed, np.nan, sensors.standardised(values))], axis=-1)
+
+    def _fitnesses(self, seen: Trajectory, genomes: int, simulators: int) -> Fitnesses:
+        fitnesses = self._robot.fitness(seen)
+        if np.shape(fitnesses) != (genomes, simulators):
+            expected = f"the fitness of {genomes} genomes in {simulators} simulators"
             raise PluginBroken(f"robot {self._robot.name!r} returned {np.shape(fitnesses)} numbers for {expected}")
         return np.where(np.isfinite(fitnesses), fitnesses, np.nan)
 
@@ -63,26 +89,32 @@ class Simulation:
         return world
 
 
+def _at(seen: Trajectory, times_s: FloatArray) -> Trajectory:
+    """Return the observations at some of the times of a trajectory."""
+    where = np.searchsorted(seen.times_s, times_s)
+    return Trajectory(times_s, seen.positions_m[..., where, :], seen.orientations[..., where, :])
+
+
 class HiddenReality:
     """A simulation with hidden parameters.
 
     Args:
-        simulate: the simulation on reality's engine.
+        simulation: the simulation on reality's engine.
         parameters: `(p,)`, the hidden parameters.
     """
 
-    def __init__(self, simulate: Simulate, parameters: FloatArray) -> None:
-        self._simulate = simulate
+    def __init__(self, simulation: Simulation, parameters: FloatArray) -> None:
+        self._simulation = simulation
         self._parameters = parameters[None, :]
 
-    def fitnesses(self, genomes: Genomes) -> FloatArray:
-        """Return the fitnesses `(n,)` of genomes `(n, g)` in reality; nan where the physics failed.
+    def ask(self, question: Callable[[Genomes, Parameters], FloatArray], genomes: Genomes) -> FloatArray:
+        """Return what the simulation answers about genomes `(n, g)` in reality, `(n, 1, ...)`.
 
         Raises:
             RealityFailed: its code raised an error.
         """
         try:
-            return self._simulate(genomes, self._parameters)[:, 0]
+            return question(genomes, self._parameters)
         except (Exception, SystemExit) as error:
             raise RealityFailed("reality failed") from error
 
@@ -90,9 +122,10 @@ class HiddenReality:
 class MeasuredReality(HiddenReality):
     """A Reality that is a simulation with hidden parameters."""
 
-    def __call__(self, genome: Genome) -> float:
-        """Return the fitness of a genome `(g,)` in reality; nan if the physics failed."""
-        return float(self.fitnesses(genome[None, :])[0])
+    def __call__(self, genome: Genome) -> Outcome:
+        """Return fitness and readings of a genome `(g,)` in reality; nan if the physics failed."""
+        fitness, *readings = self.ask(self._simulation.sense, genome[None, :])[0, 0]
+        return Outcome(float(fitness), frozen(readings))
 
 
 class EvolutionInReality(HiddenReality):
@@ -100,7 +133,7 @@ class EvolutionInReality(HiddenReality):
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
         """Return the fitnesses of genomes `(n, g)` in reality, `(n, m)`; the m simulators do not matter."""
-        return np.repeat(self.fitnesses(genomes)[:, None], len(parameters), axis=1)
+        return np.repeat(self.ask(self._simulation, genomes), len(parameters), axis=1)
 
 
 def setting(spec: ResolvedSpec, repetition: int) -> Setting:
@@ -115,11 +148,10 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
     edits = edits_of(ref.name for ref in spec.tunables)
     truth, real = reality_of(spec, robot)
     engine = engine_of(spec.engine)
-    simulate: Simulate = Simulation(robot, engine, edits)
-    if strategy.in_reality:
-        simulate = EvolutionInReality(real, truth)
+    simulation = Simulation(robot, engine, edits)
     return Setting(
-        simulate=simulate,
+        simulate=EvolutionInReality(real, truth) if strategy.in_reality else simulation,
+        sense=simulation.sense,
         reality=MeasuredReality(real, truth),
         strategy=strategy,
         optimizer=optimizers.create(spec.optimizer),
@@ -131,6 +163,9 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
         seed=spec.seed,
         repetition=repetition,
         batch_size=lambda: engine.batch,
+        discrepancy=discrepancies.create(spec.discrepancy),
+        tuner=tuners.create(spec.tuner),
+        reading_times_s=robot.sensors.reading_times_s,
     )
 
 

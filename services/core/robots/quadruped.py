@@ -7,7 +7,7 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, Genome, frozen
-from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.robots.base import Robot, Sensors
 from gaplab.services.core.types import Space
 from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, Trajectory, Vector, World
 
@@ -30,6 +30,12 @@ SETTLING_S = 0.5
 """Time before the counted time: the robot drops to the ground and starts its gait."""
 
 COUNTED_S = 2.5
+SENSED_EVERY_S = 0.25
+"""Interval between readings of the sensors."""
+
+TILT_NOISE_RAD, PLACE_NOISE_M = 0.02, 0.005
+"""Noise of the sensors: gaplab's defaults, of a cheap inertial sensor and a camera above the floor."""
+
 NARROWEST, WIDEST = 0.1, 0.9
 """Width of a pulse in periods, at gene values 0 and 1."""
 
@@ -73,6 +79,13 @@ class Quadruped(Robot):
         actuators = len(self.world.actuators)
         self.space = Space.box([0.0] * 2 * actuators, [1.0] * 2 * actuators, [True, False] * actuators)
         self.known = _trot()
+        times = np.arange(1, np.floor(self.options.counted_s / SENSED_EVERY_S) + 1) * SENSED_EVERY_S
+        self.sensors = Sensors(
+            names=("roll", "pitch", "height", "x", "y"),
+            units=("rad", "rad", "m", "m", "m"),
+            noises=frozen([TILT_NOISE_RAD] * 2 + [PLACE_NOISE_M] * 3),
+            times_s=frozen(SETTLING_S + times),
+        )
 
     def motion(self, genome: Genome) -> Motion:
         """Return the motion: each actuator is at plus its amplitude during its pulse, else at minus."""
@@ -94,6 +107,14 @@ class Quadruped(Robot):
         """Return `(...)`: the distance between first and last observation, divided by the time between them."""
         travelled = trajectory.positions_m[..., -1, :2] - trajectory.positions_m[..., 0, :2]
         return np.asarray(np.linalg.norm(travelled, axis=-1) / (trajectory.times_s[-1] - trajectory.times_s[0]))
+
+    def sense(self, trajectory: Trajectory) -> FloatArray:
+        """Return `(..., r, 5)`: roll and pitch of the trunk, its height, and its place on the ground from the start."""
+        x, y, z, w = np.moveaxis(trajectory.orientations, -1, 0)
+        roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x**2 + y**2))
+        pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+        place = trajectory.positions_m
+        return np.stack([roll, pitch, place[..., 2], place[..., 0], place[..., 1]], axis=-1)
 
 
 def _world() -> World:

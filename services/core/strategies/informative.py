@@ -3,7 +3,7 @@
 from numpy.random import Generator
 
 from gaplab.services.core.arrays import Genome
-from gaplab.services.core.scoring import simulator_weights, weighted_deviation
+from gaplab.services.core.scoring import weighted_deviation, weights_of
 from gaplab.services.core.strategies.base import EnsembleOptions, Search, Strategy
 from gaplab.services.core.types import Belief
 
@@ -26,5 +26,5 @@ class Informative(Strategy):
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
         """Return the controller with the highest weighted deviation of simulated fitness found."""
-        weights = simulator_weights(belief.squared_errors, self.options.least_error**2)
+        weights = weights_of(belief.simulators, self.options.least_error**2)
         return search(lambda _, fitnesses: weighted_deviation(fitnesses, weights))

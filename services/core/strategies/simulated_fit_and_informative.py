@@ -6,7 +6,7 @@ from numpy.random import Generator
 from pydantic import Field
 
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
-from gaplab.services.core.scoring import simulator_weights, weighted_deviation, weighted_mean
+from gaplab.services.core.scoring import weighted_deviation, weighted_mean, weights_of
 from gaplab.services.core.strategies.base import EnsembleOptions, Search, Strategy
 from gaplab.services.core.types import Belief
 
@@ -38,7 +38,7 @@ class SimulatedFitAndInformative(Strategy):
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
         """Return the controller with the highest sum of weighted mean and weighted deviation found."""
-        weights = simulator_weights(belief.squared_errors, self.options.least_error**2)
+        weights = weights_of(belief.simulators, self.options.least_error**2)
 
         def score(_: Genomes, fitnesses: Fitnesses) -> FloatArray:
             fit = self.options.fit_weight * weighted_mean(fitnesses, weights)

@@ -1,0 +1,17 @@
+"""The discrepancy of Back-to-Reality."""
+
+import numpy as np
+
+from gaplab.services.core.arrays import FloatArray, Outcomes
+from gaplab.services.core.discrepancies.base import Discrepancy
+
+
+class AbsoluteFitness(Discrepancy):
+    """The absolute difference between simulated and real fitness: one odd sample weighs less than if squared."""
+
+    name = "absolute_fitness"
+    source = "Zagal, Ruiz-del-Solar and Vallejos 2004, as surveyed"
+
+    def terms(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:  # noqa: ARG002 - the contract's
+        """Return the absolute differences, in the unit of fitness."""
+        return np.abs(simulated[..., 0] - measured[:, None, 0])

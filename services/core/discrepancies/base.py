@@ -1,0 +1,42 @@
+"""The contract of a discrepancy: how much a simulator's answer about a sample differs from reality's."""
+
+from abc import abstractmethod
+from typing import Any, ClassVar
+
+from gaplab.services.core.arrays import FloatArray, Outcomes
+from gaplab.services.core.registry import Plugin
+
+
+class Discrepancy(Plugin):
+    """Compares the outcomes of samples in simulation and in reality. Tuning minimises the sum over samples.
+
+    Attributes:
+        senses: true if it compares readings; false if fitness alone, which costs fewer observations.
+        squares: true if a term is the sum of squared `residuals`, as some tuners need.
+    """
+
+    senses: ClassVar[bool] = False
+    squares: ClassVar[bool] = False
+
+    @abstractmethod
+    def terms(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:
+        """Return `(n, m)`: how much each simulator differs on each sample; at least 0, nan where the physics failed.
+
+        Args:
+            simulated: `(n, m, 1 + q)`: fitness and readings of n samples in m simulators; q is 0 unless it `senses`.
+            measured: `(n, 1 + q)`: the same in reality. Fitness is finite; a reading is nan if its sensor failed.
+            times_s: `(q,)`: time of each reading, in seconds from the start of a rollout.
+        """
+
+    def residuals(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:
+        """Return `(n, m, r)`: differences whose squares sum to the terms, if it `squares`."""
+        raise NotImplementedError(f"{self.name} is no sum of squares")
+
+    def noise(self, measured: FloatArray, times_s: FloatArray) -> float:  # noqa: ARG002 - for those that know it
+        """Return the variance of a residual if the simulator is right; 0 if it is unknown."""
+        return 0.0
+
+    @classmethod
+    def details(cls) -> dict[str, Any]:
+        """Return whether it compares readings, and whether it is a sum of squares, for the catalogue."""
+        return {"senses": cls.senses, "squares": cls.squares}

@@ -1,0 +1,53 @@
+"""The discrepancy of what sensors say."""
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from gaplab.schemas.base import Frozen
+from gaplab.services.core.arrays import FloatArray, Outcomes
+from gaplab.services.core.discrepancies.base import Discrepancy
+
+
+class ReadingsOptions(Frozen):
+    """Options of the discrepancy of readings."""
+
+    seconds: Annotated[float, Field(strict=True, gt=0, le=3_600)] = Field(
+        default=1.0,
+        description="readings up to this time after the first count; contact is chaotic, so later ones say less",
+    )
+
+
+class Readings(Discrepancy):
+    """The squared differences between simulated and real readings, each in units of its noise; their mean.
+
+    A term of 1 is as large as the noise of the sensors. Readings that a sensor failed to give do not count.
+    """
+
+    name = "readings"
+    source = "Bongard and Lipson 2004: readings rather than fitness; the first second and the mean are gaplab's"
+    senses = True
+    squares = True
+    Options = ReadingsOptions
+    options: ReadingsOptions
+
+    def terms(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:
+        """Return the mean squares."""
+        return np.asarray((self.residuals(simulated, measured, times_s) ** 2).sum(axis=-1))
+
+    def residuals(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:
+        """Return the differences in units of noise, each divided by the root of the number of readings that count."""
+        early = self._early(times_s)
+        real = measured[:, None, 1 + early]
+        there = ~np.isnan(real)
+        count = np.maximum(there.sum(axis=-1, keepdims=True), 1)
+        return np.where(there, simulated[..., 1 + early] - real, 0.0) / np.sqrt(count)
+
+    def noise(self, measured: FloatArray, times_s: FloatArray) -> float:  # noqa: ARG002 - as many in each sample
+        """Return that of a reading, which is in units of its noise, divided by the number of readings that count."""
+        return 1.0 / len(self._early(times_s))
+
+    def _early(self, times_s: FloatArray) -> NDArray[np.intp]:
+        return np.flatnonzero(times_s <= times_s.min() + self.options.seconds + 1e-9)

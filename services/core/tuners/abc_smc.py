@@ -1,0 +1,89 @@
+"""A tuner that returns a posterior: simulators as probable as the samples make them."""
+
+from typing import Annotated
+
+import numpy as np
+from numpy.random import Generator
+from pydantic import Field
+
+from gaplab.schemas.base import Frozen
+from gaplab.services.core.arrays import FloatArray, Parameters
+from gaplab.services.core.tuners.base import Task, Tuner
+from gaplab.services.core.types import Simulator, Space
+
+WIDER = 2.0
+"""Factor of the covariance of particles by which each is moved. Source: Beaumont, Cornuet, Marin and Robert 2009."""
+
+TRIES = 100
+"""Draws of a move that leaves the bounds, before the particle stays where it is."""
+
+
+class AbcSmcOptions(Frozen):
+    """Options of approximate Bayesian computation."""
+
+    rounds: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(default=4, description="rounds, each narrower")
+    kept: Annotated[float, Field(strict=True, gt=0, lt=1)] = Field(
+        default=0.2, description="share of a round's simulators that stay: those with the least discrepancy"
+    )
+
+
+class AbcSmc(Tuner):
+    """Sequential Monte Carlo without a likelihood: draw simulators, keep the best fifth, move them, and weight them.
+
+    The evaluations are divided between the rounds. The ensemble is drawn from the weighted particles of the last round,
+    so its members are equally probable; the best particle is the first. The intervals hold 95 % of the particles.
+    """
+
+    name = "abc_smc"
+    source = "Toni et al. 2009, Beaumont et al. 2009; numbers of rounds and particles are gaplab's"
+    Options = AbcSmcOptions
+    options: AbcSmcOptions
+
+    def tune(self, task: Task, rng: Generator) -> tuple[Simulator, ...]:
+        """Return the best particle, then draws from the posterior."""
+        size = max(2, task.evaluations // self.options.rounds)
+        stay = max(2, round(size * self.options.kept))
+        particles = task.space.draw(size, rng)
+        weights = np.full(size, 1.0 / size)
+        for number in range(self.options.rounds):
+            if number:
+                particles, weights = _moved(particles, weights, task.space, size, rng)
+            errors = task.misfit.of(particles)
+            order = np.argsort(errors, kind="stable")[:stay]
+            particles, weights, errors = particles[order], weights[order] / weights[order].sum(), errors[order]
+        chosen = rng.choice(len(particles), task.ensemble - 1, p=weights)
+        first = Simulator(particles[0], float(errors[0]), _interval(particles, weights), 1.0 / task.ensemble)
+        ranked = sorted(chosen.tolist())
+        return (first, *(Simulator(particles[i], float(errors[i]), None, 1.0 / task.ensemble) for i in ranked))
+
+
+def _moved(
+    particles: Parameters, weights: FloatArray, space: Space, count: int, rng: Generator
+) -> tuple[Parameters, FloatArray]:
+    """Return new particles `(count, p)` near weighted ones, and the prior density over the density of each move."""
+    covariance = WIDER * np.cov(particles.T, aweights=weights).reshape(space.size, space.size)
+    covariance += np.diag((1e-9 * space.extent) ** 2)
+    factor = np.linalg.cholesky(covariance)
+    found = particles[rng.choice(len(particles), count, p=weights)]
+    outside = np.arange(count)
+    origin = found.copy()
+    for _ in range(TRIES):
+        found[outside] = origin[outside] + rng.standard_normal((len(outside), space.size)) @ factor.T
+        inside = np.all((space.lower <= found[outside]) & (found[outside] <= space.upper), axis=1)
+        outside = outside[~inside]
+        if not outside.size:
+            break
+    found[outside] = origin[outside]
+    away = np.linalg.solve(factor, (found[:, None, :] - particles[None, :, :]).reshape(-1, space.size).T)
+    densities = np.exp(-0.5 * (away**2).sum(axis=0)).reshape(count, len(particles)) @ weights
+    return found, (1.0 / densities) / (1.0 / densities).sum()
+
+
+def _interval(particles: Parameters, weights: FloatArray) -> FloatArray:
+    """Return `(p, 2)`: the values between which 95 % of the weight lies."""
+    ends = []
+    for column in particles.T:
+        order = np.argsort(column, kind="stable")
+        below = np.cumsum(weights[order]) - weights[order] / 2
+        ends.append(np.interp([0.025, 0.975], below, column[order]))
+    return np.array(ends)

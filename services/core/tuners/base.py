@@ -1,0 +1,52 @@
+"""The contract of a tuner: from samples to simulators that reproduce them."""
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from numpy.random import Generator
+
+from gaplab.services.core.optimizers.base import Optimizer
+from gaplab.services.core.registry import Plugin
+from gaplab.services.core.tuning import Misfit
+from gaplab.services.core.types import Simulator, Space
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What a tuner has to do, and with what.
+
+    Attributes:
+        misfit: says how much simulators differ from reality on all samples.
+        space: bounds of the tunables.
+        optimizer: the spec's optimizer; it keeps an ensemble of different simulators if one is wanted.
+        ensemble: number of simulators wanted.
+        evaluations: most simulators to evaluate, each on all samples.
+        previous: simulators of the tuning before, best first; random ones at first.
+    """
+
+    misfit: Misfit
+    space: Space
+    optimizer: Optimizer
+    ensemble: int
+    evaluations: int
+    previous: tuple[Simulator, ...]
+
+
+class Tuner(Plugin):
+    """Finds simulators that reproduce the samples.
+
+    Attributes:
+        needs_squares: true if it needs a discrepancy that is a sum of squares.
+    """
+
+    needs_squares: ClassVar[bool] = False
+
+    @abstractmethod
+    def tune(self, task: Task, rng: Generator) -> tuple[Simulator, ...]:
+        """Return `task.ensemble` simulators, best first."""
+
+    @classmethod
+    def details(cls) -> dict[str, Any]:
+        """Return whether it needs a sum of squares, for the catalogue."""
+        return {"needs_squares": cls.needs_squares}
