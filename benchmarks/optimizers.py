@@ -84,7 +84,7 @@ def simulators(one: Setting, seed: int) -> SearchProblem:
     """Return the search for simulators on samples of random controllers."""
     drawn = one.genomes.draw(SAMPLES, stream(seed, "samples"))
     answers = Answers(one.simulate)
-    misfit = Misfit(answers, [Sample(genome, one.reality(genome)) for genome in drawn])
+    misfit = Misfit(answers, [Sample(genome, *one.reality(genome)) for genome in drawn])
     return SearchProblem(one.parameters, misfit, lambda: answers.cost_of(0).rollouts, SIMULATORS)
 
 

@@ -73,6 +73,8 @@ class Catalogue(Frozen):
     engines: tuple[PluginRead, ...]
     tunables: tuple[PluginRead, ...]
     optimizers: tuple[PluginRead, ...]
+    discrepancies: tuple[PluginRead, ...] = ()
+    tuners: tuple[PluginRead, ...] = ()
     budgets: tuple[BudgetRead, ...] = ()
     defaults: dict[str, Any] = Field(
         default_factory=dict, description="the value of each field that a study's spec leaves out"

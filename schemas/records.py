@@ -135,6 +135,11 @@ class SampleRead(Frozen):
     kind: MeasurementKind
     genome: tuple[float, ...] = Field(examples=[(0.12, 0.55, 0.83, 0.31)])
     fitness: Statistic
+    readings: tuple[float | None, ...] | None = Field(
+        default=None,
+        description="what the sensors said, each divided by its noise, all sensors at one time after the other; null: "
+        "the robot has none, or a sensor failed",
+    )
     measured_by: str = Field(examples=["pybullet"])
     measured_at: Moment
 
@@ -146,4 +151,11 @@ class SimulatorRead(Frozen):
     iteration: int
     rank: int
     parameters: dict[str, float] = Field(examples=[{"static_friction": 1.04, "restitution": 0.02}])
-    squared_error: Statistic = Field(description="sum over the samples so far; null if the physics failed on one")
+    squared_error: Statistic = Field(
+        description="discrepancy, summed over the samples so far; by default squared differences in fitness; null if "
+        "the physics failed on one"
+    )
+    intervals: dict[str, tuple[float, float]] | None = Field(
+        default=None, description="95 % interval of each tunable, if the tuner gives them"
+    )
+    weight: float | None = Field(default=None, description="share of the posterior probability, if the tuner gives it")

@@ -75,6 +75,10 @@ class SharedSettings(Frozen):
         ),
         min_length=1,
     )
+    discrepancy: PluginRef = Field(
+        default=PluginRef(name="squared_fitness"), description="what tuning minimises, summed over the samples"
+    )
+    tuner: PluginRef = Field(default=PluginRef(name="search"), description="how simulators are found")
     reality: RealitySpec = RealitySpec()
     budget: BudgetSpec = BudgetSpec()
     seed: Seed = 0

@@ -11,7 +11,7 @@ from gaplab.services.core.loop import Setting
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
 from gaplab.services.core.registry import Plugin, Registry
 from gaplab.services.core.strategies import strategies
-from gaplab.services.core.types import Budget, Space
+from gaplab.services.core.types import Budget, Outcome, Space
 from gaplab.services.plugins import blame
 from gaplab.services.running import versions
 
@@ -48,7 +48,7 @@ class CountedReality:
 
     def __call__(self, genome: Any) -> Any:
         self.asked += 1
-        return self.fitness(genome)
+        return Outcome(self.fitness(genome))
 
 
 def small_setting(strategy: Any = "simulated_fit", options: Any = None, **changes: Any) -> Any:

@@ -11,7 +11,7 @@ from gaplab.services.core.answers import Answer, Answers, pack
 from gaplab.services.core.arrays import Genome
 from gaplab.services.core.errors import RealityFailed, TryAgain
 from gaplab.services.core.loop import Setting, repetition
-from gaplab.services.core.types import Step
+from gaplab.services.core.types import Outcome, Step
 from gaplab.services.store.lease import Checkpoint, Delivered, Pulse, TimedStep
 from gaplab.workers.permits import PermittedReality
 
@@ -111,7 +111,7 @@ class StepRecorder:
     def answers(self, setting: Setting) -> Answers:
         """Return the answers of the step under way: those of its checkpoints, then new ones, which are recorded."""
         checkpoints = (checkpoint.answers for checkpoint in tuple(self._parts))
-        return Answers(setting.simulate, setting.batch_size, checkpoints, self)
+        return Answers(setting.simulate, setting.batch_size, checkpoints, self, setting.sense)
 
     def genomes_per_call(self, simulators: int) -> int:
         """Return the number of genomes of a call that is short enough; 1 while durations are unknown."""
@@ -120,10 +120,10 @@ class StepRecorder:
             return 1
         return max(1, int(self._every_s / SHARE / (self._rollout_s * simulators)))
 
-    def record(self, answers: Sequence[Answer]) -> None:
+    def record(self, answers: Sequence[Answer], rollouts: int) -> None:
         """Keep the answers of a call that has just ended, and emit a checkpoint if it is time."""
         self._progressed = now = perf_counter()
-        self._rollout_s = (now - self._called) / sum(len(fitnesses) for _, fitnesses in answers)
+        self._rollout_s = (now - self._called) / rollouts
         self._answers += answers
         if now - self._last >= self._every_s:
             self._checkpoint(now)
@@ -142,7 +142,7 @@ class StepRecorder:
         step_s = self._before_s + now - self._begun
         return Pulse(len(self._log), self._measuring, max(0.0, now - self._progressed), step_s)
 
-    def _measured(self, setting: Setting, genome: Genome) -> float:
+    def _measured(self, setting: Setting, genome: Genome) -> Outcome:
         self._measuring, self._progressed = True, perf_counter()
         if isinstance(setting.reality, PermittedReality):
             self._emit(self.pulse())  # it waits for a permit, which is given once the beginning is stored

@@ -9,8 +9,8 @@ import ray
 from ray.exceptions import RayError
 
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
-from gaplab.services.core.ports import Simulate
+from gaplab.services.core.arrays import Fitnesses, Genomes, Outcomes, Parameters
+from gaplab.services.core.loop import Setting
 from gaplab.services.specs.assembly import setting
 from gaplab.workers.nodes import Versions, check_here
 
@@ -19,6 +19,9 @@ CHECK_S = 1.0
 
 LONGEST_PAUSE_S = 30.0
 """Longest pause before helpers that cost time are tried again; the pause doubles each time."""
+
+SIMULATE, SENSE = "part", "sense"
+"""Methods of a Helper that answer as a Simulate and as a Sense."""
 
 Handle: TypeAlias = Any
 """A handle of a Helper actor, which Ray does not type."""
@@ -33,16 +36,21 @@ class Helper:
 
     def __init__(self, spec: str, expected: Versions) -> None:
         check_here(expected)
-        self._simulate = _simulation(spec)
+        self._setting = _setting(spec)
 
     def part(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
         """Return the `(n, m)` fitnesses of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed."""
-        return self._simulate(genomes, parameters)
+        return self._setting.simulate(genomes, parameters)
+
+    def sense(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
+        """Return fitness and readings `(n, m, 1 + q)` of genomes `(n, g)` in simulators `(m, p)`."""
+        assert self._setting.sense is not None
+        return self._setting.sense(genomes, parameters)
 
 
 @cache
-def _simulation(spec: str) -> Simulate:
-    return setting(ResolvedSpec.model_validate_json(spec), 0).simulate
+def _setting(spec: str) -> Setting:
+    return setting(ResolvedSpec.model_validate_json(spec), 0)
 
 
 class Helpers:

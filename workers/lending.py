@@ -1,7 +1,7 @@
 """The parts of one call, shared between this core and helpers. A slow helper gets fewer; no call waits for one."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import monotonic
 from typing import TypeAlias
@@ -9,9 +9,8 @@ from typing import TypeAlias
 import ray
 from ray.exceptions import RayError
 
-from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
-from gaplab.services.core.ports import Simulate
-from gaplab.workers.helper_actors import Handle
+from gaplab.services.core.arrays import FloatArray, Genomes, Parameters
+from gaplab.workers.helper_actors import SIMULATE, Handle
 
 Part: TypeAlias = tuple[Genomes, Parameters]
 
@@ -69,6 +68,7 @@ class SharedCall:
         here: function that simulates a part on this core.
         helpers: helpers, which simulate parts on other cores.
         rollout_s: expected seconds of a rollout.
+        question: method of helpers that answers as `here` does.
 
     Attributes:
         gained: rollouts that helpers simulated.
@@ -76,7 +76,15 @@ class SharedCall:
         dead: helpers that no longer answer.
     """
 
-    def __init__(self, parts: Sequence[Part], here: Simulate, helpers: Sequence[Handle], rollout_s: float) -> None:
+    def __init__(
+        self,
+        parts: Sequence[Part],
+        here: Callable[[Genomes, Parameters], FloatArray],
+        helpers: Sequence[Handle],
+        rollout_s: float,
+        question: str = SIMULATE,
+    ) -> None:
+        self._question = question
         self.gained = self.lost = 0
         self.dead: list[Handle] = []
         self._parts = parts
@@ -84,11 +92,11 @@ class SharedCall:
         self._rollout_s = rollout_s
         self._left = deque(range(len(parts)))
         self._room = deque(helper for _ in range(QUEUED) for helper in helpers)
-        self._lent: dict[ray.ObjectRef[Fitnesses], Loan] = {}
-        self._done: dict[int, Fitnesses] = {}
+        self._lent: dict[ray.ObjectRef[FloatArray], Loan] = {}
+        self._done: dict[int, FloatArray] = {}
 
-    def run(self) -> list[Fitnesses]:
-        """Return the fitnesses of each part, in their order."""
+    def run(self) -> list[FloatArray]:
+        """Return the answers of each part, in their order."""
         while self._left or self._lent:
             self._collect(patient=not self._left)
             while len(self._left) > 1 and self._room:
@@ -101,7 +109,8 @@ class SharedCall:
     def _lend(self, index: int, helper: Handle) -> None:
         before = sum(self._rollouts(loan.part) for loan in self._lent.values() if loan.helper is helper)
         until = monotonic() + SLOWEST * self._rollout_s * (before + self._rollouts(index))
-        self._lent[helper.part.remote(*self._parts[index])] = Loan(index, helper, until)
+        asked = getattr(helper, self._question).remote(*self._parts[index])
+        self._lent[asked] = Loan(index, helper, until)
 
     def _collect(self, *, patient: bool) -> None:
         """Take the available answers; if patient, wait for one, and take back the latest part if it is late."""
@@ -115,7 +124,7 @@ class SharedCall:
         if patient and not ready:
             self._take_back(self._lent.popitem()[1])
 
-    def _take(self, loan: Loan, ref: "ray.ObjectRef[Fitnesses]") -> None:
+    def _take(self, loan: Loan, ref: "ray.ObjectRef[FloatArray]") -> None:
         try:
             self._done[loan.part] = ray.get(ref)
             self.gained += self._rollouts(loan.part)

@@ -12,6 +12,7 @@ from ray.exceptions import GetTimeoutError, RayError
 
 from gaplab.services.core.arrays import Genome
 from gaplab.services.core.ports import Reality
+from gaplab.services.core.types import Outcome
 
 SHARE = 0.8
 """Part of a lease for which a permit holds: the hardware stops before others may take it."""
@@ -72,8 +73,8 @@ class PermittedReality:
     ) -> None:
         self._reality, self._stop, self._left, self._end = reality, stop, left, end
 
-    def __call__(self, genome: Genome) -> float:
-        """Return the fitness of the genome `(g,)` in reality, once it is permitted to ask."""
+    def __call__(self, genome: Genome) -> Outcome:
+        """Return the outcome of the genome `(g,)` in reality, once it is permitted to ask."""
         while (until := self._expiry(0.0)) <= monotonic():
             sleep(POLL_S)
         answered = Event()

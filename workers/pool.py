@@ -1,5 +1,7 @@
 """One repetition on many cores: it shares its calls with idle cores."""
 
+from collections.abc import Callable
+from functools import partial
 from math import ceil
 from time import perf_counter
 from typing import TypeAlias
@@ -8,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.core.arrays import Fitnesses, Genomes, Parameters
-from gaplab.services.core.ports import Simulate
-from gaplab.workers.helper_actors import CHECK_S, Handle, Helpers
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes, Outcomes, Parameters
+from gaplab.services.core.ports import Sense, Simulate
+from gaplab.workers.helper_actors import CHECK_S, SENSE, SIMULATE, Handle, Helpers
 from gaplab.workers.lending import Part, SharedCall, sizes
 from gaplab.workers.nodes import Versions
 
@@ -21,17 +23,27 @@ LEAST_S = 0.005
 
 
 class Pool:
-    """A Simulate that shares its rollouts with the idle cores of the cluster; the numbers stay the same.
+    """A Simulate and a Sense that share their rollouts with the idle cores of the cluster; the numbers stay the same.
 
     Args:
         spec: spec of the experiment, from which helpers build the same Simulate.
         here: that Simulate, on this core.
         per_call: smallest sensible number of rollouts of a call.
         versions: versions that the node of a helper must have.
+        sense: that Sense, on this core; None if nothing asks for readings.
     """
 
-    def __init__(self, spec: ResolvedSpec, here: Simulate, per_call: int, versions: Versions | None = None) -> None:
-        self._simulate = here
+    def __init__(
+        self,
+        spec: ResolvedSpec,
+        here: Simulate,
+        per_call: int,
+        versions: Versions | None = None,
+        sense: Sense | None = None,
+    ) -> None:
+        self._compute: dict[str, Callable[[Genomes, Parameters], FloatArray]] = {SIMULATE: here}
+        if sense is not None:
+            self._compute[SENSE] = sense
         self._per_call = per_call
         self._rollout_s = 0.0
         self._helpers = Helpers(spec, versions or {})
@@ -48,6 +60,13 @@ class Pool:
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
         """Return the `(n, m)` fitnesses of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed."""
+        return self._shared(SIMULATE, genomes, parameters)
+
+    def sense(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
+        """Return fitness and readings `(n, m, 1 + q)` of genomes `(n, g)` in simulators `(m, p)`."""
+        return self._shared(SENSE, genomes, parameters)
+
+    def _shared(self, question: str, genomes: Genomes, parameters: Parameters) -> FloatArray:
         self._last = genomes, parameters
         by_genome = len(genomes) >= len(parameters)
         rows, across = (len(genomes), len(parameters)) if by_genome else (len(parameters), len(genomes))
@@ -55,14 +74,14 @@ class Pool:
         def part(rows: Rows) -> Part:
             return (genomes[rows], parameters) if by_genome else (genomes, parameters[rows])
 
-        fitnesses: list[Fitnesses] = []
+        answers: list[FloatArray] = []
         left = np.arange(rows)
         while left.size:
             helpers = self._helpers.ready(genomes, parameters)
             now, left = np.split(left, [self._until_next_check(1 + len(helpers), across)])
             ends = np.cumsum(sizes(len(now), 1 + len(helpers), self._least(across)))[:-1]
-            fitnesses += self._done([part(some) for some in np.split(now, ends)], helpers)
-        return np.concatenate(fitnesses, axis=0 if by_genome else 1)
+            answers += self._done(question, [part(some) for some in np.split(now, ends)], helpers)
+        return np.concatenate(answers, axis=0 if by_genome else 1)
 
     def _until_next_check(self, cores: int, across: int) -> int:
         """Return the number of rows to simulate before the next check for idle cores; 1 while their time is unknown."""
@@ -72,19 +91,20 @@ class Pool:
         """Return the smallest number of rows that is worth lending."""
         return ceil(max(LEAST_S / self._rollout_s, self._per_call) / across) if self._rollout_s else 1
 
-    def _done(self, parts: list[Part], helpers: list[Handle]) -> list[Fitnesses]:
+    def _done(self, question: str, parts: list[Part], helpers: list[Handle]) -> list[FloatArray]:
+        here = partial(self._here, question)
         if not helpers or len(parts) == 1:
-            return [self._here(*part) for part in parts]
-        call = SharedCall(parts, self._here, helpers, self._rollout_s)
-        fitnesses = call.run()
+            return [here(*part) for part in parts]
+        call = SharedCall(parts, here, helpers, self._rollout_s, question)
+        answers = call.run()
         if call.lost > call.gained:
             self._helpers.failed()
         else:
             self._helpers.helped(but_for=call.dead)
-        return fitnesses
+        return answers
 
-    def _here(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
+    def _here(self, question: str, genomes: Genomes, parameters: Parameters) -> FloatArray:
         begun = perf_counter()
-        fitnesses = self._simulate(genomes, parameters)
-        self._rollout_s = (perf_counter() - begun) / fitnesses.size
-        return fitnesses
+        answers = self._compute[question](genomes, parameters)
+        self._rollout_s = (perf_counter() - begun) / (len(genomes) * len(parameters))
+        return answers

@@ -64,8 +64,8 @@ def _prepared(claim: Claim, expected: Versions, permits: Handle | None) -> Setti
     alone = setting(claim.spec, claim.number)
     if permits is not None:
         alone = replace(alone, reality=_permitted(alone.reality, claim, permits))
-    pool = Pool(claim.spec, alone.simulate, alone.batch_size(), expected)
-    return replace(alone, simulate=pool, batch_size=pool.batch_size)
+    pool = Pool(claim.spec, alone.simulate, alone.batch_size(), expected, alone.sense)
+    return replace(alone, simulate=pool, sense=pool.sense, batch_size=pool.batch_size)
 
 
 def _permitted(reality: Reality, claim: Claim, permits: Handle) -> PermittedReality:

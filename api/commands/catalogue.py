@@ -21,7 +21,7 @@ def catalogue(
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """List the strategies, robots, engines, tunables and optimizers, or show one plug-in."""
+    """List the plug-ins of each kind, or show one plug-in."""
     with connect(url) as client:
         found = client.catalogue()
     plugins = {plugin.name: plugin for kind in completion.KINDS for plugin in getattr(found, kind)}

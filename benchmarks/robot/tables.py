@@ -12,7 +12,9 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import BODY_M, COUNTED_S, PERIOD_S, SETTLING_S
 from gaplab.services.core.streams import stream
-from gaplab.services.core.tuning import Misfit, squared_errors, tune
+from gaplab.services.core.tuners.base import Task
+from gaplab.services.core.tuners.search import Search
+from gaplab.services.core.tuning import Misfit, squared_errors
 from gaplab.services.core.types import Sample
 from gaplab.services.core.world import Motion
 
@@ -106,7 +108,8 @@ def identifiable(laboratory: Laboratory, arguments: Namespace) -> None:
                 rng = stream(seed, "tune", count)
                 chosen = [samples[index] for index in rng.permutation(10)[:count]]
                 misfit = Misfit(Answers(laboratory.simulate), chosen)
-                best = tune(misfit, laboratory.parameters, SteadyState(), arguments.tuning, rng)[0]
+                task = Task(misfit, laboratory.parameters, SteadyState(), 1, arguments.tuning, ())
+                best = Search().tune(task, rng)[0]
                 fitness = laboratory.real(laboratory.evolve(best.parameters, "tuned", arguments.tuning, count, seed))
                 found.setdefault(count, []).append((best.parameters, fitness))
                 error = np.sqrt(best.squared_error / count)

@@ -45,6 +45,7 @@ _TYPES: dict[Kind, Any] = {
     Kind.TRUTH: bool,
     Kind.MOMENT: _Moment,
     Kind.VECTOR: list[FiniteFloat],
+    Kind.READINGS: list[FiniteFloat | None],
     Kind.NESTED: dict[str, Any] | list[Any],
 }
 

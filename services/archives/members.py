@@ -48,6 +48,7 @@ def _write_parquet(columns: Iterable[Column], rows: Iterable[Row], target: IO[by
         Kind.TRUTH: arrow.bool_(),
         Kind.MOMENT: arrow.timestamp("us", tz="UTC"),
         Kind.VECTOR: arrow.list_(arrow.float64()),
+        Kind.READINGS: arrow.list_(arrow.float64()),
     }
     schema = arrow.schema([(column.name, types[column.kind]) for column in columns])
     count = 0

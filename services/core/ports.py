@@ -18,12 +18,13 @@ class Simulate(Protocol):
 
 
 class Sense(Protocol):
-    """The same with the readings of the robot's sensors. The fitness is that of Simulate, to the last bit."""
+    """The same with the readings of the robot's sensors; all are nan where the physics failed.
+
+    The fitness is that of Simulate, to the last bit.
+    """
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
-        """Return fitness and readings `(n, m, 1 + q)` of genomes `(n, g)` in simulators `(m, p)`; all nan where the
-        physics failed.
-        """
+        """Return fitness and readings `(n, m, 1 + q)` of genomes `(n, g)` in simulators `(m, p)`."""
         ...
 
 

@@ -79,7 +79,7 @@ def weights_of(simulators: Sequence[Simulator], floor: float) -> FloatArray:
     """Return weights `(m,)` of tuned simulators, with sum 1: their posterior shares, or else `simulator_weights`."""
     shares = [each.weight for each in simulators if each.weight is not None]
     if len(shares) == len(simulators):
-        return np.array(shares) / np.sum(shares)
+        return np.asarray(shares / np.sum(shares))
     return simulator_weights(np.array([each.squared_error for each in simulators]), floor)
 
 

@@ -8,7 +8,16 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genome, Genomes, Parameters, Readings, frozen, no_readings
+from gaplab.services.core.arrays import (
+    NO_READINGS,
+    FloatArray,
+    Genome,
+    Genomes,
+    Parameters,
+    Readings,
+    frozen,
+    no_readings,
+)
 from gaplab.services.core.errors import PluginBroken
 
 
@@ -130,7 +139,7 @@ class Simulator:
         parameters: `(p,)`, in the order of the spec's tunables.
         squared_error: the discrepancy, by default Σ(f_sim − f_real)²; at least 0; 0 before any sample, inf where the
             physics failed on one.
-        interval: `(p, 2)`: least and greatest value of each tunable within 95 % confidence; None if the tuner gives none.
+        interval: `(p, 2)`: ends of the 95 % interval of each tunable; None if the tuner gives none.
         weight: share of the posterior probability; None if the tuner gives none.
     """
 

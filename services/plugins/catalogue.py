@@ -4,10 +4,12 @@ from dataclasses import asdict
 
 from gaplab.schemas.plugin import BudgetRead, Catalogue
 from gaplab.schemas.spec import StudySpec
+from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
 from gaplab.services.specs.presets import PRESETS
 
@@ -20,6 +22,8 @@ def catalogue() -> Catalogue:
         engines=engines.describe(),
         tunables=tunables.describe(),
         optimizers=optimizers.describe(),
+        discrepancies=discrepancies.describe(),
+        tuners=tuners.describe(),
         budgets=tuple(BudgetRead(name=name, **asdict(preset)) for name, preset in PRESETS.items()),
         defaults=StudySpec().model_dump(mode="json", exclude_none=True),
     )

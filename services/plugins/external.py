@@ -3,18 +3,20 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.external_plugins import file_of
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.registry import Registry
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
 from gaplab.services.plugins.contents import Contents
 from gaplab.services.plugins.watching import present
 
 REGISTRIES: Mapping[str, Registry[Any]] = {
-    registry.kind: registry for registry in (strategies, robots, engines, tunables, optimizers)
+    registry.kind: registry for registry in (strategies, robots, engines, tunables, optimizers, discrepancies, tuners)
 }
 """The plug-ins of each kind."""
 
@@ -57,7 +59,9 @@ def unavailable(plugin: str) -> str | None:
 
 def _named_in(spec: Mapping[str, Any]) -> Iterator[str]:
     yield from (
-        f"{kind} {spec[kind]['name']}" for kind in ("strategy", "robot", "optimizer", "engine") if spec.get(kind)
+        f"{kind} {spec[kind]['name']}"
+        for kind in ("strategy", "robot", "optimizer", "engine", "discrepancy", "tuner")
+        if spec.get(kind)
     )
     reality = spec.get("reality") or {}
     if reality.get("engine"):

@@ -50,7 +50,7 @@ class Simulation:
         return self._fitnesses(self._engine.rollouts(worlds, motions), len(genomes), len(parameters))
 
     def sense(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
-        """Return fitness and readings `(n, m, 1 + q)`: the fitness as a call returns it, then each reading over its noise.
+        """Return fitness and readings `(n, m, 1 + q)`: the fitness of a call, then each reading over its noise.
 
         A robot without sensors has no readings.
         """
@@ -66,7 +66,8 @@ class Simulation:
         values = self._robot.sense(_at(seen, sensors.times_s))
         expected = (len(genomes), len(parameters), len(sensors.times_s), len(sensors.names))
         if np.shape(values) != expected:
-            raise PluginBroken(f"robot {self._robot.name!r} returned {np.shape(values)} readings; permitted: {expected}")
+            found = f"robot {self._robot.name!r} returned readings of shape {np.shape(values)}"
+            raise PluginBroken(f"{found}; permitted: {expected}")
         failed = np.isnan(fitnesses)[..., None]
         return np.concatenate([fitnesses[..., None], np.where(failed, np.nan, sensors.standardised(values))], axis=-1)
 

@@ -7,6 +7,7 @@ from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.resolved import ResolvedBudget, ResolvedReality, ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked, SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, SharedSettings, StudySpec
+from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.errors import InvalidSpec, Violation, gather
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.registry import Registry
@@ -15,10 +16,17 @@ from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.presets import PRESETS
-from gaplab.services.specs.violations import bounds_of, budget_violations, reality_violations, tunable_violations
+from gaplab.services.specs.violations import (
+    bounds_of,
+    budget_violations,
+    reality_violations,
+    tunable_violations,
+    tuning_violations,
+)
 
 
 def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
@@ -27,10 +35,12 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     Raises:
         InvalidSpec: with every violation, each with its pointer into the spec.
     """
-    robot, strategy, optimizer = gather(
+    robot, strategy, optimizer, discrepancy, tuner = gather(
         lambda: robots.create(spec.robot, "/robot"),
         lambda: strategies.create(spec.strategy, "/strategy"),
         lambda: optimizers.create(spec.optimizer, "/optimizer"),
+        lambda: discrepancies.create(spec.discrepancy, "/discrepancy"),
+        lambda: tuners.create(spec.tuner, "/tuner"),
     )
     simulated = spec.engine or PluginRef(name=robot.engine)
     real = spec.reality.engine or simulated
@@ -41,6 +51,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     budget = _budget(spec)
     violations = [
         *tunable_violations(spec, engine),
+        *tuning_violations(robot, discrepancy, tuner),
         *reality_violations(spec, strategy, engine, reality_engine),
         *budget_violations(budget, strategy, optimizer),
     ]
@@ -58,6 +69,8 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         optimizer=_completed(optimizers, spec.optimizer),
         engine=_completed(engines, simulated),
         tunables=tuple(_with_bounds(ref) for ref in spec.tunables),
+        discrepancy=_completed(discrepancies, spec.discrepancy),
+        tuner=_completed(tuners, spec.tuner),
         reality=ResolvedReality(engine=_completed(engines, real), parameters=_truth(spec, robot, reality_engine)),
         budget=budget,
         seed=spec.seed,

@@ -6,11 +6,15 @@ from collections.abc import Iterator
 from gaplab.schemas.plugin import TunableRef
 from gaplab.schemas.resolved import ResolvedBudget
 from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.discrepancies import discrepancies
+from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import Violation, unknown_name
 from gaplab.services.core.optimizers.base import Optimizer
+from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 
@@ -27,6 +31,18 @@ def tunable_violations(spec: ExperimentSpec, engine: type[Engine]) -> Iterator[V
         yield from _bound_violations(ref, pointer)
         if counts[ref.name] > 1:
             yield Violation(pointer, ref.name, f"{ref.name} is named {counts[ref.name]} times; once is permitted")
+
+
+def tuning_violations(robot: Robot, discrepancy: Discrepancy, tuner: Tuner) -> Iterator[Violation]:
+    """Yield a discrepancy of readings that the robot does not have, and one that the tuner cannot minimise."""
+    if discrepancy.senses and not robot.sensors.size:
+        able = [name for name, each in discrepancies.items() if not each.senses]
+        message = f"the {robot.name} has no sensors; {' and '.join(able)} need none"
+        yield Violation("/discrepancy", discrepancy.name, message, able)
+    if tuner.needs_squares and not discrepancy.squares:
+        able = [name for name, each in discrepancies.items() if each.squares]
+        message = f"the tuner {tuner.name} needs a sum of squares, and {discrepancy.name} is none"
+        yield Violation("/discrepancy", discrepancy.name, message, able)
 
 
 def bounds_of(ref: TunableRef) -> tuple[float, float]:

@@ -17,7 +17,7 @@ LONGEST_TEXT = 100_000
 
 
 class Kind(StrEnum):
-    """The type of a column's values."""
+    """The type of a column's values; readings are a vector in which numbers may be missing."""
 
     TEXT = "text"
     WHOLE = "whole"
@@ -25,6 +25,7 @@ class Kind(StrEnum):
     TRUTH = "truth"
     MOMENT = "moment"
     VECTOR = "vector"
+    READINGS = "readings"
     NESTED = "nested"
 
 
@@ -79,13 +80,16 @@ def _kind(column: TableColumn[Any]) -> Kind:
         Number: Kind.REAL,
         String: Kind.TEXT,
         Reason: Kind.TEXT,
-        JSON: Kind.VECTOR if _is_vector(column) else Kind.NESTED,
+        JSON: _kind_of_json(column),
     }
     return next(kind for type_, kind in kinds.items() if isinstance(column.type, type_))
 
 
-def _is_vector(column: TableColumn[Any]) -> bool:
-    """Return whether the model declares the column as a list of numbers."""
+def _kind_of_json(column: TableColumn[Any]) -> Kind:
+    """Return whether the model declares the column as a list of numbers, with gaps or without."""
     (model,) = (each.class_ for each in Base.registry.mappers if each.local_table is column.table)
     (declared,) = get_args(get_type_hints(model, {"datetime": datetime, "Any": Any})[column.name])
-    return declared == list[float] or list[float] in get_args(declared)
+    permitted = {declared, *get_args(declared)}
+    if list[float] in permitted:
+        return Kind.VECTOR
+    return Kind.READINGS if list[float | None] in permitted else Kind.NESTED

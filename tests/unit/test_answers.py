@@ -34,7 +34,7 @@ class Interruption:
         self.left -= 1
         return 1_000
 
-    def record(self, answers: Any) -> None:
+    def record(self, answers: Any, rollouts: Any) -> None:
         self.answers += answers
 
 

@@ -7,13 +7,20 @@ import pytest
 
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
-from gaplab.services.core.tuning import Misfit, draw_simulators, simulator_fitness, squared_errors, tune
+from gaplab.services.core.tuners.base import Task
+from gaplab.services.core.tuners.search import Search
+from gaplab.services.core.tuning import Misfit, draw_simulators, simulator_fitness, squared_errors
 from gaplab.services.core.types import Sample, Space
 from tests.fakes import TRUTH, Recorder, paraboloid
 
 SPACE = Space.box([0.0, 0.0], [1.0, 1.0])
 GENOMES = np.array([[0.1, 0.9], [0.8, 0.3], [0.4, 0.4]])
 SAMPLES = [Sample(genome, float(paraboloid(genome[None], TRUTH[None])[0, 0])) for genome in GENOMES]
+
+
+def tune(misfit: Any, space: Any, optimizer: Any, evaluations: Any, rng: Any) -> Any:
+    """All of the final population, best first."""
+    return Search().tune(Task(misfit, space, optimizer, 1_000, evaluations, ()), rng)
 
 
 def test_squared_errors_are_summed_over_samples() -> None:

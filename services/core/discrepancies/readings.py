@@ -43,7 +43,7 @@ class Readings(Discrepancy):
         real = measured[:, None, 1 + early]
         there = ~np.isnan(real)
         count = np.maximum(there.sum(axis=-1, keepdims=True), 1)
-        return np.where(there, simulated[..., 1 + early] - real, 0.0) / np.sqrt(count)
+        return np.asarray(np.where(there, simulated[..., 1 + early] - real, 0.0) / np.sqrt(count))
 
     def noise(self, measured: FloatArray, times_s: FloatArray) -> float:  # noqa: ARG002 - as many in each sample
         """Return that of a reading, which is in units of its noise, divided by the number of readings that count."""

@@ -85,7 +85,7 @@ class Robot(Plugin):
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return the default engine, the unit of fitness, the size of the genome, its sensors, and if it is a function."""
+        """Return the default engine, the unit of fitness, the number of genes, the sensors, and if it is a function."""
         robot = cls()
         return {
             "engine": cls.engine,

@@ -112,7 +112,6 @@ class GaussNewton(Tuner):
 
     def _descent(self, task: Task, start: FloatArray, steps: int) -> Fit | None:
         """Return the end of a descent of so many steps; None if the physics fails at its start."""
-
         answered: dict[bytes, FloatArray] = {}
 
         def residuals(place: FloatArray) -> FloatArray:

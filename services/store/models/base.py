@@ -12,7 +12,7 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.services.store.clock import UtcDateTime
 from gaplab.services.store.texts import brief, storable
 
-REVISION = "0009"
+REVISION = "0010"
 """The revision with these tables; a database at any other revision is refused."""
 
 SPEC_VERSION = 1
@@ -73,6 +73,7 @@ class Base(DeclarativeBase):
         datetime: UtcDateTime(),
         float: Number(),
         list[float]: JSON(none_as_null=True),
+        list[float | None]: JSON(none_as_null=True),
         list[dict[str, Any]]: JSON(none_as_null=True),
         dict[str, Any]: JSON(none_as_null=True),
         State: Enum(State, native_enum=False, create_constraint=True, length=16, name="state"),

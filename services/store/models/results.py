@@ -43,7 +43,7 @@ class IterationRow(Base):
 
 
 class MeasurementRow(Base):
-    """One real-world evaluation."""
+    """One real-world evaluation. Readings are NULL if the robot has no sensors; one of them, if its sensor failed."""
 
     __tablename__ = "measurement"
     __table_args__ = (
@@ -55,12 +55,16 @@ class MeasurementRow(Base):
     kind: Mapped[MeasurementKind] = mapped_column(primary_key=True)
     genome: Mapped[list[float]]
     fitness: Mapped[float | None]
+    readings: Mapped[list[float | None] | None]
     measured_by: Mapped[str] = mapped_column(String(100))
     measured_at: Mapped[datetime] = mapped_column(default=now())
 
 
 class SimulatorRow(Base):
-    """One tuned simulator; rank 0 is the best of its iteration."""
+    """One tuned simulator; rank 0 is the best of its iteration.
+
+    Its 95 % intervals, from `lower` to `upper`, and its share of the posterior are NULL unless the tuner gives them.
+    """
 
     __tablename__ = "simulator"
     __table_args__ = (
@@ -72,3 +76,6 @@ class SimulatorRow(Base):
     rank: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
     parameters: Mapped[list[float]]
     squared_error: Mapped[float | None]
+    lower: Mapped[list[float] | None]
+    upper: Mapped[list[float] | None]
+    weight: Mapped[float | None]

@@ -5,11 +5,12 @@ from collections.abc import Iterable, Sequence
 from math import inf, nan
 from typing import Any, TypeVar
 
+import numpy as np
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.records import MeasurementKind
-from gaplab.services.core.arrays import frozen
+from gaplab.services.core.arrays import NO_READINGS, Readings, frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
 from gaplab.services.store.models import IterationRow, MeasurementRow, SimulatorRow
 
@@ -73,14 +74,19 @@ def _selected(row: IterationRow) -> Selected | None:
 def _measured(row: MeasurementRow | None) -> Measured | None:
     if row is None:
         return None
-    return Measured(row.iteration, Sample(frozen(row.genome), _or(nan, row.fitness)))
+    return Measured(row.iteration, Sample(frozen(row.genome), _or(nan, row.fitness), _readings(row)))
 
 
 def _tuned(row: IterationRow, simulators: Sequence[SimulatorRow]) -> Tuned | None:
     if row.tuning_rollouts is None:
         return None
-    found = tuple(Simulator(frozen(each.parameters), _or(inf, each.squared_error)) for each in simulators)
+    found = tuple(map(_simulator, simulators))
     return Tuned(row.number, found, _cost(row.tuning_rollouts, row.tuning_failures, row.tuning_saved))
+
+
+def _simulator(row: SimulatorRow) -> Simulator:
+    interval = None if row.lower is None or row.upper is None else frozen(np.transpose([row.lower, row.upper]))
+    return Simulator(frozen(row.parameters), _or(inf, row.squared_error), interval, row.weight)
 
 
 def _transferred(row: IterationRow) -> Transferred | None:
@@ -93,7 +99,11 @@ def _transferred(row: IterationRow) -> Transferred | None:
 def _probed(row: IterationRow, probe: MeasurementRow | None) -> Probed | None:
     if probe is None:
         return None
-    return Probed(row.number, _or(nan, probe.fitness), _or(nan, row.recorded_fitness))
+    return Probed(row.number, _or(nan, probe.fitness), _or(nan, row.recorded_fitness), _readings(probe))
+
+
+def _readings(row: MeasurementRow) -> Readings:
+    return frozen([_or(nan, each) for each in row.readings]) if row.readings else NO_READINGS
 
 
 def _cost(rollouts: int | None, failures: int | None, saved: int | None) -> Cost:

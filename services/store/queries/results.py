@@ -53,7 +53,7 @@ def page_of_samples(
         InvalidSpec: the cursor is invalid.
     """
     row = MeasurementRow
-    columns = row.iteration, row.kind, row.genome, row.fitness, row.measured_by, row.measured_at
+    columns = row.iteration, row.kind, row.genome, row.fitness, row.readings, row.measured_by, row.measured_at
     query = of_experiments(row, [experiment], RepetitionRow.number, *columns)
     key, wanted = (RepetitionRow.number, row.iteration, _TURN), {RepetitionRow.number: repetition, row.kind: kind}
     names = tuple(SampleRead.model_fields)
@@ -78,18 +78,24 @@ def page_of_simulators(
     """
     row = SimulatorRow
     key = (RepetitionRow.number, row.iteration, row.rank)
-    query = of_experiments(row, [experiment.id], *key, row.parameters, row.squared_error)
+    query = of_experiments(row, [experiment.id], *key, row)
     wanted = {RepetitionRow.number: repetition, row.iteration: iteration}
     names = [each["name"] for each in experiment.spec["tunables"]]
     return tuple(
-        SimulatorRead(
-            repetition=number,
-            iteration=each,
-            rank=rank,
-            parameters=dict(zip(names, parameters, strict=True)),
-            squared_error=error,
-        )
-        for number, each, rank, parameters, error in _page(session, query, key, wanted, limit, cursor)
+        _simulator(number, found, names) for number, *_, found in _page(session, query, key, wanted, limit, cursor)
+    )
+
+
+def _simulator(repetition: int, row: SimulatorRow, names: Sequence[str]) -> SimulatorRead:
+    pairs = None if row.lower is None or row.upper is None else zip(row.lower, row.upper, strict=True)
+    return SimulatorRead(
+        repetition=repetition,
+        iteration=row.iteration,
+        rank=row.rank,
+        parameters=dict(zip(names, row.parameters, strict=True)),
+        squared_error=row.squared_error,
+        intervals=None if pairs is None else dict(zip(names, pairs, strict=True)),
+        weight=row.weight,
     )
 
 

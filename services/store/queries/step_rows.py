@@ -125,17 +125,28 @@ def iteration_columns(step: Step) -> dict[str, Any]:
 def simulator_columns(step: Tuned) -> list[dict[str, Any]]:
     """Return a row for each simulator of the step."""
     return [
-        {"rank": rank, "parameters": vector(each.parameters), "squared_error": finite(each.squared_error)}
+        {
+            "rank": rank,
+            "parameters": vector(each.parameters),
+            "squared_error": finite(each.squared_error),
+            "lower": None if each.interval is None else vector(each.interval[:, 0]),
+            "upper": None if each.interval is None else vector(each.interval[:, 1]),
+            "weight": each.weight,
+        }
         for rank, each in enumerate(step.simulators)
     ]
 
 
 def measurement_columns(step: Measured | Probed, measured_by: str) -> dict[str, Any]:
     """Return the row of a measurement; a probe's step does not repeat the transferred genome."""
-    if isinstance(step, Probed):
-        return {"fitness": finite(step.fitness), "measured_by": measured_by}
-    genome, fitness = vector(step.sample.genome), finite(step.sample.fitness)
-    return {"genome": genome, "fitness": fitness, "measured_by": measured_by}
+    seen = step if isinstance(step, Probed) else step.sample
+    columns = {"fitness": finite(seen.fitness), "readings": _readings(seen.readings), "measured_by": measured_by}
+    return columns if isinstance(step, Probed) else {"genome": vector(step.sample.genome)} | columns
+
+
+def _readings(values: FloatArray) -> list[float | None] | None:
+    """Return a JSON array with None for each nan; None if there are no readings."""
+    return [finite(each) for each in values.tolist()] if len(values) else None
 
 
 def _opens_iteration(step: Step) -> bool:
