@@ -1,0 +1,73 @@
+"""The fitness of experiments in one number that agrees with their curves: a point that all have reached."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.records import BestRead, ExperimentRead, FitnessRead
+from gaplab.services.core.curves import curve_point
+from gaplab.services.store.queries.results import last_common, recorded_at
+
+
+def fitness_of(session: Session, experiments: Sequence[str]) -> dict[str, FitnessRead]:
+    """Return the point of each experiment's curve after the last common number of evaluations, if it has a mean."""
+    return points_at(session, last_common(session, experiments))
+
+
+def points_at(session: Session, counts: Mapping[str, int]) -> dict[str, FitnessRead]:
+    """Return a point of each experiment's curve, if it has a mean.
+
+    Args:
+        session: session of a transaction.
+        counts: number of real-world evaluations by experiment.
+    """
+    points = {
+        experiment: curve_point(counts[experiment], np.array(values))
+        for experiment, values in recorded_at(session, counts).items()
+    }
+    return {
+        experiment: FitnessRead(evaluations=point.evaluations, n=point.n, mean=point.mean, sd=point.sd)
+        for experiment, point in points.items()
+        if point.mean is not None
+    }
+
+
+def best_of(session: Session, studies: Mapping[str, Sequence[ExperimentRead]]) -> dict[str, BestRead]:
+    """Return the fittest experiment of each study, after the last number of evaluations that its experiments share.
+
+    Experiments that failed or were cancelled lower that number only if no other has a result.
+
+    Args:
+        session: session of a transaction.
+        studies: experiments by study.
+    """
+    rivals = {study: _rivals(experiments) for study, experiments in studies.items()}
+    counts = {study: common_count(found) for study, found in rivals.items() if found}
+    wanted = {each.id: counts[study] for study, found in rivals.items() for each in found}
+    known = {each.id: each.fitness for found in rivals.values() for each in found if each.fitness}
+    elsewhere = {id_: count for id_, count in wanted.items() if known[id_].evaluations != count}
+    points = known | points_at(session, elsewhere)
+    return {
+        study: _fittest([(each, points[each.id]) for each in found if points[each.id].evaluations == counts[study]])
+        for study, found in rivals.items()
+        if found
+    }
+
+
+def common_count(experiments: Sequence[ExperimentRead]) -> int:
+    """Return the last number of evaluations that experiments with a fitness share."""
+    lasting = [each for each in experiments if each.state not in {State.FAILED, State.CANCELLED}] or experiments
+    return min(each.fitness.evaluations for each in lasting if each.fitness)
+
+
+def _rivals(experiments: Sequence[ExperimentRead]) -> list[ExperimentRead]:
+    """Return the experiments with a fitness; the direct baseline only if there is no other."""
+    found = [each for each in experiments if each.fitness]
+    return [each for each in found if not each.direct] or found
+
+
+def _fittest(points: Sequence[tuple[ExperimentRead, FitnessRead]]) -> BestRead:
+    experiment, point = max(points, key=lambda each: each[1].mean)
+    return BestRead(**point.model_dump(), experiment=experiment.id, name=experiment.name)
