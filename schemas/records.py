@@ -3,6 +3,7 @@
 Times are UTC. A fitness of null means failed physics or a failed measurement; JSON has no nan.
 """
 
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import Any, Generic, TypeVar
 
@@ -146,6 +147,18 @@ class StudyRead(Frozen):
     experiments: tuple[ExperimentRead, ...]
     progress: Progress
     created_at: Moment
+
+
+def common_count(experiments: Sequence[ExperimentRead]) -> int | None:
+    """Return the last number of real-world evaluations that experiments share; None if none has a fitness.
+
+    The direct baseline has a single value, which is compared with every number. Experiments that failed or were
+    cancelled lower the number only if no other has a fitness.
+    """
+    found = [each for each in experiments if each.fitness]
+    found = [each for each in found if not each.direct] or found
+    lasting = [each for each in found if each.state not in {State.FAILED, State.CANCELLED}] or found
+    return min((each.fitness.evaluations for each in lasting if each.fitness), default=None)
 
 
 class RepetitionRead(Frozen):

@@ -5,8 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from sqlalchemy.orm import Session
 
-from gaplab.schemas.lifecycle import State
-from gaplab.schemas.records import BestRead, ExperimentRead, FitnessRead
+from gaplab.schemas.records import BestRead, ExperimentRead, FitnessRead, common_count
 from gaplab.services.core.curves import curve_point
 from gaplab.services.store.queries.results import last_common, recorded_at
 
@@ -37,29 +36,21 @@ def points_at(session: Session, counts: Mapping[str, int]) -> dict[str, FitnessR
 def best_of(session: Session, studies: Mapping[str, Sequence[ExperimentRead]]) -> dict[str, BestRead]:
     """Return the fittest experiment of each study, after the last number of evaluations that its experiments share.
 
-    Experiments that failed or were cancelled lower that number only if no other has a result.
-
     Args:
         session: session of a transaction.
         studies: experiments by study.
     """
-    rivals = {study: _rivals(experiments) for study, experiments in studies.items()}
-    counts = {study: common_count(found) for study, found in rivals.items() if found}
+    shared = {study: common_count(experiments) for study, experiments in studies.items()}
+    counts = {study: count for study, count in shared.items() if count is not None}
+    rivals = {study: _rivals(studies[study]) for study in counts}
+    points = {each.id: each.fitness for found in rivals.values() for each in found if each.fitness}
     wanted = {each.id: counts[study] for study, found in rivals.items() for each in found}
-    known = {each.id: each.fitness for found in rivals.values() for each in found if each.fitness}
-    elsewhere = {id_: count for id_, count in wanted.items() if known[id_].evaluations != count}
-    points = known | points_at(session, elsewhere)
+    elsewhere = {id_: count for id_, count in wanted.items() if points[id_].evaluations != count}
+    points |= points_at(session, elsewhere)
     return {
         study: _fittest([(each, points[each.id]) for each in found if points[each.id].evaluations == counts[study]])
         for study, found in rivals.items()
-        if found
     }
-
-
-def common_count(experiments: Sequence[ExperimentRead]) -> int:
-    """Return the last number of evaluations that experiments with a fitness share."""
-    lasting = [each for each in experiments if each.state not in {State.FAILED, State.CANCELLED}] or experiments
-    return min(each.fitness.evaluations for each in lasting if each.fitness)
 
 
 def _rivals(experiments: Sequence[ExperimentRead]) -> list[ExperimentRead]:
