@@ -1,86 +1,63 @@
-"""The time left that a watcher is shown."""
+"""The interval of the time left, from the pace of the whole work so far."""
 
-import re
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
+from typing import Any
 
 import pytest
 
-from gaplab.api.clients.progress.pace import Pace, span
-from gaplab.schemas.lifecycle import State
-from gaplab.schemas.records import ExperimentRead, Progress
+from gaplab.api.clients.progress.text import span
+from gaplab.schemas.records import TimeLeft
+from gaplab.services.experiments.time_left import busy_s, interval
+
+START = datetime(2026, 1, 1, tzinfo=UTC)
 
 
-class Clock:
-    """A clock that a test sets."""
-
-    def __init__(self) -> None:
-        self.now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
+def attempt(begin: float, end: float) -> tuple[datetime, datetime]:
+    return START + timedelta(seconds=begin), START + timedelta(seconds=end)
 
 
-def experiment(done: int, state: State = State.RUNNING) -> ExperimentRead:
-    """Return an experiment of a thousand rollouts."""
-    nothing = dict.fromkeys(Progress.model_fields, 0)
-    progress = Progress.model_validate(nothing | {"rollouts": 1000, "rollouts_done": done, "seconds_left": None})
-    names = {"id": "a", "name": "a", "strategy": "simulated_fit"}
-    return ExperimentRead(**names, state=state, spec={}, progress=progress, created_at=datetime.now(UTC))
+def test_the_time_left_is_not_known_before_a_pace_is_measured() -> None:
+    assert interval(0, 1000, 100.0) is None
+    assert interval(500, 500, 9.0) is None
+    assert interval(49, 951, 100.0) is None
+    assert interval(50, 950, 100.0) is not None
+    assert interval(1000, 0, 100.0) is None
 
 
-def test_the_time_left_is_not_known_before_a_pace_is_seen() -> None:
-    clock = Clock()
-    pace = Pace(clock)
-
-    at_once = pace.left(experiment(0))
-    clock.now = 100.0
-    waited = pace.left(experiment(0))
-    clock.now = 109.0
-    too_soon = pace.left(experiment(500))
-    clock.now = 120.0
-    too_little = Pace(clock).left(experiment(500))
-
-    assert (at_once, waited, too_soon, too_little) == (None, None, None, None)
+def test_pauses_do_not_count_as_slowness_and_attempts_at_once_count_once() -> None:
+    assert busy_s([attempt(1000, 1060), attempt(0, 30), attempt(20, 40), attempt(5, 10)]) == 100.0
+    assert busy_s([]) == 0.0
 
 
-def test_waiting_for_a_core_does_not_count_as_slowness() -> None:
-    clock = Clock()
-    pace = Pace(clock)
-    pace.left(experiment(0))
-    clock.now = 1000.0
-    pace.left(experiment(0))
+@pytest.mark.parametrize("acceleration", [0.9, 1.0, 1.1])
+def test_the_interval_contains_the_true_time_although_the_pace_changes(acceleration: Any) -> None:
+    done = lambda second: second**acceleration  # noqa: E731
+    whole = done(1000)
 
-    clock.now = 1100.0
-
-    assert pace.left(experiment(250)) == "4 to 7 min"  # 250 rollouts took 100 s, so 750 take 300 s
-
-
-def test_progress_in_bursts_leaves_the_true_time_in_the_range() -> None:
-    clock = Clock()
-    pace = Pace(clock)
-
-    for second in range(0, 601, 10):  # a rollout a second, told of every half minute
-        clock.now = float(second)
-        shown = pace.left(experiment(second - second % 30))
-        if second > 200:
-            low, high = map(int, re.findall(r"\d+", shown or ""))
-            assert low * 60 <= 1000 - second <= high * 60
+    for second in range(100, 1000, 50):
+        found = interval(int(done(second)), int(whole - done(second)), float(second))
+        assert found
+        assert found.low_s <= 1000 - second <= found.high_s
 
 
-@pytest.mark.parametrize("state", [State.PAUSED, State.COMPLETED, State.QUEUED])
-def test_what_does_not_run_has_no_time_left(state: State) -> None:
-    assert Pace().left(experiment(500, state)) is None
+def test_the_interval_narrows_and_contains_the_true_time_of_progress_in_bursts() -> None:
+    found = [interval(second - second % 30, 1000 - second + second % 30, float(second)) for second in range(200, 900)]
+
+    assert all(each and each.low_s <= 1000 - second <= each.high_s for second, each in enumerate(found, 200))
+    assert found[0]
+    assert found[-1]
+    assert found[-1].high_s / found[-1].low_s < found[0].high_s / found[0].low_s
 
 
 @pytest.mark.parametrize(
-    ("seconds", "shown"),
+    ("low", "high", "shown"),
     [
-        (10, "less than 1 min"),
-        (70, "less than 2 min"),
-        (150, "2 to 4 min"),
-        (3600, "48 to 75 min"),
-        (36_000, "8 to 13 h"),
+        (8, 15, "less than 1 min"),
+        (40, 100, "less than 2 min"),
+        (125, 200, "2 to 4 min"),
+        (3000, 9000, "50 to 150 min"),
+        (28_800, 45_000, "8 to 13 h"),
     ],
 )
-def test_a_range_is_in_whole_minutes_or_hours(seconds: float, shown: str) -> None:
-    assert span(seconds) == shown
+def test_an_interval_is_in_whole_minutes_or_hours(low: Any, high: Any, shown: Any) -> None:
+    assert span(TimeLeft(low_s=low, high_s=high)) == shown

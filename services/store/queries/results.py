@@ -145,15 +145,14 @@ def last_common(session: Session, experiments: Sequence[str]) -> dict[str, int]:
 
 def recorded_at(session: Session, counts: Mapping[str, int]) -> dict[str, list[float]]:
     """Return the recorded fitness of repetitions, by number, after one number of evaluations for each experiment."""
-    experiments: dict[int, list[str]] = {}
-    for experiment, count in counts.items():
-        experiments.setdefault(count, []).append(experiment)
+    if not counts:
+        return {}
     row, found = IterationRow, dict[str, list[float]]()
-    for count, ids in experiments.items():
-        query = of_experiments(row, ids, RepetitionRow.experiment_id, row.recorded_fitness)
-        query = query.where(row.number == count, row.recorded_fitness.is_not(None)).order_by(RepetitionRow.number)
-        for experiment, fitness in session.execute(query):
-            found.setdefault(experiment, []).append(fitness)
+    query = of_experiments(row, list(counts), RepetitionRow.experiment_id, row.recorded_fitness)
+    query = query.where(row.number == case(dict(counts), value=RepetitionRow.experiment_id))
+    query = query.where(row.recorded_fitness.is_not(None)).order_by(RepetitionRow.experiment_id, RepetitionRow.number)
+    for experiment, fitness in session.execute(query):
+        found.setdefault(experiment, []).append(fitness)
     return found
 
 

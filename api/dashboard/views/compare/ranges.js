@@ -7,7 +7,7 @@
  * The direct baseline has a single value, which is compared with every number. Experiments that failed or were cancelled lower the
  * number only if no other has a result.
  *
- * @param {Pick<Api.ExperimentRead, "direct" | "state" | "fitness">[]} experiments
+ * @param {{ direct: boolean, state: Api.State, fitness: Api.FitnessRead | null }[]} experiments
  */
 export function commonCount(experiments) {
   const known = experiments.filter(({ fitness, direct }) => fitness && !direct);
