@@ -16,7 +16,7 @@ def progress_of(tally: Tally, spans: Sequence[Span] = ()) -> Progress:
 
     Args:
         tally: sums over its repetitions.
-        spans: times of the attempts at its repetitions; none unless it is running.
+        spans: times of the work on its repetitions; none unless it is running.
     """
     sums = {name: getattr(tally, name) for name in Progress.model_fields if name not in _COMPUTED}
     finished, left, busy = tally.rollouts_done + tally.rollouts_saved, tally.rollouts_left, busy_s(spans)

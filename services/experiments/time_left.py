@@ -19,11 +19,11 @@ LEAST_SPREAD, MOST_SPREAD = 0.25, 1.0
 """Relative half-width of the interval at the end of the work, and at `KNOWN_FROM`."""
 
 Span = tuple[datetime, datetime]
-"""Begin and end of an attempt."""
+"""Begin and end of the work of an attempt."""
 
 
 def busy_s(spans: Sequence[Span]) -> float:
-    """Return the seconds in which at least one attempt ran: pauses and waiting do not count."""
+    """Return the seconds in which there was work on at least one repetition: pauses and waiting do not count."""
     total, until = 0.0, None
     for begin, end in sorted(spans):
         start = begin if until is None else max(begin, until)

@@ -77,7 +77,7 @@ def state_of(states: Collection[State]) -> State:
 
 @dataclass(frozen=True)
 class _Work:
-    """Work on an experiment: sums over its repetitions, and the times of their attempts while it is running."""
+    """Work on an experiment: sums over its repetitions, and the times of work on them while it is running."""
 
     tally: Tally = field(default_factory=Tally)
     spans: tuple[Span, ...] = ()
@@ -94,7 +94,7 @@ def _work(session: Session, rows: Sequence[ExperimentRow]) -> dict[str, _Work]:
     """Return the work on each experiment; a study that runs needs the times of those of its members that ended too."""
     found = tallies(session, [row.id for row in rows])
     running = {row.study_id or row.id for row in rows if row.state in _MOVING}
-    spans = attempts.spans(session, [row.id for row in rows if (row.study_id or row.id) in running])
+    spans = attempts.work_spans(session, [row.id for row in rows if (row.study_id or row.id) in running])
     return {row.id: _Work(found.get(row.id, Tally()), tuple(spans.get(row.id, ()))) for row in rows}
 
 

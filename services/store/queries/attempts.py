@@ -57,24 +57,25 @@ def latest(session: Session, experiment: str) -> dict[int, int]:
     return dict(session.execute(found).all())
 
 
-def spans(session: Session, experiments: Sequence[str]) -> dict[str, list[tuple[datetime, datetime]]]:
-    """Return begin and end of the attempts at repetitions, by experiment; an attempt that runs ends now.
+def work_spans(session: Session, experiments: Sequence[str]) -> dict[str, list[tuple[datetime, datetime]]]:
+    """Return begin and end of the work whose results are stored, by experiment.
 
-    A lost attempt ended some time before its loss was noticed. It counts at most the work that is stored.
+    Attempts also contain waiting for a core, the step under way, and silence before a loss is noticed. Each span is
+    therefore as long as the stored steps took, and ends with its attempt; an attempt that runs ends now.
     """
     if not experiments:
         return {}
     row, repetition, present = AttemptRow, RepetitionRow, moment(session)
-    columns = repetition.experiment_id, repetition.seconds, row.started_at, row.ended_at, row.ending
+    columns = repetition.experiment_id, repetition.id, repetition.seconds, row.started_at, row.ended_at
     query = select(*columns).join(repetition, repetition.id == row.repetition_id)
+    query = query.where(repetition.experiment_id.in_(experiments), repetition.seconds > 0)
     found: dict[str, list[tuple[datetime, datetime]]] = {}
-    for experiment, seconds, started_at, ended_at, ending in session.execute(
-        query.where(repetition.experiment_id.in_(experiments))
-    ):
+    left: dict[int, timedelta] = {}
+    for experiment, id_, seconds, started_at, ended_at in session.execute(query.order_by(row.epoch.desc())):
         end = ended_at or present
-        if ending is Ending.LOST:
-            end = min(end, started_at + timedelta(seconds=seconds))
-        found.setdefault(experiment, []).append((started_at, end))
+        took = min(left.get(id_, timedelta(seconds=seconds)), end - started_at)
+        left[id_] = left.get(id_, timedelta(seconds=seconds)) - took
+        found.setdefault(experiment, []).append((end - took, end))
     return found
 
 

@@ -66,6 +66,7 @@ export function filterForm(filters, strategies, changed) {
   });
   const type = () => {
     clearTimeout(typing);
+    history.replaceState(null, "", addressOf({ ...filters, text: search.value.trim() }));  // at once, so that it can be copied
     typing = setTimeout(() => change({ text: search.value.trim() }), TYPING_MS);
   };
   const search = h("input", { type: "search", placeholder: "Name or id", "aria-label": "Search by name or id", maxlength: 200, oninput: type });
