@@ -72,7 +72,7 @@ class Client:
         self.cancel, self.extend, self.schedule = life_cycle.cancel, life_cycle.extend, life_cycle.schedule
         self.retry = life_cycle.retry
         self.curves, self.curves_of, self.curves_csv = results.curves, results.curves_of, results.curves_csv
-        self.compare, self.misfit = results.compare, results.misfit
+        self.compare, self.misfit, self.diff = results.compare, results.misfit, results.diff
         self.curve, self.samples = tables.curve, tables.samples
         self.simulators, self.predictions = tables.simulators, tables.predictions
         self.figure, self.figure_kinds = figures.draw, figures.kinds

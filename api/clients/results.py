@@ -3,8 +3,9 @@
 from collections.abc import Iterator, Sequence
 
 from gaplab.api.clients.connection import Connection, segment
-from gaplab.api.clients.records import Records, experiments_of
+from gaplab.api.clients.records import Records, experiments_of, split
 from gaplab.schemas.curves import Comparison, Curve
+from gaplab.schemas.differences import SpecDiff
 from gaplab.schemas.misfit import MisfitRead
 
 MOST_CURVES = 100
@@ -37,6 +38,10 @@ class Results:
         """Compare every pair of experiments, pooling the numbers of real-world evaluations from `first` to `last`."""
         counts = {"from": first, "to": last}
         return self._connection.get(tuple[Comparison, ...], "/comparisons", experiment=list(experiments), **counts)
+
+    def diff(self, *ids: str) -> SpecDiff:
+        """Return the settings in which studies and experiments differ; of a single study, its experiments."""
+        return self._connection.get(SpecDiff, "/differences", **split(map(self._records.find, ids)))
 
     def misfit(self, id: str) -> MisfitRead:
         """Return how far the tuned simulators of an experiment are from reality and from each other."""

@@ -55,6 +55,7 @@ ENDPOINTS = {
     "GET /experiments/{id}/curve",
     "GET /curves",
     "GET /comparisons",
+    "GET /differences",
     "GET /figures/curves",
     "GET /figures/simulators",
     "GET /figures/predictions",

@@ -131,6 +131,7 @@ def look(ask: Callable[..., Any], id: str, other: str) -> None:
     experiments = [each["id"] for each in ask("show", id)["study"]["experiments"]]
     assert set(ask("show", experiments[0])) == {"experiment", "repetitions", "provenance", "misfit"}
     assert [each["experiment"] for each in ask("curve", id)] == experiments
+    assert [column["id"] for column in ask("diff", id, other)["columns"]] == [id, other]
     assert "strategies" in ask("catalogue")
     assert ask("catalogue", "random")["name"] == "random"
     assert {each["kind"] for each in ask("events", id)} > {"submitted", "completed"}
