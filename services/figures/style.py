@@ -45,3 +45,14 @@ def tint(color: str, opacity: float) -> str:
     """Return a colour like `#0072B2` as a CSS colour with an opacity."""
     red, green, blue = (int(color[at : at + 2], 16) for at in (1, 3, 5))
     return f"rgba({red}, {green}, {blue}, {opacity})"
+
+
+def shade_at(share: float) -> str:
+    """Return the shade at a share of the way from light to dark, as `#0072B2`."""
+    place = min(max(share, 0.0), 1.0) * (len(SHADES) - 1)
+    before = min(int(place), len(SHADES) - 2)
+    parts = [
+        round(int(SHADES[before][at : at + 2], 16) * (before + 1 - place) + int(SHADES[before + 1][at : at + 2], 16) * (place - before))
+        for at in (1, 3, 5)
+    ]
+    return "#" + "".join(f"{part:02X}" for part in parts)

@@ -8,7 +8,7 @@ the fill, whose opacity it keeps. The same holds for an annotation named `ink`.
 from math import log10
 from typing import Any
 
-from gaplab.services.figures.marks import Arrow, Axis, FigureDefinition, Label, Line, Panel, Points
+from gaplab.services.figures.marks import Arrow, Axis, FigureDefinition, Label, Line, Panel, Points, Polylines
 from gaplab.services.figures.plotly.trace_dicts import Trace, short, text, traces
 from gaplab.services.figures.style import SHADES
 
@@ -147,7 +147,7 @@ def _arrow(arrow: Arrow) -> dict[str, Any]:
     return {"text": "", "showarrow": True} | ends | look | ({"name": "ink"} if arrow.style.ink else {})
 
 
-def _shades(shaded: list[Points]) -> dict[str, Any]:
+def _shades(shaded: list[Points | Polylines]) -> dict[str, Any]:
     values = [each for points in shaded for each in points.shades]
     last = len(SHADES) - 1
     whole = all(each == int(each) for each in values)
