@@ -25,7 +25,7 @@ class TrendRead(Frozen):
     trend: Trend
     n: int = Field(description="repetitions with a value at both ends of the gain", examples=[20])
     since: int | None = Field(description="number of evaluations at which the gain begins", examples=[3])
-    last: int = Field(description="number of evaluations that at least half of the repetitions have reached", examples=[10])
+    last: int = Field(description="number of evaluations at which the gain ends", examples=[10])
     gain: Statistic = Field(description="mean gain in recorded fitness between the two")
     lower: Statistic = Field(description="lower end of its 95 % interval, by Student's t")
     upper: Statistic = Field(description="upper end of that interval")
@@ -40,8 +40,8 @@ class VerdictRead(Frozen):
     sentences: tuple[str, ...] = Field(examples=[("Simulated fit reaches 94 % of the direct baseline.",)])
     trends: tuple[TrendRead, ...]
     evaluations: int | None = Field(
-        description="number of real-world evaluations that at least half of the repetitions of every experiment have "
-        "reached; strategies are compared there; null without results",
+        description="last number of real-world evaluations that the experiments share; strategies are compared there; "
+        "null without results",
         examples=[10],
     )
     rules: tuple[str, ...] = Field(

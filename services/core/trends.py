@@ -53,20 +53,6 @@ class CurveEnd:
     upper: float | None = None
 
 
-def last_count(recorded: FloatArray) -> int | None:
-    """Return the largest number of evaluations that at least half of the repetitions with a value have reached.
-
-    A few late or cancelled repetitions therefore do not hide what the others have reached. None without values.
-
-    Args:
-        recorded: `(r, k)`: recorded fitness by repetition and number of real-world evaluations; nan if missing.
-    """
-    known = np.isfinite(recorded)
-    counts = known.sum(axis=0)
-    enough = np.flatnonzero((counts > 0) & (2 * counts >= known.any(axis=1).sum()))
-    return int(enough[-1]) if len(enough) else None
-
-
 def curve_end(recorded: FloatArray, last: int) -> CurveEnd:
     """Return what the values `(r, k)` up to the count `last` say of its end; nan is a missing value."""
     n = int(np.isfinite(recorded[:, last]).sum())

@@ -72,13 +72,11 @@ class Points:
 
 @dataclass(frozen=True)
 class Polylines:
-    """Lines through the same places on x, each in its own shade, as in parallel coordinates.
+    """Lines through the same places on x, each in its own shade.
 
     Attributes:
         rows: y of each line at each place.
-        shades: a number for each line, drawn from light to dark; a bar beside the figure explains them.
-        shades_label: label of that bar.
-        hover: a text for each line.
+        shades: a number for each line, as for Points.
     """
 
     name: str

@@ -7,12 +7,12 @@ from gaplab.schemas.curves import Comparison, Curve
 from gaplab.schemas.differences import SpecDiff
 from gaplab.schemas.misfit import MisfitRead
 from gaplab.schemas.provenance import ProvenanceRead
-from gaplab.schemas.records import ExperimentRead
+from gaplab.schemas.records import ExperimentRead, common_count
 from gaplab.schemas.reports import VerdictRead
 from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.core.errors import NotFound
 from gaplab.services.experiments import checks, reading
-from gaplab.services.reports.judged import Judged, common_count, judged_curves
+from gaplab.services.reports.judged import Judged, judged_curves
 from gaplab.services.reports.verdict import judge
 from gaplab.services.results import curves as results
 from gaplab.services.results.misfit import misfit
@@ -110,7 +110,7 @@ def _facts(
     ids = [experiment.id for experiment in experiments]
     curves = results.curves(store, ids)
     verdict, at_last = _verdict(store, curves, experiments)
-    judged = judged_curves(curves, verdict.evaluations)
+    judged = judged_curves(curves, experiments, verdict.evaluations)
     columns = [SpecColumn(each.id, each.name, (each.spec,)) for each in experiments]
     with store.reading() as session:
         work = work_of(session, ids)
@@ -138,11 +138,11 @@ def _verdict(
     store: Store, curves: Sequence[Curve], experiments: Sequence[ExperimentRead]
 ) -> tuple[VerdictRead, tuple[Comparison, ...]]:
     """Return the verdict, and the comparisons at the common count that it uses."""
-    count, ids = common_count(curves), [curve.experiment for curve in curves]
+    count, ids = common_count(experiments), [curve.experiment for curve in curves]
     pairs: tuple[Comparison, ...] = ()
     if count is not None and len(ids) > 1:
         pairs = results.compare(store, ids, from_evaluations=count, to_evaluations=count)
-    return judge(curves, pairs, experiments), pairs
+    return judge(curves, experiments, pairs), pairs
 
 
 def _checks(store: Store, experiments: Sequence[ExperimentRead]) -> tuple[SensitivityRead, ...]:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaplab.schemas.curves import Comparison, Curve, CurvePoint
+from gaplab.schemas.records import ExperimentRead
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.trends import CurveEnd, curve_end, last_count
+from gaplab.services.core.trends import CurveEnd, curve_end
 from gaplab.services.figures.words import distinct_names
 
 SIGNIFICANT = 0.05
@@ -35,25 +36,19 @@ class Judged:
         return self.point.mean or 0.0 if self.point else 0.0
 
 
-def common_count(curves: Sequence[Curve]) -> int | None:
-    """Return the number of evaluations that at least half of the repetitions of every curve have reached.
-
-    None without values. The direct baseline has no evaluations, and a curve without values limits no other.
-    """
-    counts = [last_count(recorded_of(curve)) for curve in curves if not curve.direct]
-    return min((count for count in counts if count is not None), default=None)
-
-
 def recorded_of(curve: Curve) -> FloatArray:
     """Return the recorded fitness of a curve, `(repetitions, counts)`; nan is a missing value."""
     rows = [[np.nan if value is None else value for value in point.values] for point in curve.points]
     return np.array(rows, dtype=float).T if rows else np.empty((0, 0))
 
 
-def judged_curves(curves: Sequence[Curve], count: int | None) -> tuple[Judged, ...]:
-    """Return the curves with their distinct names, their ends, and their points at the common count."""
+def judged_curves(
+    curves: Sequence[Curve], experiments: Sequence[ExperimentRead], count: int | None
+) -> tuple[Judged, ...]:
+    """Return the curves of experiments with their distinct names, their ends, and their points at the common count."""
     names = distinct_names([(curve.name, curve.experiment) for curve in curves])
-    return tuple(_judged(name, curve, count) for name, curve in zip(names, curves, strict=True))
+    found = zip(names, curves, experiments, strict=True)
+    return tuple(_judged(name, curve, experiment, count) for name, curve, experiment in found)
 
 
 def differs(pair: Comparison) -> bool:
@@ -66,9 +61,9 @@ def p_of(pair: Comparison) -> float | None:
     return pair.student.p_holm if pair.student.p_holm is not None else pair.student.p
 
 
-def _judged(name: str, curve: Curve, count: int | None) -> Judged:
-    recorded = recorded_of(curve)
-    last = None if curve.direct else last_count(recorded)
+def _judged(name: str, curve: Curve, experiment: ExperimentRead, count: int | None) -> Judged:
+    last = None if curve.direct or experiment.fitness is None else experiment.fitness.evaluations
+    end = None if last is None else curve_end(recorded_of(curve), last)
     at = 0 if curve.direct else count
     point = next((point for point in curve.points if point.evaluations == at and point.mean is not None), None)
-    return Judged(name, curve, None if last is None else curve_end(recorded, last), point)
+    return Judged(name, curve, end, point)

@@ -119,21 +119,14 @@ def continuing(trends: Sequence[TrendRead]) -> Iterator[str]:
         yield f"{subject} may still rise; more repetitions would tell."
 
 
-def incomplete(experiment: ExperimentRead, names: Mapping[str, str]) -> str:
-    """Return how much of an experiment is missing."""
-    progress = experiment.progress
-    name = names.get(experiment.id, experiment.name)
-    state = "stopped early" if experiment.state is State.COMPLETED else experiment.state.value.lower()
-    failed = f", {number_of('repetition', progress.failed)} failed" if progress.failed else ""
-    done = f"{progress.completed} of {number_of('repetition', progress.repetitions)} completed"
-    return f"{name} is incomplete ({state}): {done}{failed}."
-
-
-def is_incomplete(experiment: ExperimentRead) -> bool:
-    """Return whether repetitions or evaluations of an experiment are missing: it may be stopped, or still running."""
-    progress = experiment.progress
-    stopped = progress.rollouts_done + progress.rollouts_saved < progress.rollouts
-    return experiment.state is not State.COMPLETED or stopped or progress.failed > 0
+def incomplete(experiments: Sequence[ExperimentRead], names: Mapping[str, str]) -> Iterator[str]:
+    """Yield what is missing: experiments that still run, were stopped or cancelled, or have failed repetitions."""
+    for experiment in experiments:
+        progress, state = experiment.progress, experiment.state
+        done = f"{progress.completed} of {number_of('repetition', progress.repetitions)} completed"
+        if experiment.caveat or state is not State.COMPLETED:
+            why = f" ({experiment.caveat})" if experiment.caveat else ""
+            yield f"{names[experiment.id]} is incomplete: {state.value.lower()}{why}, {done}."
 
 
 def _is_alike(pairs: Sequence[Comparison], baseline: str, one: Judged) -> bool:

@@ -1,22 +1,18 @@
 """Simulators and experiments as lines of parallel coordinates."""
 
 from collections.abc import Sequence
-from math import sqrt
 
-from gaplab.schemas.curves import Curve
 from gaplab.schemas.differences import SettingRead
 from gaplab.schemas.records import ExperimentRead
 from gaplab.services.core.tunables import tunables
-from gaplab.services.experiments.differences import read_differences
 from gaplab.services.experiments import reading
+from gaplab.services.experiments.differences import read_differences
 from gaplab.services.figures.kinds.coordinates import Coordinate, coordinates_figure
 from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import distinct_names, printable, spoken, with_unit
-from gaplab.services.results import curves
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import spec_of, unit
 from gaplab.services.store.queries import experiments, results
-from gaplab.services.store.queries.results import BestSimulator
 from gaplab.services.store.session import Store
 
 MOST_SETTINGS = 8
@@ -31,11 +27,14 @@ def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") 
     """
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
-        found = sorted(results.best_simulators(session, experiment_id), key=lambda each: (each.repetition, each.iteration))
+        found = sorted(
+            results.best_simulators(session, experiment_id), key=lambda each: (each.repetition, each.iteration)
+        )
         measured = results.measured_iterations(session, experiment_id)
     spec = spec_of(row.spec)
     space = parameters_of(spec.tunables)
-    errors = tuple(_error(each, measured.get(each.repetition, ())) for each in found)
+    samples = [results.samples_until(measured, each.repetition, each.iteration) for each in found]
+    errors = tuple(results.per_sample(each.squared_error, n) for each, n in zip(found, samples, strict=True))
     axes = [
         Coordinate("Iteration", tuple(float(each.iteration) for each in found)),
         *(
@@ -63,22 +62,19 @@ def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") 
 def experiment_coordinates(
     store: Store, studies: Sequence[str], experiment_ids: Sequence[str], *, title: str = ""
 ) -> FigureDefinition:
-    """Return experiments as lines: the settings that differ between them, and their fitness at their last count.
+    """Return experiments as lines: the settings that differ between them, and their fitness.
 
     Raises:
         NotFound: a study or an experiment does not exist.
     """
     of_studies = [each for id_ in studies for each in reading.read_study(store, id_).experiments]
     known = {each.id: each for each in [*of_studies, *(reading.read_experiment(store, id_) for id_ in experiment_ids)]}
-    chosen = list(known.values())
-    drawn = curves.curves(store, list(known))
-    final = {curve.experiment: _final(curve) for curve in drawn}
-    kept = [each for each in chosen if final[each.id] is not None]
+    kept = [each for each in known.values() if each.fitness]
     differing = read_differences(store, [], [each.id for each in kept]).settings if len(kept) > 1 else ()
-    axes = [*(_setting(setting) for setting in differing[:MOST_SETTINGS]), *_results(kept, drawn, final)]
+    axes = [*(_setting(setting) for setting in differing[:MOST_SETTINGS]), *_results(kept)]
     return coordinates_figure(
         axes,
-        shades=[final[each.id] or 0.0 for each in kept],
+        shades=[each.fitness.mean for each in kept if each.fitness],
         shades_label="Final fitness",
         hover=distinct_names([(each.name, each.id) for each in kept]),
         what="experiment",
@@ -86,20 +82,17 @@ def experiment_coordinates(
     )
 
 
-def _results(
-    kept: Sequence[ExperimentRead], drawn: Sequence[Curve], final: dict[str, float | None]
-) -> tuple[Coordinate, ...]:
-    units = {curve.unit for curve in drawn}
-    rollouts = tuple(float(each.progress.rollouts_done) for each in kept)
+def _results(kept: Sequence[ExperimentRead]) -> tuple[Coordinate, ...]:
+    units = {unit(spec_of(each.spec)) for each in kept}
     return (
-        Coordinate("Rollouts", rollouts, wide=True),
-        Coordinate(with_unit("Final fitness", units), tuple(final[each.id] for each in kept)),
+        Coordinate("Rollouts", tuple(float(each.progress.rollouts_done) for each in kept), wide=True),
+        Coordinate(with_unit("Final fitness", units), tuple(each.fitness.mean for each in kept if each.fitness)),
     )
 
 
 def _setting(setting: SettingRead) -> Coordinate:
     values = [cell[0] if cell else None for cell in setting.values]
-    label = spoken(setting.setting.split(" of ")[0].replace(" ", "_"))
+    label = spoken(setting.setting.split(" of the ")[0].replace(" ", "_"))
     if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
         return Coordinate(label, tuple(None if value is None else float(value) for value in values), wide=True)
     return Coordinate(label, tuple(None if value is None else _word(value) for value in values))
@@ -108,20 +101,4 @@ def _setting(setting: SettingRead) -> Coordinate:
 def _word(value: object) -> str:
     if isinstance(value, list):
         return " + ".join(map(_word, value))
-    return spoken(value) if isinstance(value, str) else printable(str(value))
-
-
-def _final(curve: Curve) -> float | None:
-    """Return the mean at the last count that at least half of the repetitions have reached, as reports do."""
-    from gaplab.services.results.last_count import last_point  # noqa: PLC0415
-
-    point = last_point(curve)
-    return point.mean if point else None
-
-
-def _error(best: BestSimulator, measured: Sequence[int]) -> float | None:
-    """Return the root mean square error over the samples that the simulator was tuned on; None before the first."""
-    samples = sum(iteration <= best.iteration for iteration in measured)
-    if not samples or best.squared_error is None or best.squared_error < 0:
-        return None
-    return sqrt(best.squared_error / samples)
+    return printable(str(value).replace("_", " "))

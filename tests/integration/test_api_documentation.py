@@ -57,6 +57,7 @@ ENDPOINTS = {
     "GET /comparisons",
     "GET /differences",
     "GET /figures/curves",
+    "GET /figures/coordinates",
     "GET /figures/simulators",
     "GET /figures/predictions",
     "GET /figures/squared-error",

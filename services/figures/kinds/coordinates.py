@@ -8,7 +8,7 @@ from gaplab.services.figures.marks import (
     Axis,
     FigureDefinition,
     Label,
-    Level,
+    Line,
     Mark,
     Number,
     Panel,
@@ -24,7 +24,7 @@ MOST = 1_000
 WIDE = 30.0
 """Ratio of the greatest to the least value, above which the axis of an error is logarithmic."""
 
-LONGEST = 18
+LONGEST = 22
 """Characters of a label of an axis."""
 
 AXIS = Style(INK, "solid", "circle")
@@ -55,6 +55,11 @@ class _Scaled:
 
     heights: tuple[Number, ...]
     ticks: tuple[tuple[float, str], ...]
+    words: bool = False
+
+    def labels(self, place: float) -> list[Label]:
+        """Return the labels of the axis at a place on x: numbers at its ends, words beside their heights."""
+        return [Label(text, place, height, beside=self.words) for height, text in self.ticks]
 
 
 def coordinates_figure(
@@ -82,14 +87,15 @@ def coordinates_figure(
     rows = tuple(tuple(axis.heights[line] for axis in scaled) for line in range(shown))
     places = tuple(float(place) for place in range(len(coordinates)))
     marks: list[Mark] = [Polylines("", places, rows, tuple(shades[:shown]), shades_label, tuple(hover[:shown]))]
-    marks += [Level("", place, AXIS, upright=True) for place in places]
-    marks += [Label(words, place, height) for place, axis in zip(places, scaled, strict=True) for height, words in axis.ticks]
+    ends = [(place, end) for place in places for end in (0.0, 1.0, None)]
+    marks.append(Line("", tuple(p for p, _ in ends), tuple(end for _, end in ends), AXIS, markers=False))
+    marks += [label for place, axis in zip(places, scaled, strict=True) for label in axis.labels(place)]
     ticks = tuple((place, _label(axis.label)) for place, axis in zip(places, coordinates, strict=True))
-    frame = Axis("", (-0.35, max(1.0, len(coordinates) - 1) + 0.35), ticks=ticks)
+    frame = Axis("", (-0.4, max(1.0, len(coordinates) - 1) + 0.6), ticks=ticks)
     return FigureDefinition(
         name="coordinates",
         title=heading(title),
-        panels=(Panel(tuple(marks) if shown else (), frame, Axis("", (-0.12, 1.14), ticks=((-9.0, ""),))),),
+        panels=(Panel(tuple(marks) if shown else (), frame, Axis("", (-0.19, 1.16), ticks=((0.0, ""), (1.0, "")))),),
         caption=_caption(what, lines, shown, shades_label),
         alt=_alt(coordinates, what, lines),
         table=_table(coordinates, shown),
@@ -108,12 +114,12 @@ def _scaled(coordinate: Coordinate) -> _Scaled:
     most = max(there) if coordinate.upper is None else coordinate.upper
     if coordinate.wide and least > 0 and most >= WIDE * least:
         heights = [None if value is None else log10(value / least) / log10(most / least) for value in numbers]
-        return _Scaled(tuple(heights), ((-0.12, power(float(f"{least:.1g}"))), (1.0, power(float(f"{most:.1g}")))))
+        return _Scaled(tuple(heights), ((-0.17, power(float(f"{least:.1g}"))), (1.0, power(float(f"{most:.1g}")))))
     span = most - least
     heights = [None if value is None else (value - least) / span if span else 0.5 for value in numbers]
     if not span:
         return _Scaled(tuple(heights), ((0.5, number(least)),))
-    return _Scaled(tuple(heights), ((-0.12, number(least)), (1.0, number(most))))
+    return _Scaled(tuple(heights), ((-0.17, number(least)), (1.0, number(most))))
 
 
 def _of_words(values: Sequence[str | None]) -> _Scaled:
@@ -121,7 +127,7 @@ def _of_words(values: Sequence[str | None]) -> _Scaled:
     words = list(dict.fromkeys(value for value in values if value is not None))
     height = {word: 0.5 if len(words) == 1 else at / (len(words) - 1) for at, word in enumerate(words)}
     heights = tuple(None if value is None else height[value] for value in values)
-    return _Scaled(heights, tuple((height[word], printable(word, LONGEST)) for word in words))
+    return _Scaled(heights, tuple((height[word], printable(word, LONGEST)) for word in words), words=True)
 
 
 def _label(text: str) -> str:
@@ -132,8 +138,8 @@ def _caption(what: str, lines: int, shown: int, shades_label: str) -> str:
     if not lines:
         return ""
     of = f" of {lines}" if lines > shown else ""
-    scale = "Each axis goes from its lower to its upper value"
-    return f"One line for each of {number_of(what, shown)}{of}. {scale}. Shade: {shades_label[:1].lower()}{shades_label[1:]}."
+    shade = f"{shades_label[:1].lower()}{shades_label[1:]}"
+    return f"One line for each of {number_of(what, shown)}{of}. Shade: {shade}."
 
 
 def _alt(coordinates: Sequence[Coordinate], what: str, lines: int) -> str:

@@ -2,7 +2,19 @@
 
 from typing import TYPE_CHECKING, Any
 
-from gaplab.services.figures.marks import Arrow, Bars, Diagonal, Label, Level, Line, Mark, Number, Panel, Points, Polylines
+from gaplab.services.figures.marks import (
+    Arrow,
+    Bars,
+    Diagonal,
+    Label,
+    Level,
+    Line,
+    Mark,
+    Number,
+    Panel,
+    Points,
+    Polylines,
+)
 from gaplab.services.figures.matplotlib.text_size import printable
 from gaplab.services.figures.style import INK, SHADES, Style
 
@@ -39,10 +51,8 @@ def _draw(mark: Mark, axes: "Axes", order: float, shades: tuple[float, float]) -
     match mark:
         case Line():
             _line(mark, axes, order)
-        case Points():
-            _points(mark, axes, order + 5, shades)
-        case Polylines():
-            _polylines(mark, axes, order, shades)
+        case Points() | Polylines():
+            _shaded(mark, axes, order, shades)
         case Level():
             _level(mark, axes)
         case Diagonal():
@@ -76,6 +86,13 @@ def _line(line: Line, axes: "Axes", order: float) -> None:
         lower, upper = _ends(line.lower, line.y), _ends(line.upper, line.y)
         step: Any = {"step": "post"} if line.steps else {}
         axes.fill_between(x, lower, upper, color=look.color, alpha=0.13, linewidth=0, zorder=1, **step)
+
+
+def _shaded(mark: Points | Polylines, axes: "Axes", order: float, shades: tuple[float, float]) -> None:
+    if isinstance(mark, Points):
+        _points(mark, axes, order + 5, shades)
+    else:
+        _polylines(mark, axes, order, shades)
 
 
 def _polylines(lines: Polylines, axes: "Axes", order: float, shades: tuple[float, float]) -> None:

@@ -168,4 +168,4 @@ def _shades(shaded: list[Points | Polylines]) -> dict[str, Any]:
 def _is_read_along_x(figure: FigureDefinition) -> bool:
     """Return whether one hover text can show the values of all lines at an x: without points, each line has one."""
     kinds = {type(mark) for mark in figure.marks}
-    return Line in kinds and Points not in kinds
+    return Line in kinds and not kinds & {Points, Polylines}

@@ -36,10 +36,8 @@ def _layers(mark: Mark, panel: Panel) -> list[tuple[int, Trace]]:
     match mark:
         case Line():
             return [*((0, each) for each in _band(mark)), (1 if mark.faint else 3, _line(mark))]
-        case Points():
-            return [(4, each) for each in _points(mark)]
-        case Polylines():
-            return [(3, each) for each in _polylines(mark)]
+        case Points() | Polylines():
+            return [(4, each) for each in (_points(mark) if isinstance(mark, Points) else _polylines(mark))]
         case Level():
             return _level(mark, panel)
         case Diagonal():

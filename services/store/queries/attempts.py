@@ -1,6 +1,7 @@
 """Attempts: the history of a repetition's leases, written in the transactions that begin and end them."""
 
 from collections.abc import Sequence
+from datetime import datetime, timedelta
 
 from sqlalchemy import func, insert, select, update
 from sqlalchemy.orm import Session
@@ -9,7 +10,7 @@ from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.records import AttemptRead
 from gaplab.services.core.errors import NotFound
-from gaplab.services.store.clock import now
+from gaplab.services.store.clock import moment, now
 from gaplab.services.store.models import AttemptRow, RepetitionRow
 from gaplab.services.store.queries.events import note
 
@@ -54,6 +55,27 @@ def latest(session: Session, experiment: str) -> dict[int, int]:
     of_it = select(row.repetition_id, func.max(row.epoch)).join(repetition, repetition.id == row.repetition_id)
     found = of_it.where(repetition.experiment_id == experiment).group_by(row.repetition_id)
     return dict(session.execute(found).all())
+
+
+def spans(session: Session, experiments: Sequence[str]) -> dict[str, list[tuple[datetime, datetime]]]:
+    """Return begin and end of the attempts at repetitions, by experiment; an attempt that runs ends now.
+
+    A lost attempt ended some time before its loss was noticed. It counts at most the work that is stored.
+    """
+    if not experiments:
+        return {}
+    row, repetition, present = AttemptRow, RepetitionRow, moment(session)
+    columns = repetition.experiment_id, repetition.seconds, row.started_at, row.ended_at, row.ending
+    query = select(*columns).join(repetition, repetition.id == row.repetition_id)
+    found: dict[str, list[tuple[datetime, datetime]]] = {}
+    for experiment, seconds, started_at, ended_at, ending in session.execute(
+        query.where(repetition.experiment_id.in_(experiments))
+    ):
+        end = ended_at or present
+        if ending is Ending.LOST:
+            end = min(end, started_at + timedelta(seconds=seconds))
+        found.setdefault(experiment, []).append((started_at, end))
+    return found
 
 
 def attempts_of(session: Session, experiment: str, number: int, *, secret: bool = True) -> tuple[AttemptRead, ...]:

@@ -4,8 +4,8 @@ import re
 from datetime import UTC, datetime
 
 import pytest
-
 from gaplab.api.clients.progress.pace import Pace, span
+
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead, Progress
 
