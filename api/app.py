@@ -29,6 +29,7 @@ from gaplab.api.routes import (
     provenance,
     replay_figures,
     replays,
+    reports,
     sensitivity,
     studies,
 )
@@ -51,6 +52,7 @@ TAGS = [
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
     {"name": "replays", "description": "the motion of controllers, computed on request"},
     {"name": "figures", "description": "for the browser, for notebooks and for papers"},
+    {"name": "reports", "description": "one document with figures, tables, tests and a verdict in words"},
     {"name": "events", "description": "what happens to experiments, as it happens"},
     {"name": "archives", "description": "an experiment or a study with everything in it as one file"},
     {"name": "sensitivity", "description": "the effect of each tunable on fitness, checked before tuning"},
@@ -69,6 +71,7 @@ MODULES = (
     differences,
     figures,
     replay_figures,
+    reports,
     archives,
     replays,
     sensitivity,

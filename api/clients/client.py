@@ -20,6 +20,7 @@ from gaplab.api.clients.events import EventLog
 from gaplab.api.clients.figures import Figures
 from gaplab.api.clients.life_cycle import LifeCycle
 from gaplab.api.clients.records import Records
+from gaplab.api.clients.reports import Reports
 from gaplab.api.clients.results import Results
 from gaplab.api.clients.submission import Submission
 from gaplab.api.clients.tables import Tables
@@ -60,6 +61,7 @@ class Client:
         self.tables = tables = Tables(connection, results)
         self.figures = figures = Figures(connection, records)
         self.archives = archives = Archives(connection, records)
+        self.reports = reports = Reports(connection, records)
         self.event_log = event_log = EventLog(connection)
         self.watcher = watcher = Watcher(records, results)
 
@@ -76,6 +78,7 @@ class Client:
         self.curve, self.samples = tables.curve, tables.samples
         self.simulators, self.predictions = tables.simulators, tables.predictions
         self.figure, self.figure_kinds = figures.draw, figures.kinds
+        self.verdict, self.report = reports.verdict, reports.save
         self.export, self.import_ = archives.export, archives.import_
         self.events = event_log.events
         self.watch, self.wait = watcher.watch, watcher.wait

@@ -49,8 +49,7 @@ def _archived(file: Path) -> tuple[dict[str, Any], ...]:
 
 
 def _completed(spec: dict[str, Any]) -> tuple[dict[str, Any], ...]:
-    if "strategy" in spec and "strategies" not in spec:
-        resolved = (resolve_experiment(ExperimentSpec.model_validate(spec)),)
-    else:
-        resolved = resolve_study(StudySpec.model_validate(spec))
-    return tuple(each.model_dump(mode="json") for each in resolved)
+    is_experiment = "strategy" in spec and "strategies" not in spec
+    resolved = [resolve_experiment(ExperimentSpec.model_validate(spec))] if is_experiment else None
+    studied = resolved or resolve_study(StudySpec.model_validate(spec))
+    return tuple(each.model_dump(mode="json") for each in studied)

@@ -17,7 +17,7 @@ class Paragraph:
 class Bullets:
     """A list of sentences."""
 
-    items: tuple[str, ...]
+    sentences: tuple[str, ...]
 
 
 @dataclass(frozen=True)

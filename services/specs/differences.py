@@ -1,6 +1,6 @@
 """Differences between resolved specs, setting by setting."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,7 +45,7 @@ def differences(columns: Sequence[SpecColumn]) -> SpecDiff:
         message = "a comparison of settings needs two experiments or studies, or one study with several experiments"
         raise InvalidSpec([Violation("experiment", [column.id for column in columns], message)])
     tables = [[dict(_settings(spec)) for spec in column.specs] for column in columns]
-    pointers = {path: pointer for table in tables for settings in table for path, (pointer, _) in settings.items()}
+    pointers = _pointers(settings for table in tables for settings in table)
     values = {path: tuple(_distinct(path, table) for table in tables) for path in pointers}
     hidden = {path for path in values if any(_is_hidden(path, cell) for cell in values[path])}
     differing = {path for path in values if _differs([cell for cell in values[path] if not _is_hidden(path, cell)])}
@@ -58,6 +58,13 @@ def differences(columns: Sequence[SpecColumn]) -> SpecDiff:
         equal=len(values) - len(differing | hidden),
         hidden=tuple(pointers[path] for path in sorted(hidden - differing, key=_order)),
     )
+
+
+def all_settings(column: SpecColumn) -> tuple[tuple[str, str, Values], ...]:
+    """Return the pointer, the words and the distinct values of each setting of a column, in the order of reading."""
+    table = [dict(_settings(spec)) for spec in column.specs]
+    pointers = _pointers(table)
+    return tuple((pointers[path], in_words(path), _distinct(path, table)) for path in sorted(pointers, key=_order))
 
 
 def in_words(path: Path) -> str:
@@ -87,6 +94,15 @@ def _leaves(path: Path, pointer: str, value: Any) -> Iterator[tuple[Path, tuple[
     for name, inner in value.items():
         escaped = name.replace("~", "~0").replace("/", "~1")
         yield from _leaves((*path, name), f"{pointer}/{escaped}", inner)
+
+
+def _pointers(table: Iterable[Mapping[Path, tuple[str, Any]]]) -> dict[Path, str]:
+    """Return the pointer of each setting in the first spec that has it."""
+    found: dict[Path, str] = {}
+    for settings in table:
+        for path, (pointer, _) in settings.items():
+            found.setdefault(path, pointer)
+    return found
 
 
 def _distinct(path: Path, table: Sequence[Mapping[Path, tuple[str, Any]]]) -> Values:

@@ -56,6 +56,8 @@ ENDPOINTS = {
     "GET /curves",
     "GET /comparisons",
     "GET /differences",
+    "GET /studies/{id}/report",
+    "GET /experiments/{id}/report",
     "GET /figures/curves",
     "GET /figures/coordinates",
     "GET /figures/simulators",

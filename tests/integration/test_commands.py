@@ -132,6 +132,7 @@ def look(ask: Callable[..., Any], id: str, other: str) -> None:
     assert set(ask("show", experiments[0])) == {"experiment", "repetitions", "provenance", "misfit"}
     assert [each["experiment"] for each in ask("curve", id)] == experiments
     assert [column["id"] for column in ask("diff", id, other)["columns"]] == [id, other]
+    assert ask("report", id)["headline"]
     assert "strategies" in ask("catalogue")
     assert ask("catalogue", "random")["name"] == "random"
     assert {each["kind"] for each in ask("events", id)} > {"submitted", "completed"}

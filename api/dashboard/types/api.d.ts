@@ -12,6 +12,14 @@ declare namespace Api {
     ending: Ending | null;
     reason: string | null;
   }
+  interface BestRead {
+    evaluations: number;
+    n: number;
+    mean: number;
+    sd: number | null;
+    experiment: string;
+    name: string;
+  }
   interface BudgetRead {
     name: string;
     iterations: number;
@@ -52,6 +60,7 @@ declare namespace Api {
     second: string;
     from_evaluations: number;
     to_evaluations: number;
+    caution: string | null;
     n_first: number;
     n_second: number;
     difference: number | null;
@@ -78,6 +87,11 @@ declare namespace Api {
     lower: number | null;
     upper: number | null;
     values: Array<number | null>;
+  }
+  interface DiffColumn {
+    id: string;
+    name: string;
+    experiments: number;
   }
   interface Distribution {
     n: number;
@@ -142,6 +156,8 @@ declare namespace Api {
     priority: number;
     max_parallel: number | null;
     progress: Progress;
+    caveat: string | null;
+    fitness: FitnessRead | null;
     best_fitness: number | null;
     reasons: Array<string>;
     sensitivity: string | null;
@@ -176,6 +192,12 @@ declare namespace Api {
     alt: string;
     empty: boolean;
     table: TableRead | null;
+  }
+  interface FitnessRead {
+    evaluations: number;
+    n: number;
+    mean: number;
+    sd: number | null;
   }
   interface Health {
     status: "ok" | "degraded";
@@ -253,11 +275,14 @@ declare namespace Api {
     failed: number;
     iterations: number;
     iterations_done: number;
+    counted_iterations: number;
+    counted_iterations_done: number;
     rollouts: number;
     rollouts_done: number;
     rollouts_failed: number;
     rollouts_saved: number;
     seconds_left: number | null;
+    time_left: TimeLeft | null;
   }
   interface Provenance {
     gaplab: string;
@@ -376,6 +401,11 @@ declare namespace Api {
     points: number;
     evaluations: number;
   }
+  interface SettingRead {
+    pointer: string;
+    setting: string;
+    values: Array<Array<any>>;
+  }
   interface Shape {
     kind: "box" | "sphere" | "capsule" | "plane";
     size_m: Array<number>;
@@ -390,6 +420,13 @@ declare namespace Api {
     rank: number;
     parameters: Record<string, number>;
     squared_error: number | null;
+    error: number | null;
+  }
+  interface SpecDiff {
+    columns: Array<DiffColumn>;
+    settings: Array<SettingRead>;
+    equal: number;
+    hidden: Array<string>;
   }
   interface SpecError {
     pointer: string;
@@ -405,6 +442,8 @@ declare namespace Api {
     notes: string | null;
     edits: number;
     state: State;
+    caveat: string | null;
+    best: BestRead | null;
     experiments: Array<ExperimentRead>;
     progress: Progress;
     created_at: string;
@@ -435,6 +474,24 @@ declare namespace Api {
     p_holm: number | null;
     degrees_of_freedom: number | null;
   }
+  interface TimeLeft {
+    low_s: number;
+    high_s: number;
+  }
+  type Trend = "rising" | "flat" | "falling" | "unclear" | "too_few";
+  interface TrendRead {
+    experiment: string;
+    name: string;
+    trend: Trend;
+    n: number;
+    since: number | null;
+    last: number;
+    gain: number | null;
+    lower: number | null;
+    upper: number | null;
+    continuing: boolean | null;
+    sentence: string;
+  }
   interface TunableDistribution {
     n: number;
     mean: number | null;
@@ -449,4 +506,11 @@ declare namespace Api {
   }
   type TunableRef = string | Record<string, any>;
   type Verdict = "nothing" | "rough" | "smooth" | "unknown";
+  interface VerdictRead {
+    headline: string;
+    sentences: Array<string>;
+    trends: Array<TrendRead>;
+    evaluations: number | null;
+    rules: Array<string>;
+  }
 }
