@@ -36,6 +36,7 @@ from gaplab.api.routes import (
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.settings import Limits, Settings
 from gaplab.services.store.session import Store
+from gaplab.services.waiting_line import WaitingLine
 
 DESCRIPTION = """
 Closes the *reality gap*: tunes a robot simulator from a handful of real-world evaluations, and compares the strategies
@@ -105,6 +106,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     app.state.connections = most_requests(limits) + SPARE
     app.state.feed = EventFeed(store)
     app.state.rollout_process = RolloutProcess()
+    app.state.drawing_process = RolloutProcess(line=WaitingLine("videos"))
     app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
     app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(GZipMiddleware, minimum_size=20_000, compresslevel=4)

@@ -20,6 +20,7 @@ from gaplab.api.clients.events import EventLog
 from gaplab.api.clients.figures import Figures
 from gaplab.api.clients.life_cycle import LifeCycle
 from gaplab.api.clients.records import Records
+from gaplab.api.clients.replays import Replays
 from gaplab.api.clients.reports import Reports
 from gaplab.api.clients.results import Results
 from gaplab.api.clients.submission import Submission
@@ -62,6 +63,7 @@ class Client:
         self.figures = figures = Figures(connection, records)
         self.archives = archives = Archives(connection, records)
         self.reports = reports = Reports(connection, records)
+        self.replays = replays = Replays(connection)
         self.event_log = event_log = EventLog(connection)
         self.watcher = watcher = Watcher(records, results)
 
@@ -78,7 +80,12 @@ class Client:
         self.curve, self.samples = tables.curve, tables.samples
         self.simulators, self.predictions = tables.simulators, tables.predictions
         self.figure, self.figure_kinds = figures.draw, figures.kinds
-        self.verdict, self.report = reports.verdict, reports.save
+        self.verdict, self.report, self.replay, self.video = (
+            reports.verdict,
+            reports.save,
+            replays.replay,
+            replays.video,
+        )
         self.export, self.import_ = archives.export, archives.import_
         self.events = event_log.events
         self.watch, self.wait = watcher.watch, watcher.wait

@@ -33,6 +33,7 @@ ENDPOINTS = {
     "GET /experiments/{id}/misfit",
     "GET /experiments/{id}/predictions",
     "GET /experiments/{id}/replay",
+    "GET /experiments/{id}/video",
     "GET /experiments/{id}/repetitions/{number}/attempts",
     "POST /experiments/{id}/pause",
     "POST /experiments/{id}/resume",

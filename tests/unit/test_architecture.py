@@ -26,7 +26,10 @@ ROOMS = {
     "experiments": (("core", "engines", "store", "specs", "plugins", "settings"), {"sqlalchemy"}),
     "running": (("core", "engines", "store", "plugins", "experiments"), {"sqlalchemy"}),
     "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
-    "replay": (("core", "store", "specs", "plugins", "experiments", "waiting_line"), {"numpy", "cachetools"}),
+    "replay": (
+        ("core", "store", "specs", "plugins", "experiments", "waiting_line"),
+        {"numpy", "scipy", "cachetools", "PIL", "av"},
+    ),
     "archives": (("core", "store", "specs", "experiments", "results", "settings"), {"pydantic", "pyarrow"}),
     "reports": (
         ("core", "store", "figures", "specs", "experiments", "running", "results"),

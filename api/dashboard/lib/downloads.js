@@ -14,17 +14,23 @@ const FORMATS = ["svg", "png", "pdf"];
  * @param {string} path
  * @param {Page.Query} query
  * @param {string} name of the saved file
+ * @param {string} [busy] what the service does meanwhile; a file that takes long, or may be refused, is fetched by script
  */
-export function downloadLink(label, path, query, name) {
-  const status = h("span", { role: "alert", class: "failed" });
+export function downloadLink(label, path, query, name, busy = "") {
+  const status = h("span", { role: "status", class: "note" });
+  const tell = (/** @type {string} */ text, isFailed = false) => {
+    status.textContent = text;
+    status.classList.toggle("failed", isFailed);
+  };
   const click = async (/** @type {Event} */ event) => {
-    if (!token()) return;
+    if (!token() && !busy) return;
     event.preventDefault();
-    status.textContent = "";
+    tell(busy && ` ${busy}…`);
     try {
       save(await getFile(path, query), name);
+      tell("");
     } catch (error) {
-      status.textContent = ` ${error.message}`;
+      tell(` ${error.message}`, true);
     }
   };
   const link = h("a", { href: path.replace(/^\//, "") + queryString(query), download: name, onclick: click }, label);
