@@ -62,8 +62,7 @@ class Client:
         self.tables = tables = Tables(connection, results)
         self.figures = figures = Figures(connection, records)
         self.archives = archives = Archives(connection, records)
-        self.reports = reports = Reports(connection, records)
-        self.replays = replays = Replays(connection)
+        self.reports, self.replays = reports, replays = Reports(connection, records), Replays(connection)
         self.event_log = event_log = EventLog(connection)
         self.watcher = watcher = Watcher(records, results)
 

@@ -5,6 +5,8 @@ from fractions import Fraction
 from hashlib import sha256
 from io import BytesIO
 from itertools import chain
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Literal
 
 from PIL import Image
@@ -80,11 +82,12 @@ def _mp4(drawn: Iterable[Image.Image], size: tuple[int, int]) -> bytes:
     except ImportError as error:
         msg = "MP4 needs PyAV: pip install 'gaplab[video]'; GIF and WebP need nothing more"
         raise EngineUnavailable(msg) from error
-    target = BytesIO()
-    with av.open(target, "w", format="mp4", options={"movflags": "+faststart"}) as container:
-        stream = container.add_stream("libx264", rate=Fraction(PICTURES_PER_S), options={"crf": "20"})
-        stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
-        for picture in drawn:
-            container.mux(stream.encode(av.VideoFrame.from_image(picture)))
-        container.mux(stream.encode())
-    return target.getvalue()
+    with TemporaryDirectory(prefix="gaplab-") as folder:
+        file = Path(folder) / "film.mp4"  # its index moves to the front at the end, which needs a real file
+        with av.open(file, "w", format="mp4", options={"movflags": "+faststart"}) as container:
+            stream = container.add_stream("libx264", rate=Fraction(PICTURES_PER_S), options={"crf": "20"})
+            stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
+            for picture in drawn:
+                container.mux(stream.encode(av.VideoFrame.from_image(picture)))
+            container.mux(stream.encode())
+        return file.read_bytes()

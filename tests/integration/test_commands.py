@@ -107,12 +107,8 @@ def test_every_command_prints_one_document_and_nothing_else(
     assert ask("token revoke", token["token"]["id"]) == {"id": token["token"]["id"], "revoked": True}
     assert set(ask("help")) == {str(each.value) for each in Exit}
 
-    elsewhere = {
-        "replay",
-        "sensitivity",
-        "accept-versions",
-        "retry",
-    }  # want a body, a worker, an experiment under way, and a failed one
+    # want a body, a worker, an experiment under way, and a failed one
+    elsewhere = {"replay", "sensitivity", "accept-versions", "retry"}
     assert set(said) | elsewhere == set(NAMES) - UNTIL_STOPPED
 
 

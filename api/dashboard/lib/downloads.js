@@ -17,24 +17,22 @@ const FORMATS = ["svg", "png", "pdf"];
  * @param {string} [busy] what the service does meanwhile; a file that takes long, or may be refused, is fetched by script
  */
 export function downloadLink(label, path, query, name, busy = "") {
-  const status = h("span", { role: "status", class: "note" });
-  const tell = (/** @type {string} */ text, isFailed = false) => {
-    status.textContent = text;
-    status.classList.toggle("failed", isFailed);
-  };
+  const progress = h("span", { role: "status", class: "note" });
+  const failure = h("span", { role: "alert", class: "failed" });
   const click = async (/** @type {Event} */ event) => {
     if (!token() && !busy) return;
     event.preventDefault();
-    tell(busy && ` ${busy}…`);
+    failure.textContent = "";
+    progress.textContent = busy && ` ${busy}…`;
     try {
       save(await getFile(path, query), name);
-      tell("");
     } catch (error) {
-      tell(` ${error.message}`, true);
+      failure.textContent = ` ${error.message}`;
     }
+    progress.textContent = "";
   };
   const link = h("a", { href: path.replace(/^\//, "") + queryString(query), download: name, onclick: click }, label);
-  return h("span", { class: "download" }, link, status);
+  return h("span", { class: "download" }, link, progress, failure);
 }
 
 /**
