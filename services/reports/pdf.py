@@ -1,6 +1,6 @@
 """Reports as PDF, by fpdf2: the same blocks as in HTML, with tables that continue on the next page.
 
-Fonts are matplotlib's, which has glyphs of all names that figures can show. Figures are drawn at 200 dpi.
+Fonts are matplotlib's, which has glyphs of all names that figures can show. Figures are drawn at 300 dpi.
 """
 
 from datetime import datetime
