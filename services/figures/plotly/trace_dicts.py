@@ -5,7 +5,7 @@ from html import escape
 from itertools import pairwise, zip_longest
 from typing import Any
 
-from gaplab.services.figures.marks import PLAIN, Bars, Diagonal, Level, Line, Mark, Number, Panel, Points, Polylines
+from gaplab.services.figures.marks import Bars, Diagonal, Level, Line, Mark, Number, Panel, Points, Polylines
 from gaplab.services.figures.style import SHADES, Style, shade_at, tint
 
 Trace = dict[str, Any]
@@ -13,6 +13,9 @@ Trace = dict[str, Any]
 DASHES = {"dashed": "dash", "dotted": "dot", "long": "longdash", "longdot": "longdashdot"}
 MARKERS = {"triangle": "triangle-up", "inverted": "triangle-down", "cross": "x"}
 """Plotly's names of dashes and markers, where they differ from ours."""
+
+SHADED = Style(SHADES[0], "solid", "circle")
+"""The look of a mark whose colour is that of its shade."""
 
 DIGITS = 6
 """Significant digits of a coordinate: more than a screen can show."""
@@ -114,12 +117,11 @@ def _polylines(lines: Polylines) -> list[Trace]:
         y = [value for _, row in rows for value in (*row, None)]
         told = [text(lines.hover[at]) for at, row in rows for _ in (*row, None)] if lines.hover else []
         color = shade_at((shade - least) / ((most - least) or 1.0))
-        trace = _scatter(lines.name, PLAIN, x, y, "lines") | {"line": {"color": color, "width": 1.25}, "opacity": 0.75}
-        del trace["meta"]
+        trace = _scatter(lines.name, SHADED, x, y, "lines") | {"line": {"color": color, "width": 1.25}, "opacity": 0.75}
         hover = {"customdata": told, "hovertemplate": "%{customdata}<extra></extra>"} if told else {"hoverinfo": "skip"}
         found.append(trace | hover | {"showlegend": False})
     bar = {"color": [short(least), short(most)], "coloraxis": "coloraxis"}
-    return [*found, _quiet(_scatter(lines.name, PLAIN, [None, None], [None, None], "markers")) | {"marker": bar}]
+    return [*found, _quiet(_scatter(lines.name, SHADED, [None, None], [None, None], "markers")) | {"marker": bar}]
 
 
 def _level(level: Level, panel: Panel) -> list[tuple[int, Trace]]:
