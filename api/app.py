@@ -18,6 +18,7 @@ from gaplab.api.routes import (
     catalogue,
     curves,
     dashboard,
+    differences,
     estimates,
     events,
     experiments,
@@ -28,12 +29,14 @@ from gaplab.api.routes import (
     provenance,
     replay_figures,
     replays,
+    reports,
     sensitivity,
     studies,
 )
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.settings import Limits, Settings
 from gaplab.services.store.session import Store
+from gaplab.services.waiting_line import WaitingLine
 
 DESCRIPTION = """
 Closes the *reality gap*: tunes a robot simulator from a handful of real-world evaluations, and compares the strategies
@@ -50,6 +53,7 @@ TAGS = [
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
     {"name": "replays", "description": "the motion of controllers, computed on request"},
     {"name": "figures", "description": "for the browser, for notebooks and for papers"},
+    {"name": "reports", "description": "one document with figures, tables, tests and a verdict in words"},
     {"name": "events", "description": "what happens to experiments, as it happens"},
     {"name": "archives", "description": "an experiment or a study with everything in it as one file"},
     {"name": "sensitivity", "description": "the effect of each tunable on fitness, checked before tuning"},
@@ -65,8 +69,10 @@ MODULES = (
     provenance,
     events,
     curves,
+    differences,
     figures,
     replay_figures,
+    reports,
     archives,
     replays,
     sensitivity,
@@ -100,6 +106,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     app.state.connections = most_requests(limits) + SPARE
     app.state.feed = EventFeed(store)
     app.state.rollout_process = RolloutProcess()
+    app.state.drawing_process = RolloutProcess(line=WaitingLine("videos"))
     app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
     app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(GZipMiddleware, minimum_size=20_000, compresslevel=4)

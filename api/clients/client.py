@@ -20,6 +20,8 @@ from gaplab.api.clients.events import EventLog
 from gaplab.api.clients.figures import Figures
 from gaplab.api.clients.life_cycle import LifeCycle
 from gaplab.api.clients.records import Records
+from gaplab.api.clients.replays import Replays
+from gaplab.api.clients.reports import Reports
 from gaplab.api.clients.results import Results
 from gaplab.api.clients.submission import Submission
 from gaplab.api.clients.tables import Tables
@@ -60,6 +62,7 @@ class Client:
         self.tables = tables = Tables(connection, results)
         self.figures = figures = Figures(connection, records)
         self.archives = archives = Archives(connection, records)
+        self.reports, self.replays = reports, replays = Reports(connection, records), Replays(connection)
         self.event_log = event_log = EventLog(connection)
         self.watcher = watcher = Watcher(records, results)
 
@@ -72,10 +75,16 @@ class Client:
         self.cancel, self.extend, self.schedule = life_cycle.cancel, life_cycle.extend, life_cycle.schedule
         self.retry = life_cycle.retry
         self.curves, self.curves_of, self.curves_csv = results.curves, results.curves_of, results.curves_csv
-        self.compare, self.misfit = results.compare, results.misfit
+        self.compare, self.misfit, self.diff = results.compare, results.misfit, results.diff
         self.curve, self.samples = tables.curve, tables.samples
         self.simulators, self.predictions = tables.simulators, tables.predictions
         self.figure, self.figure_kinds = figures.draw, figures.kinds
+        self.verdict, self.report, self.replay, self.video = (
+            reports.verdict,
+            reports.save,
+            replays.replay,
+            replays.video,
+        )
         self.export, self.import_ = archives.export, archives.import_
         self.events = event_log.events
         self.watch, self.wait = watcher.watch, watcher.wait

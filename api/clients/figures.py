@@ -8,8 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from gaplab.api.clients.connection import Connection
-from gaplab.api.clients.records import Records
-from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.api.clients.records import Records, split
 
 _FIGURES = "/figures/"
 
@@ -85,13 +84,10 @@ class Figures:
         Raises:
             ServiceError: an id is unknown. An unknown kind or option raises when the figure is drawn.
         """
-        records = [self._records.find(id) for id in ids]
-        studies = [record.id for record in records if isinstance(record, StudyRead)]
-        experiments = [record.id for record in records if isinstance(record, ExperimentRead)]
+        drawn = split(map(self._records.find, ids))
 
         def draw(format: str) -> bytes:  # noqa: A002 - as the API says
-            which = {"study": studies or None, "experiment": experiments or None, "format": format}
-            return self._connection.get_bytes(f"{_FIGURES}{of}", **(which | options))
+            return self._connection.get_bytes(f"{_FIGURES}{of}", **(drawn | {"format": format} | options))
 
         return Figure(of, ids, draw)
 

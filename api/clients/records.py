@@ -1,6 +1,6 @@
 """Studies and experiments, and what the service stores of them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
 import httpx2
@@ -25,6 +25,14 @@ def experiments_of(record: Record) -> tuple[ExperimentRead, ...]:
 def path_of(record: Record) -> str:
     """Return the path of a study or an experiment."""
     return f"/{'studies' if isinstance(record, StudyRead) else 'experiments'}/{segment(record.id)}"
+
+
+def split(records: Iterable[Record]) -> dict[str, list[str] | None]:
+    """Return the ids of studies and experiments as the parameters `study` and `experiment` of a request."""
+    found: dict[str, list[str]] = {"study": [], "experiment": []}
+    for record in records:
+        found["study" if isinstance(record, StudyRead) else "experiment"].append(record.id)
+    return {name: ids or None for name, ids in found.items()}
 
 
 class Records:

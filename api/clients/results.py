@@ -3,8 +3,9 @@
 from collections.abc import Iterator, Sequence
 
 from gaplab.api.clients.connection import Connection, segment
-from gaplab.api.clients.records import Records, experiments_of
+from gaplab.api.clients.records import Records, experiments_of, split
 from gaplab.schemas.curves import Comparison, Curve
+from gaplab.schemas.differences import SpecDiff
 from gaplab.schemas.misfit import MisfitRead
 from gaplab.schemas.records import common_count
 
@@ -49,6 +50,10 @@ class Results:
             first = last if last is not None else self.common_count(experiments)
         counts = {"from": first, "to": first if last is None else last}
         return self._connection.get(tuple[Comparison, ...], "/comparisons", experiment=list(experiments), **counts)
+
+    def diff(self, *ids: str) -> SpecDiff:
+        """Return the settings in which studies and experiments differ; of a single study, its experiments."""
+        return self._connection.get(SpecDiff, "/differences", **split(map(self._records.find, ids)))
 
     def common_count(self, experiments: Sequence[str]) -> int:
         """Return the last number of real-world evaluations that experiments share; 0 without any result."""

@@ -62,6 +62,12 @@ def _rollout_process(request: Request) -> RolloutProcess:
     return process
 
 
+def _drawing_process(request: Request) -> RolloutProcess:
+    """Return the app's process that draws videos."""
+    process: RolloutProcess = request.app.state.drawing_process
+    return process
+
+
 def _limited(request: Request) -> Admission:
     """Return the token of the caller, and the limits that apply."""
     return Admission(_caller(request).token, request.app.state.limits)
@@ -75,6 +81,7 @@ def _admission(admitted: Annotated[Admission, Depends(_limited)], key: Idempoten
 StoreDep = Annotated[Store, Depends(_store)]
 CallerDep = Annotated[Caller, Depends(_caller)]
 RolloutProcessDep = Annotated[RolloutProcess, Depends(_rollout_process)]
+DrawingProcessDep = Annotated[RolloutProcess, Depends(_drawing_process)]
 LimitedDep = Annotated[Admission, Depends(_limited)]
 AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]

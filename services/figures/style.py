@@ -82,3 +82,12 @@ def tint(color: str, opacity: float) -> str:
     """Return a colour like `#0072B2` as a CSS colour with an opacity."""
     red, green, blue = (int(color[at : at + 2], 16) for at in (1, 3, 5))
     return f"rgba({red}, {green}, {blue}, {opacity})"
+
+
+def shade_at(share: float) -> str:
+    """Return the shade at a share of the way from light to dark, as `#0072B2`."""
+    place = min(max(share, 0.0), 1.0) * (len(SHADES) - 1)
+    before = min(int(place), len(SHADES) - 2)
+    both = [[int(SHADES[before + after][at : at + 2], 16) for at in (1, 3, 5)] for after in (0, 1)]
+    parts = (round(first + (second - first) * (place - before)) for first, second in zip(*both, strict=True))
+    return "#" + "".join(f"{part:02X}" for part in parts)

@@ -107,7 +107,8 @@ def test_every_command_prints_one_document_and_nothing_else(
     assert ask("token revoke", token["token"]["id"]) == {"id": token["token"]["id"], "revoked": True}
     assert set(ask("help")) == {str(each.value) for each in Exit}
 
-    elsewhere = {"sensitivity", "accept-versions", "retry"}  # want a worker, an experiment under way, and a failed one
+    # want a body, a worker, an experiment under way, and a failed one
+    elsewhere = {"replay", "sensitivity", "accept-versions", "retry"}
     assert set(said) | elsewhere == set(NAMES) - UNTIL_STOPPED
 
 
@@ -131,6 +132,8 @@ def look(ask: Callable[..., Any], id: str, other: str) -> None:
     experiments = [each["id"] for each in ask("show", id)["study"]["experiments"]]
     assert set(ask("show", experiments[0])) == {"experiment", "repetitions", "provenance", "misfit"}
     assert [each["experiment"] for each in ask("curve", id)] == experiments
+    assert [column["id"] for column in ask("diff", id, other)["columns"]] == [id, other]
+    assert ask("report", id)["headline"]
     assert "strategies" in ask("catalogue")
     assert ask("catalogue", "random")["name"] == "random"
     assert {each["kind"] for each in ask("events", id)} > {"submitted", "completed"}

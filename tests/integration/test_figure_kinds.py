@@ -15,17 +15,18 @@ from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.predictions import AFTER, BEFORE, predictions_figure
 from gaplab.services.figures.kinds.simulators import MOST, REALITY, simulators_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
-from gaplab.services.figures.marks import Diagonal, FigureDefinition, Level, Line, Mark, Points
+from gaplab.services.figures.marks import Diagonal, FigureDefinition, Label, Level, Line, Mark, Points, Polylines
 from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.figures.plotly.chart import chart
 from gaplab.services.results import curves
+from gaplab.services.results.coordinates import experiment_coordinates
 from gaplab.services.results.curve_costs import cost_axis
 from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.running import execution
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, toy
-from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, curve, point, prediction, tuned
+from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, coordinates, curve, point, prediction, tuned
 
 
 def marks(figure: FigureDefinition, panel: int = 0) -> dict[str, Mark]:
@@ -103,6 +104,36 @@ def test_simulators_of_nothing_do_not_tell_where_reality_is() -> None:
 
     assert figure.empty
     assert figure.panels[0].marks == ()
+
+
+def test_parallel_coordinates_have_one_line_for_each_and_axes_with_their_ends() -> None:
+    figure = coordinates()
+
+    (panel,) = figure.panels
+    (lines,) = [mark for mark in panel.marks if isinstance(mark, Polylines)]
+    labels = {(mark.x, mark.text) for mark in panel.marks if isinstance(mark, Label)}
+    assert lines.shades == (0.25, 0.5, 0.75)
+    assert lines.rows[0] == (0.0, pytest.approx(0.2 / 1.5), 0.0, 0.5)
+    assert lines.rows[1][2] is None
+    assert lines.rows[2] == (1.0, pytest.approx(1 / 1.5), 1.0, 0.5)
+    assert {(1, "0"), (1, "1.5"), (0, "random"), (3, "8")} <= labels
+    assert [words for _, words in panel.x.ticks] == ["Strategy", "Static friction", "RMS error (m/s)", "Repetitions"]
+    assert "3\N{NO-BREAK SPACE}experiments" in figure.caption
+    assert figure.table is not None
+    assert figure.table.rows[1] == ("random", "0.4", "", "8")
+    assert coordinates(0).empty
+
+
+def test_the_coordinates_of_experiments_are_the_settings_that_differ_and_their_fitness(sqlite_store: Store) -> None:
+    ids = [submission.submit_experiment(sqlite_store, toy(seed=seed)).id for seed in (1, 2)]
+    for claim in execution.claim(sqlite_store, "test", limit=10):
+        run(sqlite_store, claim)
+
+    figure = experiment_coordinates(sqlite_store, [], ids)
+
+    assert figure.table is not None
+    assert figure.table.head == ("Seed", "Rollouts", "Final fitness (m/s)")
+    assert [row[0] for row in figure.table.rows] == ["1", "2"]
 
 
 def test_predictions_are_drawn_before_and_after_with_the_line_of_agreement() -> None:

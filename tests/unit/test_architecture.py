@@ -26,8 +26,15 @@ ROOMS = {
     "experiments": (("core", "engines", "store", "specs", "plugins", "settings"), {"sqlalchemy"}),
     "running": (("core", "engines", "store", "plugins", "experiments"), {"sqlalchemy"}),
     "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
-    "replay": (("core", "store", "specs", "plugins", "experiments", "waiting_line"), {"numpy", "cachetools"}),
+    "replay": (
+        ("core", "store", "specs", "plugins", "experiments", "waiting_line"),
+        {"numpy", "scipy", "cachetools", "PIL", "av"},
+    ),
     "archives": (("core", "store", "specs", "experiments", "results", "settings"), {"pydantic", "pyarrow"}),
+    "reports": (
+        ("core", "store", "figures", "specs", "experiments", "running", "results"),
+        {"numpy", "jinja2", "fpdf", "matplotlib", "PIL"},
+    ),
 }
 """Rooms of services, each below those that may import it: what of services each may import, and what of others."""
 

@@ -88,6 +88,11 @@ declare namespace Api {
     upper: number | null;
     values: Array<number | null>;
   }
+  interface DiffColumn {
+    id: string;
+    name: string;
+    experiments: number;
+  }
   interface Distribution {
     n: number;
     mean: number | null;
@@ -396,6 +401,11 @@ declare namespace Api {
     points: number;
     evaluations: number;
   }
+  interface SettingRead {
+    pointer: string;
+    setting: string;
+    values: Array<Array<any>>;
+  }
   interface Shape {
     kind: "box" | "sphere" | "capsule" | "plane";
     size_m: Array<number>;
@@ -411,6 +421,12 @@ declare namespace Api {
     parameters: Record<string, number>;
     squared_error: number | null;
     error: number | null;
+  }
+  interface SpecDiff {
+    columns: Array<DiffColumn>;
+    settings: Array<SettingRead>;
+    equal: number;
+    hidden: Array<string>;
   }
   interface SpecError {
     pointer: string;
@@ -462,6 +478,20 @@ declare namespace Api {
     low_s: number;
     high_s: number;
   }
+  type Trend = "rising" | "flat" | "falling" | "unclear" | "too_few";
+  interface TrendRead {
+    experiment: string;
+    name: string;
+    trend: Trend;
+    n: number;
+    since: number | null;
+    last: number;
+    gain: number | null;
+    lower: number | null;
+    upper: number | null;
+    continuing: boolean | null;
+    sentence: string;
+  }
   interface TunableDistribution {
     n: number;
     mean: number | null;
@@ -476,4 +506,11 @@ declare namespace Api {
   }
   type TunableRef = string | Record<string, any>;
   type Verdict = "nothing" | "rough" | "smooth" | "unknown";
+  interface VerdictRead {
+    headline: string;
+    sentences: Array<string>;
+    trends: Array<TrendRead>;
+    evaluations: number | null;
+    rules: Array<string>;
+  }
 }

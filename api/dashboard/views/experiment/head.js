@@ -116,5 +116,7 @@ function links({ id, isFunction }) {
     ? h("a", { href: `#/toy?experiment=${id}` }, "Step through the function")
     : h("a", { href: `#/replay?experiment=${id}` }, "Replay a controller");
   return h("p", { class: "links" }, h("a", { href: `#/compare?experiments=${id}` }, "Compare with others"), " ", replay, " ",
+    downloadLink("Report", `/experiments/${id}/report`, {}, `gaplab-${id}-report.html`, "Writing the report"), " ",
+    downloadLink("Report as PDF", `/experiments/${id}/report`, { format: "pdf" }, `gaplab-${id}-report.pdf`, "Writing the report"), " ",
     downloadLink("Archive of everything (.zip)", `/experiments/${id}/export`, {}, `gaplab-${id}.zip`));
 }

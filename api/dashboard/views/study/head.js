@@ -109,5 +109,7 @@ export function gathered({ experiments }, textsOf) {
 function links({ id, study }) {
   const ids = study.experiments.map((experiment) => experiment.id).join(",");
   return h("p", { class: "links" }, h("a", { href: `#/compare?experiments=${ids}` }, "Compare its experiments"),
+    " ", downloadLink("Report", `/studies/${id}/report`, {}, `gaplab-${id}-report.html`, "Writing the report"),
+    downloadLink("Report as PDF", `/studies/${id}/report`, { format: "pdf" }, `gaplab-${id}-report.pdf`, "Writing the report"),
     downloadLink("Archive of everything (.zip)", `/studies/${id}/export`, {}, `gaplab-${id}.zip`));
 }
