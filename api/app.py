@@ -23,6 +23,7 @@ from gaplab.api.routes import (
     experiments,
     figures,
     health,
+    keeping,
     lifecycle,
     metrics,
     provenance,
@@ -30,6 +31,7 @@ from gaplab.api.routes import (
     replays,
     sensitivity,
     studies,
+    views,
 )
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.settings import Limits, Settings
@@ -47,6 +49,7 @@ each place, what is permitted there, and the nearest valid name.
 TAGS = [
     {"name": "studies", "description": "experiments to be compared"},
     {"name": "experiments", "description": "one strategy with one set of settings, repeated"},
+    {"name": "views", "description": "saved queries of lists"},
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
     {"name": "replays", "description": "the motion of controllers, computed on request"},
     {"name": "figures", "description": "for the browser, for notebooks and for papers"},
@@ -62,6 +65,8 @@ MODULES = (
     estimates,
     experiments,
     lifecycle,
+    keeping,
+    views,
     provenance,
     events,
     curves,

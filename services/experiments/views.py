@@ -16,6 +16,7 @@ from gaplab.services.store.queries.experiments import experiments_of
 from gaplab.services.store.queries.progress import Tally, reasons, tallies
 from gaplab.services.store.queries.results import best_recorded
 from gaplab.services.store.stored_specs import without_truth
+from gaplab.services.store.texts import unpack_tags
 
 
 def view_experiments(
@@ -101,7 +102,9 @@ def _experiment(
         study=row.study_id,
         name=row.name,
         notes=row.notes,
+        tags=unpack_tags(row.tags),
         edits=row.edits,
+        archived_at=row.archived_at,
         strategy=row.strategy,
         direct=row.iterations == 1,  # other strategies have at least one iteration after number 0
         state=row.state,
@@ -124,7 +127,9 @@ def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: Mappi
         id=row.id,
         name=row.name,
         notes=row.notes,
+        tags=unpack_tags(row.tags),
         edits=row.edits,
+        archived_at=row.archived_at,
         state=state_of([experiment.state for experiment in experiments]),
         experiments=tuple(experiments),
         progress=progress_of(sum((progress.get(each.id, Tally()) for each in experiments), Tally())),

@@ -23,7 +23,10 @@ ROOMS = {
     "figures": ((), {"plotly", "matplotlib"}),
     "specs": (("core", "engines"), {"numpy"}),
     "plugins": (("core", "engines", "specs"), set()),
-    "experiments": (("core", "engines", "store", "specs", "plugins", "settings"), {"sqlalchemy"}),
+    "experiments": (
+        ("core", "engines", "store", "specs", "plugins", "settings"),
+        {"sqlalchemy", "lark", "markdown_it"},
+    ),
     "running": (("core", "engines", "store", "plugins", "experiments"), {"sqlalchemy"}),
     "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
     "replay": (("core", "store", "specs", "plugins", "experiments", "waiting_line"), {"numpy", "cachetools"}),

@@ -79,6 +79,12 @@ declare namespace Api {
     upper: number | null;
     values: Array<number | null>;
   }
+  interface DeletionRead {
+    id: string;
+    name: string;
+    study: string | null;
+    deleted_at: string;
+  }
   interface Distribution {
     n: number;
     mean: number | null;
@@ -89,6 +95,9 @@ declare namespace Api {
   interface Edit {
     name: string | null;
     notes: string | null;
+    tags: Array<string> | null;
+    add_tags: Array<string>;
+    remove_tags: Array<string>;
   }
   type Ending = "completed" | "paused" | "stopped" | "cancelled" | "handed back" | "lost" | "failed";
   interface EngineCost {
@@ -105,7 +114,7 @@ declare namespace Api {
     seconds: number;
     supervisors: number;
   }
-  type EventKind = "submitted" | "imported" | "started" | "pausing" | "paused" | "resumed" | "stopping" | "extended" | "retried" | "completed" | "failed" | "cancelled" | "sensitivity_ended" | "versions_refused" | "versions_accepted" | "repetition_claimed" | "repetition_completed" | "repetition_failed" | "repetition_lost" | "repetition_handed_back" | "repetition_paused" | "repetition_stopped" | "repetition_cancelled" | "selected" | "measured" | "tuned" | "transferred" | "probed";
+  type EventKind = "submitted" | "imported" | "started" | "pausing" | "paused" | "resumed" | "stopping" | "extended" | "retried" | "completed" | "failed" | "cancelled" | "edited" | "archived" | "unarchived" | "deleted" | "sensitivity_ended" | "versions_refused" | "versions_accepted" | "repetition_claimed" | "repetition_completed" | "repetition_failed" | "repetition_lost" | "repetition_handed_back" | "repetition_paused" | "repetition_stopped" | "repetition_cancelled" | "selected" | "measured" | "tuned" | "transferred" | "probed";
   interface EventPage {
     items: Array<EventRead>;
     last: number;
@@ -134,7 +143,9 @@ declare namespace Api {
     study: string | null;
     name: string;
     notes: string | null;
+    tags: Array<string>;
     edits: number;
+    archived_at: string | null;
     strategy: string;
     direct: boolean;
     state: State;
@@ -199,6 +210,9 @@ declare namespace Api {
     unit: string;
     points: Array<MisfitPoint>;
     remarks: Array<string>;
+  }
+  interface NotesRead {
+    html: string;
   }
   interface Page_ExperimentRead_ {
     items: Array<ExperimentRead>;
@@ -403,7 +417,9 @@ declare namespace Api {
     id: string;
     name: string;
     notes: string | null;
+    tags: Array<string>;
     edits: number;
+    archived_at: string | null;
     state: State;
     experiments: Array<ExperimentRead>;
     progress: Progress;
@@ -449,4 +465,16 @@ declare namespace Api {
   }
   type TunableRef = string | Record<string, any>;
   type Verdict = "nothing" | "rough" | "smooth" | "unknown";
+  interface ViewRead {
+    shows: "studies" | "experiments";
+    query: string | null;
+    sort: "created_at" | "-created_at" | "name" | "-name" | "strategy" | "-strategy" | "state" | "-state";
+    name: string;
+    created_at: string;
+  }
+  interface ViewSpec {
+    shows: "studies" | "experiments";
+    query: string | null;
+    sort: "created_at" | "-created_at" | "name" | "-name" | "strategy" | "-strategy" | "state" | "-state";
+  }
 }
