@@ -1,6 +1,6 @@
 """Commands that list, show and edit studies and experiments."""
 
-from itertools import islice, takewhile
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
@@ -21,17 +21,23 @@ from gaplab.schemas.records import ExperimentRead, StudyRead
 @app.command("list")
 def list_(
     experiments: Annotated[bool, typer.Option("--experiments", help="experiments instead of studies")] = False,
+    query: Annotated[
+        str | None,
+        typer.Option("--query", "-q", help="like 'tag = gait and fitness > 0.5', or words", show_default=False),
+    ] = None,
+    view: Annotated[str | None, typer.Option(help="saved view to list", show_default=False)] = None,
     limit: Annotated[int, typer.Option(min=1, max=500)] = 20,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """List the newest studies, and the experiments without a study."""
+    """List the newest studies, and the experiments without a study; or what fits a query or a saved view."""
     with connect(url) as client:
-        newest = client.experiments(limit=limit).items if experiments else _newest(client, limit)
+        newest = _of_view(client, view, query, limit) if view else _newest(client, query, limit, alone=experiments)
     if as_json:
         print_json(newest)
-    else:
-        console().print(tables.overview(newest) if newest else "Nothing yet; `gaplab submit` starts something.")
+        return
+    nothing = "Nothing fits." if view or query else "Nothing yet; `gaplab submit` starts something."
+    console().print(tables.overview(newest) if newest else nothing)
 
 
 @app.command()
@@ -102,11 +108,24 @@ def _software(use: ProvenanceUse) -> str:
     return f"gaplab {found.gaplab}{commit}, Python {found.python}, {engines}; {found.processor}, {found.system}"
 
 
-def _newest(client: Client, limit: int) -> list[Record]:
-    """Return the newest studies, and the experiments without a study that are as new."""
-    studies = client.studies(limit=limit).items
-    oldest = studies[-1].created_at if len(studies) == limit else None
-    as_new = takewhile(lambda each: oldest is None or each.created_at >= oldest, client.records.all_experiments())
-    alone = islice((experiment for experiment in as_new if experiment.study is None), limit)
-    newest: list[Record] = [*studies, *alone]
+def _newest(client: Client, query: str | None, limit: int, *, alone: bool) -> Sequence[Record]:
+    """Return the newest experiments, or the newest studies with the experiments without a study, that fit a query."""
+    if alone:
+        return client.experiments(query=query, limit=limit).items
+    studies = client.studies(query=query, limit=limit).items
+    without = client.experiments(query=_both(query, "study = none"), limit=limit).items
+    newest: list[Record] = [*studies, *without]
     return sorted(newest, key=lambda record: record.created_at, reverse=True)[:limit]
+
+
+def _of_view(client: Client, name: str, query: str | None, limit: int) -> Sequence[Record]:
+    """Return what a saved view lists, as far as it fits a further query."""
+    view = client.keeping.view(name)
+    wanted = _both(view.query, query) if query else view.query
+    listed = client.experiments if view.shows == "experiments" else client.studies
+    return listed(query=wanted, sort=view.sort, limit=limit).items
+
+
+def _both(first: str | None, second: str) -> str:
+    """Return the query for what fits both."""
+    return f"({first}) and ({second})" if first and first.strip() else second

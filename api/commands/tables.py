@@ -97,7 +97,8 @@ def _record(record: Record) -> tuple[str, ...]:
     many = f" ({len(record.experiments)})" if isinstance(record, StudyRead) else ""
     created = record.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
     progress = (percent(record.progress), _time_left(record.progress.seconds_left))
-    return record.id, escape(record.name) + many, colored(record.state), *progress, created
+    tags = f" [dim]{escape(' '.join(record.tags))}[/]" if record.tags else ""
+    return record.id, escape(record.name) + many + tags, colored(record.state), *progress, created
 
 
 def _time_left(seconds: float | None) -> str:
