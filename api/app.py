@@ -32,9 +32,10 @@ from gaplab.api.routes import (
     sensitivity,
     studies,
     views,
+    webhooks,
 )
 from gaplab.services.replay.process import RolloutProcess
-from gaplab.services.settings import Limits, Settings
+from gaplab.services.settings import Limits, Notify, Settings
 from gaplab.services.store.session import Store
 
 DESCRIPTION = """
@@ -67,6 +68,7 @@ MODULES = (
     lifecycle,
     keeping,
     views,
+    webhooks,
     provenance,
     events,
     curves,
@@ -82,13 +84,16 @@ MODULES = (
 """The modules of the API, in the order of the documentation."""
 
 
-def create_app(store: Store, settings: Settings | None = None, limits: Limits | None = None) -> FastAPI:
+def create_app(
+    store: Store, settings: Settings | None = None, limits: Limits | None = None, notify: Notify | None = None
+) -> FastAPI:
     """Return the application over a database, which it neither migrates nor closes; it needs no Ray.
 
     Args:
         store: the database.
         settings: settings of the service; None for a program that calls the app directly.
         limits: left out: the defaults.
+        notify: settings of notifications; left out: none.
     """
     app = FastAPI(
         title="gaplab",
@@ -103,7 +108,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     limits = limits or Limits()
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
     app.state.connections = most_requests(limits) + SPARE
-    app.state.feed = EventFeed(store)
+    app.state.feed, app.state.notify = EventFeed(store), notify or Notify()
     app.state.rollout_process = RolloutProcess()
     app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
     app.state.metrics = Metrics(store, app.state.feed)

@@ -57,6 +57,11 @@ class Comparison(Frozen):
     second: Id
     from_evaluations: int
     to_evaluations: int
+    caution: str | None = Field(
+        default=None,
+        description="why not to trust the tests of a pooled range; null at a single number",
+        examples=["pooled as in the paper: …"],
+    )
     n_first: int
     n_second: int
     difference: Statistic = Field(description="difference of the means")

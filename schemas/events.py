@@ -34,6 +34,8 @@ class EventKind(StrEnum):
     ARCHIVED = "archived"
     UNARCHIVED = "unarchived"
     DELETED = "deleted"
+    NOTIFIED = "notified"
+    NOTIFICATION_FAILED = "notification_failed"
     SENSITIVITY_ENDED = "sensitivity_ended"
     VERSIONS_REFUSED = "versions_refused"
     VERSIONS_ACCEPTED = "versions_accepted"

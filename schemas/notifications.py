@@ -38,7 +38,9 @@ class Notification(Frozen):
     subject: Id = Field(description="id of the study or the experiment")
     name: Name
     state: State
-    text: str = Field(description="one sentence, which Slack and Mattermost show", examples=["The study x is COMPLETED."])
+    text: str = Field(
+        description="one sentence, which Slack and Mattermost show", examples=["The study x is COMPLETED."]
+    )
     experiments: tuple[EndedExperiment, ...]
     ended_at: Moment
     url: str | None = Field(default=None, description="address on the page")

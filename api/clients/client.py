@@ -60,8 +60,7 @@ class Client:
         self.keeping = keeping = Keeping(connection, records)
         self.results = results = Results(connection, records)
         self.tables = tables = Tables(connection, results)
-        self.figures = figures = Figures(connection, records)
-        self.archives = archives = Archives(connection, records)
+        self.figures, self.archives = figures, archives = Figures(connection, records), Archives(connection, records)
         self.event_log = event_log = EventLog(connection)
         self.watcher = watcher = Watcher(records, results)
 
@@ -72,7 +71,8 @@ class Client:
         self.provenance, self.accept_versions = records.provenance, life_cycle.accept_versions
         self.pause, self.resume, self.stop = life_cycle.pause, life_cycle.resume, life_cycle.stop
         self.cancel, self.extend, self.schedule = life_cycle.cancel, life_cycle.extend, life_cycle.schedule
-        self.retry, self.tag, self.untag = life_cycle.retry, keeping.tag, keeping.untag
+        self.retry, self.notify = life_cycle.retry, keeping.notify
+        self.tag, self.untag = keeping.tag, keeping.untag
         self.archive, self.unarchive, self.delete = keeping.archive, keeping.unarchive, keeping.delete
         self.views, self.save_view, self.delete_view = keeping.views, keeping.save_view, keeping.delete_view
         self.curves, self.curves_of, self.curves_csv = results.curves, results.curves_of, results.curves_csv

@@ -9,6 +9,7 @@ from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.errors import ServiceError
 from gaplab.api.clients.records import Record, Records, path_of
 from gaplab.schemas.editing import Edit
+from gaplab.schemas.notifications import WebhookRead
 from gaplab.schemas.records import DeletionRead, ExperimentRead, StudyRead
 from gaplab.schemas.views import Order, ViewRead
 
@@ -44,6 +45,13 @@ class Keeping:
             if error.problem.status != httpx2.codes.NOT_FOUND:
                 raise
         return self._connection.change(DeletionRead, "DELETE", f"/experiments/{segment(id)}")
+
+    def notify(self, id: str, url: str | None) -> WebhookRead:
+        """Tell a webhook when a study or an experiment has ended; None tells none any more."""
+        path = f"{path_of(self._records.find(id))}/webhook"
+        if url is None:
+            return self._connection.change(WebhookRead, "DELETE", path)
+        return self._connection.change(WebhookRead, "PUT", path, json={"url": url})
 
     def views(self) -> tuple[ViewRead, ...]:
         """Return the saved views, by name."""

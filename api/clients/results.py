@@ -6,6 +6,7 @@ from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.records import Records, experiments_of
 from gaplab.schemas.curves import Comparison, Curve
 from gaplab.schemas.misfit import MisfitRead
+from gaplab.schemas.records import common_count
 
 MOST_CURVES = 100
 """Experiments of one request: the most that the service permits."""
@@ -33,10 +34,25 @@ class Results:
         first, *others = (self._connection.get_bytes("/curves", **request).decode() for request in requests)
         return first + "".join(other.partition("\n")[2] for other in others)  # the header stands once
 
-    def compare(self, experiments: Sequence[str], first: int, last: int) -> tuple[Comparison, ...]:
-        """Compare every pair of experiments, pooling the numbers of real-world evaluations from `first` to `last`."""
-        counts = {"from": first, "to": last}
+    def compare(
+        self, experiments: Sequence[str], first: int | None = None, last: int | None = None
+    ) -> tuple[Comparison, ...]:
+        """Compare every pair of experiments after one number of real-world evaluations, or pooled over a range.
+
+        Args:
+            experiments: ids of two or more experiments.
+            first: the number, or the first one of the range; left out: the last that the experiments share.
+            last: the last number of the range; left out: `first`. A pooled range is the paper's test, whose p are too
+                small: see `caution` of the result.
+        """
+        if first is None:
+            first = last if last is not None else self.common_count(experiments)
+        counts = {"from": first, "to": first if last is None else last}
         return self._connection.get(tuple[Comparison, ...], "/comparisons", experiment=list(experiments), **counts)
+
+    def common_count(self, experiments: Sequence[str]) -> int:
+        """Return the last number of real-world evaluations that experiments share; 0 without any result."""
+        return common_count([self._records.experiment(id) for id in experiments]) or 0
 
     def misfit(self, id: str) -> MisfitRead:
         """Return how far the tuned simulators of an experiment are from reality and from each other."""

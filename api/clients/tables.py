@@ -63,6 +63,8 @@ class Tables:
     def simulators(self, id: str, *, repetition: int | None = None, iteration: int | None = None) -> "pandas.DataFrame":
         """Return the tuned simulators of an experiment, with a column for each tunable; rank 0 is an iteration's best.
 
+        `squared_error` is a sum over samples and grows with them; `error` is the root mean square per sample.
+
         Args:
             id: id of the experiment.
             repetition: only this repetition.
@@ -71,7 +73,7 @@ class Tables:
         path = f"/experiments/{segment(id)}/simulators"
         filters = {"limit": PAGE, "repetition": repetition, "iteration": iteration}
         simulators = list(self._connection.items(Page[SimulatorRead], path, **filters))
-        columns = ("repetition", "iteration", "rank", "squared_error")
+        columns = ("repetition", "iteration", "rank", "squared_error", "error")
         frame = _frame([[getattr(row, name) for name in columns] for row in simulators], columns, columns)
         return frame.join(_pandas().DataFrame([row.parameters for row in simulators], index=frame.index))
 

@@ -69,6 +69,21 @@ def delete(
     print_result(deleted, f"{deleted.name} ({deleted.id}) is deleted.", as_json=as_json)
 
 
+@app.command()
+def notify(
+    id: Id,
+    webhook: Annotated[
+        str | None, typer.Argument(metavar="URL", help="address to tell; left out: none", show_default=False)
+    ] = None,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Tell a webhook when a study or an experiment has ended; GAPLAB_NOTIFY_URL of the service tells of all."""
+    with connect(url) as client:
+        told = client.notify(id, webhook)
+    print_result(told, f"{told.host} is told when {id} has ended." if told.host else "None is told.", as_json=as_json)
+
+
 @views.callback(invoke_without_command=True)
 def list_views(context: typer.Context, as_json: AsJson = False, url: Url = None) -> None:
     """List the saved views; `gaplab list --view NAME` shows what one lists."""

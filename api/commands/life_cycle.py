@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from gaplab.api.clients.progress.text import state_text
 from gaplab.api.clients.records import Record
 from gaplab.api.commands.app import AsJson, ExperimentId, Id, Url, app, connect
 from gaplab.api.commands.json_output import print_result
@@ -68,4 +69,4 @@ def accept_versions(id: ExperimentId, as_json: AsJson = False, url: Url = None) 
 
 
 def _print_state(record: Record, *, as_json: bool) -> None:
-    print_result(record, f"{record.name} is {record.state}.", as_json=as_json)
+    print_result(record, f"{record.name} is {state_text(record)}.", as_json=as_json)

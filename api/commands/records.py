@@ -5,9 +5,10 @@ from typing import Annotated
 
 import typer
 from pydantic import ValidationError
+from rich.markup import escape
 
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.progress.text import console, counts
+from gaplab.api.clients.progress.text import best, console, counts
 from gaplab.api.clients.records import Record
 from gaplab.api.commands import tables
 from gaplab.api.commands.app import AsJson, Id, Url, app, connect, print_warnings
@@ -79,7 +80,8 @@ def _show_study(study: StudyRead, *, as_json: bool) -> None:
     if as_json:
         print_json({"study": study})
         return
-    console().print(tables.overview([study]), counts(study.progress), tables.overview(study.experiments), sep="\n")
+    parts = (tables.overview([study]), counts(study.progress), *map(escape, best(study)))
+    console().print(*parts, tables.overview(study.experiments), sep="\n")
     print_warnings(study)
 
 
@@ -87,11 +89,12 @@ def _show_experiment(client: Client, experiment: ExperimentRead, *, as_json: boo
     repetitions, misfit = client.repetitions(experiment.id), client.misfit(experiment.id)
     provenance = client.provenance(experiment.id)
     if as_json:
-        shown = {"experiment": experiment, "repetitions": repetitions, "provenance": provenance, "misfit": misfit}
-        print_json(shown)
+        document = {"experiment": experiment, "repetitions": repetitions, "provenance": provenance, "misfit": misfit}
+        print_json(document)
         return
     screen = console()
-    screen.print(tables.overview([experiment]), counts(experiment.progress), tables.repetitions(repetitions), sep="\n")
+    shown = (counts(experiment.progress), tables.repetitions(repetitions, experiment))
+    screen.print(tables.overview([experiment]), *shown, sep="\n")
     for use in provenance.uses:
         screen.print(f"computed with {_software(use)}", markup=False, soft_wrap=True)
     if misfit.remarks:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.progress.text import console, counts
+from gaplab.api.clients.progress.text import console, counts, state_text
 from gaplab.api.clients.records import experiments_of
 from gaplab.api.commands import tables
 from gaplab.api.commands.app import AsJson, Id, Url, app, connect, print_warnings
@@ -75,7 +75,7 @@ def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  
     if as_json:
         print_json(record)
     else:
-        typer.echo(f"{record.name}: {record.state}; {counts(record.progress)}.")
+        typer.echo(f"{record.name}: {state_text(record)}; {counts(record.progress)}.")
     for reason in sorted({reason for experiment in experiments_of(record) for reason in experiment.reasons}):
         typer.echo(f"  {reason}", err=True)
     print_warnings(record)

@@ -36,7 +36,10 @@ class CurvesQuery(CurveQuery):
 
 
 class ComparisonQuery(Parameters):
-    """The experiments to compare, and the range of real-world evaluations to pool."""
+    """The experiments to compare, and the range of real-world evaluations to pool.
+
+    A range of several numbers is pooled as in the paper, and its p-values are too small; ask for a single number.
+    """
 
     experiment: Annotated[Ids, Field(min_length=2)]
     from_evaluations: Evaluations = Field(

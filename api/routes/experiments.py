@@ -38,6 +38,7 @@ class ExperimentFilter(Paging):
     """The experiments to list, and their order."""
 
     study: Id | None = Field(default=None, description="only experiments of this study")
+    alone: bool = Field(default=False, description="only experiments without a study")
     state: State | None = Field(default=None, description="only experiments in this state")
     strategy: str | None = Field(
         default=None, max_length=100, pattern=r"^\w+$", description="only experiments with this strategy"

@@ -85,9 +85,10 @@ def draw_curves(store: StoreDep, query: Annotated[CurvesDrawing, Query()]) -> Re
 
 @router.get("/squared-error", summary="Draw the squared error", response_model=FigureRead, responses=responses())
 def draw_squared_error(store: StoreDep, query: Annotated[ErrorDrawing, Query()]) -> Response:
-    """Draw the squared error of an experiment's best simulator by iteration: median and quartiles over repetitions."""
+    """Draw the error of an experiment's best simulator by iteration, per sample and summed: median and quartiles."""
     tuned = tuned_simulators(store, query.experiment)
-    figure = squared_error_figure(tuned.errors, unit=tuned.unit, title=_title(store, query), each=query.each)
+    title, samples = _title(store, query), tuned.samples
+    figure = squared_error_figure(tuned.errors, samples=samples, unit=tuned.unit, title=title, each=query.each)
     return answer(_explained(store, query, figure), query)
 
 
@@ -97,7 +98,14 @@ def draw_simulators(store: StoreDep, query: Annotated[SimulatorsDrawing, Query()
     tuned, title = tuned_simulators(store, query.experiment), _title(store, query)
     narrow = query.format not in {"html", "json"} and query.width < NARROW_IN
     columns = query.columns or (2 if narrow else 3)
-    figure = simulators_figure(tuned.simulators, tuned.dimensions, truth=tuned.truth, title=title, columns=columns)
+    figure = simulators_figure(
+        tuned.simulators,
+        tuned.dimensions,
+        truth=tuned.truth,
+        real_engine=tuned.real_engine,
+        title=title,
+        columns=columns,
+    )
     return answer(_explained(store, query, figure), query)
 
 

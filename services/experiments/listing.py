@@ -41,6 +41,7 @@ class ListFilter:
 
     Attributes:
         study: only experiments of this study.
+        alone: only experiments without a study.
         state: only experiments or studies in this state.
         strategy: only experiments with this strategy, or studies that have such an experiment.
         text: only experiments or studies whose name, id, notes or tags contain this text.
@@ -50,6 +51,7 @@ class ListFilter:
     """
 
     study: str | None = None
+    alone: bool = False
     state: State | None = None
     strategy: str | None = None
     text: str | None = None
@@ -130,6 +132,8 @@ def _page_of_experiments(
         query = query.where(contains(wanted.text, *EXPERIMENT_TEXTS))
     equal = {row.study_id: wanted.study, row.strategy: wanted.strategy}
     query = query.where(*(column == storable(value) for column, value in equal.items() if value is not None))
+    if wanted.alone:
+        query = query.where(row.study_id.is_(None))
     if wanted.state is not None:
         query = query.where(row.state == wanted.state)
     return tuple(session.scalars(_cut(query, wanted, EXPERIMENT_ORDERS, limit, cursor)))

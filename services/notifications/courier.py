@@ -8,6 +8,8 @@ import os
 import secrets
 import socket
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from gaplab.schemas.notifications import Channel
 from gaplab.services.core.errors import StoreUnavailable
@@ -78,3 +80,14 @@ class Courier:
                 log.warning("notifications wait for the database: %s", error)
             except Exception:  # a courier that ends would tell nobody anything again
                 log.exception("a notification failed")
+
+
+@contextmanager
+def courier(store: Store, notify: Notify, page: str) -> Iterator[Courier]:
+    """Deliver notifications for as long as the context lasts."""
+    made = Courier(store, notify, page)
+    made.start()
+    try:
+        yield made
+    finally:
+        made.stop()

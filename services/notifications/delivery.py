@@ -88,7 +88,11 @@ def run(command: str, message: Notification) -> Outcome:
     Nothing that users write is an argument of it. Its environment has no secrets of gaplab.
     """
     environment = {name: value for name, value in os.environ.items() if not name.startswith("GAPLAB_")}
-    environment |= {"GAPLAB_NOTIFICATION": message.id, "GAPLAB_STATE": message.state.value, "GAPLAB_ID": message.subject}
+    environment |= {
+        "GAPLAB_NOTIFICATION": message.id,
+        "GAPLAB_STATE": message.state.value,
+        "GAPLAB_ID": message.subject,
+    }
     try:
         ended = subprocess.run(  # noqa: S603 - the owner of the service has set it
             shlex.split(command),

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session
 
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.notifications import Channel, Notification
@@ -25,7 +24,7 @@ from gaplab.services.store.models import (
 )
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import experiments_of
-from gaplab.services.store.session import transaction
+from gaplab.services.store.session import Session, snapshot, transaction
 
 ENDS = (EventKind.COMPLETED, EventKind.FAILED, EventKind.CANCELLED)
 
@@ -74,9 +73,10 @@ def collect(session: Session, owner: str, channels: Sequence[Channel]) -> bool:
     """
     notifier, present = session.get(NotifierRow, 1, with_for_update=True), moment(session)
     assert notifier is not None
-    if notifier.owner not in (None, owner) and notifier.until is not None and notifier.until > present:
+    if notifier.owner not in (None, owner) and notifier.until and present < notifier.until <= present + TURN:
         return False
-    notifier.owner, notifier.until = owner, present + TURN
+    if notifier.owner != owner or notifier.until is None or notifier.until < present + TURN / 2:
+        notifier.owner, notifier.until = owner, present + TURN
     latest = session.execute(select(EventCounterRow.latest)).scalar_one()
     after = latest if notifier.after is None or notifier.after > latest else notifier.after
     notifier.after = min(latest, after + _AT_ONCE)
@@ -88,7 +88,7 @@ def collect(session: Session, owner: str, channels: Sequence[Channel]) -> bool:
     return True
 
 
-@transaction
+@snapshot
 def next_letter(session: Session) -> Letter | None:
     """Return the notification whose turn it is; None if nothing is due."""
     row = NotificationRow

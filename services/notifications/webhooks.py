@@ -11,7 +11,9 @@ from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries.experiments import get_experiment, get_study
 from gaplab.services.store.session import Session, snapshot, transaction
 
-NONE_PERMITTED = "this service permits no webhooks of studies and experiments: its owner lists hosts in GAPLAB_NOTIFY_HOSTS"
+NONE_PERMITTED = (
+    "this service permits no webhooks of studies and experiments: its owner lists hosts in GAPLAB_NOTIFY_HOSTS"
+)
 
 
 @transaction

@@ -1,6 +1,7 @@
 """Resolution: from a submitted spec to a resolved one, with every default; all violations are raised together."""
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef, TunableRef
@@ -84,7 +85,19 @@ def resolve_study(spec: StudySpec) -> tuple[ResolvedSpec, ...]:
             violations.update({(each.pointer, each.message): each for each in found})
     if violations:
         raise InvalidSpec(violations.values())
-    return tuple(resolved)
+    return _named_apart(resolved)
+
+
+def _named_apart(resolved: Sequence[ResolvedSpec]) -> tuple[ResolvedSpec, ...]:
+    """Return the specs of a study with distinct names: options that differ are in them, equal specs get numbers."""
+    often, met = Counter(spec.name for spec in resolved), Counter[str]()
+    named = []
+    for spec in resolved:
+        met[spec.name] += 1
+        number = f" ({met[spec.name]})"
+        name = spec.name[: 200 - len(number)] + number if often[spec.name] > 1 else spec.name
+        named.append(spec.model_copy(update={"name": name}))
+    return tuple(named)
 
 
 def resolve_sensitivity(spec: SensitivitySpec) -> Checked:

@@ -22,6 +22,7 @@ from gaplab.services.results import curves
 from gaplab.services.results.curve_costs import cost_axis
 from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.running import execution
+from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, toy
 from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, curve, point, prediction, tuned
@@ -73,6 +74,23 @@ def test_reality_is_a_point_where_both_are_known_a_level_where_one_is_and_within
     assert "ended" not in figure.caption
 
 
+def test_a_reality_of_another_engine_has_no_place_among_the_simulators(store: Store) -> None:
+    elsewhere = submission.submit_experiment(store, toy(repetitions=1)).id
+    (claim,) = execution.claim(store, "test", limit=1)
+    run(store, claim)
+    with store.transaction() as session:
+        row = session.get_one(ExperimentRow, elsewhere)
+        row.spec = row.spec | {"reality": row.spec["reality"] | {"engine": {"name": "a_lab", "options": {}}}}
+
+    found = tuned_simulators(store, elsewhere)
+    truth, engine = found.truth, found.real_engine
+    figure = simulators_figure(found.simulators, found.dimensions, truth=truth, real_engine=engine)
+
+    assert truth == {}
+    assert REALITY not in marks(figure)
+    assert "Reality is the engine a_lab: no setting of the simulators is reality." in figure.caption
+
+
 def test_of_very_many_simulators_the_first_repetitions_are_drawn() -> None:
     figure = simulators_figure(tuned(2, repetitions=4000, iterations=1), DIMENSIONS[:2], truth=None)
 
@@ -118,11 +136,29 @@ def test_squared_errors_have_their_median_and_quartiles_and_failures_are_counted
     line = marks(figure)["Best simulator"]
     assert (line.x, line.y) == ((1, 2), (2.0, 4.0))  # type: ignore[union-attr]
     assert (line.lower, line.upper) == ((1.5, None), (5.5, None))  # type: ignore[union-attr]
-    assert figure.panels[0].y.label == "Squared error ((m/s)²)"
+    assert figure.panels[0].y.label == "Sum of squared errors ((m/s)²)"
     assert not figure.panels[0].y.log
     told = figure.caption.replace("\N{NO-BREAK SPACE}", " ")
     assert "Median over 1\N{EN DASH}3 repetitions" in told
     assert "1 value left out, since the physics failed." in told
+
+
+def test_the_error_per_sample_stands_beside_the_sum_which_grows_with_the_samples() -> None:
+    figure = squared_error_figure(
+        {1: {0: 0.04, 1: 0.16}, 2: {0: 0.08, 1: None}, 3: {0: 0.12, 1: 0.3}},
+        samples={1: {0: 1, 1: 1}, 2: {0: 2, 1: 2}, 3: {0: 3, 1: 0}},
+        unit="m/s",
+    )
+
+    per_sample, total = (marks(figure, panel)["Best simulator"] for panel in (0, 1))
+    assert [panel.y.label for panel in figure.panels] == ["Error per sample (m/s)", "Sum of squared errors ((m/s)²)"]
+    assert per_sample.y == pytest.approx((0.3, 0.2, 0.2))  # type: ignore[union-attr]
+    assert total.y == pytest.approx((0.1, 0.08, 0.21))  # type: ignore[union-attr]
+    assert "root mean square" in figure.caption
+    assert figure.table
+    assert figure.table.rows[1] == ("2", "0.2", "", "", "0.08", "", "", "1")
+    assert len(figure.table.head) == 8
+    assert "error per sample (m/s): 0.3 after iteration 1" in figure.alt
 
 
 def test_squared_errors_of_many_magnitudes_are_on_a_logarithmic_axis_without_zeros() -> None:

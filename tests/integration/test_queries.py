@@ -113,8 +113,10 @@ def test_queries_find_what_they_say(store: Store, ids: dict[str, str]) -> None:
 def test_the_queried_fitness_is_the_one_that_is_shown(store: Store, ids: dict[str, str]) -> None:
     (shown,) = listing.list_experiments(store, ListFilter(q="strategy = informative")).items
 
+    assert shown.fitness is not None
     assert shown.best_fitness is not None
-    assert found(store, f"fitness = {shown.best_fitness!r}") == {"done"}
+    assert found(store, f"fitness = {shown.fitness.mean!r}") == {"done"}
+    assert found(store, f"best_fitness = {shown.best_fitness!r}") == {"done"}
 
 
 STUDY_QUERIES = {

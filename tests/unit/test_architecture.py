@@ -30,6 +30,7 @@ ROOMS = {
     "running": (("core", "engines", "store", "plugins", "experiments"), {"sqlalchemy"}),
     "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
     "replay": (("core", "store", "specs", "plugins", "experiments", "waiting_line"), {"numpy", "cachetools"}),
+    "notifications": (("core", "store", "experiments", "settings"), {"sqlalchemy", "httpx2"}),
     "archives": (("core", "store", "specs", "experiments", "results", "settings"), {"pydantic", "pyarrow"}),
 }
 """Rooms of services, each below those that may import it: what of services each may import, and what of others."""

@@ -12,6 +12,14 @@ declare namespace Api {
     ending: Ending | null;
     reason: string | null;
   }
+  interface BestRead {
+    evaluations: number;
+    n: number;
+    mean: number;
+    sd: number | null;
+    experiment: string;
+    name: string;
+  }
   interface BudgetRead {
     name: string;
     iterations: number;
@@ -52,6 +60,7 @@ declare namespace Api {
     second: string;
     from_evaluations: number;
     to_evaluations: number;
+    caution: string | null;
     n_first: number;
     n_second: number;
     difference: number | null;
@@ -153,6 +162,8 @@ declare namespace Api {
     priority: number;
     max_parallel: number | null;
     progress: Progress;
+    caveat: string | null;
+    fitness: FitnessRead | null;
     best_fitness: number | null;
     reasons: Array<string>;
     sensitivity: string | null;
@@ -187,6 +198,12 @@ declare namespace Api {
     alt: string;
     empty: boolean;
     table: TableRead | null;
+  }
+  interface FitnessRead {
+    evaluations: number;
+    n: number;
+    mean: number;
+    sd: number | null;
   }
   interface Health {
     status: "ok" | "degraded";
@@ -267,11 +284,14 @@ declare namespace Api {
     failed: number;
     iterations: number;
     iterations_done: number;
+    counted_iterations: number;
+    counted_iterations_done: number;
     rollouts: number;
     rollouts_done: number;
     rollouts_failed: number;
     rollouts_saved: number;
     seconds_left: number | null;
+    time_left: TimeLeft | null;
   }
   interface Provenance {
     gaplab: string;
@@ -404,6 +424,7 @@ declare namespace Api {
     rank: number;
     parameters: Record<string, number>;
     squared_error: number | null;
+    error: number | null;
   }
   interface SpecError {
     pointer: string;
@@ -421,6 +442,8 @@ declare namespace Api {
     edits: number;
     archived_at: string | null;
     state: State;
+    caveat: string | null;
+    best: BestRead | null;
     experiments: Array<ExperimentRead>;
     progress: Progress;
     created_at: string;
@@ -450,6 +473,10 @@ declare namespace Api {
     p: number | null;
     p_holm: number | null;
     degrees_of_freedom: number | null;
+  }
+  interface TimeLeft {
+    low_s: number;
+    high_s: number;
   }
   interface TunableDistribution {
     n: number;

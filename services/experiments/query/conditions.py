@@ -10,6 +10,7 @@ from gaplab.services.experiments.query.fields import Condition, Field, field_of
 from gaplab.services.experiments.query.parsing import Comparison, Every, Not, Some, Tree, Value, Words, parse, refusal
 from gaplab.services.store.cursor import Column
 from gaplab.services.store.models import ExperimentRow, StudyRow
+from gaplab.services.store.queries.results import best_of_all, points_of_all
 from gaplab.services.store.texts import storable
 
 Fields = Mapping[str, Field]
@@ -83,7 +84,8 @@ EXPERIMENT_FIELDS: Fields = {
     "reality": fields.text(_E.spec["reality"]["engine"]["name"].as_string(), "engine that is its reality"),
     "optimizer": fields.text(_E.spec["optimizer"]["name"].as_string(), "name of the optimizer"),
     "state": fields.state(lambda state: _E.state == state, "state"),
-    "fitness": fields.fitness(_E.id, "`best_fitness`: the best recorded fitness, averaged over repetitions"),
+    "fitness": fields.fitness(_E.id, *points_of_all(), "fitness after the last common number of evaluations"),
+    "best_fitness": fields.fitness(_E.id, *best_of_all(), "best recorded fitness, averaged over repetitions"),
     "iterations": fields.whole(_E.spec["iterations"].as_integer(), "iterations of a repetition"),
     "repetitions": fields.whole(_E.spec["repetitions"].as_integer(), "repetitions"),
     "priority": fields.whole(-_E.precedence, "priority"),

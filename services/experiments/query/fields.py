@@ -4,15 +4,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from math import isfinite
+from typing import Any
 
-from sqlalchemy import ColumnElement, Select, and_, cast, func, literal, not_, select, true
-from sqlalchemy.types import Float
+from sqlalchemy import ColumnElement, Select, and_, func, literal, not_, true
 
 from gaplab.schemas.lifecycle import State
 from gaplab.services.core.errors import InvalidSpec, Violation, unknown_name
 from gaplab.services.experiments.query.parsing import Value, refusal
 from gaplab.services.store.cursor import Column
-from gaplab.services.store.models import IterationRow, RepetitionRow
 from gaplab.services.store.texts import storable
 
 Condition = ColumnElement[bool]
@@ -108,22 +107,20 @@ def flag(is_set: Condition, meaning: str) -> Field:
     return Field(f"{meaning}: {', '.join(_FLAGS)}", CHOICE, meets)
 
 
-def fitness(experiment: Column, meaning: str) -> Field:
-    """Return the field of the best recorded fitness, averaged over repetitions, of the experiment with this id."""
-    best = (
-        select(RepetitionRow.experiment_id, func.max(IterationRow.recorded_fitness).label("best"))
-        .join(IterationRow, IterationRow.repetition_id == RepetitionRow.id)
-        .where(IterationRow.recorded_fitness.is_not(None))
-        .group_by(RepetitionRow.id, RepetitionRow.experiment_id)
-        .subquery()
-    )
-    known: Select[tuple[str]] = select(best.c.experiment_id).group_by(best.c.experiment_id)
+def fitness(experiment: Column, points: Select[Any], value: ColumnElement[Any], meaning: str) -> Field:
+    """Return the field of a fitness that is averaged over repetitions; `none` asks for experiments without one.
 
-    def meets(operator: str, value: Value) -> Condition:
-        if is_none(value):
-            return experiment.not_in(known)
-        mean = func.avg(cast(best.c.best, Float))
-        return experiment.in_(known.having(compared(mean, operator, number_of(value))))
+    Args:
+        experiment: id of the experiment.
+        points: ids of experiments with a fitness, grouped by id.
+        value: fitness of a repetition in these groups.
+        meaning: which fitness it is.
+    """
+
+    def meets(operator: str, wanted: Value) -> Condition:
+        if is_none(wanted):
+            return experiment.not_in(points)
+        return experiment.in_(points.having(compared(func.avg(value), operator, number_of(wanted))))
 
     return Field(meaning, NUMBER, meets)
 

@@ -15,7 +15,7 @@ class StudyRow(Base):
     """Experiments that belong together to be compared.
 
     Attributes:
-        notes, tags, edits, archived_at: as in `ExperimentRow`.
+        notes, tags, edits, archived_at, webhook: as in `ExperimentRow`.
     """
 
     __tablename__ = "study"
@@ -27,6 +27,7 @@ class StudyRow(Base):
     tags: Mapped[str | None] = mapped_column(Text)
     edits: Mapped[int] = mapped_column(default=0, server_default="0")
     archived_at: Mapped[datetime | None]
+    webhook: Mapped[str | None] = mapped_column(Text)
     created_at: Mapped[datetime]
 
 
@@ -52,6 +53,7 @@ class ExperimentRow(Base):
         tags: tags with a space before and after each, as `gaplab.services.store.texts` packs them; NULL for none.
         edits: number of changes of its name, notes or tags.
         archived_at: time since which lists leave it out; NULL if they do not.
+        webhook: address that is told of its end; NULL for none.
     """
 
     __tablename__ = "experiment"
@@ -89,6 +91,7 @@ class ExperimentRow(Base):
     tags: Mapped[str | None] = mapped_column(Text)
     edits: Mapped[int] = mapped_column(default=0, server_default="0")
     archived_at: Mapped[datetime | None]
+    webhook: Mapped[str | None] = mapped_column(Text)
     created_at: Mapped[datetime]
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]

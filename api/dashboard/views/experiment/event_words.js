@@ -14,8 +14,14 @@ const step = ({ repetition, body }) => `Repetition ${repetition}, iteration ${bo
 /** @type {Words} */
 const reason = ({ body }) => (body.reason ? `: ${body.reason}` : "");
 
-/** @param {number | null | undefined} value */
-const fitness = (value) => (value === null || value === undefined ? "physics failed" : number(value));
+/**
+ * Return a fitness after some words, or that there is none because the physics failed.
+ *
+ * @param {string} words
+ * @param {number | null | undefined} value
+ * @param {string} [where]
+ */
+const reaching = (words, value, where = "") => (value === null || value === undefined ? `the physics failed${where}` : `${words} ${number(value)}${where}`);
 
 /** @type {Record<string, Words>} */
 const WORDS = {
@@ -46,10 +52,10 @@ const WORDS = {
   repetition_stopped: (event) => `${which(event)} stopped`,
   repetition_cancelled: (event) => `${which(event)} cancelled`,
   selected: (event) => `${step(event)}: selected a controller to try in reality`,
-  measured: (event) => `${step(event)}: measured in reality, ${fitness(event.body.fitness)}`,
-  tuned: (event) => `${step(event)}: simulators tuned, squared error ${squaredError(event.body.squared_error)}`,
-  transferred: (event) => `${step(event)}: controller evolved, ${fitness(event.body.simulated_fitness)} in simulation`,
-  probed: (event) => `${step(event)}: the controller reaches ${fitness(event.body.fitness)} in reality`,
+  measured: (event) => `${step(event)}: ${reaching("measured in reality,", event.body.fitness, event.body.fitness === null ? " in reality" : "")}`,
+  tuned: (event) => `${step(event)}: simulators tuned, sum of squared errors ${squaredError(event.body.squared_error)}`,
+  transferred: (event) => `${step(event)}: controller evolved, ${reaching("reaching", event.body.simulated_fitness, " in simulation")}`,
+  probed: (event) => `${step(event)}: ${reaching("the controller reaches", event.body.fitness, " in reality")}`,
 };
 
 /** @param {number | null | undefined} value */

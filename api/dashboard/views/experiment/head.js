@@ -5,9 +5,9 @@ import { get } from "../../lib/api.js";
 import { h, refill, setText } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
 import { editNameAndNotes } from "../../lib/edit_dialog.js";
-import { age, count, percent, readableName, timeBetween } from "../../lib/format.js";
+import { age, count, evaluationsText, fixed, percent, readableName, timeBetween } from "../../lib/format.js";
 import { factItems, remarkBlocks } from "../../lib/head_parts.js";
-import { fraction, repetitionsDone, timeLeftFact } from "../../lib/progress.js";
+import { fraction, iterationsDone, repetitionsDone, rolloutsDone, timeLeftFact } from "../../lib/progress.js";
 import { ENDED, stateBadge } from "../../lib/state_badge.js";
 import { actions } from "./actions.js";
 
@@ -35,9 +35,9 @@ export function head(page) {
     document.title = `${done}${title.textContent} · gaplab`;
     setText(notes, experiment.notes ?? "");
     notes.hidden = !experiment.notes;
-    refill(state, experiment.state, () => stateBadge(experiment.state));
+    refill(state, `${experiment.state} ${experiment.caveat}`, () => stateBadge(experiment.state, experiment.caveat));
     bar.value = fraction(progress);
-    const known = factsOf(experiment);
+    const known = factsOf(page);
     refill(facts, JSON.stringify(known), () => factItems(known));
     refill(remarks, JSON.stringify([warnings, reasons]), () =>
       remarkBlocks(warnings.map((text) => ({ text })), reasons.map((text) => ({ text }))));
@@ -77,23 +77,26 @@ function trail({ experiment: { study }, signal }) {
 }
 
 /**
- * @param {Api.ExperimentRead} experiment
+ * @param {Page.ExperimentPage} page
  * @returns {Fact[]}
  */
-function factsOf(experiment) {
-  const { progress, max_parallel: maxParallel } = experiment;
-  const saved = progress.rollouts_saved ? `, ${count(progress.rollouts_saved)} not needed` : "";
+function factsOf({ experiment, unit }) {
+  const { progress, fitness, max_parallel: maxParallel } = experiment;
   const broken = progress.rollouts_failed ? `, physics failed in ${count(progress.rollouts_failed)}` : "";
   return [
     ["Done", percent(fraction(progress))],
     ["Repetitions", repetitionsDone(progress)],
-    ["Iterations", `${count(progress.iterations_done)} of ${count(progress.iterations)}`],
-    ["Rollouts", `${count(progress.rollouts_done)} of ${count(progress.rollouts)}${saved}${broken}`],
+    ...(progress.counted_iterations ? [/** @type {Fact} */ (["Iterations", iterationsDone(progress)])] : []),
+    ["Rollouts", `${rolloutsDone(progress)}${broken}`],
+    ...(fitness ? [/** @type {Fact} */ (["Fitness in reality", fitnessText(fitness, unit(experiment))])] : []),
     ...times(experiment),
     ["Priority", experiment.priority],
     ["At once", maxParallel === null ? "any number" : `at most ${count(maxParallel)}`],
   ];
 }
+
+/** @type {(fitness: Api.FitnessRead, unit: string) => string} */
+const fitnessText = ({ mean, evaluations, n }, unit) => `${fixed(mean)} ${unit} after ${evaluationsText(evaluations)} (mean of ${n})`;
 
 /**
  * @param {Api.ExperimentRead} experiment

@@ -4,9 +4,9 @@
 import { h, refill, setText } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
 import { editNameAndNotes } from "../../lib/edit_dialog.js";
-import { age, count, fixed, readableName } from "../../lib/format.js";
+import { age, count, evaluationsText, fixed, readableName } from "../../lib/format.js";
 import { factItems, remarkBlocks } from "../../lib/head_parts.js";
-import { progressBar, repetitionsDone, timeLeftFact } from "../../lib/progress.js";
+import { iterationsDone, progressBar, repetitionsDone, rolloutsDone, timeLeftFact } from "../../lib/progress.js";
 import { stateBadge } from "../../lib/state_badge.js";
 import { actions } from "./actions.js";
 
@@ -32,7 +32,7 @@ export function head(page) {
     document.title = `${study.name} · gaplab`;
     setText(notes, study.notes ?? "");
     notes.hidden = !study.notes;
-    refill(state, study.state, () => stateBadge(study.state));
+    refill(state, `${study.state} ${study.caveat}`, () => stateBadge(study.state, study.caveat));
     bar.update(study.progress);
     const known = factsOf(page);
     refill(facts, JSON.stringify(known), () => factItems(known));
@@ -56,19 +56,28 @@ export function head(page) {
  */
 function factsOf({ study, unit }) {
   const { progress, experiments } = study;
-  const [best] = experiments.filter(hasFitness).sort((a, b) => b.best_fitness - a.best_fitness);
   const ended = experiments.filter(({ ended_at: endedAt }) => endedAt).length;
   return [
     ["Experiments", `${count(ended)} of ${count(experiments.length)} ended`],
     ["Repetitions", repetitionsDone(progress)],
-    ["Rollouts", `${count(progress.rollouts_done)} of ${count(progress.rollouts)}, ${count(progress.rollouts_saved)} not needed`],
-    ...(best ? [/** @type {Fact} */ (["Best fitness", `${fixed(best.best_fitness)} ${unit(best)} by ${readableName(best.name)}`])] : []),
+    ...(progress.counted_iterations ? [/** @type {Fact} */ (["Iterations", iterationsDone(progress)])] : []),
+    ["Rollouts", rolloutsDone(progress)],
+    ...bestFact(study, unit(experiments[0])),
     ...times(study),
   ];
 }
 
-/** @type {(experiment: Api.ExperimentRead) => experiment is Api.ExperimentRead & { best_fitness: number }} */
-const hasFitness = (experiment) => experiment.best_fitness !== null;
+/**
+ * Return the fittest experiment after the last number of evaluations that all share, as in the figure of the curves.
+ *
+ * @param {Api.StudyRead} study
+ * @param {string} unit
+ * @returns {Fact[]}
+ */
+function bestFact({ best }, unit) {
+  if (!best) return [];
+  return [["Best fitness", `${fixed(best.mean)} ${unit} by ${readableName(best.name)}, after ${evaluationsText(best.evaluations)} (mean of ${best.n})`]];
+}
 
 /**
  * @param {Api.StudyRead} study
