@@ -12,6 +12,9 @@ Order = Literal["created_at", "-created_at", "name", "-name", "strategy", "-stra
 OF_STUDIES: tuple[Order, ...] = ("created_at", "-created_at", "name", "-name")
 """Orders of studies; experiments have all."""
 
+Shown = Literal["all", "studies", "experiments"]
+"""What a view lists."""
+
 ViewName = Annotated[
     str, StringConstraints(max_length=60, pattern=r"^[\w(][\w .:+()-]*$"), Field(examples=["slippery gaits"])
 ]
@@ -29,7 +32,9 @@ class ViewSpec(Frozen):
         "archived": {"summary": "The archived studies", "value": {"query": "archived = true", "sort": "name"}},
     }
 
-    shows: Literal["studies", "experiments"] = Field(default="studies", description="what the view lists")
+    shows: Shown = Field(
+        default="all", description="what the view lists; `all`: studies, and experiments without a study"
+    )
     query: Annotated[str, Field(max_length=1_000)] | None = Field(
         default=None, description="query of the list; null: all", examples=["strategy = informative and fitness > 0.5"]
     )
@@ -37,7 +42,7 @@ class ViewSpec(Frozen):
 
     @model_validator(mode="after")
     def _sorts_what_it_shows(self) -> "ViewSpec":
-        if self.shows == "studies" and self.sort not in OF_STUDIES:
+        if self.shows != "experiments" and self.sort not in OF_STUDIES:
             raise ValueError(f"studies cannot be sorted by {self.sort}; permitted: {', '.join(OF_STUDIES)}")
         return self
 

@@ -1,7 +1,6 @@
 """Keeping studies and experiments: tags, archived records, deletion, and saved views."""
 
 from collections.abc import Iterable
-from typing import Literal
 
 import httpx2
 
@@ -11,7 +10,7 @@ from gaplab.api.clients.records import Record, Records, path_of
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.notifications import WebhookRead
 from gaplab.schemas.records import DeletionRead, ExperimentRead, StudyRead
-from gaplab.schemas.views import Order, ViewRead
+from gaplab.schemas.views import Order, Shown, ViewRead
 
 
 class Keeping:
@@ -66,7 +65,7 @@ class Keeping:
         name: str,
         query: str | None = None,
         *,
-        shows: Literal["studies", "experiments"] = "experiments",
+        shows: Shown = "all",
         sort: Order = "-created_at",
     ) -> ViewRead:
         """Save a query under a name that all users of the service share, in place of the view that has it."""

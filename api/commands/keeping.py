@@ -1,7 +1,7 @@
 """Commands that tag, archive and delete studies and experiments, and those of saved views."""
 
 import sys
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 from rich.markup import escape
@@ -13,10 +13,9 @@ from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.api.commands.tables import table
 from gaplab.schemas.records import StudyRead
-from gaplab.schemas.views import ViewRead
+from gaplab.schemas.views import Order, Shown, ViewRead
 
 ViewName = Annotated[str, typer.Argument(metavar="NAME", help="name of the view")]
-Sort = Literal["created_at", "-created_at", "name", "-name", "strategy", "-strategy", "state", "-state"]
 
 views = typer.Typer(help="List, save and delete saved views: queries that all users share.", no_args_is_help=False)
 app.add_typer(views, name="views")
@@ -103,14 +102,14 @@ def list_views(context: typer.Context, as_json: AsJson = False, url: Url = None)
 def save(
     name: ViewName,
     query: Annotated[str | None, typer.Option(help="query; left out: all", show_default=False)] = None,
-    experiments: Annotated[bool, typer.Option("--experiments", help="of experiments instead of studies")] = False,
-    sort: Annotated[Sort, typer.Option(help="field to sort by; a minus reverses the order")] = "-created_at",
+    shows: Annotated[Shown, typer.Option(help="what it lists; all: studies, and experiments without a study")] = "all",
+    sort: Annotated[Order, typer.Option(help="field to sort by; a minus reverses the order")] = "-created_at",
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
     """Save a query as a view, in place of the view with this name."""
     with connect(url) as client:
-        view = client.save_view(name, query, shows="experiments" if experiments else "studies", sort=sort)
+        view = client.save_view(name, query, shows=shows, sort=sort)
     print_result(view, _sentence(view, "is saved"), as_json=as_json)
 
 
@@ -123,7 +122,7 @@ def delete_view(name: ViewName, as_json: AsJson = False, url: Url = None) -> Non
 
 
 def _sentence(view: ViewRead, done: str) -> str:
-    return f"The view {view.name!r} of {view.shows} {done}: {view.query or 'all'}"
+    return f"The view {view.name!r} {done}: {view.query or 'all'}"
 
 
 def _ask(record: Record) -> None:

@@ -1,6 +1,7 @@
 """Commands that list, show and edit studies and experiments."""
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Annotated
 
 import typer
@@ -111,24 +112,22 @@ def _software(use: ProvenanceUse) -> str:
     return f"gaplab {found.gaplab}{commit}, Python {found.python}, {engines}; {found.processor}, {found.system}"
 
 
-def _newest(client: Client, query: str | None, limit: int, *, alone: bool) -> Sequence[Record]:
-    """Return the newest experiments, or the newest studies with the experiments without a study, that fit a query."""
+def _newest(
+    client: Client, query: str | None, limit: int, *, alone: bool = False, sort: str = "-created_at"
+) -> Sequence[Record]:
+    """Return experiments, or studies with the experiments without a study, that fit a query: the first of an order."""
     if alone:
-        return client.experiments(query=query, limit=limit).items
-    studies = client.studies(query=query, limit=limit).items
-    without = client.experiments(query=_both(query, "study = none"), limit=limit).items
-    newest: list[Record] = [*studies, *without]
-    return sorted(newest, key=lambda record: record.created_at, reverse=True)[:limit]
+        return client.experiments(query=query, sort=sort, limit=limit).items
+    studies = client.studies(query=query, sort=sort, limit=limit).items
+    without = client.experiments(query=query, alone="true", sort=sort, limit=limit).items
+    records: list[Record] = [*studies, *without]
+    return sorted(records, key=attrgetter(sort.removeprefix("-")), reverse=sort.startswith("-"))[:limit]
 
 
 def _of_view(client: Client, name: str, query: str | None, limit: int) -> Sequence[Record]:
     """Return what a saved view lists, as far as it fits a further query."""
     view = client.keeping.view(name)
-    wanted = _both(view.query, query) if query else view.query
-    listed = client.experiments if view.shows == "experiments" else client.studies
-    return listed(query=wanted, sort=view.sort, limit=limit).items
-
-
-def _both(first: str | None, second: str) -> str:
-    """Return the query for what fits both."""
-    return f"({first}) and ({second})" if first and first.strip() else second
+    wanted = f"({view.query}) and ({query})" if view.query and query else query or view.query
+    if view.shows == "studies":
+        return client.studies(query=wanted, sort=view.sort, limit=limit).items
+    return _newest(client, wanted, limit, alone=view.shows == "experiments", sort=view.sort)

@@ -39,7 +39,7 @@ def save_view(session: Session, name: str, spec: ViewSpec) -> ViewRead:
         LimitReached: there are too many views.
     """
     try:
-        conditions.check(spec.query, of_studies=spec.shows == "studies")
+        conditions.check(spec.query, of_studies=spec.shows != "experiments")
     except InvalidSpec as error:
         raise InvalidSpec(violation.moved("q", "/query") for violation in error.violations) from error
     row = session.get(ViewRow, name, with_for_update=True)

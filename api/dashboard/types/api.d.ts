@@ -123,7 +123,7 @@ declare namespace Api {
     seconds: number;
     supervisors: number;
   }
-  type EventKind = "submitted" | "imported" | "started" | "pausing" | "paused" | "resumed" | "stopping" | "extended" | "retried" | "completed" | "failed" | "cancelled" | "edited" | "archived" | "unarchived" | "deleted" | "sensitivity_ended" | "versions_refused" | "versions_accepted" | "repetition_claimed" | "repetition_completed" | "repetition_failed" | "repetition_lost" | "repetition_handed_back" | "repetition_paused" | "repetition_stopped" | "repetition_cancelled" | "selected" | "measured" | "tuned" | "transferred" | "probed";
+  type EventKind = "submitted" | "imported" | "started" | "pausing" | "paused" | "resumed" | "stopping" | "extended" | "retried" | "completed" | "failed" | "cancelled" | "edited" | "archived" | "unarchived" | "deleted" | "notified" | "notification_failed" | "sensitivity_ended" | "versions_refused" | "versions_accepted" | "repetition_claimed" | "repetition_completed" | "repetition_failed" | "repetition_lost" | "repetition_handed_back" | "repetition_paused" | "repetition_stopped" | "repetition_cancelled" | "selected" | "measured" | "tuned" | "transferred" | "probed";
   interface EventPage {
     items: Array<EventRead>;
     last: number;
@@ -493,15 +493,21 @@ declare namespace Api {
   type TunableRef = string | Record<string, any>;
   type Verdict = "nothing" | "rough" | "smooth" | "unknown";
   interface ViewRead {
-    shows: "studies" | "experiments";
+    shows: "all" | "studies" | "experiments";
     query: string | null;
     sort: "created_at" | "-created_at" | "name" | "-name" | "strategy" | "-strategy" | "state" | "-state";
     name: string;
     created_at: string;
   }
   interface ViewSpec {
-    shows: "studies" | "experiments";
+    shows: "all" | "studies" | "experiments";
     query: string | null;
     sort: "created_at" | "-created_at" | "name" | "-name" | "strategy" | "-strategy" | "state" | "-state";
+  }
+  interface WebhookRead {
+    host: string | null;
+  }
+  interface WebhookSpec {
+    url: string;
   }
 }

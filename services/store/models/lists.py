@@ -30,7 +30,7 @@ class ViewRow(Base):
     """A saved view: a query with a name, which all callers share.
 
     Attributes:
-        shows: `studies` or `experiments`.
+        shows: `all`, `studies` or `experiments`.
         query: query of the list; NULL for all.
         sort: order of the list.
     """
