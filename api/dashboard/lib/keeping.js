@@ -66,7 +66,7 @@ function askToDelete(page, path, { name, what }) {
     fields: [{ name: "typed", label: "Type its name to confirm", value: "", required: true, autocomplete: "off" }],
     action: "Delete it", danger: true,
     act: async ({ typed }) => {
-      if (typed.trim() !== name.trim()) throw new Problem({ detail: `That is not its name, which is “${name}”.` });
+      if (typed.trim().toLowerCase() !== name.trim().toLowerCase()) throw new Problem({ detail: `That is not its name, which is “${name}”.` });
       await remove(path);
       location.hash = "#/";
     },
