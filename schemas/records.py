@@ -161,24 +161,6 @@ class StudyRead(Frozen):
     created_at: Moment
 
 
-class NotesRead(Frozen):
-    """Notes as HTML."""
-
-    html: str = Field(
-        description="the notes, rendered: without scripts, images or HTML of their own",
-        examples=["<p>the bounds were <em>too wide</em></p>"],
-    )
-
-
-class DeletionRead(Frozen):
-    """A deleted study or experiment."""
-
-    id: Id
-    name: Name
-    study: Id | None = Field(default=None, description="study of a deleted experiment")
-    deleted_at: Moment
-
-
 def common_count(experiments: Sequence[ExperimentRead]) -> int | None:
     """Return the last number of real-world evaluations that experiments share; None if none has a fitness.
 

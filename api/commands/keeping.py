@@ -62,7 +62,7 @@ def delete(
     """Delete a study or an experiment that has ended, with its results, for good; `gaplab export` saves it first."""
     with connect(url) as client:
         record = client.find(id)
-        if not yes and sys.stdin.isatty() and sys.stdout.isatty():
+        if not yes and in_terminal():
             _ask(record)
         deleted = client.delete(id)
     print_result(deleted, f"{deleted.name} ({deleted.id}) is deleted.", as_json=as_json)
@@ -123,6 +123,11 @@ def delete_view(name: ViewName, as_json: AsJson = False, url: Url = None) -> Non
 
 def _sentence(view: ViewRead, done: str) -> str:
     return f"The view {view.name!r} {done}: {view.query or 'all'}"
+
+
+def in_terminal() -> bool:
+    """Return whether a person can be asked."""
+    return sys.stdin.isatty() and sys.stdout.isatty()
 
 
 def _ask(record: Record) -> None:

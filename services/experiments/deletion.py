@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from sqlalchemy import delete, select
 
 from gaplab.schemas.events import EventKind
-from gaplab.schemas.records import DeletionRead
+from gaplab.schemas.keeping import DeletionRead
 from gaplab.services.core.errors import Conflict, Forbidden
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import (

@@ -132,11 +132,11 @@ def last_common(session: Session, experiments: Sequence[str]) -> dict[str, int]:
     The COMPLETED repetitions count. Without any, those that have begun and may go on count; without any of those, all
     that have begun. An experiment without a point of its curve is missing.
     """
-    counted = session.execute(_last_common().where(RepetitionRow.experiment_id.in_(experiments)))
+    counted = session.execute(last_common_of_all().where(RepetitionRow.experiment_id.in_(experiments)))
     return {experiment: done - 1 for experiment, done in counted if done is not None}
 
 
-def _last_common() -> Select[Any, Any]:
+def last_common_of_all() -> Select[Any, Any]:
     """Return the query for the iterations that the repetitions of each experiment share, number 0 included."""
     row = RepetitionRow
 
@@ -146,28 +146,6 @@ def _last_common() -> Select[Any, Any]:
     begun = func.coalesce(least(State.COMPLETED), least(State.QUEUED, State.RUNNING), func.min(row.iterations_done))
     query = select(row.experiment_id, begun.label("done")).where(row.iterations_done > 0)
     return query.group_by(row.experiment_id)
-
-
-def points_of_all() -> tuple[Select[Any], ColumnElement[Any]]:
-    """Return the ids of experiments with a fitness after the last common number, grouped, and that of a repetition."""
-    row, shared = IterationRow, _last_common().subquery()
-    query = select(RepetitionRow.experiment_id).join(shared, shared.c.experiment_id == RepetitionRow.experiment_id)
-    query = query.join(row, (row.repetition_id == RepetitionRow.id) & (row.number == shared.c.done - 1))
-    return query.where(row.recorded_fitness.is_not(None)).group_by(
-        RepetitionRow.experiment_id
-    ), row.recorded_fitness.expression
-
-
-def best_of_all() -> tuple[Select[Any], ColumnElement[Any]]:
-    """Return the ids of experiments with a recorded fitness, grouped, and the best of a repetition in these groups."""
-    best = (
-        select(RepetitionRow.experiment_id, func.max(IterationRow.recorded_fitness).label("best"))
-        .join(IterationRow, IterationRow.repetition_id == RepetitionRow.id)
-        .where(IterationRow.recorded_fitness.is_not(None))
-        .group_by(RepetitionRow.id, RepetitionRow.experiment_id)
-        .subquery()
-    )
-    return select(best.c.experiment_id).group_by(best.c.experiment_id), best.c.best
 
 
 def recorded_at(session: Session, counts: Mapping[str, int]) -> dict[str, list[float]]:
