@@ -197,7 +197,7 @@ def _noise(found: Sensitivity, where: str) -> str:
     return (
         f"{where}: {share:.0f} % of its effect on fitness is noise between neighbouring values; the larger this share, "
         f"the less certain its tuned value (called rough above {limit:.0f} %; 100 % is chance). Leave it out of "
-        "`tunables`, or check other bounds or another engine with `gaplab sensitivity`"
+        "the tunables, or check other bounds or another engine with the command gaplab sensitivity"
     )
 
 

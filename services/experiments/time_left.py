@@ -12,11 +12,12 @@ from gaplab.schemas.records import TimeLeft
 KNOWN_AFTER_S = 10.0
 """Shortest time of work over which a pace is measured."""
 
-KNOWN_FROM = 0.05
+KNOWN_FROM = 0.1
 """Smallest share of the work over which a pace is measured."""
 
-LEAST_SPREAD, MOST_SPREAD = 0.25, 1.0
-"""Relative half-width of the interval at the end of the work, and at `KNOWN_FROM`."""
+LEAST_SPREAD, MOST_SPREAD = 0.25, 2.0
+"""Relative half-width of the interval for much finished work, and at `KNOWN_FROM`: processes that start make the first
+steps slow."""
 
 Span = tuple[datetime, datetime]
 """Begin and end of the work of an attempt."""
@@ -53,5 +54,5 @@ def interval(finished: int, left: int, busy: float) -> TimeLeft | None:
     seconds = estimate_s(finished, left, busy)
     if seconds is None or not left:
         return None
-    spread = 1 + LEAST_SPREAD + (MOST_SPREAD - LEAST_SPREAD) * (KNOWN_FROM * (finished + left) / finished) ** 0.5
+    spread = 1 + LEAST_SPREAD + (MOST_SPREAD - LEAST_SPREAD) * KNOWN_FROM * (finished + left) / finished
     return TimeLeft(low_s=seconds / spread, high_s=seconds * spread)

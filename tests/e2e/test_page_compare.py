@@ -119,10 +119,23 @@ def test_what_differs_is_what_the_service_found(archive: Any, ids: Any, visit: A
     rows = page.get_by_role("region", name="Pairs").locator("tbody tr")
     expect(rows).to_have_count(len(found))
     heads = page.get_by_role("region", name="Pairs").locator("thead th").all_inner_texts()
-    assert heads[1:4] == ["At 1", "At 1–5", "At 3–5"]
-    page.get_by_role("button", name="3–5", exact=True).click()
-    expect(page.get_by_text("The row against the column")).to_contain_text("over 3 to 5")
-    expect(page.get_by_role("button", name="3–5", exact=True)).to_have_attribute("aria-pressed", "true")
+    pooled = ["Pooled 1–5, p too small", "Pooled 3–5, p too small"]
+    assert heads[1:5] == ["At 1", pooled[0], pooled[1], "At 5"]
+    caution = page.get_by_text("are not independent")
+    expect(caution).to_be_hidden()
+    button = page.get_by_role("button", name="3–5, pooled as in the paper", exact=True)
+    button.click()
+    expect(page.get_by_text("The row against the column")).to_contain_text("pooled over 3 to 5")
+    expect(button).to_have_attribute("aria-pressed", "true")
+    expect(caution).to_be_visible()
+
+
+def test_a_comparison_begins_at_the_last_number_that_all_share(archive: Any, ids: Any, visit: Any) -> None:
+    page = visit(address(archive, *ids))
+
+    expect(page.get_by_text("The row against the column")).to_contain_text("after 5 real-world evaluations")
+    expect(page.get_by_role("button", name="at 5", exact=True)).to_have_attribute("aria-pressed", "true")
+    assert "from=" not in fragment(page)
 
 
 def test_what_should_not_be_compared_is_warned_of(archive: Any, ids: Any, visit: Any) -> None:

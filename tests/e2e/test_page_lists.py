@@ -9,9 +9,11 @@ import pytest
 
 from gaplab.schemas.access import Role
 from gaplab.services.access import create_token
+from gaplab.services.experiments import submission
 from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import axe, fits, screenshot
+from tests.experiments import toy
 
 PUBLISHED = "MuJoCo in MuJoCo"
 QUEUED = {"robot": "toy_function", "strategies": ["random", "direct"], "budget": "smoke"}
@@ -208,7 +210,7 @@ def test_an_empty_service_says_how_to_begin(visit: Any, sqlite_url: str, tmp_pat
     api = Api(sqlite_url, tmp_path / "api.log").start()
     try:
         page = visit(api.url)
-        page.get_by_text("There are no studies yet").wait_for()
+        page.get_by_text("Nothing was submitted yet").wait_for()
         axe(page)
         screenshot(page, "empty")
 
@@ -217,6 +219,25 @@ def test_an_empty_service_says_how_to_begin(visit: Any, sqlite_url: str, tmp_pat
         page.get_by_text("No worker is running now").wait_for()
     finally:
         api.close()
+
+
+def test_a_single_experiment_is_in_the_list_beside_the_studies(visit: Any, api: Any, written: Store) -> None:
+    submission.submit_experiment(written, toy(name="all alone"))
+    page = visit(api.url)
+
+    row = page.locator("tr.experiment", has=page.get_by_role("link", name="all alone"))
+
+    row.get_by_text("Single experiment").wait_for()
+    assert page.get_by_role("button", name="All", exact=True).get_attribute("aria-pressed") == "true"
+
+
+def test_what_is_typed_into_the_search_is_in_the_address_at_once(visit: Any, archive: Any) -> None:
+    page = visit(archive.url)
+    page.locator("tr.study").first.wait_for()
+
+    page.get_by_label("Search by name or id").press_sequentially("mujoco in")
+
+    assert page.url.endswith("#/?text=mujoco+in")
 
 
 def test_a_service_with_tokens_asks_for_one_and_a_reader_may_look_and_estimate(

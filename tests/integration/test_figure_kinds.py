@@ -136,7 +136,7 @@ def test_squared_errors_have_their_median_and_quartiles_and_failures_are_counted
     line = marks(figure)["Best simulator"]
     assert (line.x, line.y) == ((1, 2), (2.0, 4.0))  # type: ignore[union-attr]
     assert (line.lower, line.upper) == ((1.5, None), (5.5, None))  # type: ignore[union-attr]
-    assert figure.panels[0].y.label == "Sum of squared errors ((m/s)²)"
+    assert (figure.panels[0].title, figure.panels[0].y.label) == ("Sum of squared errors", "Sum ((m/s)²)")
     assert not figure.panels[0].y.log
     told = figure.caption.replace("\N{NO-BREAK SPACE}", " ")
     assert "Median over 1\N{EN DASH}3 repetitions" in told
@@ -151,7 +151,8 @@ def test_the_error_per_sample_stands_beside_the_sum_which_grows_with_the_samples
     )
 
     per_sample, total = (marks(figure, panel)["Best simulator"] for panel in (0, 1))
-    assert [panel.y.label for panel in figure.panels] == ["Error per sample (m/s)", "Sum of squared errors ((m/s)²)"]
+    assert [panel.y.label for panel in figure.panels] == ["Per sample (m/s)", "Sum ((m/s)²)"]
+    assert [panel.title for panel in figure.panels] == ["Error per sample", "Sum of squared errors"]
     assert per_sample.y == pytest.approx((0.3, 0.2, 0.2))  # type: ignore[union-attr]
     assert total.y == pytest.approx((0.1, 0.08, 0.21))  # type: ignore[union-attr]
     assert "root mean square" in figure.caption

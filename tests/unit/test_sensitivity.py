@@ -60,7 +60,7 @@ def test_a_tunable_whose_effect_is_noise_is_rough() -> None:
     assert second.verdict is Verdict.ROUGH
     assert second.roughness == pytest.approx(1.0, abs=0.2)
     assert "the less certain its tuned value" in warning(second)
-    assert "Leave it out of `tunables`" in warning(second)
+    assert "Leave it out of the tunables" in warning(second)
 
 
 def test_what_is_said_of_roughness_does_not_jump_at_the_limit_of_its_verdict() -> None:

@@ -30,13 +30,13 @@ class _Measure:
     """One measure of the error, by iteration and repetition.
 
     Attributes:
-        label: label of the axis.
+        name: its name, with the unit.
         line: its median and quartiles.
         values: the known values by iteration.
         panel: the panel.
     """
 
-    label: str
+    name: str
     line: Line
     values: Mapping[int, Sequence[float]]
     panel: Panel
@@ -62,10 +62,12 @@ def squared_error_figure(
         each: draw a thin line for every repetition.
     """
     errors = {at: {one: drawable(value) for one, value in found.items()} for at, found in errors.items()}
-    total = _measure(errors, _label(unit), each=each)
-    measures = [total]
+    shown = printable(unit)
+    square = f"({shown})²" if shown not in {"", "1"} else ""
+    measures = [_measure(errors, "Sum of squared errors", "Sum", square, each=each)]
     if samples:
-        measures.insert(0, _measure(_per_sample(errors, samples), with_unit("Error per sample", {unit}), each=each))
+        per_sample = _per_sample(errors, samples)
+        measures.insert(0, _measure(per_sample, "Error per sample", "Per sample", unit, each=each))
     return FigureDefinition(
         name="squared-error",
         title=heading(title),
@@ -89,7 +91,7 @@ def _per_sample(errors: Mapping[int, Errors], samples: Mapping[int, Counts]) -> 
     }
 
 
-def _measure(errors: Mapping[int, Errors], label: str, *, each: bool) -> _Measure:
+def _measure(errors: Mapping[int, Errors], name: str, label: str, unit: str, *, each: bool) -> _Measure:
     there = {at: [value for value in found.values() if value is not None] for at, found in sorted(errors.items())}
     there = {at: found for at, found in there.items() if found}
     line = _median(there)
@@ -98,9 +100,10 @@ def _measure(errors: Mapping[int, Errors], label: str, *, each: bool) -> _Measur
     panel = Panel(
         tuple(_above_zero(mark) for mark in marks) if logarithmic else marks,
         Axis("Iteration (real-world evaluations so far)", _frame(there), whole=True),
-        Axis(label, _limits(marks, logarithmic=logarithmic), log=logarithmic),
+        Axis(with_unit(label, {unit}), _limits(marks, logarithmic=logarithmic), log=logarithmic),
+        title=name,
     )
-    return _Measure(label, line, there, panel)
+    return _Measure(with_unit(name, {unit}), line, there, panel)
 
 
 def _median(there: Mapping[int, Sequence[float]]) -> Line:
@@ -149,11 +152,6 @@ def _limits(lines: Sequence[Line], *, logarithmic: bool) -> tuple[float, float]:
     return 0.0, limits([0.0, *found])[1] if found else 1.0
 
 
-def _label(unit: str) -> str:
-    shown = printable(unit)
-    return f"Sum of squared errors (({shown})²)" if shown not in {"", "1"} else "Sum of squared errors"
-
-
 def _caption(errors: Mapping[int, Errors], measures: Sequence[_Measure], *, each: bool) -> str:
     there = measures[-1].values
     if not there:
@@ -178,7 +176,7 @@ def _caption(errors: Mapping[int, Errors], measures: Sequence[_Measure], *, each
 def _alt(measures: Sequence[_Measure]) -> str:
     if not measures[-1].line.x:
         return "Error of the best simulator over iterations: no results yet."
-    told = [f"{measure.label.lower()}: {_ends(measure.line)}" for measure in measures if measure.line.x]
+    told = [f"{measure.name.lower()}: {_ends(measure.line)}" for measure in measures if measure.line.x]
     return f"Error of the best simulator over iterations; the median goes from: {'; '.join(told)}."
 
 
@@ -188,7 +186,7 @@ def _ends(line: Line) -> str:
 
 def _table(measures: Sequence[_Measure]) -> Table:
     """Return the table: quartiles of the error per sample, then of the sum, then the number of repetitions."""
-    heads = [f"{measure.label}, {which}" for measure in measures for which in ("median", "quartile 1", "quartile 3")]
+    heads = [f"{measure.name}, {which}" for measure in measures for which in ("median", "quartile 1", "quartile 3")]
     rows = {str(at): [str(len(found))] for at, found in measures[-1].values.items()}
     for measure in reversed(measures):
         line = measure.line

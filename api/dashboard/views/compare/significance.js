@@ -30,7 +30,7 @@ export function significance(view) {
   const changeTest = () => { view.change({ test: /** @type {Page.Comparison["test"]} */ (test.value) }); };
   const test = h("select", { onchange: changeTest }, ...tests);
   const place = h("div");
-  const pooled = h("p", { class: "remark warned", hidden: true }, POOLED);
+  const pooled = h("p", { class: "caution", hidden: true }, POOLED);
   const element = h("section", { class: "card significance", "aria-labelledby": "differ" },
     h("div", { class: "titled" }, h("h2", { id: "differ" }, "Which differ"), h("p", { class: "options" }, h("label", {}, "Test ", test))),
     h("div", { class: "controls" }, buttons, h("label", {}, "from ", from), h("label", {}, "to ", to)), pooled, place, h("p", { class: "note" }, NOTE));
