@@ -36,7 +36,7 @@ def set_experiment_webhook(id: Id, spec: Spec, store: StoreDep, hosts: HostsDep)
 
 
 @_experiment.delete("", summary="Remove an experiment's webhook", responses=documented(404))
-def remove_experiment_webhook(id: Id, store: StoreDep, hosts: HostsDep) -> WebhookRead:
+def drop_experiment_webhook(id: Id, store: StoreDep, hosts: HostsDep) -> WebhookRead:
     """Tell no webhook of its own when the experiment has ended."""
     return webhooks.set_experiment_webhook(store, id, None, hosts)
 
@@ -54,7 +54,7 @@ def set_study_webhook(id: Id, spec: Spec, store: StoreDep, hosts: HostsDep) -> W
 
 
 @_study.delete("", summary="Remove a study's webhook", responses=documented(404))
-def remove_study_webhook(id: Id, store: StoreDep, hosts: HostsDep) -> WebhookRead:
+def drop_study_webhook(id: Id, store: StoreDep, hosts: HostsDep) -> WebhookRead:
     """Tell no webhook of its own when the study has ended."""
     return webhooks.set_study_webhook(store, id, None, hosts)
 
