@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.records import BestRead, ExperimentRead, FitnessRead, common_count
+from gaplab.services.core.arrays import frozen
 from gaplab.services.core.curves import curve_point
 from gaplab.services.store.queries.results import last_common, recorded_at
 
@@ -23,7 +23,7 @@ def points_at(session: Session, counts: Mapping[str, int]) -> dict[str, FitnessR
         counts: number of real-world evaluations by experiment.
     """
     points = {
-        experiment: curve_point(counts[experiment], np.array(values))
+        experiment: curve_point(counts[experiment], frozen(values))
         for experiment, values in recorded_at(session, counts).items()
     }
     return {

@@ -174,7 +174,7 @@ def test_the_verbs_say_what_it_is_now_and_forbidden_ones_are_a_sentence(gaplab: 
     assert [each.out.rpartition(" is ")[2].strip() for each in said] == ["PAUSED.", "QUEUED.", "", "QUEUED.", ""]
     assert [each.code for each in said] == [0, 0, Exit.CONFLICT, 0, Exit.CONFLICT]
     assert said[2].err.endswith("is QUEUED and cannot be resumed; permitted: pause, stop, cancel\n")
-    assert gaplab("stop", id).out.endswith("is COMPLETED.\n")
+    assert gaplab("stop", id).out.endswith("is COMPLETED, stopped early, 35 % done.\n")
 
 
 def test_the_catalogue_lists_every_kind_of_plug_in(gaplab: Gaplab) -> None:

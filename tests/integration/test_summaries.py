@@ -39,8 +39,7 @@ def claims(store: Store, limit: int = 20) -> dict[str, list[Claim]]:
 def record(store: Store, claim: Claim, *fitnesses: float, complete: bool = True) -> None:
     """Record a repetition with these fitnesses after 0, 1, … real-world evaluations."""
     for step in some_log(iterations=len(fitnesses) - 1):
-        probed = isinstance(step, Probed)
-        recorded = replace(step, recorded=fitnesses[step.iteration]) if probed else step  # type: ignore[type-var]
+        recorded = replace(step, recorded=fitnesses[step.iteration]) if isinstance(step, Probed) else step
         assert execution.record(store, claim, recorded, seconds=0.5)
     if complete:
         assert execution.complete(store, claim)
@@ -84,10 +83,10 @@ def test_the_best_of_a_study_is_the_highest_curve_at_the_last_shared_number_with
     assert made.best is None
     fit, random, known, direct = (each.id for each in made.experiments)
     found = claims(store)
-    record(store, *found[fit], 0.1, 0.5, 0.4)
-    record(store, *found[random], 0.9, 0.3, 0.35)  # has the highest maximum
-    record(store, *found[known], 0.9, 0.9, complete=False)
-    record(store, *found[direct], 2.0)
+    record(store, found[fit][0], 0.1, 0.5, 0.4)
+    record(store, found[random][0], 0.9, 0.3, 0.35)  # has the highest maximum
+    record(store, found[known][0], 0.9, 0.9, complete=False)
+    record(store, found[direct][0], 2.0)
 
     running = reading.read_study(store, made.id).best
     cancel(store, known)
@@ -102,7 +101,7 @@ def test_the_best_of_a_study_is_the_highest_curve_at_the_last_shared_number_with
 
 def test_the_baseline_alone_is_the_best_of_its_study(store: Store) -> None:
     made = study(store, "direct")
-    record(store, *claims(store)[made.experiments[0].id], 2.0)
+    record(store, claims(store)[made.experiments[0].id][0], 2.0)
 
     best = reading.read_study(store, made.id).best
 
@@ -130,8 +129,8 @@ def test_a_study_says_what_became_of_its_experiments(store: Store) -> None:
     made = study(store, "simulated_fit", "random", "known_fit")
     fit, random, known = (each.id for each in made.experiments)
     found = claims(store)
-    run(store, *found[fit])
-    execution.fail(store, *found[random], Failure("it broke"))
+    run(store, found[fit][0])
+    execution.fail(store, found[random][0], Failure("it broke"))
     going_on = reading.read_study(store, made.id)
     cancel(store, known)
     ended = reading.read_study(store, made.id)
