@@ -24,6 +24,7 @@ from gaplab.api.routes import (
     experiments,
     figures,
     health,
+    keeping,
     lifecycle,
     metrics,
     provenance,
@@ -32,9 +33,11 @@ from gaplab.api.routes import (
     reports,
     sensitivity,
     studies,
+    views,
+    webhooks,
 )
 from gaplab.services.replay.process import RolloutProcess
-from gaplab.services.settings import Limits, Settings
+from gaplab.services.settings import Limits, Notify, Settings
 from gaplab.services.store.session import Store
 from gaplab.services.waiting_line import WaitingLine
 
@@ -50,6 +53,7 @@ each place, what is permitted there, and the nearest valid name.
 TAGS = [
     {"name": "studies", "description": "experiments to be compared"},
     {"name": "experiments", "description": "one strategy with one set of settings, repeated"},
+    {"name": "views", "description": "saved queries of lists"},
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
     {"name": "replays", "description": "the motion of controllers, computed on request"},
     {"name": "figures", "description": "for the browser, for notebooks and for papers"},
@@ -66,6 +70,9 @@ MODULES = (
     estimates,
     experiments,
     lifecycle,
+    keeping,
+    views,
+    webhooks,
     provenance,
     events,
     curves,
@@ -83,13 +90,16 @@ MODULES = (
 """The modules of the API, in the order of the documentation."""
 
 
-def create_app(store: Store, settings: Settings | None = None, limits: Limits | None = None) -> FastAPI:
+def create_app(
+    store: Store, settings: Settings | None = None, limits: Limits | None = None, notify: Notify | None = None
+) -> FastAPI:
     """Return the application over a database, which it neither migrates nor closes; it needs no Ray.
 
     Args:
         store: the database.
         settings: settings of the service; None for a program that calls the app directly.
         limits: left out: the defaults.
+        notify: settings of notifications; left out: none.
     """
     app = FastAPI(
         title="gaplab",
@@ -104,7 +114,7 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     limits = limits or Limits()
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
     app.state.connections = most_requests(limits) + SPARE
-    app.state.feed = EventFeed(store)
+    app.state.feed, app.state.notify = EventFeed(store), notify or Notify()
     app.state.rollout_process = RolloutProcess()
     app.state.drawing_process = RolloutProcess(line=WaitingLine("videos"))
     app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1

@@ -20,7 +20,7 @@ from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.plugin import BudgetRead, PluginRead
 from gaplab.services.plugins.catalogue import catalogue
 from gaplab.services.plugins.folders import VARIABLE
-from gaplab.services.settings import Limits, Settings, variable_of
+from gaplab.services.settings import Limits, Notify, Settings, variable_of
 from gaplab.services.store.session import Store
 
 FOLDER = Path(__file__).parent / "reference"
@@ -102,6 +102,9 @@ def settings() -> Iterator[str]:
     rows = [(f"`GAPLAB_{name.upper()}`", _attribute(Settings, name), _default(value)) for name, value in Settings()]
     own = "folders with your plug-ins, separated as in `PATH`: [how](../how-to/strategy.md)"
     yield from _table(("variable", "meaning", "left out"), [*rows, (f"`{VARIABLE}`", own, "none")])
+    yield "## Notifications\n\n[How](../how-to/notifications.md). Without any of them, nothing is sent.\n"
+    told = [(f"`GAPLAB_NOTIFY_{name.upper()}`", _attribute(Notify, name), "none") for name in Notify.model_fields]
+    yield from _table(("variable", "meaning", "left out"), told)
     yield "## Limits\n\nWhile no token exists, all clients together count as one token.\n"
     limits = [(f"`{variable_of(name)}`", _attribute(Limits, name), f"{most:,}") for name, most in Limits()]
     yield from _table(("variable", "at most", "left out"), limits)  # type: ignore[arg-type]

@@ -90,8 +90,14 @@ class ExperimentRead(Frozen):
     id: Id
     study: Id | None = None
     name: Name
-    notes: str | None = Field(default=None, description="free text by people", examples=["the bounds were too wide"])
-    edits: int = Field(default=0, description="number of changes to the name or notes")
+    notes: str | None = Field(
+        default=None, description="Markdown by people; `/notes` has it as HTML", examples=["the bounds were *too wide*"]
+    )
+    tags: tuple[str, ...] = Field(default=(), description="tags by people", examples=[("gait", "paper")])
+    edits: int = Field(default=0, description="number of changes to the name, notes or tags")
+    archived_at: Moment | None = Field(
+        default=None, description="time since which lists leave it out; null: they do not"
+    )
     strategy: Name
     direct: bool = Field(
         default=False,
@@ -135,8 +141,14 @@ class StudyRead(Frozen):
 
     id: Id
     name: Name
-    notes: str | None = Field(default=None, description="free text by people", examples=["the bounds were too wide"])
-    edits: int = Field(default=0, description="number of changes to the name or notes")
+    notes: str | None = Field(
+        default=None, description="Markdown by people; `/notes` has it as HTML", examples=["the bounds were *too wide*"]
+    )
+    tags: tuple[str, ...] = Field(default=(), description="tags by people", examples=[("gait", "paper")])
+    edits: int = Field(default=0, description="number of changes to the name, notes or tags")
+    archived_at: Moment | None = Field(
+        default=None, description="time since which lists leave it out; null: they do not"
+    )
     state: State
     caveat: str | None = Field(
         default=None,

@@ -18,6 +18,7 @@ from gaplab.api.clients.connection import PAUSES_S, Connection
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
 from gaplab.api.clients.events import EventLog
 from gaplab.api.clients.figures import Figures
+from gaplab.api.clients.keeping import Keeping
 from gaplab.api.clients.life_cycle import LifeCycle
 from gaplab.api.clients.records import Records
 from gaplab.api.clients.replays import Replays
@@ -58,6 +59,7 @@ class Client:
         self.submission = submission = Submission(connection)
         self.records = records = Records(connection)
         self.life_cycle = life_cycle = LifeCycle(connection, records)
+        self.keeping = keeping = Keeping(connection, records)
         self.results = results = Results(connection, records)
         self.tables = tables = Tables(connection, results)
         self.figures = figures = Figures(connection, records)
@@ -73,7 +75,10 @@ class Client:
         self.provenance, self.accept_versions = records.provenance, life_cycle.accept_versions
         self.pause, self.resume, self.stop = life_cycle.pause, life_cycle.resume, life_cycle.stop
         self.cancel, self.extend, self.schedule = life_cycle.cancel, life_cycle.extend, life_cycle.schedule
-        self.retry = life_cycle.retry
+        self.retry, self.notify = life_cycle.retry, keeping.notify
+        self.tag, self.untag = keeping.tag, keeping.untag
+        self.archive, self.unarchive, self.delete = keeping.archive, keeping.unarchive, keeping.delete
+        self.views, self.save_view, self.delete_view = keeping.views, keeping.save_view, keeping.delete_view
         self.curves, self.curves_of, self.curves_csv = results.curves, results.curves_of, results.curves_csv
         self.compare, self.misfit, self.diff = results.compare, results.misfit, results.diff
         self.curve, self.samples = tables.curve, tables.samples

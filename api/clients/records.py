@@ -58,20 +58,25 @@ class Records:
                 raise
         return self.experiment(id)
 
-    def studies(self, **filters: str | int | None) -> Page[StudyRead]:
-        """Return studies, newest first; filters as in the API: limit, cursor, state, strategy, text, sort."""
-        return self._connection.get(Page[StudyRead], "/studies", **filters)
+    def studies(self, *, query: str | None = None, **filters: str | int | None) -> Page[StudyRead]:
+        """Return studies, newest first.
 
-    def experiments(self, **filters: str | int | None) -> Page[ExperimentRead]:
-        """Return experiments, newest first; filters: those of `studies`, and study."""
-        return self._connection.get(Page[ExperimentRead], "/experiments", **filters)
+        Args:
+            query: like `strategy = informative and fitness > 0.5`, or words; archived ones need `archived = true`.
+            filters: as in the API: limit, cursor, state, strategy, text, sort.
+        """
+        return self._connection.get(Page[StudyRead], "/studies", q=query, **filters)
 
-    def all_experiments(self) -> Iterator[ExperimentRead]:
-        """Yield all experiments, newest first."""
-        return self._connection.items(Page[ExperimentRead], "/experiments", limit=PAGE)
+    def experiments(self, *, query: str | None = None, **filters: str | int | None) -> Page[ExperimentRead]:
+        """Return experiments, newest first; the query and the filters are those of `studies`, and study."""
+        return self._connection.get(Page[ExperimentRead], "/experiments", q=query, **filters)
+
+    def all_experiments(self, *, query: str | None = None) -> Iterator[ExperimentRead]:
+        """Yield all experiments that fit a query, newest first."""
+        return self._connection.items(Page[ExperimentRead], "/experiments", limit=PAGE, q=query)
 
     def edit(self, id: str, edit: Edit) -> ExperimentRead | StudyRead:
-        """Replace the name or the notes of a study or an experiment, and return it."""
+        """Change the name, the notes or the tags of a study or an experiment, and return it."""
         record = self.find(id)
         body, headers = edit.model_dump(exclude_unset=True), {"If-Match": "*"}
         return self._connection.change(type(record), "PATCH", path_of(record), json=body, headers=headers)

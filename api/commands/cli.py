@@ -8,7 +8,8 @@ from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, lines_of
 
 # the order of the commands in `gaplab --help`
 # isort: off
-from gaplab.api.commands import service, submission, records, differences, figures, reports, replays, life_cycle, events  # noqa: F401
+from gaplab.api.commands import service, submission, records, differences, figures, reports, replays  # noqa: F401
+from gaplab.api.commands import life_cycle, keeping, events  # noqa: F401
 from gaplab.api.commands import catalogue, archives, tokens, help  # noqa: A004, F401
 
 # isort: on

@@ -1,6 +1,7 @@
 """Commands that list, show and edit studies and experiments."""
 
-from itertools import islice, takewhile
+from collections.abc import Sequence
+from operator import attrgetter
 from typing import Annotated
 
 import typer
@@ -22,17 +23,23 @@ from gaplab.schemas.records import ExperimentRead, StudyRead
 @app.command("list")
 def list_(
     experiments: Annotated[bool, typer.Option("--experiments", help="experiments instead of studies")] = False,
+    query: Annotated[
+        str | None,
+        typer.Option("--query", "-q", help="like 'tag = gait and fitness > 0.5', or words", show_default=False),
+    ] = None,
+    view: Annotated[str | None, typer.Option(help="saved view to list", show_default=False)] = None,
     limit: Annotated[int, typer.Option(min=1, max=500)] = 20,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """List the newest studies, and the experiments without a study."""
+    """List the newest studies, and the experiments without a study; or what fits a query or a saved view."""
     with connect(url) as client:
-        newest = client.experiments(limit=limit).items if experiments else _newest(client, limit)
+        newest = _of_view(client, view, query, limit) if view else _newest(client, query, limit, alone=experiments)
     if as_json:
         print_json(newest)
-    else:
-        console().print(tables.overview(newest) if newest else "Nothing yet; `gaplab submit` starts something.")
+        return
+    nothing = "Nothing fits." if view or query else "Nothing yet; `gaplab submit` starts something."
+    console().print(tables.overview(newest) if newest else nothing)
 
 
 @app.command()
@@ -105,11 +112,22 @@ def _software(use: ProvenanceUse) -> str:
     return f"gaplab {found.gaplab}{commit}, Python {found.python}, {engines}; {found.processor}, {found.system}"
 
 
-def _newest(client: Client, limit: int) -> list[Record]:
-    """Return the newest studies, and the experiments without a study that are as new."""
-    studies = client.studies(limit=limit).items
-    oldest = studies[-1].created_at if len(studies) == limit else None
-    as_new = takewhile(lambda each: oldest is None or each.created_at >= oldest, client.records.all_experiments())
-    alone = islice((experiment for experiment in as_new if experiment.study is None), limit)
-    newest: list[Record] = [*studies, *alone]
-    return sorted(newest, key=lambda record: record.created_at, reverse=True)[:limit]
+def _newest(
+    client: Client, query: str | None, limit: int, *, alone: bool = False, sort: str = "-created_at"
+) -> Sequence[Record]:
+    """Return experiments, or studies with the experiments without a study, that fit a query: the first of an order."""
+    if alone:
+        return client.experiments(query=query, sort=sort, limit=limit).items
+    studies = client.studies(query=query, sort=sort, limit=limit).items
+    without = client.experiments(query=query, alone="true", sort=sort, limit=limit).items
+    records: list[Record] = [*studies, *without]
+    return sorted(records, key=attrgetter(sort.removeprefix("-")), reverse=sort.startswith("-"))[:limit]
+
+
+def _of_view(client: Client, name: str, query: str | None, limit: int) -> Sequence[Record]:
+    """Return what a saved view lists, as far as it fits a further query."""
+    view = client.keeping.view(name)
+    wanted = f"({view.query}) and ({query})" if view.query and query else query or view.query
+    if view.shows == "studies":
+        return client.studies(query=wanted, sort=view.sort, limit=limit).items
+    return _newest(client, wanted, limit, alone=view.shows == "experiments", sort=view.sort)

@@ -100,7 +100,8 @@ def _record(record: Record) -> tuple[str, ...]:
     created = record.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
     unknown = "not known yet" if record.state is State.RUNNING else "-"
     progress = (fitness(record), percent(record.progress), time_left(record) or unknown)
-    return record.id, escape(record.name) + many, standing(record), *progress, created
+    tags = f" [dim]{escape(' '.join(record.tags))}[/]" if record.tags else ""
+    return record.id, escape(record.name) + many + tags, standing(record), *progress, created
 
 
 def _repetition(found: RepetitionRead, iterations: int) -> tuple[str, ...]:

@@ -93,8 +93,8 @@ def _check(session: Session, private: Store, opened: OpenedArchive, now: datetim
 def _copy(session: Session, checked: CheckedArchive) -> ImportRead:
     """Copy the rows of the private database into the service's, and begin the life of the experiments there."""
     studies = {checked.study} if checked.study else set()
-    taken = archives.taken_ids(session, StudyRow, studies)
-    renamed = {old: new_id() for old in studies & taken}
+    taken_studies = archives.taken_ids(session, StudyRow, studies)
+    renamed = {old: new_id() for old in studies & taken_studies}
     taken = archives.taken_ids(session, ExperimentRow, checked.experiments)
     ids = {old: new_id() if old in taken else old for old in checked.experiments}
     with checked.store.reading() as source:
@@ -102,6 +102,7 @@ def _copy(session: Session, checked: CheckedArchive) -> ImportRead:
             owners = [*studies] if table == "study" else list(ids)
             rows = archives.read_rows(source, table, [column.name for column in columns_of(table)], owners)
             _insert(session, table, (_renamed(table, row, renamed, ids) for row in rows))
+    archives.forget_deletions(session, [*studies - taken_studies, *ids.values()])
     for id_ in ids.values():
         note(session, EventKind.IMPORTED, id_)
     settle(session, ids.values())

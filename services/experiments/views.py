@@ -20,6 +20,7 @@ from gaplab.services.store.queries.experiments import experiments_of
 from gaplab.services.store.queries.progress import Tally, reasons, tallies
 from gaplab.services.store.queries.results import best_recorded
 from gaplab.services.store.stored_specs import without_truth
+from gaplab.services.store.texts import unpack_tags
 
 _MOVING = (State.RUNNING, State.PAUSING, State.STOPPING)
 
@@ -133,7 +134,9 @@ def _experiment(row: ExperimentRow, work: _Work, found: _Found, *, secret: bool)
         study=row.study_id,
         name=row.name,
         notes=row.notes,
+        tags=unpack_tags(row.tags),
         edits=row.edits,
+        archived_at=row.archived_at,
         strategy=row.strategy,
         direct=row.iterations == 1,  # other strategies have at least one iteration after number 0
         state=row.state,
@@ -164,7 +167,9 @@ def _study(
         id=row.id,
         name=row.name,
         notes=row.notes,
+        tags=unpack_tags(row.tags),
         edits=row.edits,
+        archived_at=row.archived_at,
         state=state,
         caveat=study_caveat_of(state, states, stopped, together.tally),
         best=best,

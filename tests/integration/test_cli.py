@@ -66,7 +66,7 @@ def test_an_edit_that_is_none_is_a_sentence(gaplab: Gaplab) -> None:
     nothing, nameless = gaplab("edit", id), gaplab("edit", id, "--name", "")
 
     assert (nothing.code, nameless.code) == (Exit.INVALID, Exit.INVALID)
-    assert nothing.err == "gaplab: nothing to change: give a name, notes, or both\n"
+    assert nothing.err == "gaplab: nothing to change: give a name, notes or tags\n"
     assert nameless.err == "gaplab: --name: String should have at least 1 character\n"
 
 

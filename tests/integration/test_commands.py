@@ -98,6 +98,7 @@ def test_every_command_prints_one_document_and_nothing_else(
     live_and_die(ask, finish)
     look(ask, *(each["id"] for each in said["list"][::-1]))
     keep(ask, said["list"][-1]["id"], tmp_path)
+    tidy(ask, said["list"][-1]["id"])
     with monkeypatch.context() as patch:
         patch.setenv("GAPLAB_DATABASE_URL", f"sqlite:///{tmp_path / 'restored.db'}")
         assert ask("restore", str(tmp_path / "copy.db"))["file"] == str(tmp_path / "restored.db")
@@ -110,6 +111,16 @@ def test_every_command_prints_one_document_and_nothing_else(
     # want a body, a worker, an experiment under way, and a failed one
     elsewhere = {"replay", "sensitivity", "accept-versions", "retry"}
     assert set(said) | elsewhere == set(NAMES) - UNTIL_STOPPED
+
+
+def tidy(ask: Callable[..., Any], ended: str) -> None:
+    assert ask("tag", ended, "gait")["tags"] == ["gait"]
+    assert ask("notify", ended) == {"host": None}
+    assert ask("archive", ended)["archived_at"]
+    assert ask("unarchive", ended)["archived_at"] is None
+    assert ask("views save", "mine", "--query", "tag = gait")["name"] == "mine"
+    assert ask("views delete", "mine")["query"] == "tag = gait"
+    assert ask("delete", ended)["id"] == ended
 
 
 def live_and_die(ask: Callable[..., Any], finish: Callable[[], None]) -> None:

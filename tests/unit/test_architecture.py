@@ -23,13 +23,17 @@ ROOMS = {
     "figures": ((), {"plotly", "matplotlib"}),
     "specs": (("core", "engines"), {"numpy"}),
     "plugins": (("core", "engines", "specs"), set()),
-    "experiments": (("core", "engines", "store", "specs", "plugins", "settings"), {"sqlalchemy"}),
+    "experiments": (
+        ("core", "engines", "store", "specs", "plugins", "settings"),
+        {"sqlalchemy", "lark", "markdown_it"},
+    ),
     "running": (("core", "engines", "store", "plugins", "experiments"), {"sqlalchemy"}),
     "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
     "replay": (
         ("core", "store", "specs", "plugins", "experiments", "waiting_line"),
         {"numpy", "scipy", "cachetools", "PIL", "av"},
     ),
+    "notifications": (("core", "store", "experiments", "settings"), {"sqlalchemy", "httpx2"}),
     "archives": (("core", "store", "specs", "experiments", "results", "settings"), {"pydantic", "pyarrow"}),
     "reports": (
         ("core", "store", "figures", "specs", "experiments", "running", "results"),

@@ -88,6 +88,12 @@ declare namespace Api {
     upper: number | null;
     values: Array<number | null>;
   }
+  interface DeletionRead {
+    id: string;
+    name: string;
+    study: string | null;
+    deleted_at: string;
+  }
   interface DiffColumn {
     id: string;
     name: string;
@@ -103,6 +109,9 @@ declare namespace Api {
   interface Edit {
     name: string | null;
     notes: string | null;
+    tags: Array<string> | null;
+    add_tags: Array<string>;
+    remove_tags: Array<string>;
   }
   type Ending = "completed" | "paused" | "stopped" | "cancelled" | "handed back" | "lost" | "failed";
   interface EngineCost {
@@ -119,7 +128,7 @@ declare namespace Api {
     seconds: number;
     supervisors: number;
   }
-  type EventKind = "submitted" | "imported" | "started" | "pausing" | "paused" | "resumed" | "stopping" | "extended" | "retried" | "completed" | "failed" | "cancelled" | "sensitivity_ended" | "versions_refused" | "versions_accepted" | "repetition_claimed" | "repetition_completed" | "repetition_failed" | "repetition_lost" | "repetition_handed_back" | "repetition_paused" | "repetition_stopped" | "repetition_cancelled" | "selected" | "measured" | "tuned" | "transferred" | "probed";
+  type EventKind = "submitted" | "imported" | "started" | "pausing" | "paused" | "resumed" | "stopping" | "extended" | "retried" | "completed" | "failed" | "cancelled" | "edited" | "archived" | "unarchived" | "deleted" | "notified" | "notification_failed" | "sensitivity_ended" | "versions_refused" | "versions_accepted" | "repetition_claimed" | "repetition_completed" | "repetition_failed" | "repetition_lost" | "repetition_handed_back" | "repetition_paused" | "repetition_stopped" | "repetition_cancelled" | "selected" | "measured" | "tuned" | "transferred" | "probed";
   interface EventPage {
     items: Array<EventRead>;
     last: number;
@@ -148,7 +157,9 @@ declare namespace Api {
     study: string | null;
     name: string;
     notes: string | null;
+    tags: Array<string>;
     edits: number;
+    archived_at: string | null;
     strategy: string;
     direct: boolean;
     state: State;
@@ -221,6 +232,9 @@ declare namespace Api {
     unit: string;
     points: Array<MisfitPoint>;
     remarks: Array<string>;
+  }
+  interface NotesRead {
+    html: string;
   }
   interface Page_ExperimentRead_ {
     items: Array<ExperimentRead>;
@@ -440,7 +454,9 @@ declare namespace Api {
     id: string;
     name: string;
     notes: string | null;
+    tags: Array<string>;
     edits: number;
+    archived_at: string | null;
     state: State;
     caveat: string | null;
     best: BestRead | null;
@@ -512,5 +528,23 @@ declare namespace Api {
     trends: Array<TrendRead>;
     evaluations: number | null;
     rules: Array<string>;
+  }
+  interface ViewRead {
+    shows: "all" | "studies" | "experiments";
+    query: string | null;
+    sort: "created_at" | "-created_at" | "name" | "-name" | "strategy" | "-strategy" | "state" | "-state";
+    name: string;
+    created_at: string;
+  }
+  interface ViewSpec {
+    shows: "all" | "studies" | "experiments";
+    query: string | null;
+    sort: "created_at" | "-created_at" | "name" | "-name" | "strategy" | "-strategy" | "state" | "-state";
+  }
+  interface WebhookRead {
+    host: string | null;
+  }
+  interface WebhookSpec {
+    url: string;
   }
 }

@@ -2,13 +2,14 @@
 /** The list of studies and experiments, live: to find them, to open them, and to choose some for a comparison. */
 
 import { get } from "../lib/api.js";
-import { h } from "../lib/dom.js";
+import { h, setText } from "../lib/dom.js";
 import { keyedRows } from "../lib/keyed_rows.js";
 import { follow } from "../lib/live.js";
 import { empty, failed, loading } from "../lib/placeholders.js";
 import { unitsOf } from "../lib/robots.js";
 import { addressOf, filterForm, filtersOf, isFiltered } from "./list/filters.js";
 import { experimentRow, headCells, studyRow } from "./list/rows.js";
+import { savedViews } from "./list/saved_views.js";
 import { selectionBar } from "./list/selection.js";
 import { lengthened, merged, refreshed, sourcesOf } from "./list/sources.js";
 
@@ -37,6 +38,7 @@ export async function show(root, parameters, signal) {
     if (signal.aborted) return;  // words typed just before the reader left would change the address of another view
     history.replaceState(null, "", addressOf(filters));
     const loaded = list.change({ ...filters });
+    views.update();
     if (filters.show !== shown) {
       const focused = place.querySelector(":focus")?.textContent;
       makeForm();
@@ -48,7 +50,8 @@ export async function show(root, parameters, signal) {
   let shown = list.filters.show;
   makeForm();
   const title = h("div", { class: "titled" }, h("h1", {}, "Studies and experiments"), h("a", { class: "button", href: "#/new" }, "New study"));
-  root.replaceChildren(title, place, list.element);
+  const views = savedViews(() => list.filters, signal);
+  root.replaceChildren(title, place, views.element, list.element);
   await changed(list.filters);
   if (signal.aborted) return;
   follow({}, () => list.refresh(), signal);
@@ -80,7 +83,8 @@ class List {
     this.more = h("button", { type: "button", class: "quiet more", onclick: () => { this.lengthen(); } }, "Show more");
     this.bar = selectionBar(() => this.draw());
     this.note = h("div", {}, loading());
-    this.element = h("div", {}, this.bar.element, this.table, this.note, this.more);
+    this.mistake = h("p", { class: "mistake", role: "status" });
+    this.element = h("div", {}, this.mistake, this.bar.element, this.table, this.note, this.more);
     this.ticked = () => {
       this.bar.update();
       this.draw();
@@ -108,6 +112,10 @@ class List {
       await loaded;
     } catch (error) {
       if (requests !== this.requests || this.signal.aborted) return;
+      if (error.errors?.[0]?.pointer === "q") {  // half a query: the former list stays until it is whole
+        setText(this.mistake, error.errors[0].message);
+        return;
+      }
       this.sources = sourcesOf(filters);
       this.fail(error, () => this.change(filters));
     }
@@ -124,6 +132,7 @@ class List {
     const sources = await Promise.all((others ?? this.sources).map((source) => refreshed(source, limit(source), this.signal)));
     if (request !== this.requests || this.signal.aborted) return;
     if (others || !this.shown().items.length) this.error = null;
+    if (others) setText(this.mistake, "");
     this.sources = sources;
     this.draw();
   }

@@ -14,7 +14,7 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import Schedule
 from gaplab.services.core.errors import NotFound, StoreUnavailable
 from gaplab.services.store.clock import moment
-from gaplab.services.store.models import SPEC_VERSION, ExperimentRow, RepetitionRow, StudyRow
+from gaplab.services.store.models import SPEC_VERSION, DeletionRow, ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.statements import storable
 
@@ -131,6 +131,11 @@ def get_study(session: Session, study_id: str) -> StudyRow:
     return _get(session, StudyRow, "study", study_id)
 
 
+def was_deleted(session: Session, id_: str) -> bool:
+    """Return whether a study or an experiment with this id was deleted."""
+    return session.get(DeletionRow, storable(id_)) is not None
+
+
 def experiments_of(session: Session, studies: Sequence[str]) -> tuple[ExperimentRow, ...]:
     """Return the experiments of these studies, by study and position."""
     row = ExperimentRow
@@ -168,9 +173,11 @@ def lock(session: Session, experiments: Sequence[str]) -> dict[str, State]:
 
 
 def _get(session: Session, table: type[R], noun: str, id_: str) -> R:
-    if (found := session.get(table, storable(id_))) is None:
-        raise NotFound(f"there is no {noun} {id_!r}")
-    return found
+    if (found := session.get(table, storable(id_))) is not None:
+        return found
+    if deletion := session.get(DeletionRow, storable(id_)):
+        raise NotFound(f"{noun} {id_!r}, {deletion.name!r}, was deleted at {deletion.deleted_at:%Y-%m-%d %H:%M} UTC")
+    raise NotFound(f"there is no {noun} {id_!r}")
 
 
 @event.listens_for(ExperimentRow, "load")

@@ -132,15 +132,20 @@ def last_common(session: Session, experiments: Sequence[str]) -> dict[str, int]:
     The COMPLETED repetitions count. Without any, those that have begun and may go on count; without any of those, all
     that have begun. An experiment without a point of its curve is missing.
     """
+    counted = session.execute(last_common_of_all().where(RepetitionRow.experiment_id.in_(experiments)))
+    return {experiment: done - 1 for experiment, done in counted if done is not None}
+
+
+def last_common_of_all() -> Select[Any, Any]:
+    """Return the query for the iterations that the repetitions of each experiment share, number 0 included."""
     row = RepetitionRow
 
     def least(*states: State) -> ColumnElement[int | None]:
         return func.min(case((row.state.in_(states), row.iterations_done)))
 
     begun = func.coalesce(least(State.COMPLETED), least(State.QUEUED, State.RUNNING), func.min(row.iterations_done))
-    query = select(row.experiment_id, begun).where(row.experiment_id.in_(experiments), row.iterations_done > 0)
-    counted = session.execute(query.group_by(row.experiment_id))
-    return {experiment: done - 1 for experiment, done in counted if done is not None}
+    query = select(row.experiment_id, begun.label("done")).where(row.iterations_done > 0)
+    return query.group_by(row.experiment_id)
 
 
 def recorded_at(session: Session, counts: Mapping[str, int]) -> dict[str, list[float]]:

@@ -37,6 +37,13 @@ const WORDS = {
   failed: () => "Failed",
   cancelled: () => "Cancelled",
   retried: () => "Retried",
+  edited: ({ body }) => `${body.of_study ? "Its study was edited" : "Edited"}: ${(body.fields ?? []).join(", ").replaceAll("_", " ")}`,
+  archived: () => "Archived: lists leave it out",
+  unarchived: () => "Listed again",
+  deleted: ({ body }) => `Deleted: ${body.name}`,
+  notified: ({ body }) => `Told ${channel(body)} of the end of the ${body.of}`,
+  notification_failed: ({ body }) =>
+    `Could not tell ${channel(body)} of the end of the ${body.of}: ${body.reason}${body.again_in_s ? `; again in ${count(body.again_in_s)} s` : "; given up"}`,
   sensitivity_ended: ({ body }) =>
     `Sensitivity check ${String(body.state).toLowerCase()}${body.warnings?.length ? `: ${body.warnings.join(" ")}` : ""}`,
   versions_refused: ({ body }) => / \(unavailable: /.test(body.refused_by)
@@ -57,6 +64,9 @@ const WORDS = {
   transferred: (event) => `${step(event)}: controller evolved, ${reaching("reaching", event.body.simulated_fitness, " in simulation")}`,
   probed: (event) => `${step(event)}: ${reaching("the controller reaches", event.body.fitness, " in reality")}`,
 };
+
+/** @param {{ channel?: string }} body */
+const channel = ({ channel: name }) => `the ${String(name).replace("own_webhook", "webhook of its own").replace(/^webhook$/, "service's webhook")}`;
 
 /** @param {number | null | undefined} value */
 function squaredError(value) {

@@ -7,8 +7,11 @@ import { downloadLink } from "../../lib/downloads.js";
 import { editNameAndNotes } from "../../lib/edit_dialog.js";
 import { age, count, evaluationsText, fixed, percent, readableName, timeBetween } from "../../lib/format.js";
 import { factItems, remarkBlocks } from "../../lib/head_parts.js";
+import { keepingButtons } from "../../lib/keeping.js";
+import { notesBlock } from "../../lib/markdown.js";
 import { fraction, iterationsDone, repetitionsDone, rolloutsDone, timeLeftFact } from "../../lib/progress.js";
 import { ENDED, stateBadge } from "../../lib/state_badge.js";
+import { tagList } from "../../lib/tags.js";
 import { actions } from "./actions.js";
 
 /** @typedef {import("../../lib/head_parts.js").Fact} Fact */
@@ -22,7 +25,9 @@ import { actions } from "./actions.js";
 export function head(page) {
   const title = h("h1");
   const state = h("span", { class: "state-now", role: "status" });
-  const notes = h("p", { class: "notes" });
+  const notes = notesBlock(`/experiments/${page.id}`, page.signal);
+  const tags = tagList();
+  const keeping = keepingButtons(page, `/experiments/${page.id}`, () => keptOf(page.experiment));
   const bar = h("progress", { max: 1, "aria-label": "Progress" });
   const facts = h("dl", { class: "facts" });
   const remarks = h("div", { class: "remarks" });
@@ -33,8 +38,9 @@ export function head(page) {
     setText(title, readableName(experiment.name));
     const done = ENDED.includes(experiment.state) ? "" : `${percent(fraction(progress))} · `;
     document.title = `${done}${title.textContent} · gaplab`;
-    setText(notes, experiment.notes ?? "");
-    notes.hidden = !experiment.notes;
+    notes.update(experiment.notes);
+    tags.update(experiment.tags);
+    keeping.update();
     refill(state, `${experiment.state} ${experiment.caveat}`, () => stateBadge(experiment.state, experiment.caveat));
     bar.value = fraction(progress);
     const known = factsOf(page);
@@ -44,10 +50,10 @@ export function head(page) {
     buttons.update();
   };
   const edit = () => editNameAndNotes(page, `/experiments/${page.id}`, () => page.experiment);
-  const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name and notes");
+  const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name, notes and tags");
   update();
-  const element = h("header", { class: "experiment-head" }, trail(page), h("div", { class: "titled" }, title, state, editButton),
-    h("p", { class: "what" }, summary(page.experiment)), notes, bar, facts, remarks, buttons.element, links(page));
+  const element = h("header", { class: "experiment-head" }, trail(page), h("div", { class: "titled" }, title, state, tags.element, editButton),
+    h("p", { class: "what" }, summary(page.experiment)), notes.element, bar, facts, remarks, buttons.element, links(page), keeping.element);
   return { element, update };
 }
 
@@ -120,3 +126,12 @@ function links({ id, isFunction }) {
     downloadLink("Report as PDF", `/experiments/${id}/report`, { format: "pdf" }, `gaplab-${id}-report.pdf`, "Writing the report"), " ",
     downloadLink("Archive of everything (.zip)", `/experiments/${id}/export`, {}, `gaplab-${id}.zip`));
 }
+
+/**
+ * Return what archiving and deleting must know of the experiment.
+ *
+ * @param {Api.ExperimentRead} experiment
+ */
+const keptOf = ({ name, state, progress, archived_at: archivedAt }) => ({
+  name, what: `${count(progress.repetitions)} repetitions`, hasEnded: ENDED.includes(state), isArchived: Boolean(archivedAt),
+});

@@ -5,14 +5,14 @@ import { h } from "../../lib/dom.js";
 import { readableName } from "../../lib/format.js";
 import { STATES } from "../../lib/state_badge.js";
 
-/** @typedef {{ show: "all" | "studies" | "experiments", sort: string, state: string, strategy: string, text: string }} Filters */
+/** @typedef {{ show: "all" | "studies" | "experiments", sort: string, state: string, strategy: string, text: string, q: string }} Filters */
 /** @typedef {[value: string, label: string][]} Choices */
 
 /** @type {Choices} */
 const STUDY_ORDERS = [["-created_at", "Newest first"], ["created_at", "Oldest first"], ["name", "By name"]];
 const ORDERS = { all: STUDY_ORDERS, studies: STUDY_ORDERS, experiments: /** @type {Choices} */ ([...STUDY_ORDERS, ["strategy", "By strategy"], ["state", "By state"]]) };
 const NEWEST_FIRST = "-created_at";
-const TYPING_MS = 250;
+const TYPING_MS = 350;
 
 /**
  * Return the filters in an address.
@@ -25,7 +25,7 @@ export function filtersOf(parameters) {
   const show = wanted === "studies" || wanted === "experiments" ? wanted : "all";
   const order = ORDERS[show].find(([name]) => name === parameters.get("sort"));
   const value = (/** @type {string} */ name) => parameters.get(name) ?? "";
-  return { show, sort: order ? order[0] : NEWEST_FIRST, state: value("state"), strategy: value("strategy"), text: value("text") };
+  return { show, sort: order ? order[0] : NEWEST_FIRST, state: value("state"), strategy: value("strategy"), text: value("text"), q: value("q") };
 }
 
 /**
@@ -44,7 +44,7 @@ export function addressOf({ show, sort, ...others }) {
  *
  * @param {Filters} filters
  */
-export const isFiltered = ({ state, strategy, text }) => Boolean(state || strategy || text);
+export const isFiltered = ({ state, strategy, text, q }) => Boolean(state || strategy || text || q);
 
 /**
  * Return the form of the filters.
@@ -66,11 +66,12 @@ export function filterForm(filters, strategies, changed) {
   });
   const type = () => {
     clearTimeout(typing);
-    history.replaceState(null, "", addressOf({ ...filters, text: search.value.trim() }));  // at once, so that it can be copied
-    typing = setTimeout(() => change({ text: search.value.trim() }), TYPING_MS);
+    const words = { text: "", q: search.value.trim() };
+    history.replaceState(null, "", addressOf({ ...filters, ...words }));  // at once, so that it can be copied
+    typing = setTimeout(() => change(words), TYPING_MS);
   };
-  const search = h("input", { type: "search", placeholder: "Name or id", "aria-label": "Search by name or id", maxlength: 200, oninput: type });
-  search.value = filters.text;
+  const search = h("input", { type: "search", placeholder: "Words, or a query like tag = gait", "aria-label": "Search by words or a query", maxlength: 1000, oninput: type });
+  search.value = filters.q || filters.text;
   /** @type {Choices} */
   const states = STATES.map((state) => [state, readableName(state.toLowerCase())]);
   /** @type {Choices} */

@@ -5,6 +5,7 @@ import { h, refill, setText } from "../../lib/dom.js";
 import { age, evaluationsText, fixed, readableName } from "../../lib/format.js";
 import { progressBar, timeLeft } from "../../lib/progress.js";
 import { stateBadge } from "../../lib/state_badge.js";
+import { tagList } from "../../lib/tags.js";
 import { tickBox } from "./selection.js";
 
 /**
@@ -54,10 +55,11 @@ function baseRow(cssClass, name, list, toggle = null) {
   const box = tickBox(`Select ${name}`, list.ticked);
   const link = h("a", {});
   const subtitle = h("span", { class: "sub" });
+  const tags = tagList();
   const bar = progressBar(`Progress of ${name}`);
   const cells = Object.fromEntries(COLUMNS.map((column) => [column.key, h("td", { class: classOf(column) })]));
   cells.ticks.append(box.element);
-  cells.name.append(h("div", { class: "named" }, toggle, h("span", {}, link, subtitle)));
+  cells.name.append(h("div", { class: "named" }, toggle, h("span", {}, link, tags.element, subtitle)));
   cells.progress.append(bar.element);
   const element = h("tr", { class: cssClass }, ...Object.values(cells));
   /** @type {(item: Api.StudyRead | Api.ExperimentRead, content: Content) => void} */
@@ -65,6 +67,7 @@ function baseRow(cssClass, name, list, toggle = null) {
     setText(link, title);
     link.href = address;
     setText(subtitle, words);
+    tags.update(item.tags);
     box.update(ids);
     bar.update(item.progress);
     refill(cells.stands, `${item.state} ${item.caveat}`, () => stateBadge(item.state, item.caveat));

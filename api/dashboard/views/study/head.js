@@ -6,8 +6,11 @@ import { downloadLink } from "../../lib/downloads.js";
 import { editNameAndNotes } from "../../lib/edit_dialog.js";
 import { age, count, evaluationsText, fixed, readableName } from "../../lib/format.js";
 import { factItems, remarkBlocks } from "../../lib/head_parts.js";
+import { keepingButtons } from "../../lib/keeping.js";
+import { notesBlock } from "../../lib/markdown.js";
 import { iterationsDone, progressBar, repetitionsDone, rolloutsDone, timeLeftFact } from "../../lib/progress.js";
-import { stateBadge } from "../../lib/state_badge.js";
+import { ENDED, stateBadge } from "../../lib/state_badge.js";
+import { tagList } from "../../lib/tags.js";
 import { actions } from "./actions.js";
 
 /** @typedef {import("../../lib/head_parts.js").Fact} Fact */
@@ -21,7 +24,9 @@ import { actions } from "./actions.js";
 export function head(page) {
   const title = h("h1");
   const state = h("span", { class: "state-now", role: "status" });
-  const notes = h("p", { class: "notes" });
+  const notes = notesBlock(`/studies/${page.id}`, page.signal);
+  const tags = tagList();
+  const keeping = keepingButtons(page, `/studies/${page.id}`, () => keptOf(page.study));
   const bar = progressBar("Progress");
   const facts = h("dl", { class: "facts" });
   const remarks = h("div", { class: "remarks" });
@@ -30,8 +35,9 @@ export function head(page) {
     const { study } = page;
     setText(title, study.name);
     document.title = `${study.name} · gaplab`;
-    setText(notes, study.notes ?? "");
-    notes.hidden = !study.notes;
+    notes.update(study.notes);
+    tags.update(study.tags);
+    keeping.update();
     refill(state, `${study.state} ${study.caveat}`, () => stateBadge(study.state, study.caveat));
     bar.update(study.progress);
     const known = factsOf(page);
@@ -44,9 +50,9 @@ export function head(page) {
   const edit = () => editNameAndNotes(page, `/studies/${page.id}`, () => page.study);
   update();
   const trail = h("nav", { "aria-label": "Place", class: "trail" }, h("a", { href: "#/" }, "Studies"));
-  const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name and notes");
-  const element = h("header", { class: "experiment-head" }, trail, h("div", { class: "titled" }, title, state, editButton),
-    notes, h("div", { class: "whole" }, bar.element), facts, remarks, buttons.element, links(page));
+  const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name, notes and tags");
+  const element = h("header", { class: "experiment-head" }, trail, h("div", { class: "titled" }, title, state, tags.element, editButton),
+    notes.element, h("div", { class: "whole" }, bar.element), facts, remarks, buttons.element, links(page), keeping.element);
   return { element, update };
 }
 
@@ -113,3 +119,15 @@ function links({ id, study }) {
     downloadLink("Report as PDF", `/studies/${id}/report`, { format: "pdf" }, `gaplab-${id}-report.pdf`, "Writing the report"),
     downloadLink("Archive of everything (.zip)", `/studies/${id}/export`, {}, `gaplab-${id}.zip`));
 }
+
+/**
+ * Return what archiving and deleting must know of the study.
+ *
+ * @param {Api.StudyRead} study
+ */
+const keptOf = ({ name, experiments, progress, archived_at: archivedAt }) => ({
+  name,
+  what: `${count(experiments.length)} experiments and ${count(progress.repetitions)} repetitions`,
+  hasEnded: experiments.every(({ state }) => ENDED.includes(state)),
+  isArchived: Boolean(archivedAt),
+});
