@@ -5,7 +5,7 @@ tests/unit/test_docs.py fails if the stored files differ from the generated ones
 
 import inspect
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -107,7 +107,7 @@ def settings() -> Iterator[str]:
     yield from _table(("variable", "meaning", "left out"), told)
     yield "## Limits\n\nWhile no token exists, all clients together count as one token.\n"
     limits = [(f"`{variable_of(name)}`", _attribute(Limits, name), f"{most:,}") for name, most in Limits()]
-    yield from _table(("variable", "at most", "left out"), limits)  # type: ignore[arg-type]
+    yield from _table(("variable", "at most", "left out"), limits)
 
 
 def _commands(command: Any, name: str) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 - of typer's own click
@@ -136,7 +136,7 @@ def _plugin(found: PluginRead) -> Iterator[str]:
     yield from _table(("option", "type", "meaning", "left out"), rows)  # type: ignore[arg-type]
 
 
-def _table(heads: tuple[str, ...], rows: list[tuple[str, ...]]) -> Iterator[str]:
+def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
     if rows:
         lines = [heads, ("---",) * len(heads), *rows]
         yield "\n".join(f"| {' | '.join(row)} |".replace("|  |", "| |") for row in lines) + "\n"

@@ -36,7 +36,8 @@ def only_one(page: Any) -> None:
 def test_notes_are_rendered_and_run_and_load_nothing(visit: Any, api: Any, written: Any) -> None:
     made = ended(written, "noted", notes=NOTES, tags=("gait", "paper"))
 
-    for mode, how in {"light": {}, "dark": {"dark": True}, "phone": {"width": 375, "height": 760}}.items():
+    modes: dict[str, Any] = {"light": {}, "dark": {"dark": True}, "phone": {"width": 375, "height": 760}}
+    for mode, how in modes.items():
         page = visit(f"{api.url}/#/experiments/{made}", **how)
         page.locator(".notes em").wait_for()
         axe(page)
@@ -111,7 +112,8 @@ def test_a_query_finds_is_explained_and_is_saved_as_a_view(visit: Any, api: Any,
     axe(page)
     screenshot(page, "views-light")
 
-    for mode, how in {"dark": {"dark": True}, "phone": {"width": 375, "height": 760}}.items():
+    modes: dict[str, Any] = {"dark": {"dark": True}, "phone": {"width": 375, "height": 760}}
+    for mode, how in modes.items():
         other = visit(api.url, **how)
         other.get_by_role("link", name="found ones").click()
         only_one(other)

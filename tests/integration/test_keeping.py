@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from sqlalchemy import func, select
+from sqlalchemy import func, select, update
 
 from gaplab.api.app import create_app
 from gaplab.schemas.access import Role
@@ -173,7 +173,7 @@ def test_nothing_is_deleted_that_is_under_way_or_holds_hardware(store: Store) ->
         deletion.delete_experiment(store, made.id, ME)
     cancel(store, made.id)
     with store.transaction() as session:
-        session.execute(RepetitionRow.__table__.update().values(hardware="arm"))
+        session.execute(update(RepetitionRow).values(hardware="arm"))
     with pytest.raises(Conflict, match="still holds hardware"):
         deletion.delete_experiment(store, made.id, ME)
     execution.free_hardware(store, [claim])

@@ -14,6 +14,7 @@ from gaplab.api.app import create_app
 from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import import_archive
+from gaplab.services.core.types import Probed
 from gaplab.services.experiments import lifecycle, reading, submission
 from gaplab.services.reports.content import study_verdict
 from gaplab.services.reports.document import study_report
@@ -69,9 +70,9 @@ def recorded(store: Store, means: list[float], spread: float, repetitions: int =
     for claim in execution.claim(store, "test", limit=repetitions):
         log = list(some_log(len(means) - 1))
         for step in log:
-            if hasattr(step, "recorded"):
+            if isinstance(step, Probed):
                 offset = spread * (claim.number - repetitions / 2)
-                step = type(step)(step.iteration, 0.5, means[step.iteration] + offset)
+                step = Probed(step.iteration, 0.5, means[step.iteration] + offset)
             assert execution.record(store, claim, step, seconds=0.5)
         assert execution.complete(store, claim)
     return made
@@ -109,7 +110,7 @@ def test_the_verdict_on_a_study_agrees_with_the_comparison_at_the_last_count(
     sqlite_store: Store, api: TestClient, study: str
 ) -> None:
     experiments = reading.read_study(sqlite_store, study).experiments
-    asked = {"experiment": [each.id for each in experiments], "from": 5, "to": 5}
+    asked: Any = {"experiment": [each.id for each in experiments], "from": 5, "to": 5}
     pairs = api.get("/comparisons", params=asked).json()
     learned = {each.id for each in experiments if not each.direct}
     compared = [pair for pair in pairs if {pair["first"], pair["second"]} <= learned]

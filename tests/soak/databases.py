@@ -27,7 +27,8 @@ def _shift_heartbeats(url: str, by: timedelta) -> bool:
     store = Store(url)
     try:
         with store.transaction() as session:
-            for model in (RepetitionRow, SensitivityRow, SupervisorRow):
+            models: tuple[Any, ...] = (RepetitionRow, SensitivityRow, SupervisorRow)
+            for model in models:
                 for row in session.scalars(select(model).where(model.heartbeat_at.is_not(None))).all():
                     row.heartbeat_at += by
         return True
