@@ -10,7 +10,7 @@ from gaplab.api.clients.client import Client
 from gaplab.api.clients.progress.text import console, counts
 from gaplab.api.clients.records import Record
 from gaplab.api.commands import tables
-from gaplab.api.commands.app import AsJson, Id, Url, app, connect, print_warnings
+from gaplab.api.commands.app import LIFE, RESULTS, AsJson, Id, Url, app, connect, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.schemas.editing import Edit
@@ -18,7 +18,7 @@ from gaplab.schemas.provenance import ProvenanceUse
 from gaplab.schemas.records import ExperimentRead, StudyRead
 
 
-@app.command("list")
+@app.command("list", rich_help_panel=RESULTS)
 def list_(
     experiments: Annotated[bool, typer.Option("--experiments", help="experiments instead of studies")] = False,
     limit: Annotated[int, typer.Option(min=1, max=500)] = 20,
@@ -34,7 +34,7 @@ def list_(
         console().print(tables.overview(newest) if newest else "Nothing yet; `gaplab submit` starts something.")
 
 
-@app.command()
+@app.command(rich_help_panel=RESULTS)
 def show(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     """Show the experiments of a study, or the repetitions of an experiment."""
     with connect(url) as client:
@@ -45,7 +45,7 @@ def show(id: Id, as_json: AsJson = False, url: Url = None) -> None:
             _show_experiment(client, record, as_json=as_json)
 
 
-@app.command()
+@app.command(rich_help_panel=LIFE)
 def edit(
     id: Id,
     name: Annotated[str | None, typer.Option(help="new name", show_default=False)] = None,

@@ -9,7 +9,7 @@ import typer
 from rich.markup import escape
 
 from gaplab.api.clients.progress.text import console
-from gaplab.api.commands.app import AsJson, app
+from gaplab.api.commands.app import OTHERS, AsJson, app
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.api.commands.tables import table
 from gaplab.schemas.access import Role, TokenRead
@@ -20,7 +20,7 @@ from gaplab.services.store.session import Store
 tokens = typer.Typer(
     help="Manage the tokens that the service accepts, in the database of GAPLAB_DATABASE_URL.", no_args_is_help=True
 )
-app.add_typer(tokens, name="token")
+app.add_typer(tokens, name="token", rich_help_panel=OTHERS)
 
 
 @tokens.command()
