@@ -29,6 +29,7 @@ from gaplab.api.routes import (
     replay_figures,
     replays,
     sensitivity,
+    specs,
     studies,
 )
 from gaplab.services.replay.process import RolloutProcess
@@ -61,6 +62,7 @@ MODULES = (
     studies,
     estimates,
     experiments,
+    specs,
     lifecycle,
     provenance,
     events,

@@ -67,6 +67,7 @@ class Client:
         self.find, self.study, self.experiment = records.find, records.study, records.experiment
         self.studies, self.experiments, self.edit = records.studies, records.experiments, records.edit
         self.repetitions, self.attempts, self.reveal = records.repetitions, records.attempts, records.reveal
+        self.spec = records.spec
         self.provenance, self.accept_versions = records.provenance, life_cycle.accept_versions
         self.pause, self.resume, self.stop = life_cycle.pause, life_cycle.resume, life_cycle.stop
         self.cancel, self.extend, self.schedule = life_cycle.cancel, life_cycle.extend, life_cycle.schedule
