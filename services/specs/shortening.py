@@ -34,6 +34,8 @@ def study_spec(name: str, stored: Sequence[Stored]) -> SpecRead:
     than their strategies.
     """
     specs = [spec_of(each) for each in stored]
+    if not specs:
+        return SpecRead(spec=None, resolved=(), remarks=("the study has no experiments",))
     size, wanted = _common_size(specs)
     base = next((spec for spec in wanted if not is_direct(spec)), wanted[0])
     strategies = [_shortest(_complete(spec), within="strategy")["strategy"] for spec in wanted]
