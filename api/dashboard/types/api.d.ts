@@ -50,6 +50,8 @@ declare namespace Api {
   interface Comparison {
     first: string;
     second: string;
+    first_name: string;
+    second_name: string;
     from_evaluations: number;
     to_evaluations: number;
     n_first: number;
@@ -104,6 +106,7 @@ declare namespace Api {
     cores: number;
     seconds: number;
     supervisors: number;
+    specs: Array<Record<string, any>>;
   }
   type EventKind = "submitted" | "imported" | "started" | "pausing" | "paused" | "resumed" | "stopping" | "extended" | "retried" | "completed" | "failed" | "cancelled" | "sensitivity_ended" | "versions_refused" | "versions_accepted" | "repetition_claimed" | "repetition_completed" | "repetition_failed" | "repetition_lost" | "repetition_handed_back" | "repetition_paused" | "repetition_stopped" | "repetition_cancelled" | "selected" | "measured" | "tuned" | "transferred" | "probed";
   interface EventPage {
@@ -397,6 +400,11 @@ declare namespace Api {
     message: string;
     permitted: Array<string> | string | null;
     nearest: string | null;
+  }
+  interface SpecRead {
+    spec: Record<string, any> | null;
+    resolved: Array<Record<string, any>>;
+    remarks: Array<string>;
   }
   type State = "QUEUED" | "RUNNING" | "PAUSING" | "PAUSED" | "STOPPING" | "COMPLETED" | "FAILED" | "CANCELLED";
   interface StudyRead {

@@ -7,6 +7,7 @@ import { downloadLink } from "../../lib/downloads.js";
 import { editNameAndNotes } from "../../lib/edit_dialog.js";
 import { age, count, percent, readableName, timeBetween } from "../../lib/format.js";
 import { factItems, remarkBlocks } from "../../lib/head_parts.js";
+import { newFromThis } from "../../lib/new_from_this.js";
 import { fraction, repetitionsDone, timeLeftFact } from "../../lib/progress.js";
 import { ENDED, stateBadge } from "../../lib/state_badge.js";
 import { actions } from "./actions.js";
@@ -46,7 +47,7 @@ export function head(page) {
   const edit = () => editNameAndNotes(page, `/experiments/${page.id}`, () => page.experiment);
   const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name and notes");
   update();
-  const element = h("header", { class: "experiment-head" }, trail(page), h("div", { class: "titled" }, title, state, editButton),
+  const element = h("header", { class: "experiment-head" }, trail(page), h("div", { class: "titled" }, title, state, editButton, newFromThis(`/experiments/${page.id}`)),
     h("p", { class: "what" }, summary(page.experiment)), notes, bar, facts, remarks, buttons.element, links(page));
   return { element, update };
 }

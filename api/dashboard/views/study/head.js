@@ -6,6 +6,7 @@ import { downloadLink } from "../../lib/downloads.js";
 import { editNameAndNotes } from "../../lib/edit_dialog.js";
 import { age, count, fixed, readableName } from "../../lib/format.js";
 import { factItems, remarkBlocks } from "../../lib/head_parts.js";
+import { newFromThis } from "../../lib/new_from_this.js";
 import { progressBar, repetitionsDone, timeLeftFact } from "../../lib/progress.js";
 import { stateBadge } from "../../lib/state_badge.js";
 import { actions } from "./actions.js";
@@ -45,7 +46,7 @@ export function head(page) {
   update();
   const trail = h("nav", { "aria-label": "Place", class: "trail" }, h("a", { href: "#/" }, "Studies"));
   const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name and notes");
-  const element = h("header", { class: "experiment-head" }, trail, h("div", { class: "titled" }, title, state, editButton),
+  const element = h("header", { class: "experiment-head" }, trail, h("div", { class: "titled" }, title, state, editButton, newFromThis(`/studies/${page.id}`)),
     notes, h("div", { class: "whole" }, bar.element), facts, remarks, buttons.element, links(page));
   return { element, update };
 }
