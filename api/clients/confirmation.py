@@ -31,20 +31,18 @@ def sentence(estimate: EstimateRead) -> str:
     pace = "" if measured else ", at the engine's usual pace"
     cores = _count(estimate.cores, "core")
     waiting = "" if estimate.supervisors else "; no supervisor runs, so nothing starts yet"
-    return (
-        f"{size}: at most {estimate.rollouts:,} rollouts, about {duration(estimate.seconds)} on {cores}{pace}{waiting}"
-    )
+    return f"{size}: at most {estimate.rollouts:,} rollouts, {duration(estimate.seconds)} on {cores}{pace}{waiting}"
 
 
 def duration(seconds: float) -> str:
-    """Return a duration in its two largest units, as in "2 h 5 min"."""
+    """Return a duration in its two largest units, as in "about 2 h 5 min"."""
     if seconds < 1:
         return "less than a second"
     for unit, length, smaller, part in (("d", 86_400, "h", 3_600), ("h", 3_600, "min", 60), ("min", 60, "s", 1)):
         if seconds >= length:
             whole, rest = divmod(math.floor(seconds / part), length // part)
-            return f"{whole:,} {unit} {rest} {smaller}" if rest else f"{whole:,} {unit}"
-    return f"{seconds:.0f} s"
+            return f"about {whole:,} {unit} {rest} {smaller}" if rest else f"about {whole:,} {unit}"
+    return f"about {seconds:.0f} s"
 
 
 def confirm(estimate: EstimateRead, ask: Ask | None) -> None:

@@ -14,6 +14,7 @@ from gaplab.api.commands.app import LIFE, RESULTS, SPECS, AsJson, Id, Url, app, 
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.schemas.editing import Edit
+from gaplab.schemas.mistakes import sentence
 from gaplab.schemas.provenance import ProvenanceUse
 from gaplab.schemas.records import ExperimentRead, StudyRead
 
@@ -88,8 +89,7 @@ def edit(
     try:
         checked = Edit.model_validate(changes)
     except ValidationError as error:
-        mistakes = [(wrong["loc"], wrong["msg"].removeprefix("Value error, ")) for wrong in error.errors()]
-        msg = "; ".join(f"--{place[0]}: {message}" if place else message for place, message in mistakes)
+        msg = "; ".join(f"{'--' if wrong['loc'] else ''}{sentence(wrong)}" for wrong in error.errors())
         raise CommandError(msg, Exit.INVALID) from error
     with connect(url) as client:
         record = client.edit(id, checked)

@@ -131,6 +131,8 @@ def look(ask: Callable[..., Any], id: str, other: str) -> None:
     experiments = [each["id"] for each in ask("show", id)["study"]["experiments"]]
     assert set(ask("show", experiments[0])) == {"experiment", "repetitions", "provenance", "misfit"}
     assert [each["experiment"] for each in ask("curve", id)] == experiments
+    assert ask("compare", id)[0]["first"] == experiments[0]
+    assert ask("spec", id)["spec"]["strategies"] == STUDY["strategies"]
     assert "strategies" in ask("catalogue")
     assert ask("catalogue", "random")["name"] == "random"
     assert {each["kind"] for each in ask("events", id)} > {"submitted", "completed"}
@@ -141,6 +143,7 @@ def keep(ask: Callable[..., Any], id: str, folder: Path) -> None:
     archive, figure, copy = (str(folder / name) for name in ("a.zip", "f.svg", "copy.db"))
     assert ask("export", id, "--to", archive)["file"] == archive
     assert ask("import", archive)["renamed"]
+    assert ask("rerun", archive)["state"] == "QUEUED"
     assert ask("figure", "curves", id, "--out", figure)[0]["bytes"] == Path(figure).stat().st_size
     assert ask("backup", copy)["bytes"] > 0
 
