@@ -64,7 +64,8 @@ class SharedSettings(Frozen):
     )
     robot: PluginRef = PluginRef(name="quadruped")
     engine: PluginRef | None = Field(
-        default=None, description="engine of the simulators; default: the robot's, PyBullet for the quadruped"
+        default=None,
+        description="engine of the simulators; default: the robot's, for the quadruped PyBullet, and MuJoCo where PyBullet has no wheels (Python 3.12 and later)",
     )
     optimizer: PluginRef = PluginRef(name="steady_state")
     tunables: tuple[TunableRef, ...] = Field(

@@ -17,6 +17,8 @@ from gaplab.services import access
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import Store
 
+NONE_LEFT = "No token is left, and the service refuses every request; `gaplab token create --role admin` makes one."
+
 tokens = typer.Typer(
     help="Manage the tokens that the service accepts, in the database of GAPLAB_DATABASE_URL.", no_args_is_help=True
 )
@@ -59,7 +61,10 @@ def revoke(id: Annotated[str, typer.Argument(metavar="ID", help="id of the token
     """Revoke a token; the service refuses it from the next request on."""
     with _store() as store:
         access.revoke_token(store, id)
+        left = [token for token in access.list_tokens(store) if token.revoked_at is None]
     print_result({"id": id, "revoked": True}, f"Revoked {id}.", as_json=as_json)
+    if not left:
+        typer.echo(NONE_LEFT, err=True)
 
 
 @contextmanager
