@@ -23,11 +23,15 @@ ROOMS = {
     "figures": ((), {"plotly", "matplotlib"}),
     "specs": (("core", "engines"), {"numpy"}),
     "plugins": (("core", "engines", "specs"), set()),
+    "contract": (("core", "engines", "specs", "plugins"), {"numpy"}),
     "experiments": (("core", "engines", "store", "specs", "plugins", "settings"), {"sqlalchemy"}),
     "running": (("core", "engines", "store", "plugins", "experiments"), {"sqlalchemy"}),
     "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
     "replay": (("core", "store", "specs", "plugins", "experiments", "waiting_line"), {"numpy", "cachetools"}),
-    "archives": (("core", "store", "specs", "experiments", "results", "settings"), {"pydantic", "pyarrow"}),
+    "archives": (
+        ("core", "engines", "store", "specs", "plugins", "experiments", "running", "results", "settings"),
+        {"numpy", "pydantic", "pyarrow"},
+    ),
 }
 """Rooms of services, each below those that may import it: what of services each may import, and what of others."""
 
