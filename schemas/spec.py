@@ -67,7 +67,6 @@ class SharedSettings(Frozen):
         default=None,
         description="engine of the simulators; default: the robot's, PyBullet for the quadruped (MuJoCo on Python 3.12 "
         "and later, for which PyBullet has no wheels)",
-        "and later, for which PyBullet has no wheels)",
     )
     optimizer: PluginRef = PluginRef(name="steady_state")
     tunables: tuple[TunableRef, ...] = Field(

@@ -30,6 +30,6 @@ def catalogue(
     if as_json:
         print_json(found if name is None else plugins[name])
     elif name is None:
-        console().print(*tables.catalogue(found))
+        console().print(*tables.catalogue(found), *tables.ignored(found), soft_wrap=True)
     else:
         console().print(*tables.plugin(plugins[name]), soft_wrap=True)

@@ -66,6 +66,11 @@ def catalogue(plugins: Catalogue) -> list[Table]:
     return [table((kind, "summary", "options"), map(_plugin, getattr(plugins, kind))) for kind in KINDS]
 
 
+def ignored(plugins: Catalogue) -> list[str]:
+    """Return a line for each file in a plug-in folder that is no plug-in."""
+    return [f"{escape(each.file)} is not used: {escape(each.why)}\n" for each in plugins.ignored]
+
+
 def plugin(found: PluginRead) -> list[Table | str]:
     """Return all that is known of a plug-in: summary, source, details and options."""
     lines = [f"[bold]{escape(found.name)}[/]", escape(found.summary), f"source: {escape(found.source)}"]

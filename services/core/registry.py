@@ -85,6 +85,11 @@ class Registry(Mapping[str, type[P]], Generic[P]):
         return {name: each.why for name, each in self._found.unusable.items()}
 
     @property
+    def refused(self) -> tuple[Unusable, ...]:
+        """The external plug-ins that specs cannot use."""
+        return tuple(self._found.unusable.values())
+
+    @property
     def _found(self) -> _Found[P]:
         """The plug-ins, sorted again after the plug-in folders were set again."""
         package = external_plugins.package()

@@ -9,6 +9,7 @@ from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.engines import engines
+from gaplab.services.plugins.ignored import ignored_files
 from gaplab.services.specs.default_engines import default_engine
 from gaplab.services.specs.presets import PRESETS
 
@@ -22,6 +23,7 @@ def catalogue() -> Catalogue:
         tunables=tunables.describe(),
         optimizers=optimizers.describe(),
         budgets=tuple(BudgetRead(name=name, **asdict(preset)) for name, preset in PRESETS.items()),
+        ignored=ignored_files(),
         defaults=StudySpec().model_dump(mode="json", exclude_none=True),
     )
 

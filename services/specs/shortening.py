@@ -44,7 +44,7 @@ def study_spec(name: str, stored: Sequence[Stored]) -> SpecRead:
     remarks = list(_hidden(stored))
     if specs != wanted:
         remarks.append("experiments were extended since; the spec has the iterations and repetitions that all have")
-    if not _gives(spec, wanted):
+    if not _gives(spec, wanted, hidden=bool(_hidden(stored))):
         return SpecRead(
             spec=None,
             resolved=tuple(map(dict, stored)),
@@ -66,14 +66,18 @@ def _common_size(specs: Sequence[ResolvedSpec]) -> tuple[Spec, list[ResolvedSpec
     return ({"direct_repetitions": direct} if direct != repetitions else {}), wanted
 
 
-def _gives(spec: Spec, wanted: Sequence[ResolvedSpec]) -> bool:
-    """Return whether the spec of a study resolves to these experiments, apart from their names."""
+def _gives(spec: Spec, wanted: Sequence[ResolvedSpec], *, hidden: bool) -> bool:
+    """Return whether the spec of a study resolves to these experiments, apart from names and hidden parameters."""
     try:
         found = resolve_study(StudySpec.model_validate(spec))
     except (GaplabError, ValueError):
         return False
-    unnamed = {"name", *SCHEDULE}
-    return [each.model_dump(exclude=unnamed) for each in found] == [each.model_dump(exclude=unnamed) for each in wanted]
+    left_out: dict[str, Any] = dict.fromkeys({"name", *SCHEDULE}, True)
+    if hidden:
+        left_out["reality"] = {"parameters"}
+    return [each.model_dump(exclude=left_out) for each in found] == [
+        each.model_dump(exclude=left_out) for each in wanted
+    ]
 
 
 def _complete(spec: ResolvedSpec) -> Spec:
