@@ -33,7 +33,7 @@ def restored() -> Iterator[None]:
     external_plugins.set_folders(before)
 
 
-@pytest.mark.parametrize(("plugin", "check"), own())
+@pytest.mark.parametrize(("plugin", "check"), list(own()))
 def test_each_plug_in_keeps_the_contract(plugin: type[Any], check: Check) -> None:
     check(plugin)
 
