@@ -51,12 +51,14 @@ def write_skeleton(kind: str, name: str, folder: Path) -> Path:
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or iskeyword(name):
         raise GaplabError(f"{name!r} cannot be the name of a plug-in; use small letters, digits and _, like my_{kind}")
+    file = folder / f"{name}.py"
+    if file.exists():
+        raise FileExistsError(17, "the file exists; choose another name or folder", str(file))
     if name in REGISTRIES[kind]:
         raise GaplabError(f"there is a {kind} called {name!r} already; choose another name")
     template = files("gaplab.services.contract").joinpath("skeletons", f"{kind}.txt").read_text("utf-8")
     class_name = "".join(part.capitalize() for part in name.split("_"))
     folder.mkdir(parents=True, exist_ok=True)
-    file = folder / f"{name}.py"
     with file.open("x", encoding="utf-8") as target:
         target.write(template.replace("{class}", class_name).replace("{name}", name))
     return file

@@ -144,6 +144,8 @@ def keep(ask: Callable[..., Any], id: str, folder: Path) -> None:
     assert ask("export", id, "--to", archive)["file"] == archive
     assert ask("import", archive)["renamed"]
     assert ask("rerun", archive)["state"] == "QUEUED"
+    plugin = ask("plugin new", "strategy", "mine", "--folder", str(folder))["file"]
+    assert ask("plugin check", plugin)[0]["name"] == "mine"
     assert ask("figure", "curves", id, "--out", figure)[0]["bytes"] == Path(figure).stat().st_size
     assert ask("backup", copy)["bytes"] > 0
 

@@ -104,4 +104,4 @@ def test_a_range_that_is_none_is_refused_in_words(ids: list[str], gaplab: Gaplab
     assert wrong.code == Exit.USAGE
     assert "'late' is no number of real-world evaluations" in wrong.err.replace("\n│ ", "")
     assert backwards.code == alone.code == Exit.INVALID
-    assert "two or more experiments" in alone.err
+    assert "at least 2 items" in alone.err

@@ -3,6 +3,7 @@
 import json
 import zipfile
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,11 @@ SMALL = {"strategies": ["simulated_fit", "direct"], "robot": "toy_function", "bu
 
 def stored(spec: dict[str, object]) -> list[dict[str, object]]:
     return [each.model_dump(mode="json") for each in resolve_study(StudySpec.model_validate(spec))]
+
+
+def exported(store: Store, study: str) -> bytes:
+    with export_study(store, study).file as archive:
+        return archive.read()
 
 
 def compute(store: Store) -> None:
@@ -90,7 +96,7 @@ def test_hidden_parameters_are_in_no_spec_until_the_experiment_has_ended(sqlite_
 
     with TestClient(create_app(sqlite_store), base_url="http://localhost") as api:
         before = api.get(f"/studies/{study.id}/spec")
-        archive = export_study(sqlite_store, study.id).file
+        archive = BytesIO(exported(sqlite_store, study.id))
         compute(sqlite_store)
         after = api.get(f"/studies/{study.id}/spec").json()
         one = api.get(f"/experiments/{study.experiments[0].id}/spec").json()
@@ -110,7 +116,7 @@ def test_an_archive_has_the_spec_and_is_verified_to_the_last_bit(
     study = submission.submit_study(sqlite_store, StudySpec.model_validate(SMALL | {"repetitions": 1}))
     compute(sqlite_store)
     file = tmp_path / "a.zip"
-    file.write_bytes(export_study(sqlite_store, study.id).file.read())
+    file.write_bytes(exported(sqlite_store, study.id))
 
     with zipfile.ZipFile(file) as archive:
         spec = json.loads(archive.read("spec.json"))["spec"]

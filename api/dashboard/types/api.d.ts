@@ -34,6 +34,7 @@ declare namespace Api {
     tunables: Array<PluginRead>;
     optimizers: Array<PluginRead>;
     budgets: Array<BudgetRead>;
+    ignored: Array<IgnoredFile>;
     defaults: Record<string, any>;
   }
   interface Chart {
@@ -183,6 +184,10 @@ declare namespace Api {
   interface Health {
     status: "ok" | "degraded";
     warnings: Array<string>;
+  }
+  interface IgnoredFile {
+    file: string;
+    why: string;
   }
   interface ImportRead {
     study: string | null;
