@@ -123,7 +123,7 @@ def rerun(recorded: Recorded) -> RepetitionRerun:
         experiment=recorded.experiment,
         name=recorded.name,
         repetition=recorded.number,
-        outcome=outcome,  # type: ignore[arg-type] # one of the literals
+        outcome=outcome,
         steps=same,
         stored_steps=len(recorded.log),
         reason=reason,

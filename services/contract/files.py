@@ -85,9 +85,9 @@ def check_file(file: Path) -> Iterator[Checked]:
         for plugin in own:
             found = True
             yield Checked(kind, plugin.name, tuple(results(kind, plugin)))
-    for name, kind, why in _unusable(module):
+    for name, refused_kind, why in _unusable(module):
         found = True
-        yield Checked(kind or "plug-in", name, unusable=why)
+        yield Checked(refused_kind or "plug-in", name, unusable=why)
     if not found:
         bases = ", ".join(kind.capitalize() for kind in KINDS)
         raise GaplabError(f"{file} has no plug-in; it needs a class of one of {bases} from gaplab.plugins")

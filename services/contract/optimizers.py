@@ -81,9 +81,18 @@ def compares_by_rank(plugin: Plugin) -> None:
 def lets_nan_never_win(plugin: Plugin) -> None:
     """Lets nan and infinities never win."""
     for bad in (np.nan, np.inf, -np.inf):
-        found = searched(plugin, Hill(lambda fitness, bad=bad: np.where(fitness > -0.05, bad, fitness)), 500)
+        found = searched(plugin, Hill(_spoilt(bad)), 500)
         finite = np.isfinite(found.fitness[0]) and found.fitness[0] <= -0.05
         assert finite, f"where fitness is {bad} near the summit, its best is {found.fitness[0]}"
+
+
+def _spoilt(bad: float) -> Callable[[FloatArray], FloatArray]:
+    """Return a transformation that replaces fitness near the summit."""
+
+    def spoil(fitness: FloatArray) -> FloatArray:
+        return np.where(fitness > -0.05, bad, fitness)
+
+    return spoil
 
 
 def goes_on_where_everything_fails(plugin: Plugin) -> None:

@@ -139,7 +139,7 @@ def _without(value: Any, path: Sequence[str | int]) -> Any:  # noqa: ANN401 - JS
     if inner is None:
         return None
     if isinstance(value, list):
-        return [*value[:key], inner, *value[key + 1 :]]
+        return [inner if index == key else item for index, item in enumerate(value)]
     return {**value, key: inner}
 
 

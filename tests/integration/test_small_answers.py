@@ -94,7 +94,7 @@ def test_where_the_robots_engine_is_not_installed_another_of_gaplabs_own_runs_it
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Iterator[Path]:
+def plugin_folder(tmp_path: Path) -> Iterator[Path]:
     before = external_plugins.named_folders()
     external_plugins.set_folders((tmp_path,))
     yield tmp_path
@@ -117,7 +117,7 @@ class {cls}(Strategy):
 
 
 def test_a_plug_in_that_is_added_or_repaired_needs_no_restart(
-    folder: Path, sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+    plugin_folder: Path, sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gaplab.services.plugins.watching.LOOK_S", 0.0)
     with TestClient(create_app(sqlite_store), base_url="http://localhost") as api:
@@ -126,11 +126,11 @@ def test_a_plug_in_that_is_added_or_repaired_needs_no_restart(
             return {each["name"]: each["available"] for each in api.get("/catalogue").json()["strategies"]}
 
         before = names()
-        (folder / "mine.py").write_text(PLUGIN.format(cls="Mine", name="mine"))
+        (plugin_folder / "mine.py").write_text(PLUGIN.format(cls="Mine", name="mine"))
         added = names()
-        (folder / "mine.py").write_text("import nowhere\n" + PLUGIN.format(cls="Mine", name="mine"))
+        (plugin_folder / "mine.py").write_text("import nowhere\n" + PLUGIN.format(cls="Mine", name="mine"))
         broken = names()
-        (folder / "mine.py").write_text(PLUGIN.format(cls="Mine", name="yours"))
+        (plugin_folder / "mine.py").write_text(PLUGIN.format(cls="Mine", name="yours"))
         repaired = names()
         accepted = api.post("/experiments", json={"strategy": "yours", "robot": "toy_function"})
 
@@ -140,13 +140,15 @@ def test_a_plug_in_that_is_added_or_repaired_needs_no_restart(
     assert accepted.status_code == 202
 
 
-def test_a_file_that_is_no_plug_in_is_named(folder: Path, gaplab: Gaplab) -> None:
-    (folder / "robot.urdf").write_text("<robot/>")
-    (folder / "data").mkdir()
-    (folder / "extra.py").write_text("X = 1\n")
-    (folder / "_shared.py").write_text("X = 1\n")
-    (folder / "used.py").write_text("X = 1\n")
-    (folder / "mine.py").write_text("from gaplab_plugins.used import X\n" + PLUGIN.format(cls="Mine", name="mine"))
+def test_a_file_that_is_no_plug_in_is_named(plugin_folder: Path, gaplab: Gaplab) -> None:
+    (plugin_folder / "robot.urdf").write_text("<robot/>")
+    (plugin_folder / "data").mkdir()
+    (plugin_folder / "extra.py").write_text("X = 1\n")
+    (plugin_folder / "_shared.py").write_text("X = 1\n")
+    (plugin_folder / "used.py").write_text("X = 1\n")
+    (plugin_folder / "mine.py").write_text(
+        "from gaplab_plugins.used import X\n" + PLUGIN.format(cls="Mine", name="mine")
+    )
 
     found = {each.file: each.why for each in ignored_files()}
 
