@@ -32,7 +32,7 @@ export function specIn(text) {
   } catch (error) {
     throw new Error(`This is not JSON: ${error.message}`, { cause: error });
   }
-  if (found === null || typeof found !== "object" || Array.isArray(found)) throw new Error('A spec is an object, like {"robot": "toy_function"}.');
+  if (found === null || typeof found !== "object" || Array.isArray(found)) throw new Error('A spec is an object, like {"budget": "smoke"}.');
   return found;
 }
 
@@ -42,7 +42,7 @@ export function specIn(text) {
  * @param {(spec: Spec) => void} fill fills the form
  */
 export function pasteField(fill) {
-  const area = h("textarea", { id: "pasted", rows: 8, spellcheck: "false", placeholder: '{"strategies": ["simulated_fit", "random"], "budget": "smoke"}' });
+  const area = h("textarea", { id: "pasted", rows: 8, spellcheck: "false", placeholder: '{"budget": "smoke", "repetitions": 3}' });
   const troubles = h("div", { role: "alert", class: "trouble" });
   const element = h("details", { class: "paste" }, h("summary", {}, "Paste a spec"),
     h("label", { for: "pasted" }, "Spec of a study or an experiment, as JSON"), area, troubles,
