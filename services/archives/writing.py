@@ -84,7 +84,7 @@ def _export(
                     members[member_of(table)] = _add(archive, member_of(table), part, count)
             points = TypeAdapter(tuple[Curve, ...]).dump_json(curves.curves_of(session, ids))
             members[CURVES] = _add(archive, CURVES, BytesIO(points), len(ids))
-            members[SPEC] = _add(archive, SPEC, BytesIO(_spec(session, study, owners, hidden)), 1)
+            members[SPEC] = _add(archive, SPEC, BytesIO(_spec(session, study, owners, hidden)), 0)
             manifest = Manifest(
                 format=FORMAT, gaplab=version("gaplab"), revision=REVISION, kind=kind, id=id_, members=members
             )
