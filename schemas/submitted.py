@@ -14,5 +14,5 @@ class SpecRead(Frozen):
         description="the shortest spec that gives the same; null if no single spec gives all experiments",
         examples=[{"strategies": ["simulated_fit", "random"], "engine": "mujoco", "budget": "smoke"}],
     )
-    resolved: tuple[dict[str, Any], ...] = Field(description="the complete spec of each experiment")
+    resolved: tuple[dict[str, Any], ...] = Field(default=(), description="the complete spec of each experiment")
     remarks: tuple[str, ...] = Field(default=(), description="what the spec lacks, in words")
