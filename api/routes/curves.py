@@ -23,7 +23,14 @@ _ROWS = """experiment,name,strategy,repetition,evaluations,fitness
 """
 _CSV: Responses = {200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": _ROWS}}}}
 _TABLE = {"schema": {"type": "string"}, "example": "first,first_name,second,second_name,from_evaluations,…\n"}
-_TABLES: Responses = {200: {"content": {"text/csv": _TABLE, "application/x-latex": {"schema": {"type": "string"}}}}}
+_TABLES: Responses = {
+    200: {
+        "content": {
+            "text/csv": _TABLE,
+            "application/x-latex": {"schema": {"type": "string"}, "example": "\\begin{table}…"},
+        }
+    }
+}
 
 
 class CurveQuery(Parameters):
