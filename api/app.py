@@ -8,7 +8,7 @@ from fastapi.middleware.gzip import GZipMiddleware
 
 from gaplab.api.http import documentation, problems
 from gaplab.api.http.access import Access
-from gaplab.api.http.dependencies import refuse_repeated_parameters
+from gaplab.api.http.dependencies import refuse_repeated_parameters, reload_plugins
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.http.limits import SPARE, BodyLimit, RequestLimit, Streams, most_requests
 from gaplab.api.http.metrics import Metrics, RequestCounter
@@ -32,6 +32,7 @@ from gaplab.api.routes import (
     replays,
     reports,
     sensitivity,
+    specs,
     studies,
     views,
     webhooks,
@@ -69,6 +70,7 @@ MODULES = (
     studies,
     estimates,
     experiments,
+    specs,
     lifecycle,
     keeping,
     views,
@@ -88,6 +90,10 @@ MODULES = (
     metrics,
 )
 """The modules of the API, in the order of the documentation."""
+
+
+RELOADING = (studies, estimates, experiments, sensitivity, catalogue)
+"""The modules whose answers depend on the plug-ins: these are imported again if their files were changed."""
 
 
 def create_app(
@@ -127,7 +133,8 @@ def create_app(
     app.add_middleware(RequestCounter, metrics=app.state.metrics)
     problems.install(app)
     for module in MODULES:
-        app.include_router(module.router, dependencies=[Depends(refuse_repeated_parameters)])
+        reloading = [Depends(reload_plugins)] if module in RELOADING else []
+        app.include_router(module.router, dependencies=[Depends(refuse_repeated_parameters), *reloading])
     figures.install(app)
     dashboard.install(app)
     documentation.install(app)

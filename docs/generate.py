@@ -90,7 +90,7 @@ def python() -> Iterator[str]:
     yield "`from gaplab import Client`. Methods raise `ServiceError`, which has the service's `problem`, and"
     yield "`ServiceUnreachable`; some raise `ExperimentFailed` or `ExtraMissing`. Import all of them from `gaplab`.\n"
     yield f"## Client{_signature(Client.__init__)}\n\n{_docstring(Client)}\n"
-    with Client("") as client:
+    with Client("http://127.0.0.1") as client:
         methods = inspect.getmembers(client, inspect.ismethod)
     for name, method in (each for each in methods if not each[0].startswith("_")):
         yield f"## {name}{_signature(method)}\n\n{_docstring(method)}\n"

@@ -55,6 +55,8 @@ class Comparison(Frozen):
 
     first: Id
     second: Id
+    first_name: Name = ""
+    second_name: Name = ""
     from_evaluations: int
     to_evaluations: int
     caution: str | None = Field(

@@ -62,21 +62,18 @@ class Client:
         self.keeping = keeping = Keeping(connection, records)
         self.results = results = Results(connection, records)
         self.tables = tables = Tables(connection, results)
-        self.figures = figures = Figures(connection, records)
-        self.archives = archives = Archives(connection, records)
+        self.figures, self.archives = figures, archives = Figures(connection, records), Archives(connection, records)
         self.reports, self.replays = reports, replays = Reports(connection, records), Replays(connection)
-        self.event_log = event_log = EventLog(connection)
-        self.watcher = watcher = Watcher(records, results)
+        self.event_log, self.watcher = event_log, watcher = EventLog(connection), Watcher(records, results)
 
         self.submit, self.estimate, self.check = submission.submit, submission.estimate, submission.check
         self.find, self.study, self.experiment = records.find, records.study, records.experiment
         self.studies, self.experiments, self.edit = records.studies, records.experiments, records.edit
         self.repetitions, self.attempts, self.reveal = records.repetitions, records.attempts, records.reveal
-        self.provenance, self.accept_versions = records.provenance, life_cycle.accept_versions
+        self.spec, self.provenance, self.accept_versions = records.spec, records.provenance, life_cycle.accept_versions
         self.pause, self.resume, self.stop = life_cycle.pause, life_cycle.resume, life_cycle.stop
         self.cancel, self.extend, self.schedule = life_cycle.cancel, life_cycle.extend, life_cycle.schedule
-        self.retry, self.notify = life_cycle.retry, keeping.notify
-        self.tag, self.untag = keeping.tag, keeping.untag
+        self.retry, self.notify, self.tag, self.untag = life_cycle.retry, keeping.notify, keeping.tag, keeping.untag
         self.archive, self.unarchive, self.delete = keeping.archive, keeping.unarchive, keeping.delete
         self.views, self.save_view, self.delete_view = keeping.views, keeping.save_view, keeping.delete_view
         self.curves, self.curves_of, self.curves_csv = results.curves, results.curves_of, results.curves_csv
@@ -84,14 +81,9 @@ class Client:
         self.curve, self.samples = tables.curve, tables.samples
         self.simulators, self.predictions = tables.simulators, tables.predictions
         self.figure, self.figure_kinds = figures.draw, figures.kinds
-        self.verdict, self.report, self.replay, self.video = (
-            reports.verdict,
-            reports.save,
-            replays.replay,
-            replays.video,
-        )
-        self.export, self.import_ = archives.export, archives.import_
-        self.events = event_log.events
+        self.verdict, self.report = reports.verdict, reports.save
+        self.replay, self.video = replays.replay, replays.video
+        self.export, self.import_, self.events = archives.export, archives.import_, event_log.events
         self.watch, self.wait = watcher.watch, watcher.wait
 
     def __enter__(self) -> Self:

@@ -10,6 +10,7 @@ from gaplab.api.clients.errors import ServiceError
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.provenance import ProvenanceRead
 from gaplab.schemas.records import AttemptRead, ExperimentRead, Page, RepetitionRead, StudyRead
+from gaplab.schemas.submitted import SpecRead
 
 PAGE = 100
 """Experiments of one request of `all_experiments`."""
@@ -57,6 +58,10 @@ class Records:
             if error.problem.status != httpx2.codes.NOT_FOUND:
                 raise
         return self.experiment(id)
+
+    def spec(self, id: str) -> SpecRead:
+        """Return the spec of a study or an experiment: the shortest one that gives the same, and the complete one."""
+        return self._connection.get(SpecRead, f"{path_of(self.find(id))}/spec")
 
     def studies(self, *, query: str | None = None, **filters: str | int | None) -> Page[StudyRead]:
         """Return studies, newest first.

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
-from gaplab.api.clients.connection import Connection, segment
+from gaplab.api.clients.comparisons import Comparisons
+from gaplab.api.clients.connection import Connection, Parameter, segment
 from gaplab.api.clients.records import Records, experiments_of, split
 from gaplab.schemas.curves import Comparison, Curve
 from gaplab.schemas.differences import SpecDiff
@@ -35,21 +36,26 @@ class Results:
         first, *others = (self._connection.get_bytes("/curves", **request).decode() for request in requests)
         return first + "".join(other.partition("\n")[2] for other in others)  # the header stands once
 
-    def compare(
-        self, experiments: Sequence[str], first: int | None = None, last: int | None = None
-    ) -> tuple[Comparison, ...]:
-        """Compare every pair of experiments after one number of real-world evaluations, or pooled over a range.
+    def compare(self, experiments: Sequence[str], first: int | None = None, last: int | None = None) -> Comparisons:
+        """Compare every pair of experiments by three tests, with Holm's correction over all pairs.
+
+        A pooled range is the paper's test, whose p are too small: see `caution` of the result.
 
         Args:
-            experiments: ids of two or more experiments.
-            first: the number, or the first one of the range; left out: the last that the experiments share.
-            last: the last number of the range; left out: `first`. A pooled range is the paper's test, whose p are too
-                small: see `caution` of the result.
+            experiments: ids of experiments, or of studies for all of their experiments.
+            first: first number of real-world evaluations to pool; left out: `last`.
+            last: last number to pool; left out: the last that all experiments have.
         """
-        if first is None:
-            first = last if last is not None else self.common_count(experiments)
-        counts = {"from": first, "to": first if last is None else last}
-        return self._connection.get(tuple[Comparison, ...], "/comparisons", experiment=list(experiments), **counts)
+        records = [each for id in experiments for each in experiments_of(self._records.find(id))]
+        last = (common_count(records) or 0) if last is None else last
+        query: dict[str, Parameter] = {"experiment": [each.id for each in records], "to": last}
+        query["from"] = last if first is None else first
+        pairs = self._connection.get(tuple[Comparison, ...], "/comparisons", **query)
+
+        def formatted(format: str) -> str:  # noqa: A002 - as the API says
+            return self._connection.get_bytes("/comparisons", format=format, **query).decode()
+
+        return Comparisons(pairs, formatted)
 
     def diff(self, *ids: str) -> SpecDiff:
         """Return the settings in which studies and experiments differ; of a single study, its experiments."""

@@ -10,7 +10,7 @@ from gaplab.api.clients.client import Client
 from gaplab.api.clients.progress.text import console
 from gaplab.api.clients.records import experiments_of
 from gaplab.api.commands import completion, tables
-from gaplab.api.commands.app import AsJson, Url, app, connect
+from gaplab.api.commands.app import RESULTS, AsJson, Url, app, connect
 from gaplab.api.commands.json_output import print_json
 from gaplab.api.commands.spec_columns import column_of
 from gaplab.schemas.differences import SpecDiff, Values
@@ -28,7 +28,7 @@ Compared = Annotated[
 ]
 
 
-@app.command()
+@app.command(rich_help_panel=RESULTS)
 def diff(of: Compared, as_json: AsJson = False, url: Url = None) -> None:
     """Show the settings in which studies, experiments, archives or specs differ."""
     if any(Path(name).suffix in FILES for name in of):

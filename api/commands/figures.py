@@ -8,11 +8,11 @@ import typer
 from gaplab.api.clients.figures import FORMATS
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands import completion, tables
-from gaplab.api.commands.app import AsJson, Ids, Url, app, connect
+from gaplab.api.commands.app import RESULTS, AsJson, Ids, Url, app, connect
 from gaplab.api.commands.json_output import print_json, print_result
 
 
-@app.command()
+@app.command(rich_help_panel=RESULTS)
 def curve(
     ids: Ids,
     csv: Annotated[bool, typer.Option("--csv", help="print comma-separated values")] = False,
@@ -38,7 +38,7 @@ def curve(
                 typer.echo(f"Wrote {file}.", err=as_json or csv)
 
 
-@app.command()
+@app.command(rich_help_panel=RESULTS)
 def figure(
     kind: Annotated[str, typer.Argument(metavar="KIND", help="like curves", autocompletion=completion.figures)],
     ids: Ids,

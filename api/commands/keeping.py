@@ -8,7 +8,7 @@ from rich.markup import escape
 
 from gaplab.api.clients.progress.text import console
 from gaplab.api.clients.records import Record, experiments_of
-from gaplab.api.commands.app import AsJson, Id, Url, app, connect
+from gaplab.api.commands.app import KEEPING, RESULTS, AsJson, Id, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.api.commands.tables import table
@@ -18,10 +18,10 @@ from gaplab.schemas.views import Order, Shown, ViewRead
 ViewName = Annotated[str, typer.Argument(metavar="NAME", help="name of the view")]
 
 views = typer.Typer(help="List, save and delete saved views: queries that all users share.", no_args_is_help=False)
-app.add_typer(views, name="views")
+app.add_typer(views, name="views", rich_help_panel=RESULTS)
 
 
-@app.command()
+@app.command(rich_help_panel=KEEPING)
 def tag(
     id: Id,
     tags: Annotated[list[str], typer.Argument(metavar="TAG...", help="tags, like gait")],
@@ -35,7 +35,7 @@ def tag(
     print_result(record, f"{record.id}: {record.name} [{', '.join(record.tags)}]", as_json=as_json)
 
 
-@app.command()
+@app.command(rich_help_panel=KEEPING)
 def archive(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     """Leave a study or an experiment that has ended out of lists; everything else stays."""
     with connect(url) as client:
@@ -44,7 +44,7 @@ def archive(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     print_result(record, text, as_json=as_json)
 
 
-@app.command()
+@app.command(rich_help_panel=KEEPING)
 def unarchive(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     """List an archived study or experiment again."""
     with connect(url) as client:
@@ -52,7 +52,7 @@ def unarchive(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     print_result(record, f"{record.name} is listed again.", as_json=as_json)
 
 
-@app.command()
+@app.command(rich_help_panel=KEEPING)
 def delete(
     id: Id,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask; without a terminal nothing is asked")] = False,
@@ -68,7 +68,7 @@ def delete(
     print_result(deleted, f"{deleted.name} ({deleted.id}) is deleted.", as_json=as_json)
 
 
-@app.command()
+@app.command(rich_help_panel=KEEPING)
 def notify(
     id: Id,
     webhook: Annotated[

@@ -12,15 +12,16 @@ from gaplab.api.clients.client import Client
 from gaplab.api.clients.progress.text import best, console, counts
 from gaplab.api.clients.records import Record
 from gaplab.api.commands import tables
-from gaplab.api.commands.app import AsJson, Id, Url, app, connect, print_warnings
+from gaplab.api.commands.app import LIFE, RESULTS, SPECS, AsJson, Id, Url, app, connect, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.schemas.editing import Edit
+from gaplab.schemas.mistakes import sentence
 from gaplab.schemas.provenance import ProvenanceUse
 from gaplab.schemas.records import ExperimentRead, StudyRead
 
 
-@app.command("list")
+@app.command("list", rich_help_panel=RESULTS)
 def list_(
     experiments: Annotated[bool, typer.Option("--experiments", help="experiments instead of studies")] = False,
     query: Annotated[
@@ -42,18 +43,46 @@ def list_(
     console().print(tables.overview(newest) if newest else nothing)
 
 
-@app.command()
-def show(id: Id, as_json: AsJson = False, url: Url = None) -> None:
+@app.command(rich_help_panel=RESULTS)
+def show(
+    id: Id,
+    with_spec: Annotated[bool, typer.Option("--spec", help="also print the complete spec of an experiment")] = False,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
     """Show the experiments of a study, or the repetitions of an experiment."""
     with connect(url) as client:
         record = client.find(id)
         if isinstance(record, StudyRead):
             _show_study(record, as_json=as_json)
         else:
-            _show_experiment(client, record, as_json=as_json)
+            _show_experiment(client, record, as_json=as_json, with_spec=with_spec)
 
 
-@app.command()
+@app.command(rich_help_panel=SPECS)
+def spec(
+    id: Id,
+    resolved: Annotated[
+        bool, typer.Option("--resolved", help="every field, as stored; for a study, a list of its experiments")
+    ] = False,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Print a spec that gives the same study or experiment again, for `gaplab submit`."""
+    with connect(url) as client:
+        record, found = client.find(id), client.spec(id)
+    complete = found.resolved if isinstance(record, StudyRead) else found.resolved[0]
+    for remark in found.remarks:
+        typer.echo(f"note: {remark}", err=True)
+    if as_json:
+        print_json(found)
+    elif resolved or found.spec is not None:
+        print_json(complete if resolved else found.spec)
+    else:
+        raise CommandError(f"no single spec gives {record.name}; --resolved prints those of its experiments")
+
+
+@app.command(rich_help_panel=LIFE)
 def edit(
     id: Id,
     name: Annotated[str | None, typer.Option(help="new name", show_default=False)] = None,
@@ -68,8 +97,7 @@ def edit(
     try:
         checked = Edit.model_validate(changes)
     except ValidationError as error:
-        mistakes = [(wrong["loc"], wrong["msg"].removeprefix("Value error, ")) for wrong in error.errors()]
-        msg = "; ".join(f"--{place[0]}: {message}" if place else message for place, message in mistakes)
+        msg = "; ".join(f"{'--' if wrong['loc'] else ''}{sentence(wrong)}" for wrong in error.errors())
         raise CommandError(msg, Exit.INVALID) from error
     with connect(url) as client:
         record = client.edit(id, checked)
@@ -86,7 +114,7 @@ def _show_study(study: StudyRead, *, as_json: bool) -> None:
     print_warnings(study)
 
 
-def _show_experiment(client: Client, experiment: ExperimentRead, *, as_json: bool) -> None:
+def _show_experiment(client: Client, experiment: ExperimentRead, *, as_json: bool, with_spec: bool) -> None:
     repetitions, misfit = client.repetitions(experiment.id), client.misfit(experiment.id)
     provenance = client.provenance(experiment.id)
     if as_json:
@@ -100,7 +128,8 @@ def _show_experiment(client: Client, experiment: ExperimentRead, *, as_json: boo
         screen.print(f"computed with {_software(use)}", markup=False, soft_wrap=True)
     if misfit.remarks:
         screen.print(tables.tuned(misfit), *misfit.remarks, sep="\n", markup=False)
-    screen.print_json(data=experiment.spec)
+    if with_spec:
+        screen.print_json(data=experiment.spec)
     print_warnings(experiment)
 
 

@@ -6,13 +6,13 @@ from typing import Annotated
 import typer
 
 from gaplab.api.clients.replays import FORMATS
-from gaplab.api.commands.app import AsJson, ExperimentId, Url, app, connect
+from gaplab.api.commands.app import RESULTS, AsJson, ExperimentId, Url, app, connect
 from gaplab.api.commands.figures import named_option
 from gaplab.api.commands.json_output import print_json
 from gaplab.schemas.replays import ReplayWorld
 
 
-@app.command()
+@app.command(rich_help_panel=RESULTS)
 def replay(
     id: ExperimentId,
     save: Annotated[

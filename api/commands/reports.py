@@ -6,11 +6,11 @@ from typing import Annotated
 import typer
 
 from gaplab.api.clients.reports import FORMATS
-from gaplab.api.commands.app import AsJson, Id, Url, app, connect
+from gaplab.api.commands.app import RESULTS, AsJson, Id, Url, app, connect
 from gaplab.api.commands.json_output import print_json
 
 
-@app.command()
+@app.command(rich_help_panel=RESULTS)
 def report(
     id: Id,
     save: Annotated[

@@ -16,6 +16,7 @@ from gaplab.services.access import Caller, demand
 from gaplab.services.core.errors import InvalidSpec, NotFound
 from gaplab.services.experiments.idempotency import Once
 from gaplab.services.experiments.limits import Admission
+from gaplab.services.plugins import watching
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.store.session import Store
 
@@ -95,6 +96,11 @@ async def refuse_repeated_parameters(request: Request) -> None:
     """
     if repeated := repeated_parameters(request):
         raise InvalidSpec(repeated)
+
+
+def reload_plugins() -> None:
+    """Import the plug-ins again if their files were changed, so that a request needs no restart of the service."""
+    watching.reload()
 
 
 class Parameters(BaseModel):

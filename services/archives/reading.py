@@ -7,6 +7,7 @@ had ended arrives unchanged, to the last bit.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -69,15 +70,30 @@ def import_archive(store: Store, file: IO[bytes], *, most_rows: int | None = Non
     if not _SLOTS.acquire(blocking=False):
         raise Conflict(f"{AT_ONCE} archives are being imported already; try again when they are done")
     try:
-        with TemporaryDirectory(prefix="gaplab-import-") as folder:
-            opened = open_archive(file, Path(folder), most_rows or Limits().imported_rows)
-            with store.reading() as session:
-                now = archives.database_time(session)
-            with private_store(Path(folder) / "checked.db") as private:
-                checked = private.write(_check, private, opened, now)
-                return store.write(_copy, checked)
+        with store.reading() as session:
+            now = archives.database_time(session)
+        with checked_archive(file, now, most_rows=most_rows) as checked:
+            return store.write(_copy, checked)
     finally:
         _SLOTS.release()
+
+
+@contextmanager
+def checked_archive(file: IO[bytes], now: datetime, *, most_rows: int | None = None) -> Iterator[CheckedArchive]:
+    """Yield the content of an archive in a private database, which is deleted afterwards.
+
+    Args:
+        file: seekable file, at its beginning.
+        now: when work that the archive shows under way counts as ended.
+        most_rows: most rows of all tables together; left out: the default of the setting.
+
+    Raises:
+        InvalidArchive: the file is damaged, harmful, too large or not an archive.
+    """
+    with TemporaryDirectory(prefix="gaplab-import-") as folder:
+        opened = open_archive(file, Path(folder), most_rows or Limits().imported_rows)
+        with private_store(Path(folder) / "checked.db") as private:
+            yield private.write(_check, private, opened, now)
 
 
 def _check(session: Session, private: Store, opened: OpenedArchive, now: datetime) -> CheckedArchive:

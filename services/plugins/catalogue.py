@@ -2,13 +2,15 @@
 
 from dataclasses import asdict
 
-from gaplab.schemas.plugin import BudgetRead, Catalogue
+from gaplab.schemas.plugin import BudgetRead, Catalogue, PluginRead
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.engines import engines
+from gaplab.services.plugins.ignored import ignored_files
+from gaplab.services.specs.default_engines import default_engine
 from gaplab.services.specs.presets import PRESETS
 
 
@@ -16,10 +18,18 @@ def catalogue() -> Catalogue:
     """Return every plug-in of every kind, by name, and the named budgets."""
     return Catalogue(
         strategies=strategies.describe(),
-        robots=robots.describe(),
+        robots=tuple(map(_with_engine_of_here, robots.describe())),
         engines=engines.describe(),
         tunables=tunables.describe(),
         optimizers=optimizers.describe(),
         budgets=tuple(BudgetRead(name=name, **asdict(preset)) for name, preset in PRESETS.items()),
+        ignored=ignored_files(),
         defaults=StudySpec().model_dump(mode="json", exclude_none=True),
     )
+
+
+def _with_engine_of_here(robot: PluginRead) -> PluginRead:
+    """Return a robot's entry with the engine that a spec without one gets on this machine."""
+    if not robot.available or "engine" not in robot.details:
+        return robot
+    return robot.model_copy(update={"details": robot.details | {"engine": default_engine(robots[robot.name])}})

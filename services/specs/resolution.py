@@ -18,6 +18,7 @@ from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.tunables import tunables
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.specs.default_engines import default_engine, runs
 from gaplab.services.specs.presets import PRESETS
 from gaplab.services.specs.violations import bounds_of, budget_violations, reality_violations, tunable_violations
 
@@ -33,7 +34,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         lambda: strategies.create(spec.strategy, "/strategy"),
         lambda: optimizers.create(spec.optimizer, "/optimizer"),
     )
-    simulated = spec.engine or PluginRef(name=robot.engine)
+    simulated = spec.engine or PluginRef(name=default_engine(robot))
     real = spec.reality.engine or simulated
     engine, reality_engine = gather(
         lambda: _engine(simulated, robot, "/engine"),
@@ -151,7 +152,7 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
 def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
     """Return the engine if it is installed and can run the robot."""
     engine, _ = engines.check(ref, pointer)
-    able = [name for name, each in engines.items() if _runs(each, robot)]
+    able = [name for name, each in engines.items() if runs(each, robot.world)]
     if ref.name not in able:
         message = f"{ref.name} cannot run the {robot.name}; {' and '.join(able)} can"
         raise InvalidSpec([Violation(pointer, ref.name, message, able)])
@@ -159,14 +160,6 @@ def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
         installed = [name for name in able if engines[name].available()]
         raise InvalidSpec([Violation(pointer, ref.name, f"not installed: {engine.install}", installed)])
     return engine
-
-
-def _runs(engine: type[Engine], robot: Robot) -> bool:
-    """Return whether the engine can run the robot; one that raises cannot."""
-    try:
-        return engine.runs(robot.world)
-    except Exception:  # noqa: BLE001 - an external engine concerns only the specs that name it
-        return False
 
 
 def _completed(registry: Registry[Any], ref: PluginRef) -> PluginRef:

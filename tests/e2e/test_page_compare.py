@@ -202,3 +202,16 @@ def test_it_is_accessible_and_fits_a_phone(archive: Any, ids: Any, visit: Any, d
         fits(page)
         page.get_by_text("Every pair, at every range").click()
         screenshot(page, f"compare-{'dark' if dark else 'light'}-{width}")
+
+
+def test_the_tests_of_all_pairs_are_copied_as_a_table(archive: Any, ids: Any, visit: Any) -> None:
+    page = visit(address(archive, *ids[:3]))
+    page.get_by_role("button", name="Copy as LaTeX").click()
+    expect(page.get_by_role("button", name="Copied")).to_be_visible()
+    latex = page.evaluate("() => navigator.clipboard.readText()")
+    page.get_by_role("button", name="Copy as CSV").click()
+    expect(page.get_by_role("button", name="Copied").first).to_be_visible()
+
+    page.wait_for_function("async () => (await navigator.clipboard.readText()).startsWith('first,')")
+    assert latex.count(r" \\") == 1 + 3
+    assert r"\toprule" in latex

@@ -269,3 +269,28 @@ def test_the_line_for_curl_is_one_that_every_shell_takes(visit: Any, archive: An
     call = page.locator(".calls code").first.text_content()
 
     assert call == f"curl '{archive.url}/studies/{published['id']}/curves?format=csv'"
+
+
+def test_a_study_is_opened_in_the_form_changed_and_pasted(visit: Any, archive: Any, published: Any) -> None:
+    visit.forgive(*REFUSED)
+    page = visit(f"{archive.url}/#/studies/{published['id']}")
+    page.get_by_role("button", name="New from this").click()
+    page.locator(".panel .big").wait_for()
+    spec = json.loads(page.locator("#panel-json code").text_content())
+    again = archive.get(f"/studies/{published['id']}/spec")["spec"]
+    answers = [archive.http.post("/studies/estimate", json=each).json()["specs"] for each in (spec, again)]
+    assert answers[0] == answers[1]
+
+    page.get_by_text("Paste a spec").click()
+    pasted = page.get_by_label("Spec of a study or an experiment, as JSON")
+    pasted.fill('{"strategy": "randon", "robot": "toy_function"}')
+    page.get_by_role("button", name="Fill the form").click()
+    page.locator(".paste .trouble", has_text="random").wait_for()
+    axe(page)
+    screenshot(page, "new-pasted")
+    pasted.fill('{"strategy": "random", "robot": "toy_function"}')
+    page.get_by_role("button", name="Fill the form").click()
+    page.locator(".paste:not([open])").wait_for()
+
+    spec = json.loads(page.locator("#panel-json code").text_content())
+    assert (spec["strategies"], spec["robot"]) == (["random"], "toy_function")

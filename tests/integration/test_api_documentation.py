@@ -21,6 +21,9 @@ METHODS = {"get", "post", "put", "patch", "delete"}
 ENDPOINTS = {
     "POST /studies",
     "POST /studies/estimate",
+    "POST /experiments/estimate",
+    "GET /studies/{id}/spec",
+    "GET /experiments/{id}/spec",
     "GET /studies",
     "GET /studies/{id}",
     "GET /studies/{id}/curves",
@@ -98,6 +101,9 @@ ENDPOINTS = {
 OPERATIONS = {
     "submit_study",
     "estimate_study",
+    "estimate_experiment",
+    "read_study_spec",
+    "read_experiment_spec",
     "list_studies",
     "read_study",
     "edit_study",

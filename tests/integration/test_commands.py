@@ -145,6 +145,8 @@ def look(ask: Callable[..., Any], id: str, other: str) -> None:
     assert [each["experiment"] for each in ask("curve", id)] == experiments
     assert [column["id"] for column in ask("diff", id, other)["columns"]] == [id, other]
     assert ask("report", id)["headline"]
+    assert ask("compare", id)[0]["first"] == experiments[0]
+    assert ask("spec", id)["spec"]["strategies"] == STUDY["strategies"]
     assert "strategies" in ask("catalogue")
     assert ask("catalogue", "random")["name"] == "random"
     assert {each["kind"] for each in ask("events", id)} > {"submitted", "completed"}
@@ -155,6 +157,9 @@ def keep(ask: Callable[..., Any], id: str, folder: Path) -> None:
     archive, figure, copy = (str(folder / name) for name in ("a.zip", "f.svg", "copy.db"))
     assert ask("export", id, "--to", archive)["file"] == archive
     assert ask("import", archive)["renamed"]
+    assert ask("rerun", archive)["state"] == "QUEUED"
+    plugin = ask("plugin new", "strategy", "mine", "--folder", str(folder))["file"]
+    assert ask("plugin check", plugin)[0]["name"] == "mine"
     assert ask("figure", "curves", id, "--out", figure)[0]["bytes"] == Path(figure).stat().st_size
     assert ask("backup", copy)["bytes"] > 0
 

@@ -23,6 +23,7 @@ ROOMS = {
     "figures": ((), {"plotly", "matplotlib"}),
     "specs": (("core", "engines"), {"numpy"}),
     "plugins": (("core", "engines", "specs"), set()),
+    "contract": (("core", "engines", "specs", "plugins"), {"numpy"}),
     "experiments": (
         ("core", "engines", "store", "specs", "plugins", "settings"),
         {"sqlalchemy", "lark", "markdown_it"},
@@ -34,7 +35,10 @@ ROOMS = {
         {"numpy", "scipy", "cachetools", "PIL", "av"},
     ),
     "notifications": (("core", "store", "experiments", "settings"), {"sqlalchemy", "httpx2"}),
-    "archives": (("core", "store", "specs", "experiments", "results", "settings"), {"pydantic", "pyarrow"}),
+    "archives": (
+        ("core", "engines", "store", "specs", "plugins", "experiments", "running", "results", "settings"),
+        {"numpy", "pydantic", "pyarrow"},
+    ),
     "reports": (
         ("core", "store", "figures", "specs", "experiments", "running", "results"),
         {"numpy", "jinja2", "fpdf", "matplotlib", "PIL"},

@@ -42,6 +42,7 @@ declare namespace Api {
     tunables: Array<PluginRead>;
     optimizers: Array<PluginRead>;
     budgets: Array<BudgetRead>;
+    ignored: Array<IgnoredFile>;
     defaults: Record<string, any>;
   }
   interface Chart {
@@ -58,6 +59,8 @@ declare namespace Api {
   interface Comparison {
     first: string;
     second: string;
+    first_name: string;
+    second_name: string;
     from_evaluations: number;
     to_evaluations: number;
     caution: string | null;
@@ -127,6 +130,7 @@ declare namespace Api {
     cores: number;
     seconds: number;
     supervisors: number;
+    specs: Array<Record<string, any>>;
   }
   type EventKind = "submitted" | "imported" | "started" | "pausing" | "paused" | "resumed" | "stopping" | "extended" | "retried" | "completed" | "failed" | "cancelled" | "edited" | "archived" | "unarchived" | "deleted" | "notified" | "notification_failed" | "sensitivity_ended" | "versions_refused" | "versions_accepted" | "repetition_claimed" | "repetition_completed" | "repetition_failed" | "repetition_lost" | "repetition_handed_back" | "repetition_paused" | "repetition_stopped" | "repetition_cancelled" | "selected" | "measured" | "tuned" | "transferred" | "probed";
   interface EventPage {
@@ -213,6 +217,10 @@ declare namespace Api {
   interface Health {
     status: "ok" | "degraded";
     warnings: Array<string>;
+  }
+  interface IgnoredFile {
+    file: string;
+    why: string;
   }
   interface ImportRead {
     study: string | null;
@@ -448,6 +456,11 @@ declare namespace Api {
     message: string;
     permitted: Array<string> | string | null;
     nearest: string | null;
+  }
+  interface SpecRead {
+    spec: Record<string, any> | null;
+    resolved: Array<Record<string, any>>;
+    remarks: Array<string>;
   }
   type State = "QUEUED" | "RUNNING" | "PAUSING" | "PAUSED" | "STOPPING" | "COMPLETED" | "FAILED" | "CANCELLED";
   interface StudyRead {

@@ -118,7 +118,9 @@ def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow
     named = ExperimentRow.id.in_([storable(each) for each in ids])
     found = {row.id: row for row in session.scalars(select(ExperimentRow).where(named))}
     if missing := [each for each in ids if each not in found]:
-        raise NotFound(f"there is no experiment {', '.join(map(repr, missing))}")
+        raise NotFound(
+            _of_another_kind(session, missing[0]) or f"there is no experiment {', '.join(map(repr, missing))}"
+        )
     return tuple(found[each] for each in ids)
 
 
@@ -177,7 +179,17 @@ def _get(session: Session, table: type[R], noun: str, id_: str) -> R:
         return found
     if deletion := session.get(DeletionRow, storable(id_)):
         raise NotFound(f"{noun} {id_!r}, {deletion.name!r}, was deleted at {deletion.deleted_at:%Y-%m-%d %H:%M} UTC")
-    raise NotFound(f"there is no {noun} {id_!r}")
+    raise NotFound(_of_another_kind(session, id_) or f"there is no {noun} {id_!r}")
+
+
+def _of_another_kind(session: Session, id_: str) -> str | None:
+    """Return that an id is of a study and not of an experiment, or the reverse; None if it is of neither."""
+    if session.get(StudyRow, storable(id_)) is not None:
+        names = [f"{row.id} ({row.name})" for row in experiments_of(session, [id_])]
+        return f"{id_!r} is a study, and this needs an experiment: {', '.join(names) or 'it has none'}"
+    if session.get(ExperimentRow, storable(id_)) is not None:
+        return f"{id_!r} is an experiment, and this needs a study"
+    return None
 
 
 @event.listens_for(ExperimentRow, "load")

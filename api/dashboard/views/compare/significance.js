@@ -5,6 +5,7 @@ import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
 import { failed, loading } from "../../lib/placeholders.js";
 import { TESTS, wholeNumber } from "./address.js";
+import { exports } from "./exports.js";
 import { matrix } from "./matrix.js";
 import { pairsTable } from "./pairs.js";
 import { commonCount, isPooled, rangesOf, rangeText } from "./ranges.js";
@@ -106,7 +107,7 @@ async function fill(place, view, request) {
     if (!isCurrent()) return;
     const results = ranges.map((each, index) => ({ range: each, pairs: answers[index] }));
     const isOpen = place.querySelector("details")?.open ?? false;
-    place.replaceChildren(...matrix(view, ids, results[results.length - 1]), pairsTable(view, results, isOpen));
+    place.replaceChildren(...matrix(view, ids, results[results.length - 1]), exports(ids, range), pairsTable(view, results, isOpen));
   } catch (error) {
     const stays = !isNew && place.querySelector("table");
     if (isCurrent() && !stays) place.replaceChildren(failed(error, () => fill(place, view, request), "h3"));

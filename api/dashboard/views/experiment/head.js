@@ -9,6 +9,7 @@ import { age, count, evaluationsText, fixed, percent, readableName, timeBetween 
 import { factItems, remarkBlocks } from "../../lib/head_parts.js";
 import { keepingButtons } from "../../lib/keeping.js";
 import { notesBlock } from "../../lib/markdown.js";
+import { newFromThis } from "../../lib/new_from_this.js";
 import { fraction, iterationsDone, repetitionsDone, rolloutsDone, timeLeftFact } from "../../lib/progress.js";
 import { ENDED, stateBadge } from "../../lib/state_badge.js";
 import { tagList } from "../../lib/tags.js";
@@ -52,7 +53,7 @@ export function head(page) {
   const edit = () => editNameAndNotes(page, `/experiments/${page.id}`, () => page.experiment);
   const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name, notes and tags");
   update();
-  const element = h("header", { class: "experiment-head" }, trail(page), h("div", { class: "titled" }, title, state, tags.element, editButton),
+  const element = h("header", { class: "experiment-head" }, trail(page), h("div", { class: "titled" }, title, state, tags.element, editButton, newFromThis(`/experiments/${page.id}`)),
     h("p", { class: "what" }, summary(page.experiment)), notes.element, bar, facts, remarks, buttons.element, links(page), keeping.element);
   return { element, update };
 }

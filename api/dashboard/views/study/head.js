@@ -8,6 +8,7 @@ import { age, count, evaluationsText, fixed, readableName } from "../../lib/form
 import { factItems, remarkBlocks } from "../../lib/head_parts.js";
 import { keepingButtons } from "../../lib/keeping.js";
 import { notesBlock } from "../../lib/markdown.js";
+import { newFromThis } from "../../lib/new_from_this.js";
 import { iterationsDone, progressBar, repetitionsDone, rolloutsDone, timeLeftFact } from "../../lib/progress.js";
 import { ENDED, stateBadge } from "../../lib/state_badge.js";
 import { tagList } from "../../lib/tags.js";
@@ -51,7 +52,7 @@ export function head(page) {
   update();
   const trail = h("nav", { "aria-label": "Place", class: "trail" }, h("a", { href: "#/" }, "Studies"));
   const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name, notes and tags");
-  const element = h("header", { class: "experiment-head" }, trail, h("div", { class: "titled" }, title, state, tags.element, editButton),
+  const element = h("header", { class: "experiment-head" }, trail, h("div", { class: "titled" }, title, state, tags.element, editButton, newFromThis(`/studies/${page.id}`)),
     notes.element, h("div", { class: "whole" }, bar.element), facts, remarks, buttons.element, links(page), keeping.element);
   return { element, update };
 }
