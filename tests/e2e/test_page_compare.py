@@ -187,7 +187,7 @@ def test_its_figure_is_saved_in_every_format(archive: Any, ids: Any, visit: Any)
     page = visit(address(archive, *ids, band="sd", x="rollouts"))
     for words, begins in (("SVG", b"<?xml"), ("PNG", b"\x89PNG"), ("PDF", b"%PDF"), ("CSV", b"experiment,")):
         with page.expect_download(timeout=SLOW_MS) as saved:
-            page.get_by_role("link", name=words).click()
+            page.get_by_role("link", name=words).first.click()
         assert saved.value.path().read_bytes().startswith(begins)
 
 

@@ -60,7 +60,7 @@ def test_studies_are_found_opened_ticked_and_compared(visit: Any, archive: Any, 
     page = visit(archive.url)
     page.locator("tr.study").nth(10).wait_for()
 
-    page.get_by_label("Search by name or id").fill("mujoco")
+    page.get_by_label("Search by words or a query").fill("mujoco")
     page.locator("tr.study").nth(1).wait_for(state="detached")
     page.get_by_role("button", name=f"Experiments of {PUBLISHED}").press("Enter")
     page.locator("tr.nested").nth(6).wait_for()
@@ -73,7 +73,7 @@ def test_studies_are_found_opened_ticked_and_compared(visit: Any, archive: Any, 
     ids = parse_qs(urlsplit(found.removeprefix("#")).query)["experiments"][0].split(",")
     wanted = {each["id"] for each in published["experiments"] if each["name"] in {"known_fit", "direct"}}
     assert set(ids) == wanted
-    assert "text=mujoco" in page.url
+    assert "q=mujoco" in page.url
     page.reload()
     page.locator("tr.study").first.wait_for()
     assert page.locator("tr.study").count() == 1
@@ -114,7 +114,7 @@ def test_a_study_is_renamed_and_nobody_is_written_over(visit: Any, archive: Any)
     visit.forgive("412")
     made = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
     page = visit(f"{archive.url}/#/studies/{made}")
-    page.get_by_role("button", name="Edit name and notes").click()
+    page.get_by_role("button", name="Edit name, notes and tags").click()
     archive.http.patch(f"/studies/{made}", json={"notes": "of somebody else"}, headers={"If-Match": "*"})
     page.get_by_label("Name", exact=True).fill("second name")
 
@@ -235,9 +235,9 @@ def test_what_is_typed_into_the_search_is_in_the_address_at_once(visit: Any, arc
     page = visit(archive.url)
     page.locator("tr.study").first.wait_for()
 
-    page.get_by_label("Search by name or id").press_sequentially("mujoco in")
+    page.get_by_label("Search by words or a query").press_sequentially("mujoco in")
 
-    assert page.url.endswith("#/?text=mujoco+in")
+    assert page.url.endswith("#/?q=mujoco+in")
 
 
 def test_a_service_with_tokens_asks_for_one_and_a_reader_may_look_and_estimate(

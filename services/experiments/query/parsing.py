@@ -30,9 +30,9 @@ comparison: WORD OPERATOR value
 value: WORD | STRING
 OR.3: /or(?![^\s()=!<>~,"])/i
 AND.3: /and(?![^\s()=!<>~,"])/i
-NOT_IN.4: /not\s+in(?![^\s()=!<>~,"])/i
+NOT_IN.4: /not\s+in(?=\s*\()/i
 NOT.3: /not(?![^\s()=!<>~,"])/i
-IN.3: /in(?![^\s()=!<>~,"])/i
+IN.3: /in(?=\s*\()/i
 OPERATOR: "!=" | "!~" | ">=" | "<=" | "=" | "~" | ">" | "<"
 STRING: /"(\\.|[^"\\])*"/ | /'(\\.|[^'\\])*'/
 WORD: /[^\s()=!<>~,"'][^\s()=!<>~,"]*/
