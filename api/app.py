@@ -8,7 +8,7 @@ from fastapi.middleware.gzip import GZipMiddleware
 
 from gaplab.api.http import documentation, problems
 from gaplab.api.http.access import Access
-from gaplab.api.http.dependencies import refuse_repeated_parameters
+from gaplab.api.http.dependencies import refuse_repeated_parameters, reload_plugins
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.http.limits import SPARE, BodyLimit, RequestLimit, Streams, most_requests
 from gaplab.api.http.metrics import Metrics, RequestCounter
@@ -18,22 +18,29 @@ from gaplab.api.routes import (
     catalogue,
     curves,
     dashboard,
+    differences,
     estimates,
     events,
     experiments,
     figures,
     health,
+    keeping,
     lifecycle,
     metrics,
     provenance,
     replay_figures,
     replays,
+    reports,
     sensitivity,
+    specs,
     studies,
+    views,
+    webhooks,
 )
 from gaplab.services.replay.process import RolloutProcess
-from gaplab.services.settings import Limits, Settings
+from gaplab.services.settings import Limits, Notify, Settings
 from gaplab.services.store.session import Store
+from gaplab.services.waiting_line import WaitingLine
 
 DESCRIPTION = """
 Closes the *reality gap*: tunes a robot simulator from a handful of real-world evaluations, and compares the strategies
@@ -47,9 +54,11 @@ each place, what is permitted there, and the nearest valid name.
 TAGS = [
     {"name": "studies", "description": "experiments to be compared"},
     {"name": "experiments", "description": "one strategy with one set of settings, repeated"},
+    {"name": "views", "description": "saved queries of lists"},
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
     {"name": "replays", "description": "the motion of controllers, computed on request"},
     {"name": "figures", "description": "for the browser, for notebooks and for papers"},
+    {"name": "reports", "description": "one document with figures, tables, tests and a verdict in words"},
     {"name": "events", "description": "what happens to experiments, as it happens"},
     {"name": "archives", "description": "an experiment or a study with everything in it as one file"},
     {"name": "sensitivity", "description": "the effect of each tunable on fitness, checked before tuning"},
@@ -61,12 +70,18 @@ MODULES = (
     studies,
     estimates,
     experiments,
+    specs,
     lifecycle,
+    keeping,
+    views,
+    webhooks,
     provenance,
     events,
     curves,
+    differences,
     figures,
     replay_figures,
+    reports,
     archives,
     replays,
     sensitivity,
@@ -77,13 +92,20 @@ MODULES = (
 """The modules of the API, in the order of the documentation."""
 
 
-def create_app(store: Store, settings: Settings | None = None, limits: Limits | None = None) -> FastAPI:
+RELOADING = (studies, estimates, experiments, sensitivity, catalogue)
+"""The modules whose answers depend on the plug-ins: these are imported again if their files were changed."""
+
+
+def create_app(
+    store: Store, settings: Settings | None = None, limits: Limits | None = None, notify: Notify | None = None
+) -> FastAPI:
     """Return the application over a database, which it neither migrates nor closes; it needs no Ray.
 
     Args:
         store: the database.
         settings: settings of the service; None for a program that calls the app directly.
         limits: left out: the defaults.
+        notify: settings of notifications; left out: none.
     """
     app = FastAPI(
         title="gaplab",
@@ -98,8 +120,9 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     limits = limits or Limits()
     app.state.store, app.state.limits, app.state.streams = store, limits, Streams(limits)
     app.state.connections = most_requests(limits) + SPARE
-    app.state.feed = EventFeed(store)
+    app.state.feed, app.state.notify = EventFeed(store), notify or Notify()
     app.state.rollout_process = RolloutProcess()
+    app.state.drawing_process = RolloutProcess(line=WaitingLine("videos"))
     app.state.cores = (settings.workers if settings else None) or os.cpu_count() or 1
     app.state.metrics = Metrics(store, app.state.feed)
     app.add_middleware(GZipMiddleware, minimum_size=20_000, compresslevel=4)
@@ -110,7 +133,8 @@ def create_app(store: Store, settings: Settings | None = None, limits: Limits | 
     app.add_middleware(RequestCounter, metrics=app.state.metrics)
     problems.install(app)
     for module in MODULES:
-        app.include_router(module.router, dependencies=[Depends(refuse_repeated_parameters)])
+        reloading = [Depends(reload_plugins)] if module in RELOADING else []
+        app.include_router(module.router, dependencies=[Depends(refuse_repeated_parameters), *reloading])
     figures.install(app)
     dashboard.install(app)
     documentation.install(app)

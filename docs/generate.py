@@ -5,7 +5,7 @@ tests/unit/test_docs.py fails if the stored files differ from the generated ones
 
 import inspect
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from gaplab.api.commands.exit_codes import Exit
 from gaplab.schemas.plugin import BudgetRead, PluginRead
 from gaplab.services.plugins.catalogue import catalogue
 from gaplab.services.plugins.folders import VARIABLE
-from gaplab.services.settings import Limits, Settings, variable_of
+from gaplab.services.settings import Limits, Notify, Settings, variable_of
 from gaplab.services.store.session import Store
 
 FOLDER = Path(__file__).parent / "reference"
@@ -90,7 +90,7 @@ def python() -> Iterator[str]:
     yield "`from gaplab import Client`. Methods raise `ServiceError`, which has the service's `problem`, and"
     yield "`ServiceUnreachable`; some raise `ExperimentFailed` or `ExtraMissing`. Import all of them from `gaplab`.\n"
     yield f"## Client{_signature(Client.__init__)}\n\n{_docstring(Client)}\n"
-    with Client("") as client:
+    with Client("http://127.0.0.1") as client:
         methods = inspect.getmembers(client, inspect.ismethod)
     for name, method in (each for each in methods if not each[0].startswith("_")):
         yield f"## {name}{_signature(method)}\n\n{_docstring(method)}\n"
@@ -102,9 +102,12 @@ def settings() -> Iterator[str]:
     rows = [(f"`GAPLAB_{name.upper()}`", _attribute(Settings, name), _default(value)) for name, value in Settings()]
     own = "folders with your plug-ins, separated as in `PATH`: [how](../how-to/strategy.md)"
     yield from _table(("variable", "meaning", "left out"), [*rows, (f"`{VARIABLE}`", own, "none")])
+    yield "## Notifications\n\n[How](../how-to/notifications.md). Without any of them, nothing is sent.\n"
+    told = [(f"`GAPLAB_NOTIFY_{name.upper()}`", _attribute(Notify, name), "none") for name in Notify.model_fields]
+    yield from _table(("variable", "meaning", "left out"), told)
     yield "## Limits\n\nWhile no token exists, all clients together count as one token.\n"
     limits = [(f"`{variable_of(name)}`", _attribute(Limits, name), f"{most:,}") for name, most in Limits()]
-    yield from _table(("variable", "at most", "left out"), limits)  # type: ignore[arg-type]
+    yield from _table(("variable", "at most", "left out"), limits)
 
 
 def _commands(command: Any, name: str) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 - of typer's own click
@@ -133,7 +136,7 @@ def _plugin(found: PluginRead) -> Iterator[str]:
     yield from _table(("option", "type", "meaning", "left out"), rows)  # type: ignore[arg-type]
 
 
-def _table(heads: tuple[str, ...], rows: list[tuple[str, ...]]) -> Iterator[str]:
+def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
     if rows:
         lines = [heads, ("---",) * len(heads), *rows]
         yield "\n".join(f"| {' | '.join(row)} |".replace("|  |", "| |") for row in lines) + "\n"

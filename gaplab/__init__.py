@@ -11,10 +11,15 @@ Your own plug-ins import from `gaplab.plugins`. The other modules are internal.
 """
 
 from importlib import import_module
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    __version__: str
+
     from gaplab.api.clients.client import Client as Client
+    from gaplab.api.clients.comparisons import Comparisons as Comparisons
+    from gaplab.api.clients.confirmation import NotSubmitted as NotSubmitted
     from gaplab.api.clients.errors import ExperimentFailed as ExperimentFailed
     from gaplab.api.clients.errors import ExtraMissing as ExtraMissing
     from gaplab.api.clients.errors import ServiceError as ServiceError
@@ -25,10 +30,12 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "Client": "gaplab.api.clients.client",
+    "Comparisons": "gaplab.api.clients.comparisons",
     "CommandError": "gaplab.api.process.errors",
     "ExperimentFailed": "gaplab.api.clients.errors",
     "ExtraMissing": "gaplab.api.clients.errors",
     "Figure": "gaplab.api.clients.figures",
+    "NotSubmitted": "gaplab.api.clients.confirmation",
     "ServiceError": "gaplab.api.clients.errors",
     "ServiceUnreachable": "gaplab.api.clients.errors",
     "local_service": "gaplab.api.process.local_service",
@@ -39,10 +46,12 @@ __all__ = sorted(_MODULES)
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - a class or a function
     """Import a name when it is first used: a worker that loads a plug-in needs no client."""
+    if name == "__version__":
+        return version("gaplab")
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_MODULES[name]), name)
 
 
 def __dir__() -> list[str]:
-    return [*__all__, "plugins"]
+    return [*__all__, "__version__", "plugins"]

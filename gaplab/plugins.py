@@ -12,6 +12,7 @@ from gaplab.services.core.arrays import Genomes as Genomes
 from gaplab.services.core.arrays import frozen as frozen
 from gaplab.services.core.errors import TryAgain as TryAgain
 from gaplab.services.core.optimizers.base import Optimizer as Optimizer
+from gaplab.services.core.optimizers.base import Population as Population
 from gaplab.services.core.robots.base import Robot as Robot
 from gaplab.services.core.scoring import simulator_weights as simulator_weights
 from gaplab.services.core.scoring import uniqueness_penalty as uniqueness_penalty

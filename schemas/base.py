@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 SEED_LIMIT = 2**64
 
@@ -28,6 +28,13 @@ Priority = Annotated[int, Field(strict=True, ge=-10, le=10)]
 
 Label = Annotated[str, Field(min_length=1, max_length=200)]
 """A name that a person gives to a study or an experiment."""
+
+Tag = Annotated[
+    str,
+    StringConstraints(strip_whitespace=True, to_lower=True, max_length=50, pattern=r"^[^\W_][\w.:/+-]*$"),
+    Field(examples=["gait"]),
+]
+"""A tag, in lower case: letters, digits and `_ . : / + -`; the first is a letter or a digit."""
 
 Id = Annotated[str, Field(examples=["01f2e3d4c5b6"])]
 """The id of a study, an experiment or a sensitivity check."""

@@ -55,8 +55,15 @@ class Comparison(Frozen):
 
     first: Id
     second: Id
+    first_name: Name = ""
+    second_name: Name = ""
     from_evaluations: int
     to_evaluations: int
+    caution: str | None = Field(
+        default=None,
+        description="why not to trust the tests of a pooled range; null at a single number",
+        examples=["pooled as in the paper: …"],
+    )
     n_first: int
     n_second: int
     difference: Statistic = Field(description="difference of the means")

@@ -2,28 +2,42 @@
 
 from typing import Annotated, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from gaplab.schemas.base import Examples, Frozen, Label
+from gaplab.schemas.base import Examples, Frozen, Label, Tag
+
+MOST_TAGS = 20
+"""Tags of one study or experiment."""
+
+Tags = Annotated[tuple[Tag, ...], Field(max_length=MOST_TAGS), AfterValidator(lambda tags: tuple(sorted(set(tags))))]
+"""Tags in alphabetical order, each once."""
 
 
 class Edit(Frozen):
-    """A new name, new notes, or both; a missing field stays unchanged."""
+    """A new name, new notes or other tags; a missing field stays unchanged."""
 
     EXAMPLES: ClassVar[Examples] = {
         "another name": {"summary": "Rename it", "value": {"name": "half the weight"}},
         "notes": {"summary": "Tell others about it", "value": {"notes": "stopped early: the bounds were wrong"}},
+        "tags": {"summary": "Tag it", "value": {"add_tags": ["gait", "paper"], "remove_tags": ["draft"]}},
     }
 
     name: Label | None = Field(default=None, description="a new name")
     notes: Annotated[str, Field(max_length=10_000)] | None = Field(
-        default=None, description="new notes; null removes them"
+        default=None, description="new notes in Markdown; null removes them"
     )
+    tags: Tags | None = Field(default=None, description="all of its tags; an empty list removes them")
+    add_tags: Tags = Field(default=(), description="tags to add to those it has")
+    remove_tags: Tags = Field(default=(), description="tags to remove from those it has")
 
     @model_validator(mode="after")
     def _something_changes(self) -> "Edit":
         if not self.model_fields_set:
-            raise ValueError("nothing to change: give a name, notes, or both")
+            raise ValueError("nothing to change: give a name, notes or tags")
         if "name" in self.model_fields_set and self.name is None:
             raise ValueError("the name is null, but must be text: a name can be changed, not removed")
+        if "tags" in self.model_fields_set and self.tags is None:
+            raise ValueError("the tags are null, but must be a list: an empty one removes them")
+        if "tags" in self.model_fields_set and (self.add_tags or self.remove_tags):
+            raise ValueError("give either all tags, or tags to add and to remove")
         return self

@@ -1,5 +1,7 @@
 """The cost of a spec, estimated before submission."""
 
+from typing import Any
+
 from pydantic import Field
 
 from gaplab.schemas.base import EngineName, Frozen, Name
@@ -30,7 +32,7 @@ class ExperimentCost(Frozen):
 
 
 class EstimateRead(Frozen):
-    """Cost of a study: rollouts, and time on the cores of this service."""
+    """Cost of a study or an experiment: rollouts, and time on the cores of this service."""
 
     experiments: tuple[ExperimentCost, ...]
     engines: tuple[EngineCost, ...]
@@ -41,3 +43,6 @@ class EstimateRead(Frozen):
     )
     seconds: float = Field(description="expected duration if nothing else is waiting", examples=[10_400.0])
     supervisors: int = Field(description="supervisors that run now; with 0, nothing starts")
+    specs: tuple[dict[str, Any], ...] = Field(
+        default=(), description="spec of each experiment with every field, as it would be stored"
+    )

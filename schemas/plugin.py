@@ -54,6 +54,13 @@ class PluginRead(Frozen):
     )
 
 
+class IgnoredFile(Frozen):
+    """A file in a plug-in folder that is no plug-in."""
+
+    file: str
+    why: str = Field(description="why it is no plug-in, and what to do")
+
+
 class BudgetRead(Frozen):
     """A named budget: the numbers that a spec gets if it leaves them out."""
 
@@ -76,6 +83,9 @@ class Catalogue(Frozen):
     discrepancies: tuple[PluginRead, ...] = ()
     tuners: tuple[PluginRead, ...] = ()
     budgets: tuple[BudgetRead, ...] = ()
+    ignored: tuple[IgnoredFile, ...] = Field(
+        default=(), description="files in the folders of GAPLAB_PLUGINS that are no plug-ins"
+    )
     defaults: dict[str, Any] = Field(
         default_factory=dict, description="the value of each field that a study's spec leaves out"
     )

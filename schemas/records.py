@@ -3,6 +3,7 @@
 Times are UTC. A fitness of null means failed physics or a failed measurement; JSON has no nan.
 """
 
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import Any, Generic, TypeVar
 
@@ -23,6 +24,13 @@ class Page(Frozen, Generic[T]):
     )
 
 
+class TimeLeft(Frozen):
+    """Interval of the remaining time, from the pace so far. It narrows as more work is done."""
+
+    low_s: float = Field(examples=[2400.0])
+    high_s: float = Field(examples=[4200.0])
+
+
 class Progress(Frozen):
     """Completed and remaining work."""
 
@@ -30,7 +38,11 @@ class Progress(Frozen):
     completed: int = Field(examples=[12])
     failed: int
     iterations: int = Field(description="iterations of all repetitions, including number 0", examples=[440])
-    iterations_done: int = Field(examples=[150])
+    iterations_done: int = Field(description="completed iterations, including number 0", examples=[150])
+    counted_iterations: int = Field(
+        default=0, description="iterations of all repetitions as a spec counts them, without number 0", examples=[400]
+    )
+    counted_iterations_done: int = Field(default=0, description="those that are completed", examples=[138])
     rollouts: int = Field(
         description="budgeted rollouts: in the end those done plus those saved, unless the experiment was stopped"
     )
@@ -40,8 +52,36 @@ class Progress(Frozen):
         description="budgeted rollouts that were not simulated, because they cannot change a number"
     )
     seconds_left: float | None = Field(
-        default=None, description="expected remaining time; null while unknown, 0 at the end", examples=[3120.0]
+        default=None,
+        description="estimate of the remaining time, inside `time_left`; null while unknown, 0 at the end",
+        examples=[3120.0],
     )
+    time_left: TimeLeft | None = Field(
+        default=None, description="interval of the remaining time; null until enough is measured, and at the end"
+    )
+
+
+class FitnessRead(Frozen):
+    """A point of the curve: recorded fitness after a number of real-world evaluations.
+
+    The number is the last that every repetition counted here has reached: the COMPLETED ones; without any, those that
+    have begun.
+    """
+
+    evaluations: int = Field(examples=[10])
+    n: int = Field(description="repetitions in the mean", examples=[40])
+    mean: float = Field(examples=[0.585])
+    sd: Statistic = Field(description="sample standard deviation")
+
+
+class BestRead(FitnessRead):
+    """The fittest experiment of a study, after the last number of real-world evaluations that its experiments share.
+
+    The direct baseline takes part only in a study without any other experiment.
+    """
+
+    experiment: Id
+    name: Name
 
 
 class ExperimentRead(Frozen):
@@ -50,8 +90,14 @@ class ExperimentRead(Frozen):
     id: Id
     study: Id | None = None
     name: Name
-    notes: str | None = Field(default=None, description="free text by people", examples=["the bounds were too wide"])
-    edits: int = Field(default=0, description="number of changes to the name or notes")
+    notes: str | None = Field(
+        default=None, description="Markdown by people; `/notes` has it as HTML", examples=["the bounds were *too wide*"]
+    )
+    tags: tuple[str, ...] = Field(default=(), description="tags by people", examples=[("gait", "paper")])
+    edits: int = Field(default=0, description="number of changes to the name, notes or tags")
+    archived_at: Moment | None = Field(
+        default=None, description="time since which lists leave it out; null: they do not"
+    )
     strategy: Name
     direct: bool = Field(
         default=False,
@@ -65,8 +111,18 @@ class ExperimentRead(Frozen):
     priority: int = Field(default=0, description="the highest priority is computed first")
     max_parallel: int | None = Field(default=None, description="largest number of repetitions at once; null: no limit")
     progress: Progress
+    caveat: str | None = Field(
+        default=None,
+        description="what the state does not say: it was stopped early, or repetitions failed; null: nothing",
+        examples=["stopped early, 57 % done"],
+    )
+    fitness: FitnessRead | None = Field(
+        default=None, description="the curve's mean after the last common number of evaluations; null: no result yet"
+    )
     best_fitness: Statistic = Field(
-        default=None, description="best recorded fitness of each repetition so far, averaged over repetitions"
+        default=None,
+        description="best recorded fitness of each repetition so far, averaged over repetitions; it lies above the "
+        "curve, since each repetition has its maximum elsewhere. To compare strategies, use `fitness`",
     )
     reasons: tuple[str, ...] = Field(
         default=(), description="why it was paused, if not by a person; then the distinct reasons of failed repetitions"
@@ -85,12 +141,36 @@ class StudyRead(Frozen):
 
     id: Id
     name: Name
-    notes: str | None = Field(default=None, description="free text by people", examples=["the bounds were too wide"])
-    edits: int = Field(default=0, description="number of changes to the name or notes")
+    notes: str | None = Field(
+        default=None, description="Markdown by people; `/notes` has it as HTML", examples=["the bounds were *too wide*"]
+    )
+    tags: tuple[str, ...] = Field(default=(), description="tags by people", examples=[("gait", "paper")])
+    edits: int = Field(default=0, description="number of changes to the name, notes or tags")
+    archived_at: Moment | None = Field(
+        default=None, description="time since which lists leave it out; null: they do not"
+    )
     state: State
+    caveat: str | None = Field(
+        default=None,
+        description="what the state does not say: experiments were stopped early, cancelled, or failed; null: nothing",
+        examples=["1 of 7 experiments cancelled, 81 % done"],
+    )
+    best: BestRead | None = Field(default=None, description="the fittest experiment; null: no result yet")
     experiments: tuple[ExperimentRead, ...]
     progress: Progress
     created_at: Moment
+
+
+def common_count(experiments: Sequence[ExperimentRead]) -> int | None:
+    """Return the last number of real-world evaluations that experiments share; None if none has a fitness.
+
+    The direct baseline has a single value, which is compared with every number. Experiments that failed or were
+    cancelled lower the number only if no other has a fitness.
+    """
+    found = [each for each in experiments if each.fitness]
+    found = [each for each in found if not each.direct] or found
+    lasting = [each for each in found if each.state not in {State.FAILED, State.CANCELLED}] or found
+    return min((each.fitness.evaluations for each in lasting if each.fitness), default=None)
 
 
 class RepetitionRead(Frozen):
@@ -98,7 +178,7 @@ class RepetitionRead(Frozen):
 
     number: int
     state: State
-    iterations_done: int
+    iterations_done: int = Field(description="completed iterations, including number 0")
     rollouts_done: int
     attempts: int
     error: str | None = Field(default=None, examples=["the engine pybullet is not installed"])
@@ -152,8 +232,12 @@ class SimulatorRead(Frozen):
     rank: int
     parameters: dict[str, float] = Field(examples=[{"static_friction": 1.04, "restitution": 0.02}])
     squared_error: Statistic = Field(
-        description="discrepancy, summed over the samples so far; by default squared differences in fitness; null if "
-        "the physics failed on one"
+        description="discrepancy, summed over the samples so far, which grows with their number; by default squared "
+        "differences in fitness; null if the physics failed on one"
+    )
+    error: Statistic = Field(
+        default=None,
+        description="root mean square error per sample, in the unit of fitness; null without samples too",
     )
     intervals: dict[str, tuple[float, float]] | None = Field(
         default=None, description="95 % interval of each tunable, if the tuner gives them"

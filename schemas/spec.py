@@ -64,7 +64,9 @@ class SharedSettings(Frozen):
     )
     robot: PluginRef = PluginRef(name="quadruped")
     engine: PluginRef | None = Field(
-        default=None, description="engine of the simulators; default: the robot's, PyBullet for the quadruped"
+        default=None,
+        description="engine of the simulators; default: the robot's, PyBullet for the quadruped (MuJoCo on Python 3.12 "
+        "and later, for which PyBullet has no wheels)",
     )
     optimizer: PluginRef = PluginRef(name="steady_state")
     tunables: tuple[TunableRef, ...] = Field(

@@ -5,12 +5,12 @@ All of them raise StoreUnavailable while the database cannot be used.
 
 from dataclasses import dataclass
 
-from sqlalchemy import select
+from sqlalchemy import func, select
 
 from gaplab.schemas.events import EventKind, EventPage, EventRead
 from gaplab.services.core.errors import Conflict
-from gaplab.services.store.models import EventCounterRow, EventRow, ExperimentRow
-from gaplab.services.store.queries.experiments import get_experiment, get_study
+from gaplab.services.store.models import DeletionRow, EventCounterRow, EventRow, ExperimentRow
+from gaplab.services.store.queries.experiments import get_experiment, get_study, was_deleted
 from gaplab.services.store.session import Session, snapshot
 
 
@@ -41,14 +41,16 @@ class WantedEvents:
 def page(session: Session, after: int, wanted: WantedEvents, *, limit: int) -> EventPage:
     """Return up to `limit` selected events in order, from the first after the number `after`."""
     row, experiment, newest = EventRow, ExperimentRow, _latest(session)
-    query = select(row.number, row.kind, row.experiment_id, experiment.study_id, row.repetition, row.body, row.at)
+    study = func.coalesce(experiment.study_id, DeletionRow.study_id)
+    query = select(row.number, row.kind, row.experiment_id, study, row.repetition, row.body, row.at)
     if wanted.experiment is not None:
         query = query.where(row.experiment_id == wanted.experiment)
     if wanted.study is not None:
-        query = query.where(experiment.study_id == wanted.study)
+        query = query.where(study == wanted.study)
     if wanted.kinds:
         query = query.where(row.kind.in_(list(wanted.kinds)))
-    query = query.outerjoin(experiment, experiment.id == row.experiment_id).where(row.number > after)
+    query = query.outerjoin(experiment, experiment.id == row.experiment_id)
+    query = query.outerjoin(DeletionRow, DeletionRow.id == row.experiment_id).where(row.number > after)
     names = ("number", "kind", "experiment", "study", "repetition", "body", "at")
     rows = session.execute(query.order_by(row.number).limit(limit))
     items = tuple(EventRead(**dict(zip(names, values, strict=True))) for values in rows)
@@ -64,7 +66,7 @@ def latest(session: Session) -> int:
 
 @snapshot
 def check(session: Session, wanted: WantedEvents, after: int = 0) -> None:
-    """Refuse a selection whose experiment, study or preceding event does not exist.
+    """Refuse a selection whose experiment, study or preceding event does not exist; deleted ones have events.
 
     Raises:
         NotFound: no such experiment, or no such study.
@@ -76,9 +78,9 @@ def check(session: Session, wanted: WantedEvents, after: int = 0) -> None:
             f"an earlier backup: continue after {newest}, or begin with 0"
         )
         raise Conflict(msg)
-    if wanted.experiment is not None:
+    if wanted.experiment is not None and not was_deleted(session, wanted.experiment):
         get_experiment(session, wanted.experiment)
-    if wanted.study is not None:
+    if wanted.study is not None and not was_deleted(session, wanted.study):
         get_study(session, wanted.study)
 
 

@@ -45,7 +45,7 @@ def configure(stream: TextIO | None = None) -> None:
     handler.addFilter(_rewrite_requests)
     handler.addFilter(Repeats())
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
-    for noisy in ("alembic", "uvicorn.error", "httpx", "httpx2", "asyncio"):
+    for noisy in ("alembic", "uvicorn.error", "httpx", "httpx2", "asyncio", "matplotlib", "fontTools"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
 
 

@@ -35,7 +35,12 @@ class _Environment(BaseSettings):
         except ValidationError as error:
             (first, *_) = error.errors()
             variable = f"{cls.model_config['env_prefix']}{first['loc'][0]}".upper()
-            raise ValueError(f"{variable} is {first['input']!r}; it must be a whole number of at least 1") from error
+            raise ValueError(f"{variable} {cls._expectation(first['loc'][0], first['input'])}") from error
+
+    @classmethod
+    def _expectation(cls, name: int | str, given: object) -> str:  # noqa: ARG003 - for subclasses
+        """Return what is wrong with a value, and what is permitted."""
+        return f"is {given!r}; it must be a whole number of at least 1"
 
 
 class Settings(_Environment):
@@ -98,6 +103,40 @@ class Limits(_Environment):
     streams: PositiveInt = 200
     imported_rows: PositiveInt = 250_000
     requests: PositiveInt = 1_000
+
+
+class Notify(_Environment):
+    """Who is told that work has ended: settings of the service's owner, which no request can change.
+
+    Attributes:
+        url: webhook that is told of every study, and of every experiment without one. `GAPLAB_NOTIFY_URL`.
+        command: command line that is run for the same, without a shell. `GAPLAB_NOTIFY_COMMAND`.
+        secret: key of the signature of webhooks. `GAPLAB_NOTIFY_SECRET`.
+        hosts: hosts that webhooks of single studies and experiments may have, separated by commas; others are refused.
+            `GAPLAB_NOTIFY_HOSTS`; none.
+    """
+
+    model_config = SettingsConfigDict(env_prefix="GAPLAB_NOTIFY_")
+
+    url: Annotated[str | None, Field(pattern=r"^https?://[^/\s]+\S*$", repr=False)] = None
+    command: Annotated[str | None, Field(repr=False)] = None
+    secret: Annotated[str | None, Field(repr=False)] = None
+    hosts: Annotated[str, Field(pattern=r"^[A-Za-z0-9.:,\[\]\s-]*$")] = ""
+
+    @classmethod
+    def _expectation(cls, name: int | str, given: object) -> str:
+        """Return what is permitted, without the value, which may be secret."""
+        return "is not an http or https address" if name == "url" else f"is {given!r}; it must be hosts, with commas"
+
+    @property
+    def permitted_hosts(self) -> frozenset[str]:
+        """Return the hosts that users' webhooks may have, in lower case."""
+        return frozenset(host.strip().lower() for host in self.hosts.split(",") if host.strip())
+
+    @property
+    def is_on(self) -> bool:
+        """Return whether anything can be told."""
+        return bool(self.url or self.command or self.permitted_hosts)
 
 
 def address(host: str, port: int) -> str:

@@ -3,6 +3,7 @@
 from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.predictions import Prediction
+from gaplab.services.figures.kinds.coordinates import Coordinate, coordinates_figure
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.predictions import predictions_figure
 from gaplab.services.figures.kinds.simulators import Dimension, SimulatorPoint, simulators_figure
@@ -18,6 +19,7 @@ from gaplab.services.figures.marks import (
     Line,
     Panel,
     Points,
+    Polylines,
     Table,
 )
 from gaplab.services.figures.style import style_of
@@ -84,6 +86,7 @@ EVERYTHING = FigureDefinition(
                 Level("mean", 0.5, lower=0.4, upper=0.6),
                 Diagonal("equal"),
                 Points("tuned", (1, 2, 3), (0.5, 1, 1.5), style_of(3), shades=(0, 1, 2), shades_label="Iteration"),
+                Polylines("paths", (0, 2, 4), ((0, 1, 0), (1, None, 1)), (0, 2), "Iteration", ("a", "b")),
                 Points("truth", (2,), (1.8,), style_of(4), size=2, hollow=True),
                 Arrow((1, 0), (3, 1), style_of(5)),
                 Arrow((1, 0), (3, -0.5)),
@@ -136,7 +139,26 @@ PREDICTIONS = [
 ]
 ERRORS = {1: {0: 1e-6, 1: 1e-4, 2: None}, 2: {0: 0.0, 1: 1.0, 2: 0.5}}
 
+COORDINATES = (
+    Coordinate("Strategy", ("simulated fit", "random", "<b>own</b>")),
+    Coordinate("Static friction", (0.2, 0.4, 1.0), 0.0, 1.5),
+    Coordinate("RMS error (m/s)", (1e-6, None, 0.5), wide=True),
+    Coordinate("Repetitions", (8.0, 8.0, 8.0)),
+)
+
+
+def coordinates(lines: int = 3, title: str = "") -> FigureDefinition:
+    axes = [Coordinate(axis.label, axis.values[:lines], axis.lower, axis.upper, axis.wide) for axis in COORDINATES]
+    shades, hover = [0.25, 0.5, 0.75][:lines], ["a", "<i>b</i>", "c"][:lines]
+    return coordinates_figure(
+        axes, shades=shades, shades_label="Final fitness", hover=hover, what="experiment", title=title
+    )
+
+
 FIGURES = [
+    coordinates(title="coordinates"),
+    coordinates(1),
+    coordinates(0),
     curves_figure([RISING, DIRECT], title="curves", each=True),
     curves_figure([]),
     curves_figure([curve("a")]),

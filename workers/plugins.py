@@ -9,6 +9,7 @@ from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.sensitivity import Checked
 from gaplab.services.core.errors import PluginDiffers
+from gaplab.services.plugins.watching import reload
 from gaplab.services.running import execution
 from gaplab.services.running.provenance import tell_refused
 from gaplab.services.running.versions import provenance, versions_of
@@ -49,6 +50,7 @@ class Plugins:
 
     def present(self) -> tuple[Provenance, Mapping[str, str]]:
         """Return under what work may be claimed now, and why plug-ins are refused, by kind and name."""
+        reload()
         self._under = provenance()
         has, now = versions_of(self._under), self._clock()
         refused = {

@@ -18,8 +18,11 @@ from gaplab.api.clients.connection import PAUSES_S, Connection
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
 from gaplab.api.clients.events import EventLog
 from gaplab.api.clients.figures import Figures
+from gaplab.api.clients.keeping import Keeping
 from gaplab.api.clients.life_cycle import LifeCycle
 from gaplab.api.clients.records import Records
+from gaplab.api.clients.replays import Replays
+from gaplab.api.clients.reports import Reports
 from gaplab.api.clients.results import Results
 from gaplab.api.clients.submission import Submission
 from gaplab.api.clients.tables import Tables
@@ -56,28 +59,31 @@ class Client:
         self.submission = submission = Submission(connection)
         self.records = records = Records(connection)
         self.life_cycle = life_cycle = LifeCycle(connection, records)
+        self.keeping = keeping = Keeping(connection, records)
         self.results = results = Results(connection, records)
         self.tables = tables = Tables(connection, results)
-        self.figures = figures = Figures(connection, records)
-        self.archives = archives = Archives(connection, records)
-        self.event_log = event_log = EventLog(connection)
-        self.watcher = watcher = Watcher(records, results)
+        self.figures, self.archives = figures, archives = Figures(connection, records), Archives(connection, records)
+        self.reports, self.replays = reports, replays = Reports(connection, records), Replays(connection)
+        self.event_log, self.watcher = event_log, watcher = EventLog(connection), Watcher(records, results)
 
         self.submit, self.estimate, self.check = submission.submit, submission.estimate, submission.check
         self.find, self.study, self.experiment = records.find, records.study, records.experiment
         self.studies, self.experiments, self.edit = records.studies, records.experiments, records.edit
         self.repetitions, self.attempts, self.reveal = records.repetitions, records.attempts, records.reveal
-        self.provenance, self.accept_versions = records.provenance, life_cycle.accept_versions
+        self.spec, self.provenance, self.accept_versions = records.spec, records.provenance, life_cycle.accept_versions
         self.pause, self.resume, self.stop = life_cycle.pause, life_cycle.resume, life_cycle.stop
         self.cancel, self.extend, self.schedule = life_cycle.cancel, life_cycle.extend, life_cycle.schedule
-        self.retry = life_cycle.retry
+        self.retry, self.notify, self.tag, self.untag = life_cycle.retry, keeping.notify, keeping.tag, keeping.untag
+        self.archive, self.unarchive, self.delete = keeping.archive, keeping.unarchive, keeping.delete
+        self.views, self.save_view, self.delete_view = keeping.views, keeping.save_view, keeping.delete_view
         self.curves, self.curves_of, self.curves_csv = results.curves, results.curves_of, results.curves_csv
-        self.compare, self.misfit = results.compare, results.misfit
+        self.compare, self.misfit, self.diff = results.compare, results.misfit, results.diff
         self.curve, self.samples = tables.curve, tables.samples
         self.simulators, self.predictions = tables.simulators, tables.predictions
         self.figure, self.figure_kinds = figures.draw, figures.kinds
-        self.export, self.import_ = archives.export, archives.import_
-        self.events = event_log.events
+        self.verdict, self.report = reports.verdict, reports.save
+        self.replay, self.video = replays.replay, replays.video
+        self.export, self.import_, self.events = archives.export, archives.import_, event_log.events
         self.watch, self.wait = watcher.watch, watcher.wait
 
     def __enter__(self) -> Self:

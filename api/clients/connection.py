@@ -79,6 +79,8 @@ class Connection:
             )
         except (httpx2.InvalidURL, UnicodeEncodeError) as error:
             raise ServiceUnreachable(f"{url!r} is not the address of a service: {error}") from error
+        if self._http.base_url.scheme not in {"http", "https"}:
+            raise ServiceUnreachable(_without_scheme(url))
 
     def close(self) -> None:
         """Close the connection."""
@@ -152,6 +154,12 @@ class Connection:
     def _send(self, method: str, path: str, **request: Unpack[Request]) -> bytes:
         with self.stream(method, path, **request) as answer:
             return answer.read()
+
+
+def _without_scheme(url: str) -> str:
+    """Return what to write in place of an address without http:// or https://."""
+    rest = url.partition("://")[2] if "://" in url else url
+    return f"{url!r} is not the address of a service: it begins with http:// or https://, like http://{rest or 'HOST'}"
 
 
 def segment(id: str) -> str:

@@ -1,15 +1,15 @@
 """Figures that show themselves in a notebook and save themselves in the format of a file's suffix."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
 
 from gaplab.api.clients.connection import Connection
-from gaplab.api.clients.records import Records
-from gaplab.schemas.records import ExperimentRead, StudyRead
+from gaplab.api.clients.errors import ServiceError
+from gaplab.api.clients.records import Record, Records, experiments_of, split
 
 _FIGURES = "/figures/"
 
@@ -86,12 +86,15 @@ class Figures:
             ServiceError: an id is unknown. An unknown kind or option raises when the figure is drawn.
         """
         records = [self._records.find(id) for id in ids]
-        studies = [record.id for record in records if isinstance(record, StudyRead)]
-        experiments = [record.id for record in records if isinstance(record, ExperimentRead)]
+        drawn = split(records)
 
         def draw(format: str) -> bytes:  # noqa: A002 - as the API says
-            which = {"study": studies or None, "experiment": experiments or None, "format": format}
-            return self._connection.get_bytes(f"{_FIGURES}{of}", **(which | options))
+            try:
+                return self._connection.get_bytes(f"{_FIGURES}{of}", **(drawn | {"format": format} | options))
+            except ServiceError as error:
+                if drawn["study"] and any(mistake.pointer == "study" for mistake in error.problem.errors):
+                    raise ValueError(_one_experiment(of, records)) from error
+                raise
 
         return Figure(of, ids, draw)
 
@@ -99,3 +102,9 @@ class Figures:
         """Return the kinds of figures that the service draws."""
         paths = self._connection.get(_Paths, "/openapi.json").paths
         return tuple(path.removeprefix(_FIGURES) for path in paths if path.startswith(_FIGURES))
+
+
+def _one_experiment(kind: str, records: Sequence[Record]) -> str:
+    """Return a sentence that names the experiments of which this kind of figure draws one."""
+    names = [f"{each.id} ({each.name})" for record in records for each in experiments_of(record)]
+    return f"a figure of {kind} has one experiment, not a study; choose one of {', '.join(names)}"

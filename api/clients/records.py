@@ -1,6 +1,6 @@
 """Studies and experiments, and what the service stores of them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
 import httpx2
@@ -10,6 +10,7 @@ from gaplab.api.clients.errors import ServiceError
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.provenance import ProvenanceRead
 from gaplab.schemas.records import AttemptRead, ExperimentRead, Page, RepetitionRead, StudyRead
+from gaplab.schemas.submitted import SpecRead
 
 PAGE = 100
 """Experiments of one request of `all_experiments`."""
@@ -25,6 +26,14 @@ def experiments_of(record: Record) -> tuple[ExperimentRead, ...]:
 def path_of(record: Record) -> str:
     """Return the path of a study or an experiment."""
     return f"/{'studies' if isinstance(record, StudyRead) else 'experiments'}/{segment(record.id)}"
+
+
+def split(records: Iterable[Record]) -> dict[str, list[str] | None]:
+    """Return the ids of studies and experiments as the parameters `study` and `experiment` of a request."""
+    found: dict[str, list[str]] = {"study": [], "experiment": []}
+    for record in records:
+        found["study" if isinstance(record, StudyRead) else "experiment"].append(record.id)
+    return {name: ids or None for name, ids in found.items()}
 
 
 class Records:
@@ -50,20 +59,29 @@ class Records:
                 raise
         return self.experiment(id)
 
-    def studies(self, **filters: str | int | None) -> Page[StudyRead]:
-        """Return studies, newest first; filters as in the API: limit, cursor, state, strategy, text, sort."""
-        return self._connection.get(Page[StudyRead], "/studies", **filters)
+    def spec(self, id: str) -> SpecRead:
+        """Return the spec of a study or an experiment: the shortest one that gives the same, and the complete one."""
+        return self._connection.get(SpecRead, f"{path_of(self.find(id))}/spec")
 
-    def experiments(self, **filters: str | int | None) -> Page[ExperimentRead]:
-        """Return experiments, newest first; filters: those of `studies`, and study."""
-        return self._connection.get(Page[ExperimentRead], "/experiments", **filters)
+    def studies(self, *, query: str | None = None, **filters: str | int | None) -> Page[StudyRead]:
+        """Return studies, newest first.
 
-    def all_experiments(self) -> Iterator[ExperimentRead]:
-        """Yield all experiments, newest first."""
-        return self._connection.items(Page[ExperimentRead], "/experiments", limit=PAGE)
+        Args:
+            query: like `strategy = informative and fitness > 0.5`, or words; archived ones need `archived = true`.
+            filters: as in the API: limit, cursor, state, strategy, text, sort.
+        """
+        return self._connection.get(Page[StudyRead], "/studies", q=query, **filters)
+
+    def experiments(self, *, query: str | None = None, **filters: str | int | None) -> Page[ExperimentRead]:
+        """Return experiments, newest first; the query and the filters are those of `studies`, and study."""
+        return self._connection.get(Page[ExperimentRead], "/experiments", q=query, **filters)
+
+    def all_experiments(self, *, query: str | None = None) -> Iterator[ExperimentRead]:
+        """Yield all experiments that fit a query, newest first."""
+        return self._connection.items(Page[ExperimentRead], "/experiments", limit=PAGE, q=query)
 
     def edit(self, id: str, edit: Edit) -> ExperimentRead | StudyRead:
-        """Replace the name or the notes of a study or an experiment, and return it."""
+        """Change the name, the notes or the tags of a study or an experiment, and return it."""
         record = self.find(id)
         body, headers = edit.model_dump(exclude_unset=True), {"If-Match": "*"}
         return self._connection.change(type(record), "PATCH", path_of(record), json=body, headers=headers)

@@ -2,10 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 
-from gaplab.api.clients.connection import Connection, segment
-from gaplab.api.clients.records import Records, experiments_of
+from gaplab.api.clients.comparisons import Comparisons
+from gaplab.api.clients.connection import Connection, Parameter, segment
+from gaplab.api.clients.records import Records, experiments_of, split
 from gaplab.schemas.curves import Comparison, Curve
+from gaplab.schemas.differences import SpecDiff
 from gaplab.schemas.misfit import MisfitRead
+from gaplab.schemas.records import common_count
 
 MOST_CURVES = 100
 """Experiments of one request: the most that the service permits."""
@@ -33,10 +36,34 @@ class Results:
         first, *others = (self._connection.get_bytes("/curves", **request).decode() for request in requests)
         return first + "".join(other.partition("\n")[2] for other in others)  # the header stands once
 
-    def compare(self, experiments: Sequence[str], first: int, last: int) -> tuple[Comparison, ...]:
-        """Compare every pair of experiments, pooling the numbers of real-world evaluations from `first` to `last`."""
-        counts = {"from": first, "to": last}
-        return self._connection.get(tuple[Comparison, ...], "/comparisons", experiment=list(experiments), **counts)
+    def compare(self, experiments: Sequence[str], first: int | None = None, last: int | None = None) -> Comparisons:
+        """Compare every pair of experiments by three tests, with Holm's correction over all pairs.
+
+        A pooled range is the paper's test, whose p are too small: see `caution` of the result.
+
+        Args:
+            experiments: ids of experiments, or of studies for all of their experiments.
+            first: first number of real-world evaluations to pool; left out: `last`.
+            last: last number to pool; left out: the last that all experiments have.
+        """
+        records = [each for id in experiments for each in experiments_of(self._records.find(id))]
+        last = (common_count(records) or 0) if last is None else last
+        query: dict[str, Parameter] = {"experiment": [each.id for each in records], "to": last}
+        query["from"] = last if first is None else first
+        pairs = self._connection.get(tuple[Comparison, ...], "/comparisons", **query)
+
+        def formatted(format: str) -> str:  # noqa: A002 - as the API says
+            return self._connection.get_bytes("/comparisons", format=format, **query).decode()
+
+        return Comparisons(pairs, formatted)
+
+    def diff(self, *ids: str) -> SpecDiff:
+        """Return the settings in which studies and experiments differ; of a single study, its experiments."""
+        return self._connection.get(SpecDiff, "/differences", **split(map(self._records.find, ids)))
+
+    def common_count(self, experiments: Sequence[str]) -> int:
+        """Return the last number of real-world evaluations that experiments share; 0 without any result."""
+        return common_count([self._records.experiment(id) for id in experiments]) or 0
 
     def misfit(self, id: str) -> MisfitRead:
         """Return how far the tuned simulators of an experiment are from reality and from each other."""

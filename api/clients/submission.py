@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from gaplab.api.clients.confirmation import can_ask, confirm
 from gaplab.api.clients.connection import Connection, segment
 from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.records import ExperimentRead, StudyRead
@@ -17,6 +18,8 @@ Spec = ExperimentSpec | StudySpec | Mapping[str, Any]
 NOT_CHECKED = {"name", "strategy", "strategies", "direct_repetitions", "priority", "max_parallel"}
 """Fields of a spec that a sensitivity check does not have."""
 
+_KINDS = {True: "experiments", False: "studies"}
+
 
 class Submission:
     """Requests that send a spec; the service validates it."""
@@ -24,16 +27,29 @@ class Submission:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def submit(self, spec: Spec) -> ExperimentRead | StudyRead:
-        """Queue an experiment if the spec names a `strategy`, else a study."""
+    def submit(self, spec: Spec, *, yes: bool = False) -> ExperimentRead | StudyRead:
+        """Queue an experiment if the spec names a `strategy`, else a study.
+
+        In a terminal or a notebook, the estimated cost is shown first, and above an hour a person is asked.
+
+        Args:
+            spec: spec of an experiment or a study.
+            yes: submit without estimate and question.
+
+        Raises:
+            NotSubmitted: the person declined.
+        """
+        if not yes and can_ask():
+            confirm(self.estimate(spec), input)
         body = _body(spec)
-        if "strategy" in body and "strategies" not in body:
+        if _is_experiment(body):
             return self._connection.post(ExperimentRead, "/experiments", body)
         return self._connection.post(StudyRead, "/studies", body)
 
-    def estimate(self, spec: StudySpec | Mapping[str, Any]) -> EstimateRead:
-        """Return the rollouts and the duration of a study on the service's machine; nothing is stored."""
-        return self._connection.post(EstimateRead, "/studies/estimate", _body(spec))
+    def estimate(self, spec: Spec) -> EstimateRead:
+        """Return the rollouts, the duration and the resolved specs of an experiment or a study; nothing is stored."""
+        body = _body(spec)
+        return self._connection.post(EstimateRead, f"/{_KINDS[_is_experiment(body)]}/estimate", body)
 
     def check(self, spec: Spec | SensitivitySpec, *, every_s: float = 0.5) -> SensitivityRead:
         """Return the effect of the tunables of a spec on fitness; the service computes it if it is not known yet.
@@ -52,3 +68,7 @@ class Submission:
 
 def _body(spec: BaseModel | Mapping[str, Any]) -> dict[str, Any]:
     return spec.model_dump(mode="json", exclude_unset=True) if isinstance(spec, BaseModel) else dict(spec)
+
+
+def _is_experiment(body: Mapping[str, Any]) -> bool:
+    return "strategy" in body and "strategies" not in body

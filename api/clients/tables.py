@@ -1,12 +1,10 @@
 """Results as tables: pandas frames with one row per observation, complete however many pages the service sends."""
 
 import time
-from collections.abc import Sequence
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gaplab.api.clients.connection import Connection, segment
-from gaplab.api.clients.errors import ExtraMissing
+from gaplab.api.clients.frames import frame, pandas_library
 from gaplab.api.clients.results import Results
 from gaplab.schemas.curves import CurvePoint
 from gaplab.schemas.predictions import Prediction, Predictions
@@ -42,7 +40,7 @@ class Tables:
             for point in curve.points
             for row in _rows(point, each=each)
         ]
-        return _frame(rows, ("experiment", "name", "strategy", *numbers), numbers)
+        return frame(rows, ("experiment", "name", "strategy", *numbers), numbers)
 
     def samples(self, id: str, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
         """Return the real-world evaluations of an experiment, with a column for each gene.
@@ -55,13 +53,15 @@ class Tables:
         path, wanted = f"/experiments/{segment(id)}/samples", None if kind is None else MeasurementKind(kind)
         samples = list(self._connection.items(Page[SampleRead], path, limit=PAGE, repetition=repetition, kind=wanted))
         columns = ("repetition", "iteration", "kind", "fitness", "measured_by", "measured_at")
-        frame = _frame([[getattr(sample, name) for name in columns] for sample in samples], columns, ("fitness",))
-        frame["kind"] = frame["kind"].astype(str)
-        genes = _pandas().DataFrame([sample.genome for sample in samples], index=frame.index)
-        return frame.join(genes.rename(columns=lambda gene: f"gene_{gene}"))
+        table = frame([[getattr(sample, name) for name in columns] for sample in samples], columns, ("fitness",))
+        table["kind"] = table["kind"].astype(str)
+        genes = pandas_library().DataFrame([sample.genome for sample in samples], index=table.index)
+        return table.join(genes.rename(columns=lambda gene: f"gene_{gene}"))
 
     def simulators(self, id: str, *, repetition: int | None = None, iteration: int | None = None) -> "pandas.DataFrame":
         """Return the tuned simulators of an experiment, with a column for each tunable; rank 0 is an iteration's best.
+
+        `squared_error` is a sum over samples and grows with them; `error` is the root mean square per sample.
 
         Args:
             id: id of the experiment.
@@ -71,9 +71,9 @@ class Tables:
         path = f"/experiments/{segment(id)}/simulators"
         filters = {"limit": PAGE, "repetition": repetition, "iteration": iteration}
         simulators = list(self._connection.items(Page[SimulatorRead], path, **filters))
-        columns = ("repetition", "iteration", "rank", "squared_error")
-        frame = _frame([[getattr(row, name) for name in columns] for row in simulators], columns, columns)
-        return frame.join(_pandas().DataFrame([row.parameters for row in simulators], index=frame.index))
+        columns = ("repetition", "iteration", "rank", "squared_error", "error")
+        table = frame([[getattr(row, name) for name in columns] for row in simulators], columns, columns)
+        return table.join(pandas_library().DataFrame([row.parameters for row in simulators], index=table.index))
 
     def predictions(self, id: str, *, every_s: float = 0.5, timeout_s: float = 600.0) -> "pandas.DataFrame":
         """Return the fitness of each sample in reality, and in simulation before and after it was measured.
@@ -89,7 +89,7 @@ class Tables:
         Raises:
             TimeoutError: it takes longer; computed predictions are kept, so ask again.
         """
-        _pandas()
+        pandas_library()
         deadline, path = time.monotonic() + timeout_s, f"/experiments/{segment(id)}/predictions"
         while (predictions := self._connection.get(Predictions, path)).pending:
             if time.monotonic() > deadline:
@@ -97,25 +97,10 @@ class Tables:
                 raise TimeoutError(msg)
             time.sleep(every_s)
         columns = tuple(Prediction.model_fields)
-        return _frame([[getattr(item, name) for name in columns] for item in predictions.items], columns, columns)
+        return frame([[getattr(item, name) for name in columns] for item in predictions.items], columns, columns)
 
 
 def _rows(point: CurvePoint, *, each: bool) -> list[tuple[float | None, ...]]:
     if each:
         return [(repetition, point.evaluations, fitness) for repetition, fitness in enumerate(point.values)]
     return [tuple(getattr(point, name) for name in STATISTICS)]
-
-
-def _pandas() -> Any:  # noqa: ANN401 - a module that may be missing
-    try:
-        return import_module("pandas")
-    except ImportError as error:
-        raise ExtraMissing("pandas", "notebook") from error
-
-
-def _frame(rows: Sequence[Sequence[object]], columns: Sequence[str], numeric: Sequence[str]) -> "pandas.DataFrame":
-    """Return a frame whose numeric columns have nan for null, even if every value is null."""
-    frame = _pandas().DataFrame(rows, columns=columns)
-    for name in numeric:
-        frame[name] = _pandas().to_numeric(frame[name])
-    return frame

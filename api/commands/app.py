@@ -1,5 +1,6 @@
 """The `gaplab` command, and the arguments that its parts share."""
 
+from importlib.metadata import version
 from typing import Annotated
 
 import typer
@@ -17,6 +18,15 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+RUNNING = "Run the service"
+SPECS = "Submit and follow"
+LIFE = "Change what runs"
+RESULTS = "Read results"
+KEEPING = "Keep and move"
+PLUGINS = "Plug-ins"
+OTHERS = "Access and help"
+"""The groups of `gaplab --help`; commands are in them in the order of use."""
+
 Id = Annotated[str, typer.Argument(metavar="ID", help="a study or an experiment", autocompletion=completion.ids)]
 ExperimentId = Annotated[str, typer.Argument(metavar="ID", help="an experiment", autocompletion=completion.experiments)]
 Ids = Annotated[
@@ -27,6 +37,21 @@ Url = Annotated[
     str | None,
     typer.Option("--url", help="address of the service; left out: GAPLAB_URL, or this machine", show_default=False),
 ]
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"gaplab {version('gaplab')}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", help="print the version of gaplab", is_eager=True, callback=_print_version)
+    ] = False,
+) -> None:
+    """Close the reality gap: tune a robot simulator from a few real-world evaluations."""
 
 
 def connect(url: str | None) -> Client:

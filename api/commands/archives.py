@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gaplab.api.commands.app import AsJson, Id, Url, app, connect
+from gaplab.api.commands.app import KEEPING, AsJson, Id, Url, app, connect
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.services.settings import Settings
 from gaplab.services.store.atomic_files import appearing
@@ -14,7 +14,7 @@ from gaplab.services.store.restore import restore as put_back
 from gaplab.services.store.sqlite_file import PRIVATE
 
 
-@app.command()
+@app.command(rich_help_panel=KEEPING)
 def export(
     id: Id,
     to: Annotated[Path | None, typer.Option(help="new file; left out: gaplab-ID.zip", show_default=False)] = None,
@@ -29,7 +29,7 @@ def export(
     print_result({"file": str(file), "bytes": file.stat().st_size}, f"Wrote {file}.", as_json=as_json)
 
 
-@app.command("import")
+@app.command("import", rich_help_panel=KEEPING)
 def import_(file: Annotated[Path, typer.Argument(help="an archive")], as_json: AsJson = False, url: Url = None) -> None:
     """Store the content of an archive; nothing in it is run."""
     with connect(url) as client, file.open("rb") as source:
@@ -44,14 +44,14 @@ def import_(file: Annotated[Path, typer.Argument(help="an archive")], as_json: A
         typer.echo(f"{cancelled} had not ended; it is cancelled here", err=True)
 
 
-@app.command()
+@app.command(rich_help_panel=KEEPING)
 def backup(file: Annotated[Path, typer.Argument(help="new file for the copy")], as_json: AsJson = False) -> None:
     """Copy the SQLite database of GAPLAB_DATABASE_URL into a file, even while the service writes to it."""
     size = copy(Settings.from_environment().database_url, file)
     print_result({"file": str(file), "bytes": size}, f"Wrote {file}: {size:,} bytes, checked.", as_json=as_json)
 
 
-@app.command()
+@app.command(rich_help_panel=KEEPING)
 def restore(
     file: Annotated[Path, typer.Argument(help="a backup, which stays as it is")], as_json: AsJson = False
 ) -> None:

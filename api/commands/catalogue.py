@@ -6,13 +6,13 @@ import typer
 
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands import completion, tables
-from gaplab.api.commands.app import AsJson, Url, app, connect
+from gaplab.api.commands.app import PLUGINS, AsJson, Url, app, connect
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json
 from gaplab.services.core.errors import unknown_name
 
 
-@app.command()
+@app.command(rich_help_panel=PLUGINS)
 def catalogue(
     name: Annotated[
         str | None,
@@ -30,6 +30,6 @@ def catalogue(
     if as_json:
         print_json(found if name is None else plugins[name])
     elif name is None:
-        console().print(*tables.catalogue(found))
+        console().print(*tables.catalogue(found), *tables.ignored(found), soft_wrap=True)
     else:
         console().print(*tables.plugin(plugins[name]), soft_wrap=True)

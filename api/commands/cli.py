@@ -4,12 +4,14 @@ import sys
 
 import typer
 
+from gaplab.api.clients.confirmation import NotSubmitted
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, lines_of
 
-# the order of the commands in `gaplab --help`
+# the order of the commands in `gaplab --help`, and of its groups
 # isort: off
-from gaplab.api.commands import service, submission, records, figures, life_cycle, events  # noqa: F401
-from gaplab.api.commands import catalogue, archives, tokens, help  # noqa: A004, F401
+from gaplab.api.commands import service, submission, events, records, keeping, differences, figures  # noqa: F401
+from gaplab.api.commands import reports, replays, comparisons, life_cycle  # noqa: F401
+from gaplab.api.commands import archives, reruns, catalogue, plugins, tokens, help  # noqa: A004, F401
 
 # isort: on
 from gaplab.api.commands.app import app as app
@@ -21,6 +23,8 @@ def main() -> None:
     """Run the command; an error prints a sentence and sets the exit code, without a traceback."""
     try:
         app(prog_name="gaplab")
+    except NotSubmitted as error:
+        _exit([str(error)], Exit.INTERRUPTED)
     except (ServiceError, ServiceUnreachable, CommandError) as error:
         _exit(lines_of(error.problem) if isinstance(error, ServiceError) else [str(error)], code_of(error))
     except (GaplabError, ValueError) as error:

@@ -7,13 +7,13 @@ from rich.markup import escape
 
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands import completion
-from gaplab.api.commands.app import Url, app, connect
+from gaplab.api.commands.app import SPECS, Url, app, connect
 from gaplab.api.commands.json_output import print_json
 from gaplab.schemas.events import EventKind, EventRead
 from gaplab.schemas.records import StudyRead
 
 
-@app.command()
+@app.command(rich_help_panel=SPECS)
 def events(
     id: Annotated[
         str | None, typer.Argument(metavar="[ID]", help="a study or an experiment", autocompletion=completion.ids)

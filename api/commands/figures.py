@@ -8,11 +8,11 @@ import typer
 from gaplab.api.clients.figures import FORMATS
 from gaplab.api.clients.progress.text import console
 from gaplab.api.commands import completion, tables
-from gaplab.api.commands.app import AsJson, Ids, Url, app, connect
+from gaplab.api.commands.app import RESULTS, AsJson, Ids, Url, app, connect
 from gaplab.api.commands.json_output import print_json, print_result
 
 
-@app.command()
+@app.command(rich_help_panel=RESULTS)
 def curve(
     ids: Ids,
     csv: Annotated[bool, typer.Option("--csv", help="print comma-separated values")] = False,
@@ -38,7 +38,7 @@ def curve(
                 typer.echo(f"Wrote {file}.", err=as_json or csv)
 
 
-@app.command()
+@app.command(rich_help_panel=RESULTS)
 def figure(
     kind: Annotated[str, typer.Argument(metavar="KIND", help="like curves", autocompletion=completion.figures)],
     ids: Ids,
@@ -59,7 +59,7 @@ def figure(
             msg = f"{file} has no suffix of a figure; permitted: {', '.join(FORMATS)}"
             raise typer.BadParameter(msg, param_hint="--out")
     with connect(url) as client:
-        drawn = client.figures.draw(*ids, of=kind, **dict(map(_option, options or [])))
+        drawn = client.figures.draw(*ids, of=kind, **dict(map(named_option, options or [])))
         for file in out:
             drawn.content(_format(file))
     files = [drawn.save(file) for file in out]
@@ -71,7 +71,8 @@ def _format(file: Path) -> str:
     return file.suffix.removeprefix(".").lower()
 
 
-def _option(text: str) -> tuple[str, str]:
+def named_option(text: str) -> tuple[str, str]:
+    """Return the name and the value of NAME=VALUE."""
     name, equals, value = text.partition("=")
     if not equals or not name.isidentifier() or name in {"of", "format", "study", "experiment"}:
         msg = f"{text!r} sets no option; write NAME=VALUE, like band=sd"

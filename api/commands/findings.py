@@ -11,14 +11,17 @@ MOST = 4
 
 
 def findings(client: Client, curves: Sequence[Curve]) -> Iterator[str]:
-    """Yield a sentence for each of the paper's ranges: one evaluation, more than two, more than five.
+    """Yield a sentence for the last number of evaluations that the strategies share, the first, and the paper's ranges.
 
-    Pairs of strategies are compared by Student's t, as in the paper, with Holm's correction over all pairs.
+    Pairs of strategies are compared by Student's t, as in the paper, with Holm's correction over all pairs. The ranges
+    pool values of one repetition, which are not independent; their sentences say so.
     """
     learned = [curve for curve in curves if not curve.direct]
     names = {curve.experiment: curve.name.replace("_", " ") for curve in learned}
     last = max((point.evaluations for curve in curves for point in curve.points), default=0)
-    for first, final in ((1, 1), (3, last), (6, last)):  # Source: the caption of the paper's Fig. 4
+    shared = min((max(_reached(curve), default=0) for curve in learned), default=0)
+    ranges = [(shared, shared), (1, 1), (3, last), (6, last)]  # Source: the caption of the paper's Fig. 4
+    for first, final in dict.fromkeys(ranges):
         if len(names) > 1 and first <= final <= last:
             yield _sentence(client.compare(list(names), first, final), names, first, final)
     level = next((point.mean for curve in curves if curve.direct for point in curve.points), None)
@@ -32,10 +35,15 @@ def findings(client: Client, curves: Sequence[Curve]) -> Iterator[str]:
         yield f"After {last} real-world evaluations, relative to the direct baseline: {', '.join(ratios)}"
 
 
+def _reached(curve: Curve) -> list[int]:
+    return [point.evaluations for point in curve.points if point.mean is not None]
+
+
 def _sentence(pairs: Sequence[Comparison], names: Mapping[str, str], first: int, final: int) -> str:
     differing = sorted((pair for pair in pairs if _p(pair) < SIGNIFICANT), key=_p)
     where = f"At {first if first == final else f'{first}-{final}'} real-world evaluation{'' if final == 1 else 's'}"
-    start = f"{where}, {len(differing)} of {len(pairs)} pairs differ (p < {SIGNIFICANT}, Student's t, Holm)"
+    pooled = "" if first == final else "; pooled as in the paper, so p is too small"
+    start = f"{where}, {len(differing)} of {len(pairs)} pairs differ (p < {SIGNIFICANT}, Student's t, Holm{pooled})"
     shown = [_words(pair, names) for pair in differing[:MOST]]
     more = [f"and {len(differing) - MOST} more"] if len(differing) > MOST else []
     return f"{start}: {', '.join(shown + more)}" if differing else start

@@ -4,12 +4,12 @@ from typing import Annotated, Literal
 
 import typer
 
-from gaplab.api.commands.app import AsJson, app
+from gaplab.api.commands.app import OTHERS, AsJson, app
 from gaplab.api.commands.exit_codes import Exit
 from gaplab.api.commands.json_output import print_json
 
 
-@app.command("help")
+@app.command("help", rich_help_panel=OTHERS)
 def help_(
     context: typer.Context,
     topic: Annotated[

@@ -4,49 +4,50 @@ from typing import Annotated
 
 import typer
 
+from gaplab.api.clients.progress.text import state_text
 from gaplab.api.clients.records import Record
-from gaplab.api.commands.app import AsJson, ExperimentId, Id, Url, app, connect
+from gaplab.api.commands.app import LIFE, AsJson, ExperimentId, Id, Url, app, connect
 from gaplab.api.commands.json_output import print_result
 
 Total = typer.Option(min=1, help="new total; left out: unchanged", show_default=False)
 
 
-@app.command()
+@app.command(rich_help_panel=LIFE)
 def pause(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     """Pause an experiment or a study once its current steps end, and free its cores."""
     with connect(url) as client:
         _print_state(client.pause(id), as_json=as_json)
 
 
-@app.command()
+@app.command(rich_help_panel=LIFE)
 def resume(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     """Continue a paused experiment or study."""
     with connect(url) as client:
         _print_state(client.resume(id), as_json=as_json)
 
 
-@app.command()
+@app.command(rich_help_panel=LIFE)
 def stop(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     """Complete an experiment or a study with its results so far, once its current steps end."""
     with connect(url) as client:
         _print_state(client.stop(id), as_json=as_json)
 
 
-@app.command()
+@app.command(rich_help_panel=LIFE)
 def cancel(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     """Cancel an experiment, or the experiments of a study that have not ended; stored results are kept."""
     with connect(url) as client:
         _print_state(client.cancel(id), as_json=as_json)
 
 
-@app.command()
+@app.command(rich_help_panel=LIFE)
 def retry(id: Id, as_json: AsJson = False, url: Url = None) -> None:
     """Queue the FAILED repetitions of an experiment or a study once more; they go on from their stored steps."""
     with connect(url) as client:
         _print_state(client.retry(id), as_json=as_json)
 
 
-@app.command()
+@app.command(rich_help_panel=LIFE)
 def extend(
     id: ExperimentId,
     iterations: Annotated[int | None, Total] = None,
@@ -59,7 +60,7 @@ def extend(
         _print_state(client.extend(id, iterations=iterations, repetitions=repetitions), as_json=as_json)
 
 
-@app.command("accept-versions")
+@app.command("accept-versions", rich_help_panel=LIFE)
 def accept_versions(id: ExperimentId, as_json: AsJson = False, url: Url = None) -> None:
     """Let an experiment continue under other versions of engines or plug-ins than it started with."""
     with connect(url) as client:
@@ -68,4 +69,4 @@ def accept_versions(id: ExperimentId, as_json: AsJson = False, url: Url = None) 
 
 
 def _print_state(record: Record, *, as_json: bool) -> None:
-    print_result(record, f"{record.name} is {record.state}.", as_json=as_json)
+    print_result(record, f"{record.name} is {state_text(record)}.", as_json=as_json)

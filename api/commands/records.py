@@ -1,51 +1,88 @@
 """Commands that list, show and edit studies and experiments."""
 
-from itertools import islice, takewhile
+from collections.abc import Sequence
+from operator import attrgetter
 from typing import Annotated
 
 import typer
 from pydantic import ValidationError
+from rich.markup import escape
 
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.progress.text import console, counts
+from gaplab.api.clients.progress.text import best, console, counts
 from gaplab.api.clients.records import Record
 from gaplab.api.commands import tables
-from gaplab.api.commands.app import AsJson, Id, Url, app, connect, print_warnings
+from gaplab.api.commands.app import LIFE, RESULTS, SPECS, AsJson, Id, Url, app, connect, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.schemas.editing import Edit
+from gaplab.schemas.mistakes import sentence
 from gaplab.schemas.provenance import ProvenanceUse
 from gaplab.schemas.records import ExperimentRead, StudyRead
 
 
-@app.command("list")
+@app.command("list", rich_help_panel=RESULTS)
 def list_(
     experiments: Annotated[bool, typer.Option("--experiments", help="experiments instead of studies")] = False,
+    query: Annotated[
+        str | None,
+        typer.Option("--query", "-q", help="like 'tag = gait and fitness > 0.5', or words", show_default=False),
+    ] = None,
+    view: Annotated[str | None, typer.Option(help="saved view to list", show_default=False)] = None,
     limit: Annotated[int, typer.Option(min=1, max=500)] = 20,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """List the newest studies, and the experiments without a study."""
+    """List the newest studies, and the experiments without a study; or what fits a query or a saved view."""
     with connect(url) as client:
-        newest = client.experiments(limit=limit).items if experiments else _newest(client, limit)
+        newest = _of_view(client, view, query, limit) if view else _newest(client, query, limit, alone=experiments)
     if as_json:
         print_json(newest)
-    else:
-        console().print(tables.overview(newest) if newest else "Nothing yet; `gaplab submit` starts something.")
+        return
+    nothing = "Nothing fits." if view or query else "Nothing yet; `gaplab submit` starts something."
+    console().print(tables.overview(newest) if newest else nothing)
 
 
-@app.command()
-def show(id: Id, as_json: AsJson = False, url: Url = None) -> None:
+@app.command(rich_help_panel=RESULTS)
+def show(
+    id: Id,
+    with_spec: Annotated[bool, typer.Option("--spec", help="also print the complete spec of an experiment")] = False,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
     """Show the experiments of a study, or the repetitions of an experiment."""
     with connect(url) as client:
         record = client.find(id)
         if isinstance(record, StudyRead):
             _show_study(record, as_json=as_json)
         else:
-            _show_experiment(client, record, as_json=as_json)
+            _show_experiment(client, record, as_json=as_json, with_spec=with_spec)
 
 
-@app.command()
+@app.command(rich_help_panel=SPECS)
+def spec(
+    id: Id,
+    resolved: Annotated[
+        bool, typer.Option("--resolved", help="every field, as stored; for a study, a list of its experiments")
+    ] = False,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Print a spec that gives the same study or experiment again, for `gaplab submit`."""
+    with connect(url) as client:
+        record, found = client.find(id), client.spec(id)
+    complete = found.resolved if isinstance(record, StudyRead) else found.resolved[0]
+    for remark in found.remarks:
+        typer.echo(f"note: {remark}", err=True)
+    if as_json:
+        print_json(found)
+    elif resolved or found.spec is not None:
+        print_json(complete if resolved else found.spec)
+    else:
+        raise CommandError(f"no single spec gives {record.name}; --resolved prints those of its experiments")
+
+
+@app.command(rich_help_panel=LIFE)
 def edit(
     id: Id,
     name: Annotated[str | None, typer.Option(help="new name", show_default=False)] = None,
@@ -60,8 +97,7 @@ def edit(
     try:
         checked = Edit.model_validate(changes)
     except ValidationError as error:
-        mistakes = [(wrong["loc"], wrong["msg"].removeprefix("Value error, ")) for wrong in error.errors()]
-        msg = "; ".join(f"--{place[0]}: {message}" if place else message for place, message in mistakes)
+        msg = "; ".join(f"{'--' if wrong['loc'] else ''}{sentence(wrong)}" for wrong in error.errors())
         raise CommandError(msg, Exit.INVALID) from error
     with connect(url) as client:
         record = client.edit(id, checked)
@@ -73,24 +109,27 @@ def _show_study(study: StudyRead, *, as_json: bool) -> None:
     if as_json:
         print_json({"study": study})
         return
-    console().print(tables.overview([study]), counts(study.progress), tables.overview(study.experiments), sep="\n")
+    parts = (tables.overview([study]), counts(study.progress), *map(escape, best(study)))
+    console().print(*parts, tables.overview(study.experiments), sep="\n")
     print_warnings(study)
 
 
-def _show_experiment(client: Client, experiment: ExperimentRead, *, as_json: bool) -> None:
+def _show_experiment(client: Client, experiment: ExperimentRead, *, as_json: bool, with_spec: bool) -> None:
     repetitions, misfit = client.repetitions(experiment.id), client.misfit(experiment.id)
     provenance = client.provenance(experiment.id)
     if as_json:
-        shown = {"experiment": experiment, "repetitions": repetitions, "provenance": provenance, "misfit": misfit}
-        print_json(shown)
+        document = {"experiment": experiment, "repetitions": repetitions, "provenance": provenance, "misfit": misfit}
+        print_json(document)
         return
     screen = console()
-    screen.print(tables.overview([experiment]), counts(experiment.progress), tables.repetitions(repetitions), sep="\n")
+    shown = (counts(experiment.progress), tables.repetitions(repetitions, experiment))
+    screen.print(tables.overview([experiment]), *shown, sep="\n")
     for use in provenance.uses:
         screen.print(f"computed with {_software(use)}", markup=False, soft_wrap=True)
     if misfit.remarks:
         screen.print(tables.tuned(misfit), *misfit.remarks, sep="\n", markup=False)
-    screen.print_json(data=experiment.spec)
+    if with_spec:
+        screen.print_json(data=experiment.spec)
     print_warnings(experiment)
 
 
@@ -102,11 +141,22 @@ def _software(use: ProvenanceUse) -> str:
     return f"gaplab {found.gaplab}{commit}, Python {found.python}, {engines}; {found.processor}, {found.system}"
 
 
-def _newest(client: Client, limit: int) -> list[Record]:
-    """Return the newest studies, and the experiments without a study that are as new."""
-    studies = client.studies(limit=limit).items
-    oldest = studies[-1].created_at if len(studies) == limit else None
-    as_new = takewhile(lambda each: oldest is None or each.created_at >= oldest, client.records.all_experiments())
-    alone = islice((experiment for experiment in as_new if experiment.study is None), limit)
-    newest: list[Record] = [*studies, *alone]
-    return sorted(newest, key=lambda record: record.created_at, reverse=True)[:limit]
+def _newest(
+    client: Client, query: str | None, limit: int, *, alone: bool = False, sort: str = "-created_at"
+) -> Sequence[Record]:
+    """Return experiments, or studies with the experiments without a study, that fit a query: the first of an order."""
+    if alone:
+        return client.experiments(query=query, sort=sort, limit=limit).items
+    studies = client.studies(query=query, sort=sort, limit=limit).items
+    without = client.experiments(query=query, alone="true", sort=sort, limit=limit).items
+    records: list[Record] = [*studies, *without]
+    return sorted(records, key=attrgetter(sort.removeprefix("-")), reverse=sort.startswith("-"))[:limit]
+
+
+def _of_view(client: Client, name: str, query: str | None, limit: int) -> Sequence[Record]:
+    """Return what a saved view lists, as far as it fits a further query."""
+    view = client.keeping.view(name)
+    wanted = f"({view.query}) and ({query})" if view.query and query else query or view.query
+    if view.shows == "studies":
+        return client.studies(query=wanted, sort=view.sort, limit=limit).items
+    return _newest(client, wanted, limit, alone=view.shows == "experiments", sort=view.sort)

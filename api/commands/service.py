@@ -6,11 +6,11 @@ from typing import Annotated, Any
 import typer
 
 from gaplab.api.clients.progress.text import console
-from gaplab.api.commands.app import app
+from gaplab.api.commands.app import RUNNING, app
 from gaplab.services.settings import Settings
 
 
-@app.command()
+@app.command(rich_help_panel=RUNNING)
 def serve(
     port: Annotated[int | None, typer.Option(help="left out: GAPLAB_PORT, or 8000", show_default=False)] = None,
     host: Annotated[str | None, typer.Option(help="left out: GAPLAB_HOST, or loopback", show_default=False)] = None,
@@ -25,7 +25,7 @@ def serve(
     run(Settings.from_environment().model_copy(update=given), workers=workers)
 
 
-@app.command()
+@app.command(rich_help_panel=RUNNING)
 def demo(
     folder: Annotated[Path, typer.Option(help="folder for the database, the figures and the log")] = Path(
         "results/demo"

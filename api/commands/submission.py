@@ -2,33 +2,48 @@
 
 import json
 import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
 
 from gaplab.api.clients.client import Client
-from gaplab.api.clients.progress.text import console, counts
-from gaplab.api.clients.records import experiments_of
+from gaplab.api.clients.confirmation import Ask, confirm, sentence
+from gaplab.api.clients.progress.text import console, counts, state_text
+from gaplab.api.clients.records import Record, experiments_of
 from gaplab.api.commands import tables
-from gaplab.api.commands.app import AsJson, Id, Url, app, connect, print_warnings
+from gaplab.api.commands.app import SPECS, AsJson, Id, Url, app, connect, print_warnings
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json
+from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.lifecycle import State
 
 SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="a JSON file, or - for standard input")]
 
 
-@app.command()
+@app.command(rich_help_panel=SPECS)
 def submit(
     spec: SpecFile,
     watch: Annotated[bool, typer.Option("--watch", help="show the progress until it ends")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask, however long it takes")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="print the complete spec and the estimated cost; submit nothing")
+    ] = False,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Submit an experiment, or a study if the spec names several strategies or none."""
+    """Submit an experiment, or a study if the spec names several strategies or none.
+
+    The estimated cost is shown first, on standard error. Above an hour, a person at a terminal is asked.
+    """
+    content = read_spec(spec)
     with connect(url) as client:
-        record = client.submit(_read(spec))
+        if dry_run:
+            _print_estimate(client.estimate(content), as_json=as_json)
+            return
+        record = submit_confirmed(client, content, yes=yes)
         if not as_json:
             typer.echo(record.id)
         if watch:
@@ -37,7 +52,46 @@ def submit(
         print_json(record)
 
 
-@app.command()
+def submit_confirmed(client: Client, spec: Mapping[str, Any], *, yes: bool) -> Record:
+    """Show the estimated cost of a spec, ask a person at a terminal if it is long, and submit it.
+
+    Raises:
+        NotSubmitted: the person declined.
+    """
+    with _keyboard() as ask:
+        confirm(client.estimate(spec), None if yes else ask)
+    return client.submit(spec, yes=True)
+
+
+@contextmanager
+def _keyboard() -> Iterator[Ask | None]:
+    """Yield what asks the person at the terminal, even if standard input is the spec; None without a terminal."""
+    if not sys.stdout.isatty():
+        yield None
+        return
+    try:
+        terminal = open("/dev/tty", "r+b", buffering=0)  # noqa: SIM115 - closed below
+    except OSError:
+        yield input if sys.stdin.isatty() else None
+        return
+    with terminal:
+
+        def ask(question: str) -> str:
+            terminal.write(question.encode())
+            return terminal.readline().decode(errors="replace")
+
+        yield ask
+
+
+def _print_estimate(estimate: EstimateRead, *, as_json: bool) -> None:
+    if as_json:
+        print_json(estimate)
+        return
+    print_json(estimate.specs[0] if len(estimate.specs) == 1 else estimate.specs)
+    typer.echo(f"{sentence(estimate)}. Nothing was submitted.", err=True)
+
+
+@app.command(rich_help_panel=SPECS)
 def watch(
     id: Id,
     every: Annotated[float, typer.Option(min=0.1, max=3600, help="seconds between requests")] = 1.0,
@@ -50,11 +104,11 @@ def watch(
         _watch(client, id, as_json=as_json, curves=True, every_s=every, patience_s=patience)
 
 
-@app.command()
+@app.command(rich_help_panel=SPECS)
 def sensitivity(spec: SpecFile, as_json: AsJson = False, url: Url = None) -> None:
     """Check the tunables of a spec: whether they change fitness, how much, and how smoothly."""
     with connect(url) as client:
-        check = client.check(_read(spec))
+        check = client.check(read_spec(spec))
     if as_json:
         print_json(check)
     if check.state is not State.COMPLETED:
@@ -75,7 +129,7 @@ def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  
     if as_json:
         print_json(record)
     else:
-        typer.echo(f"{record.name}: {record.state}; {counts(record.progress)}.")
+        typer.echo(f"{record.name}: {state_text(record)}; {counts(record.progress)}.")
     for reason in sorted({reason for experiment in experiments_of(record) for reason in experiment.reasons}):
         typer.echo(f"  {reason}", err=True)
     print_warnings(record)
@@ -83,7 +137,7 @@ def _watch(client: Client, id: str, *, as_json: bool, **options: Any) -> None:  
         raise typer.Exit(Exit.FAILED)
 
 
-def _read(name: str) -> dict[str, Any]:
+def read_spec(name: str) -> dict[str, Any]:
     """Return the spec in a JSON file, or in standard input if the name is "-".
 
     Raises:

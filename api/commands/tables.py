@@ -6,25 +6,27 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from gaplab.api.clients.progress.text import colored, percent
+from gaplab.api.clients.progress.text import colored, fitness, percent, standing, time_left
 from gaplab.api.clients.records import Record
 from gaplab.api.commands.completion import KINDS
-from gaplab.schemas.curves import Curve, CurvePoint
+from gaplab.schemas.curves import Comparison, Curve, CurvePoint
+from gaplab.schemas.lifecycle import State
 from gaplab.schemas.misfit import MisfitRead, TunableDistribution
 from gaplab.schemas.plugin import Catalogue, PluginRead
-from gaplab.schemas.records import RepetitionRead, StudyRead
+from gaplab.schemas.records import ExperimentRead, RepetitionRead, StudyRead
 from gaplab.schemas.sensitivity import Sensitivity, SensitivityRead
 
 
 def overview(records: Iterable[Record]) -> Table:
     """Return a table of studies and experiments."""
-    return table(("id", "name", "state", "progress", "left", "created"), map(_record, records))
+    return table(("id", "name", "state", "fitness", "progress", "left", "created"), map(_record, records))
 
 
-def repetitions(found: Iterable[RepetitionRead]) -> Table:
+def repetitions(found: Iterable[RepetitionRead], experiment: ExperimentRead) -> Table:
     """Return a table of the repetitions of an experiment."""
+    iterations = 0 if experiment.direct else int(experiment.spec["iterations"])
     columns = ("repetition", "state", "iterations", "rollouts", "attempts", "reason of failure")
-    return table(columns, map(_repetition, found))
+    return table(columns, (_repetition(repetition, iterations) for repetition in found))
 
 
 def curves(found: Sequence[Curve]) -> Table:
@@ -53,9 +55,22 @@ def baselines(found: Sequence[Curve]) -> list[str]:
     ]
 
 
+def comparisons(pairs: Sequence[Comparison]) -> list[Table | str]:
+    """Return a table of pairs with Holm's corrected p of each test, and a line that says what was compared."""
+    first, last = pairs[0].from_evaluations, pairs[0].to_evaluations
+    where = f"after {first} real-world evaluations" if first == last else f"pooled over {first} to {last}"
+    columns = ("first", "second", "n", "difference", "d", "p Student", "p Welch", "p Mann-Whitney")
+    return [f"Fitness in reality {where}; p with Holm's correction over all pairs", table(columns, map(_pair, pairs))]
+
+
 def catalogue(plugins: Catalogue) -> list[Table]:
     """Return a table for each kind of plug-in."""
     return [table((kind, "summary", "options"), map(_plugin, getattr(plugins, kind))) for kind in KINDS]
+
+
+def ignored(plugins: Catalogue) -> list[str]:
+    """Return a line for each file in a plug-in folder that is no plug-in."""
+    return [f"{escape(each.file)} is not used: {escape(each.why)}\n" for each in plugins.ignored]
 
 
 def plugin(found: PluginRead) -> list[Table | str]:
@@ -96,21 +111,18 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
 def _record(record: Record) -> tuple[str, ...]:
     many = f" ({len(record.experiments)})" if isinstance(record, StudyRead) else ""
     created = record.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
-    progress = (percent(record.progress), _time_left(record.progress.seconds_left))
-    return record.id, escape(record.name) + many, colored(record.state), *progress, created
+    unknown = "not known yet" if record.state is State.RUNNING else "-"
+    progress = (fitness(record), percent(record.progress), time_left(record) or unknown)
+    tags = f" [dim]{escape(' '.join(record.tags))}[/]" if record.tags else ""
+    return record.id, escape(record.name) + many + tags, standing(record), *progress, created
 
 
-def _time_left(seconds: float | None) -> str:
-    if seconds is None:
-        return "-"
-    minutes, seconds = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes:02} min" if hours else f"{minutes}:{seconds:02}"
-
-
-def _repetition(found: RepetitionRead) -> tuple[str, ...]:
-    counts = (f"{found.iterations_done}", f"{found.rollouts_done:,}", f"{found.attempts}")
-    return f"{found.number}", colored(found.state), *counts, escape(found.error or "")
+def _repetition(found: RepetitionRead, iterations: int) -> tuple[str, ...]:
+    done = max(0, found.iterations_done - 1)
+    early = found.state is State.COMPLETED and done < iterations
+    state = f"[yellow]{found.state}, stopped early[/]" if early else colored(found.state)
+    counts = (f"{done} of {iterations}" if iterations else "-", f"{found.rollouts_done:,}", f"{found.attempts}")
+    return f"{found.number}", state, *counts, escape(found.error or "")
 
 
 def _plugin(found: PluginRead) -> tuple[str, ...]:
@@ -128,6 +140,17 @@ def _tuned(found: TunableDistribution) -> tuple[str, ...]:
     bounds = ", ".join(f"{100 * share:.0f} % at {bound:g}" for bound, share in sides if share) or "-"
     mean_sd = f"{_number(found.mean)}±{_number(found.sd)}"
     return found.name, mean_sd, _number(found.least), _number(found.greatest), bounds
+
+
+def _pair(found: Comparison) -> tuple[str, ...]:
+    names = (escape(found.first_name), escape(found.second_name))
+    sizes = (_signed(found.difference), _signed(found.effect_size))
+    tests = (found.student, found.welch, found.mann_whitney)
+    return *names, f"{found.n_first}, {found.n_second}", *sizes, *(_number(test.p_holm) for test in tests)
+
+
+def _signed(value: float | None) -> str:
+    return "-" if value is None else f"{value:+.3g}"
 
 
 def _number(value: float | None) -> str:

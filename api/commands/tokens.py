@@ -9,7 +9,7 @@ import typer
 from rich.markup import escape
 
 from gaplab.api.clients.progress.text import console
-from gaplab.api.commands.app import AsJson, app
+from gaplab.api.commands.app import OTHERS, AsJson, app
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.api.commands.tables import table
 from gaplab.schemas.access import Role, TokenRead
@@ -17,10 +17,12 @@ from gaplab.services import access
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import Store
 
+NONE_LEFT = "No token is left, and the service refuses every request; `gaplab token create --role admin` makes one."
+
 tokens = typer.Typer(
     help="Manage the tokens that the service accepts, in the database of GAPLAB_DATABASE_URL.", no_args_is_help=True
 )
-app.add_typer(tokens, name="token")
+app.add_typer(tokens, name="token", rich_help_panel=OTHERS)
 
 
 @tokens.command()
@@ -59,7 +61,10 @@ def revoke(id: Annotated[str, typer.Argument(metavar="ID", help="id of the token
     """Revoke a token; the service refuses it from the next request on."""
     with _store() as store:
         access.revoke_token(store, id)
+        left = [token for token in access.list_tokens(store) if token.revoked_at is None]
     print_result({"id": id, "revoked": True}, f"Revoked {id}.", as_json=as_json)
+    if not left:
+        typer.echo(NONE_LEFT, err=True)
 
 
 @contextmanager

@@ -33,7 +33,7 @@ RECHECK_S = 10.0
 
 READING = {"GET", "HEAD", "OPTIONS"}
 
-ASKING = {"/studies/estimate"}
+ASKING = {"/studies/estimate", "/experiments/estimate"}
 """POST requests that only read: the question is too long for an address."""
 
 

@@ -16,6 +16,7 @@ from gaplab.services.access import Caller, demand
 from gaplab.services.core.errors import InvalidSpec, NotFound
 from gaplab.services.experiments.idempotency import Once
 from gaplab.services.experiments.limits import Admission
+from gaplab.services.plugins import watching
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.store.session import Store
 
@@ -62,6 +63,12 @@ def _rollout_process(request: Request) -> RolloutProcess:
     return process
 
 
+def _drawing_process(request: Request) -> RolloutProcess:
+    """Return the app's process that draws videos."""
+    process: RolloutProcess = request.app.state.drawing_process
+    return process
+
+
 def _limited(request: Request) -> Admission:
     """Return the token of the caller, and the limits that apply."""
     return Admission(_caller(request).token, request.app.state.limits)
@@ -75,6 +82,7 @@ def _admission(admitted: Annotated[Admission, Depends(_limited)], key: Idempoten
 StoreDep = Annotated[Store, Depends(_store)]
 CallerDep = Annotated[Caller, Depends(_caller)]
 RolloutProcessDep = Annotated[RolloutProcess, Depends(_rollout_process)]
+DrawingProcessDep = Annotated[RolloutProcess, Depends(_drawing_process)]
 LimitedDep = Annotated[Admission, Depends(_limited)]
 AdmissionDep = Annotated[Admission, Depends(_admission)]
 Id = Annotated[str, AfterValidator(_plausible)]
@@ -88,6 +96,11 @@ async def refuse_repeated_parameters(request: Request) -> None:
     """
     if repeated := repeated_parameters(request):
         raise InvalidSpec(repeated)
+
+
+def reload_plugins() -> None:
+    """Import the plug-ins again if their files were changed, so that a request needs no restart of the service."""
+    watching.reload()
 
 
 class Parameters(BaseModel):

@@ -1,6 +1,7 @@
 """The query parameters that all figures share, and the answer in the requested format."""
 
-from typing import Literal
+from collections.abc import Callable
+from typing import Literal, TypeVar
 
 from fastapi import Response
 from pydantic import Field
@@ -15,6 +16,8 @@ from gaplab.services.figures.plotly.chart import chart
 from gaplab.services.figures.plotly.html import render_html
 from gaplab.services.figures.words import TITLE
 from gaplab.services.waiting_line import WaitingLine
+
+T = TypeVar("T")
 
 MEDIA_TYPES = {
     "json": "application/json",
@@ -54,10 +57,20 @@ def answer(figure: FigureDefinition, query: Drawing) -> Response:
     media_type = MEDIA_TYPES[query.format]
     if query.format == "json":
         return Response(read(figure).model_dump_json(), media_type=media_type)
-    with _DRAWING.turn():
-        drawn = render_file(figure, query.format, width_in=query.width, caption=query.caption)
+    file_format = query.format
+    drawn = in_turn(lambda: render_file(figure, file_format, width_in=query.width, caption=query.caption))
     disposition = {"Content-Disposition": f'inline; filename="gaplab-{figure.name}.{query.format}"'}
     return Response(drawn, media_type=media_type, headers=disposition)
+
+
+def in_turn(draw: Callable[[], T]) -> T:
+    """Return what `draw` draws with Matplotlib, once it is the caller's turn.
+
+    Raises:
+        LimitReached: too many files are being drawn.
+    """
+    with _DRAWING.turn():
+        return draw()
 
 
 def read(figure: FigureDefinition) -> FigureRead:

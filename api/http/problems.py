@@ -8,10 +8,11 @@ from uuid import uuid4
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
+from fastapi.responses import JSONResponse, Response
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
+from gaplab.api.http.lost import asks_for_a_page, lost
 from gaplab.api.http.violations import MOST_ERRORS, explain, finite, without_consequences
 from gaplab.schemas.problems import Problem, SpecError
 from gaplab.services.core.errors import (
@@ -106,16 +107,24 @@ def documented(*statuses: int) -> Responses:
     }
 
 
-def of_gaplab(request: Request, error: Exception) -> JSONResponse:
+def of_gaplab(request: Request, error: Exception) -> Response:
     """Return the response to a request that gaplab refused."""
     kind = next((KINDS[each] for each in type(error).__mro__ if each in KINDS), None)
     if kind is None:
         return _of_bug(request, error)
     if not isinstance(error, InvalidSpec):
-        return response(problem(*kind, str(finite(str(error) or type(error).__name__))), _headers(request, error))
+        refused = problem(*kind, str(finite(str(error) or type(error).__name__)))
+        return _shown(request, refused, _headers(request, error))
     errors = [_spec_error(violation) for violation in error.violations]
     in_body = any(each.pointer.startswith("/") or not each.pointer for each in errors)
     return response(problem(*(kind if in_body else INVALID_REQUEST), _sentence(errors, len(errors)), errors))
+
+
+def _shown(request: Request, refused: Problem, headers: dict[str, str]) -> Response:
+    """Return the problem; as a page if a person looks for something that does not exist."""
+    if refused.status == HTTPStatus.NOT_FOUND and asks_for_a_page(request):
+        return lost(request, refused)
+    return response(refused, headers)
 
 
 def _headers(request: Request, error: Exception) -> dict[str, str]:
@@ -166,14 +175,14 @@ def _sentence(errors: Sequence[SpecError], count: int) -> str:
     return f"{first.pointer}: {first.message}{others}" if first.pointer else f"{first.message}{others}"
 
 
-def _of_framework(request: Request, error: Exception) -> JSONResponse:
+def _of_framework(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     phrase = HTTPStatus(error.status_code).phrase
     fallback = (error.status_code, phrase.lower().replace(" ", "-"), phrase)
     kind = FRAMEWORK.get(error.status_code, fallback)
     template = DETAILS.get(error.status_code, str(error.detail).replace("{", "{{").replace("}", "}}"))
     detail = template.format(path=finite(request.url.path), method=request.method)
-    return response(problem(*kind, detail), dict(error.headers or {}))
+    return _shown(request, problem(*kind, detail), dict(error.headers or {}))
 
 
 def _of_absent_client(request: Request, error: Exception) -> JSONResponse:  # noqa: ARG001 - a handler's signature

@@ -1,7 +1,6 @@
 """Explanations of invalid requests: the place, the value, what is permitted, and the nearest valid name."""
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from itertools import islice
@@ -11,36 +10,12 @@ from typing import Any, Union, get_args, get_origin
 from fastapi import Request
 from pydantic import BaseModel
 
+from gaplab.schemas.mistakes import permitted_by, sentence
 from gaplab.schemas.problems import SpecError
 from gaplab.services.core.errors import Violation
 
 MOST_ERRORS = 50
 """Most errors in one answer: a hostile body could cause thousands."""
-
-PERMITTED = {
-    "int_type": "a whole number",
-    "int_parsing": "a whole number",
-    "int_from_float": "a whole number",
-    "float_type": "a finite number",
-    "float_parsing": "a finite number",
-    "finite_number": "a finite number",
-    "string_type": "text",
-    "bool_parsing": "true or false",
-    "bool_type": "true or false",
-    "dict_type": "an object",
-    "model_type": "an object",
-    "model_attributes_type": "an object",
-    "tuple_type": "a list",
-    "list_type": "a list",
-    "greater_than": "above {gt}",
-    "greater_than_equal": "at least {ge}",
-    "less_than": "below {lt}",
-    "less_than_equal": "at most {le}",
-    "too_short": "at least {min_length}",
-    "too_long": "at most {max_length}",
-    "string_too_short": "at least {min_length} characters",
-    "string_too_long": "at most {max_length} characters",
-}
 
 
 def without_consequences(errors: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
@@ -61,7 +36,7 @@ def explain(error: Mapping[str, Any], body: object, request: Request) -> SpecErr
     path = path[: _depth(body, path)] if place == "body" else path
     if error["type"] == "extra_forbidden":
         return _unknown_field(str(place), path, error["input"], request)
-    permitted, message = _permitted(error), str(error["msg"])
+    permitted, message = permitted_by(error), str(finite(sentence(error, path)))
     if error["type"] == "model_attributes_type" and isinstance(error["input"], bytes):
         message = "send the body as JSON, with the header `Content-Type: application/json`"
     absent = error["type"] == "missing" or isinstance(error["input"], bytes)
@@ -111,14 +86,6 @@ def _pointer(place: str, path: Sequence[str | int]) -> str:
 
 def _text(part: object) -> str:
     return str(finite(str(part)))
-
-
-def _permitted(error: Mapping[str, Any]) -> tuple[str, ...] | str | None:
-    context = error.get("ctx", {})
-    if error["type"] in {"literal_error", "enum"}:
-        return tuple(re.findall(r"'([^']*)'", context["expected"]))
-    template = PERMITTED.get(error["type"])
-    return template.format(**context) if template else None
 
 
 def _nearest(value: object, permitted: tuple[str, ...] | str | None) -> str | None:

@@ -12,8 +12,9 @@ from gaplab.api.process.connections import TimedConnection
 from gaplab.api.process.errors import CommandError
 from gaplab.api.process.supervisor_process import SupervisorProcess
 from gaplab.services.access import demand_token_beyond_loopback
+from gaplab.services.notifications.courier import courier
 from gaplab.services.plugins import folders
-from gaplab.services.settings import Limits, Settings
+from gaplab.services.settings import Limits, Notify, Settings
 from gaplab.services.store.session import Store
 from gaplab.services.store.sqlite_file import in_use
 
@@ -58,9 +59,11 @@ def serve_api(settings: Settings, listener: socket.socket, supervisor: Superviso
     store = Store(settings.database_url)
     try:
         with in_use(store.file):
-            app = create_app(store, settings, Limits.from_environment())
+            notify = Notify.from_environment()
+            app = create_app(store, settings, Limits.from_environment(), notify)
             app.state.supervisor, app.state.lease_s = supervisor, settings.lease_s
-            Server(app).run([listener])
+            with courier(store, notify, settings.url):
+                Server(app).run([listener])
     finally:
         store.dispose()
 
@@ -99,6 +102,7 @@ class Server(uvicorn.Server):
         """End the streams and the replay process, finish the requests under way, and close."""
         self._app.state.feed.close()
         self._app.state.rollout_process.close()
+        self._app.state.drawing_process.close()
         await super().shutdown(sockets)
 
 

@@ -11,6 +11,7 @@ from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.curves import Comparison, Curve
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.results import curves
+from gaplab.services.results.comparison_tables import comparisons_csv, comparisons_latex
 
 router = APIRouter(tags=["curves"])
 
@@ -21,6 +22,15 @@ _ROWS = """experiment,name,strategy,repetition,evaluations,fitness
 01f2e3d4c5b6,simulated_fit,simulated_fit,0,0,0.9
 """
 _CSV: Responses = {200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": _ROWS}}}}
+_TABLE = {"schema": {"type": "string"}, "example": "first,first_name,second,second_name,from_evaluations,…\n"}
+_TABLES: Responses = {
+    200: {
+        "content": {
+            "text/csv": _TABLE,
+            "application/x-latex": {"schema": {"type": "string"}, "example": "\\begin{table}…"},
+        }
+    }
+}
 
 
 class CurveQuery(Parameters):
@@ -36,9 +46,13 @@ class CurvesQuery(CurveQuery):
 
 
 class ComparisonQuery(Parameters):
-    """The experiments to compare, and the range of real-world evaluations to pool."""
+    """The experiments to compare, and the range of real-world evaluations to pool.
+
+    A range of several numbers is pooled as in the paper, and its p-values are too small; ask for a single number.
+    """
 
     experiment: Annotated[Ids, Field(min_length=2)]
+    format: Literal["json", "csv", "latex"] = "json"
     from_evaluations: Evaluations = Field(
         default=None, alias="from", description="smallest number to pool; left out: 1"
     )
@@ -87,17 +101,26 @@ def read_curves(store: StoreDep, query: Annotated[CurvesQuery, Query()]) -> tupl
 @router.get(
     "/comparisons",
     summary="Compare experiments",
+    response_model=tuple[Comparison, ...],
     response_description="One for each pair",
-    responses=documented(404, 422),
+    responses=_TABLES | documented(404, 422),
 )
-def compare_experiments(store: StoreDep, query: Annotated[ComparisonQuery, Query()]) -> tuple[Comparison, ...]:
+def compare_experiments(
+    store: StoreDep, query: Annotated[ComparisonQuery, Query()]
+) -> tuple[Comparison, ...] | Response:
     """Compare every pair by the paper's t-test, Welch's and Mann-Whitney's, with Holm's correction over all pairs."""
     first, last = query.from_evaluations, query.to_evaluations
     try:
-        return curves.compare(store, query.experiment, from_evaluations=first, to_evaluations=last)
+        pairs = curves.compare(store, query.experiment, from_evaluations=first, to_evaluations=last)
     except InvalidSpec as error:
         renamed = (replace(each, pointer=each.pointer.removesuffix("_evaluations")) for each in error.violations)
         raise InvalidSpec(renamed) from error
+    if query.format == "csv":
+        return _file(comparisons_csv(pairs), "text/csv", "gaplab-comparisons.csv")
+    if query.format == "latex":
+        unit = curves.unit_of(store, query.experiment[0])
+        return _file(comparisons_latex(pairs, unit), "application/x-latex", "gaplab-comparisons.tex")
+    return pairs
 
 
 def _formatted(found: tuple[Curve, ...], query: CurveQuery) -> tuple[Curve, ...] | Response:
@@ -105,5 +128,8 @@ def _formatted(found: tuple[Curve, ...], query: CurveQuery) -> tuple[Curve, ...]
 
 
 def _csv(found: tuple[Curve, ...]) -> Response:
-    disposition = {"Content-Disposition": 'attachment; filename="gaplab-curves.csv"'}
-    return Response(curves.curves_csv(found), media_type="text/csv", headers=disposition)
+    return _file(curves.curves_csv(found), "text/csv", "gaplab-curves.csv")
+
+
+def _file(text: str, media_type: str, name: str) -> Response:
+    return Response(text, media_type=media_type, headers={"Content-Disposition": f'attachment; filename="{name}"'})

@@ -38,12 +38,19 @@ class ExperimentFilter(Paging):
     """The experiments to list, and their order."""
 
     study: Id | None = Field(default=None, description="only experiments of this study")
+    alone: bool = Field(default=False, description="only experiments without a study")
     state: State | None = Field(default=None, description="only experiments in this state")
     strategy: str | None = Field(
         default=None, max_length=100, pattern=r"^\w+$", description="only experiments with this strategy"
     )
     text: str | None = Field(
-        default=None, max_length=200, description="only experiments whose name or id contains this text"
+        default=None, max_length=200, description="only experiments whose name, id, notes or tags contain this text"
+    )
+    q: str | None = Field(
+        default=None,
+        max_length=1_000,
+        description="query, like `strategy = informative and fitness > 0.5`, or words; archived ones are left out "
+        "unless it mentions `archived`",
     )
     sort: Literal["created_at", "-created_at", "name", "-name", "strategy", "-strategy", "state", "-state"] = Field(
         default="-created_at", description="field to sort by; a minus reverses the order"
@@ -128,7 +135,7 @@ def edit_experiment(
     request: Request,
     if_match: conditional.IfMatch = None,
 ) -> Response:
-    """Change its name or notes. `If-Match` names the `ETag` of what you edit; progress does not invalidate it."""
+    """Change its name, notes or tags. `If-Match` names the `ETag` of what you edit; progress does not invalidate it."""
     expected = conditional.starting_from(if_match)
     experiment = editing.edit_experiment(store, id, edit, starting_from=expected)
     return conditional.tagged(request, experiment, experiment.edits)

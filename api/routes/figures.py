@@ -1,7 +1,7 @@
 """Figures of studies and experiments, for the browser, for notebooks and for papers."""
 
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from fastapi import APIRouter, FastAPI, Query, Request, Response
 from pydantic import Field, model_validator
@@ -19,6 +19,7 @@ from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import TITLE, spoken
 from gaplab.services.replay.predictions import predictions
 from gaplab.services.results import curves
+from gaplab.services.results.coordinates import experiment_coordinates, simulator_coordinates
 from gaplab.services.results.curve_costs import cost_axis
 from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.specs.resolution import is_direct, spec_of
@@ -35,13 +36,24 @@ DIRECT = "the direct baseline tunes no simulators"
 """The message in place of a figure of simulators that do not exist."""
 
 
-class CurvesDrawing(Drawing):
-    """The curves to draw, and how."""
+class CoordinatesDrawing(Drawing):
+    """The experiments to draw, and how."""
 
     experiment: list[Id] = Field(default=[], max_length=100, description="id of an experiment; repeat for more")
     study: list[Id] = Field(
         default=[], max_length=20, description="id of a study, for all of its experiments; repeat for more"
     )
+
+    @model_validator(mode="after")
+    def _something_is_drawn(self) -> Self:
+        if not self.experiment and not self.study:
+            raise ValueError("name an experiment or a study, as in ?study=… or ?experiment=…&experiment=…")
+        return self
+
+
+class CurvesDrawing(CoordinatesDrawing):
+    """The curves to draw, and how."""
+
     band: Band | None = Field(
         default=None,
         description="around each curve: 95 % interval of the mean, or SD; left out: SD below five repetitions",
@@ -51,12 +63,6 @@ class CurvesDrawing(Drawing):
     )
     cost_s: float = Field(default=0.0, ge=0, le=1e9, description="seconds per real-world evaluation, if x is time")
     each: bool = EACH
-
-    @model_validator(mode="after")
-    def _something_is_drawn(self) -> "CurvesDrawing":
-        if not self.experiment and not self.study:
-            raise ValueError("name an experiment or a study, as in ?study=… or ?experiment=…&experiment=…")
-        return self
 
 
 class ExperimentDrawing(Drawing):
@@ -85,9 +91,10 @@ def draw_curves(store: StoreDep, query: Annotated[CurvesDrawing, Query()]) -> Re
 
 @router.get("/squared-error", summary="Draw the squared error", response_model=FigureRead, responses=responses())
 def draw_squared_error(store: StoreDep, query: Annotated[ErrorDrawing, Query()]) -> Response:
-    """Draw the squared error of an experiment's best simulator by iteration: median and quartiles over repetitions."""
+    """Draw the error of an experiment's best simulator by iteration, per sample and summed: median and quartiles."""
     tuned = tuned_simulators(store, query.experiment)
-    figure = squared_error_figure(tuned.errors, unit=tuned.unit, title=_title(store, query), each=query.each)
+    title, samples = _title(store, query), tuned.samples
+    figure = squared_error_figure(tuned.errors, samples=samples, unit=tuned.unit, title=title, each=query.each)
     return answer(_explained(store, query, figure), query)
 
 
@@ -97,8 +104,32 @@ def draw_simulators(store: StoreDep, query: Annotated[SimulatorsDrawing, Query()
     tuned, title = tuned_simulators(store, query.experiment), _title(store, query)
     narrow = query.format not in {"html", "json"} and query.width < NARROW_IN
     columns = query.columns or (2 if narrow else 3)
-    figure = simulators_figure(tuned.simulators, tuned.dimensions, truth=tuned.truth, title=title, columns=columns)
+    figure = simulators_figure(
+        tuned.simulators,
+        tuned.dimensions,
+        truth=tuned.truth,
+        real_engine=tuned.real_engine,
+        title=title,
+        columns=columns,
+    )
     return answer(_explained(store, query, figure), query)
+
+
+@router.get("/coordinates", summary="Draw parallel coordinates", response_model=FigureRead, responses=responses())
+def draw_coordinates(store: StoreDep, query: Annotated[CoordinatesDrawing, Query()]) -> Response:
+    """Draw parallel coordinates: the simulators of one experiment, or the settings that differ between experiments.
+
+    Of one experiment, each line is the best simulator of an iteration: its tunables, its error per sample, and the
+    real fitness of the controller that evolved in it. Of several, each line is an experiment with its final fitness.
+    """
+    if len(query.experiment) == 1 and not query.study:
+        alone = ExperimentDrawing(experiment=query.experiment[0], title=query.title)
+        figure = simulator_coordinates(store, alone.experiment, title=_title(store, alone))
+        return answer(_explained(store, alone, figure), query)
+    title = query.title
+    if title is None:
+        title = ", ".join(reading.read_study(store, id).name for id in query.study)
+    return answer(experiment_coordinates(store, query.study, query.experiment, title=title), query)
 
 
 @router.get(

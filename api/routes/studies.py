@@ -28,7 +28,13 @@ class StudyFilter(Paging):
         default=None, max_length=100, pattern=r"^\w+$", description="only studies with this strategy"
     )
     text: str | None = Field(
-        default=None, max_length=200, description="only studies whose name or id contains this text"
+        default=None, max_length=200, description="only studies whose name, id, notes or tags contain this text"
+    )
+    q: str | None = Field(
+        default=None,
+        max_length=1_000,
+        description="query, like `strategy = informative and fitness > 0.5`, or words; archived ones are left out "
+        "unless it mentions `archived`",
     )
     sort: Literal["created_at", "-created_at", "name", "-name"] = Field(
         default="-created_at", description="field to sort by; a minus reverses the order"
@@ -90,7 +96,7 @@ def edit_study(
     request: Request,
     if_match: conditional.IfMatch = None,
 ) -> Response:
-    """Change its name or notes. `If-Match` names the `ETag` of what you edit; progress does not invalidate it."""
+    """Change its name, notes or tags. `If-Match` names the `ETag` of what you edit; progress does not invalidate it."""
     expected = conditional.starting_from(if_match)
     study = editing.edit_study(store, id, edit, starting_from=expected)
     return conditional.tagged(request, study, study.edits)

@@ -19,6 +19,7 @@ from pydantic import (
     create_model,
 )
 
+from gaplab.schemas.mistakes import sentence
 from gaplab.services.archives.columns import EXPERIMENT, columns_of
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.store.tables import Column, Kind
@@ -83,9 +84,9 @@ def checked(table: str, file: Path, count: int) -> Iterator[Row]:
 
 
 def first_error(error: ValidationError) -> str:
-    """Return the place and the message of the first error, without the value."""
+    """Return the place and the mistake of the first error, without the value."""
     first = error.errors(include_url=False, include_input=False)[0]
-    return f"{'/'.join(map(str, first['loc']))[:100]}: {first['msg']}"
+    return f"{'/'.join(map(str, first['loc']))[:100]}: {sentence(first)}"
 
 
 def _lines(lines: IO[str], table: str) -> Iterator[str]:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from pydantic import ValidationError
 
+from gaplab.schemas.editing import Edit
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.archives.checking import Row
@@ -16,6 +17,7 @@ from gaplab.services.core.tunables import tunables
 from gaplab.services.specs.resolution import is_direct, spec_of
 from gaplab.services.store.models import SPEC_VERSION
 from gaplab.services.store.queries import provenance
+from gaplab.services.store.texts import pack_tags, unpack_tags
 
 MOST_EXPERIMENTS = 1_000
 
@@ -48,6 +50,8 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
     Raises:
         InvalidArchive: the message quotes the row.
     """
+    if table in {"study", "experiment"}:
+        _check_tags(table, row)
     if table == "study":
         return
     if table == "provenance":
@@ -63,6 +67,15 @@ def check_row(table: str, row: Row, experiments: Mapping[str, Row]) -> None:
         or (table == "simulator" and len(row["parameters"]) != len(owner["spec"]["tunables"]))
     ):
         raise InvalidArchive(f"a row of {table} does not fit its experiment: {str(row)[:200]}")
+
+
+def _check_tags(table: str, row: Row) -> None:
+    try:
+        tags = Edit(tags=unpack_tags(row.get("tags"))).tags or ()
+    except ValidationError as error:
+        raise InvalidArchive(f"the tags of {table} {row['id']!r} are invalid") from error
+    if pack_tags(tags) != row.get("tags"):
+        raise InvalidArchive(f"the tags of {table} {row['id']!r} are not as this service stores them")
 
 
 def _check_provenance(row: Row) -> None:

@@ -9,7 +9,7 @@ from typing import IO, Any
 from gaplab.services.archives.columns import columns_of, is_nested
 from gaplab.services.store.tables import Column, Kind
 
-MANIFEST, CURVES = "manifest.json", "curves.json"
+MANIFEST, CURVES, SPEC = "manifest.json", "curves.json", "spec.json"
 
 Row = dict[str, Any]
 

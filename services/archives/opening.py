@@ -22,7 +22,7 @@ from pydantic import ValidationError
 from gaplab.schemas.archives import FORMAT, Manifest, Member
 from gaplab.services.archives.checking import Row, checked, first_error
 from gaplab.services.archives.columns import EXPORTED
-from gaplab.services.archives.members import CURVES, MANIFEST, member_of
+from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, member_of
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.settings import variable_of
 
@@ -89,7 +89,7 @@ def open_archive(file: IO[bytes], folder: Path, most_rows: int) -> OpenedArchive
 
 
 def _members(archive: ZipFile) -> dict[str, ZipInfo]:
-    known = {MANIFEST, CURVES, *map(member_of, EXPORTED)}
+    known = {MANIFEST, CURVES, SPEC, *map(member_of, EXPORTED)}
     found: dict[str, ZipInfo] = {}
     for info in archive.infolist():
         if info.filename not in known:
@@ -123,7 +123,7 @@ def _manifest(archive: ZipFile, members: dict[str, ZipInfo]) -> Manifest:
 
 
 def _refuse_too_many_rows(manifest: Manifest, most: int) -> None:
-    rows = sum(member.rows for name, member in manifest.members.items() if name != CURVES)
+    rows = sum(member.rows for name, member in manifest.members.items() if name not in {CURVES, SPEC})
     if rows > most:
         permitted = f"{most:,} are permitted ({variable_of('imported_rows')})"
         raise InvalidArchive(f"it has {rows:,} rows; {permitted}: export its experiments one by one")

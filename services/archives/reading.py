@@ -7,6 +7,7 @@ had ended arrives unchanged, to the last bit.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -69,15 +70,30 @@ def import_archive(store: Store, file: IO[bytes], *, most_rows: int | None = Non
     if not _SLOTS.acquire(blocking=False):
         raise Conflict(f"{AT_ONCE} archives are being imported already; try again when they are done")
     try:
-        with TemporaryDirectory(prefix="gaplab-import-") as folder:
-            opened = open_archive(file, Path(folder), most_rows or Limits().imported_rows)
-            with store.reading() as session:
-                now = archives.database_time(session)
-            with private_store(Path(folder) / "checked.db") as private:
-                checked = private.write(_check, private, opened, now)
-                return store.write(_copy, checked)
+        with store.reading() as session:
+            now = archives.database_time(session)
+        with checked_archive(file, now, most_rows=most_rows) as checked:
+            return store.write(_copy, checked)
     finally:
         _SLOTS.release()
+
+
+@contextmanager
+def checked_archive(file: IO[bytes], now: datetime, *, most_rows: int | None = None) -> Iterator[CheckedArchive]:
+    """Yield the content of an archive in a private database, which is deleted afterwards.
+
+    Args:
+        file: seekable file, at its beginning.
+        now: when work that the archive shows under way counts as ended.
+        most_rows: most rows of all tables together; left out: the default of the setting.
+
+    Raises:
+        InvalidArchive: the file is damaged, harmful, too large or not an archive.
+    """
+    with TemporaryDirectory(prefix="gaplab-import-") as folder:
+        opened = open_archive(file, Path(folder), most_rows or Limits().imported_rows)
+        with private_store(Path(folder) / "checked.db") as private:
+            yield private.write(_check, private, opened, now)
 
 
 def _check(session: Session, private: Store, opened: OpenedArchive, now: datetime) -> CheckedArchive:
@@ -93,8 +109,8 @@ def _check(session: Session, private: Store, opened: OpenedArchive, now: datetim
 def _copy(session: Session, checked: CheckedArchive) -> ImportRead:
     """Copy the rows of the private database into the service's, and begin the life of the experiments there."""
     studies = {checked.study} if checked.study else set()
-    taken = archives.taken_ids(session, StudyRow, studies)
-    renamed = {old: new_id() for old in studies & taken}
+    taken_studies = archives.taken_ids(session, StudyRow, studies)
+    renamed = {old: new_id() for old in studies & taken_studies}
     taken = archives.taken_ids(session, ExperimentRow, checked.experiments)
     ids = {old: new_id() if old in taken else old for old in checked.experiments}
     with checked.store.reading() as source:
@@ -102,6 +118,7 @@ def _copy(session: Session, checked: CheckedArchive) -> ImportRead:
             owners = [*studies] if table == "study" else list(ids)
             rows = archives.read_rows(source, table, [column.name for column in columns_of(table)], owners)
             _insert(session, table, (_renamed(table, row, renamed, ids) for row in rows))
+    archives.forget_deletions(session, [*studies - taken_studies, *ids.values()])
     for id_ in ids.values():
         note(session, EventKind.IMPORTED, id_)
     settle(session, ids.values())

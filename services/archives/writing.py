@@ -15,9 +15,10 @@ from pydantic import TypeAdapter
 from gaplab.schemas.archives import FORMAT, Manifest, Member
 from gaplab.schemas.curves import Curve
 from gaplab.services.archives.columns import EXPORTED, columns_of
-from gaplab.services.archives.members import CURVES, MANIFEST, Row, member_of, write
+from gaplab.services.archives.members import CURVES, MANIFEST, SPEC, Row, member_of, write
 from gaplab.services.experiments import hiding
 from gaplab.services.results import curves
+from gaplab.services.specs.shortening import experiment_spec, study_spec
 from gaplab.services.store.models import REVISION, ExperimentRow
 from gaplab.services.store.queries import archives, experiments
 from gaplab.services.store.session import Session, Store
@@ -83,6 +84,7 @@ def _export(
                     members[member_of(table)] = _add(archive, member_of(table), part, count)
             points = TypeAdapter(tuple[Curve, ...]).dump_json(curves.curves_of(session, ids))
             members[CURVES] = _add(archive, CURVES, BytesIO(points), len(ids))
+            members[SPEC] = _add(archive, SPEC, BytesIO(_spec(session, study, owners, hidden)), 0)
             manifest = Manifest(
                 format=FORMAT, gaplab=version("gaplab"), revision=REVISION, kind=kind, id=id_, members=members
             )
@@ -93,6 +95,13 @@ def _export(
         file.close()
         raise
     return Archive(name=f"gaplab-{id_}.zip", size=size, file=file)
+
+
+def _spec(session: Session, study: str | None, owners: Sequence[ExperimentRow], hidden: Collection[str]) -> bytes:
+    """Return the spec to submit again, as JSON, with remarks on what it lacks."""
+    specs = [without_truth(row.spec) if row.id in hidden else row.spec for row in owners]
+    found = study_spec(experiments.get_study(session, study).name, specs) if study else experiment_spec(specs[0])
+    return found.model_dump_json(include={"spec", "remarks"}, indent=2).encode()
 
 
 def _rows(

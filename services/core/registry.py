@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 from pydantic import ValidationError
 
 from gaplab.schemas.base import Frozen
+from gaplab.schemas.mistakes import permitted_by, sentence
 from gaplab.schemas.plugin import PluginRead, PluginRef
 from gaplab.services.core import external_plugins
 from gaplab.services.core.errors import GaplabError, InvalidSpec, Violation, unknown_name
@@ -82,6 +83,11 @@ class Registry(Mapping[str, type[P]], Generic[P]):
     def unusable(self) -> Mapping[str, str]:
         """Why specs cannot use an external plug-in, by its name in the catalogue."""
         return {name: each.why for name, each in self._found.unusable.items()}
+
+    @property
+    def refused(self) -> tuple[Unusable, ...]:
+        """The external plug-ins that specs cannot use."""
+        return tuple(self._found.unusable.values())
 
     @property
     def _found(self) -> _Found[P]:
@@ -201,4 +207,4 @@ def _option_violation(plugin: type[Plugin], error: dict[str, Any], pointer: str)
     if error["type"] == "extra_forbidden":
         kind = f"option of {plugin.name!r}"
         return unknown_name(pointer + place, kind, str(error["loc"][-1]), list(plugin.Options.model_fields) or ["none"])
-    return Violation(pointer + place, error["input"], error["msg"])
+    return Violation(pointer + place, error["input"], sentence(error), permitted_by(error))

@@ -36,7 +36,11 @@ NOTHING = 0.01
 """Largest relative effect that counts as none: chaotic physics alone has it. Source: docs/decisions/sensitivity.md."""
 
 ROUGH = 0.5
-"""Roughness above which tuning does little better than chance. Source: docs/decisions/sensitivity.md."""
+"""Roughness above which the verdict is rough. Nothing happens there suddenly: tuned values grow less certain from
+`NOTEWORTHY` on, up to chance at 1. Source: docs/decisions/sensitivity.md."""
+
+NOTEWORTHY = 0.4
+"""Roughness above which a warning says how uncertain tuned values are."""
 
 VERSION = 1
 """Version of this module; a result of another version is another check."""
@@ -175,20 +179,26 @@ def verdict(relative_effect: float, roughness: float) -> Verdict:
 
 
 def warning(found: Sensitivity) -> str | None:
-    """Return a warning about tuning this parameter, in one sentence; None if it is smooth."""
+    """Return a warning about tuning this parameter, with what to do about it; None if it is smooth."""
     lower, upper = found.values[0], found.values[-1]
     where = f"{found.name} over {lower:g} to {upper:g}"
     match found.verdict:
         case Verdict.NOTHING:
             share = 100 * (found.relative_effect or 0.0)
             return f"{where} does nothing: its effect on fitness is {share:.2g} % of the spread between controllers"
-        case Verdict.ROUGH:
-            share = 100 * (found.roughness or 0.0)
-            return f"{where} is rough: {share:.0f} % of its effect on fitness is noise between neighbouring values"
         case Verdict.UNKNOWN:
             return f"{where} is unknown: physics failed in {found.failures} of the check's rollouts"
-        case Verdict.SMOOTH:
-            return None
+    return _noise(found, where) if (found.roughness or 0.0) > NOTEWORTHY else None
+
+
+def _noise(found: Sensitivity, where: str) -> str:
+    """Return what roughness means for the tuned value: the same sentence on both sides of the verdict's limit."""
+    share, limit = 100 * (found.roughness or 0.0), 100 * ROUGH
+    return (
+        f"{where}: {share:.0f} % of its effect on fitness is noise between neighbouring values; the larger this share, "
+        f"the less certain its tuned value (called rough above {limit:.0f} %; 100 % is chance). Leave it out of "
+        "the tunables, or check other bounds or another engine with the command gaplab sensitivity"
+    )
 
 
 def _relative(effect: float, spread: float) -> float:

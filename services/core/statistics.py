@@ -16,6 +16,11 @@ from gaplab.schemas.curves import Comparison, Test
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import equal, known
 
+POOLED = (
+    "pooled as in the paper: the values of one repetition at several numbers of evaluations are not independent, so "
+    "each p is too small; trust a single number"
+)
+
 
 @np.errstate(over="ignore", invalid="ignore")
 def compare(first: FloatArray, second: FloatArray) -> tuple[Test, Test, Test]:
@@ -88,6 +93,7 @@ def compare_all(
             second=second,
             from_evaluations=from_evaluations,
             to_evaluations=to_evaluations,
+            caution=POOLED if from_evaluations < to_evaluations else None,
             n_first=len(pooled[first]),
             n_second=len(pooled[second]),
             difference=_difference(pooled[first], pooled[second]),

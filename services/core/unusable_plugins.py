@@ -11,7 +11,7 @@ KINDS = ("strategy", "robot", "engine", "tunable", "optimizer")
 LONGEST = 300
 """Longest message of a plug-in's own error that is quoted, in characters."""
 
-REMEDY = "repair the file, then restart the service"
+REMEDY = "repair the file, which is then imported again"
 
 _CLASS = re.compile(r"^class[ \t]+([A-Za-z]\w*)[ \t]*\(?([^)\n]*)", re.MULTILINE)
 _NAME = re.compile(r"^[ \t]+name[ \t]*(?::[^=\n]*)?=[ \t]*[\"']([^\"'\n]{1,100})[\"']", re.MULTILINE)

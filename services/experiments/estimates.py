@@ -1,4 +1,4 @@
-"""Estimates: the cost of a study that is checked and resolved as if submitted, and not stored."""
+"""Estimates: the cost of a study or an experiment that is checked and resolved as if submitted, and not stored."""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -6,11 +6,17 @@ from collections.abc import Mapping
 from gaplab.schemas.estimates import EngineCost, EstimateRead, ExperimentCost
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.schemas.spec import StudySpec
+from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import check_extent
 from gaplab.services.settings import Limits
-from gaplab.services.specs.resolution import expected_rollouts, is_direct, resolve_study, spec_of
+from gaplab.services.specs.resolution import (
+    expected_rollouts,
+    is_direct,
+    resolve_experiment,
+    resolve_study,
+    spec_of,
+)
 from gaplab.services.store.queries import costs, supervisors
 from gaplab.services.store.session import Store
 
@@ -24,14 +30,16 @@ Key = tuple[str, str]
 """Robot and engine, with their options."""
 
 
-def estimate(store: Store, spec: StudySpec, *, limits: Limits | None = None, cores: int = 1) -> EstimateRead:
-    """Return the cost of the study on a number of cores.
+def estimate(
+    store: Store, spec: StudySpec | ExperimentSpec, *, limits: Limits | None = None, cores: int = 1
+) -> EstimateRead:
+    """Return the cost of the study or the experiment on a number of cores.
 
     Raises:
         InvalidSpec: the spec is invalid; the error has every violation, as on submission.
         StoreUnavailable: the database cannot be used now.
     """
-    resolved = resolve_study(spec)
+    resolved = resolve_study(spec) if isinstance(spec, StudySpec) else (resolve_experiment(spec),)
     check_extent(resolved, limits)
     with store.reading() as session:
         measured = _measured(costs.latest(session, LATEST))
@@ -47,6 +55,7 @@ def estimate(store: Store, spec: StudySpec, *, limits: Limits | None = None, cor
         cores=shared,
         seconds=total / shared,
         supervisors=working,
+        specs=tuple(each.model_dump(mode="json") for each in resolved),
     )
 
 

@@ -8,6 +8,7 @@ from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
+from gaplab.services.experiments.archiving import show_again
 from gaplab.services.experiments.lifecycle import get_permitting
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
 from gaplab.services.experiments.states import move, settle
@@ -55,6 +56,7 @@ def extend_experiment(
     experiment.spec = experiment.spec | {"iterations": spec.iterations, "repetitions": total}
     experiment.iterations, experiment.rollouts = extent.iterations, extent.rollouts
     session.flush()
+    show_again(session, experiment)
     note(session, EventKind.EXTENDED, experiment_id, iterations=spec.iterations, repetitions=total)
     settle(session, [experiment_id], State.QUEUED)
     session.refresh(experiment)

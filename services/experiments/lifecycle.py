@@ -13,6 +13,7 @@ from gaplab.schemas.lifecycle import PERMITTED, Ending, State, Verb
 from gaplab.schemas.records import ExperimentRead, StudyRead
 from gaplab.schemas.schedule import ScheduleChange
 from gaplab.services.core.errors import Conflict
+from gaplab.services.experiments.archiving import show_again
 from gaplab.services.experiments.checks import cancel_unneeded
 from gaplab.services.experiments.states import move, settle
 from gaplab.services.experiments.views import view_experiments, view_studies
@@ -137,6 +138,7 @@ def _obey(session: Session, experiment: ExperimentRow, verb: Verb) -> None:
         queued = (row.experiment_id == experiment.id) & (row.state == State.QUEUED)
         session.execute(update(row).where(queued).values(losses=0))
     if verb is Verb.RETRY:
+        show_again(session, experiment)
         failed = (row.experiment_id == experiment.id) & (row.state == State.FAILED)
         move(session, row, failed, State.QUEUED, losses=0, error=None, hidden_error=None)
     settle(session, [experiment.id], _REQUESTED[verb](experiment))

@@ -11,10 +11,19 @@ from datetime import datetime
 from hashlib import sha256
 from typing import Any, TypeVar
 
-from sqlalchemy import ColumnElement, Select, String, or_, select, tuple_, type_coerce
+from sqlalchemy import Select, String, select, tuple_, type_coerce
 
-from gaplab.schemas.lifecycle import OPEN, State
+from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead, Page, StudyRead
+from gaplab.services.experiments.query.conditions import (
+    EXPERIMENT_TEXTS,
+    STUDY_TEXTS,
+    contains,
+    experiments_meeting,
+    of_study,
+    studies_meeting,
+    study_is,
+)
 from gaplab.services.experiments.views import view_experiments, view_studies
 from gaplab.services.store.cursor import Column, decode, encode
 from gaplab.services.store.models import ExperimentRow, StudyRow
@@ -32,16 +41,21 @@ class ListFilter:
 
     Attributes:
         study: only experiments of this study.
+        alone: only experiments without a study.
         state: only experiments or studies in this state.
         strategy: only experiments with this strategy, or studies that have such an experiment.
-        text: only experiments or studies whose name or id contains this text.
+        text: only experiments or studies whose name, id, notes or tags contain this text.
+        q: query, as `gaplab.services.experiments.query` has it. Archived ones are left out unless it mentions them, or
+            a study is named.
         sort: a name of EXPERIMENT_ORDERS or STUDY_ORDERS; a minus before it reverses the order.
     """
 
     study: str | None = None
+    alone: bool = False
     state: State | None = None
     strategy: str | None = None
     text: str | None = None
+    q: str | None = None
     sort: str = "-created_at"
 
     def digest(self) -> str:
@@ -85,7 +99,7 @@ def list_experiments(
     """Return a page of experiments; concurrent submissions do not shift later pages.
 
     Raises:
-        InvalidSpec: the cursor is invalid, or of another list.
+        InvalidSpec: the query is invalid, or the cursor is, or it is of another list.
     """
     rows = _page_of_experiments(session, wanted, limit=limit + 1, cursor=cursor)
     return Page(items=view_experiments(session, rows[:limit]), next=_next(rows, limit, wanted))
@@ -98,7 +112,7 @@ def list_studies(
     """Return a page of studies.
 
     Raises:
-        InvalidSpec: the cursor is invalid, or of another list.
+        InvalidSpec: the query is invalid, or the cursor is, or it is of another list.
     """
     rows = _page_of_studies(session, wanted, limit=limit + 1, cursor=cursor)
     return Page(items=view_studies(session, rows[:limit]), next=_next(rows, limit, wanted))
@@ -113,20 +127,26 @@ def _page_of_experiments(
     session: Session, wanted: ListFilter, *, limit: int, cursor: str | None
 ) -> tuple[ExperimentRow, ...]:
     row = ExperimentRow
-    query = select(row).where(*_text(wanted.text, row.name, row.id))
+    query = select(row).where(*experiments_meeting(wanted.q, all_=wanted.study is not None))
+    if wanted.text:
+        query = query.where(contains(wanted.text, *EXPERIMENT_TEXTS))
     equal = {row.study_id: wanted.study, row.strategy: wanted.strategy}
     query = query.where(*(column == storable(value) for column, value in equal.items() if value is not None))
+    if wanted.alone:
+        query = query.where(row.study_id.is_(None))
     if wanted.state is not None:
         query = query.where(row.state == wanted.state)
     return tuple(session.scalars(_cut(query, wanted, EXPERIMENT_ORDERS, limit, cursor)))
 
 
 def _page_of_studies(session: Session, wanted: ListFilter, *, limit: int, cursor: str | None) -> tuple[StudyRow, ...]:
-    query = select(StudyRow).where(*_text(wanted.text, StudyRow.name, StudyRow.id))
+    query = select(StudyRow).where(*studies_meeting(wanted.q))
+    if wanted.text:
+        query = query.where(contains(wanted.text, *STUDY_TEXTS))
     if wanted.strategy is not None:
-        query = query.where(_has(ExperimentRow.strategy == storable(wanted.strategy)))
+        query = query.where(of_study(ExperimentRow.strategy == storable(wanted.strategy)))
     if wanted.state is not None:
-        query = query.where(*_study_is(wanted.state))
+        query = query.where(study_is(wanted.state))
     return tuple(session.scalars(_cut(query, wanted, STUDY_ORDERS, limit, cursor)))
 
 
@@ -145,33 +165,3 @@ def _cut(
         key, after = tuple_(*columns), decode(cursor, columns, wanted.digest())
         query = query.where(key < after if falling else key > after)
     return query.order_by(*(each.desc() if falling else each.asc() for each in columns)).limit(limit)
-
-
-def _text(text: str | None, *columns: Column) -> Sequence[ColumnElement[bool]]:
-    """SQL condition: a column contains the text; SQLite ignores the case of ASCII letters only."""
-    return [or_(*(each.icontains(storable(text), autoescape=True) for each in columns))] if text else []
-
-
-def _has(condition: ColumnElement[bool]) -> ColumnElement[bool]:
-    return select(ExperimentRow.id).where(ExperimentRow.study_id == StudyRow.id, condition).exists()
-
-
-def _study_is(state: State) -> list[ColumnElement[bool]]:
-    """SQL condition: the study is in the state; `views.state_of` computes the same for one study."""
-    open_ = _has(ExperimentRow.state.in_(OPEN))
-    if state is State.RUNNING:
-        return [open_, *(~_all_left_are(each) for each in OPEN if each is not State.RUNNING)]
-    if not state.ended:
-        return [open_, _all_left_are(state)]
-    ends = (State.COMPLETED, State.FAILED, State.CANCELLED)
-    return [
-        ~open_,
-        _has(ExperimentRow.state == state),
-        *(~_has(ExperimentRow.state == each) for each in ends[: ends.index(state)]),
-    ]
-
-
-def _all_left_are(state: State) -> ColumnElement[bool]:
-    """SQL condition: no open experiment is in another state; for QUEUED, no experiment at all is."""
-    others = State if state is State.QUEUED else OPEN
-    return ~_has(ExperimentRow.state.in_([each for each in others if each is not state]))

@@ -1,7 +1,7 @@
 """Experiments and studies, read with their repetitions, samples and simulators. Use cases raise StoreUnavailable."""
 
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from gaplab.schemas.records import (
     AttemptRead,
@@ -13,11 +13,15 @@ from gaplab.schemas.records import (
     SimulatorRead,
     StudyRead,
 )
+from gaplab.schemas.submitted import SpecRead
 from gaplab.services.experiments.hiding import hidden
 from gaplab.services.experiments.views import view_experiments, view_repetition, view_studies
+from gaplab.services.specs.shortening import experiment_spec, study_spec
+from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import attempts, results
-from gaplab.services.store.queries.experiments import get_experiment, get_study, repetitions_of
+from gaplab.services.store.queries.experiments import experiments_of, get_experiment, get_study, repetitions_of
 from gaplab.services.store.session import Session, snapshot
+from gaplab.services.store.stored_specs import without_truth
 
 R = TypeVar("R")
 
@@ -40,6 +44,32 @@ def read_study(session: Session, study_id: str, *, reveal: bool = False) -> Stud
         NotFound: no such study.
     """
     return view_studies(session, [get_study(session, study_id)], reveal=reveal)[0]
+
+
+@snapshot
+def read_experiment_spec(session: Session, experiment_id: str, *, reveal: bool = False) -> SpecRead:
+    """Return the spec of an experiment; `reveal` includes hidden parameters of reality.
+
+    Raises:
+        NotFound: no such experiment.
+    """
+    return experiment_spec(*_shown_specs(session, [get_experiment(session, experiment_id)], reveal=reveal))
+
+
+@snapshot
+def read_study_spec(session: Session, study_id: str, *, reveal: bool = False) -> SpecRead:
+    """Return the spec of a study; `reveal` includes hidden parameters of reality.
+
+    Raises:
+        NotFound: no such study.
+    """
+    study = get_study(session, study_id)
+    return study_spec(study.name, _shown_specs(session, experiments_of(session, [study.id]), reveal=reveal))
+
+
+def _shown_specs(session: Session, rows: Sequence[ExperimentRow], *, reveal: bool) -> list[dict[str, Any]]:
+    secret = frozenset() if reveal else hidden(session, rows)
+    return [without_truth(row.spec) if row.id in secret else row.spec for row in rows]
 
 
 @snapshot

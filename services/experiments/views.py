@@ -1,21 +1,28 @@
 """Experiments, studies and repetitions as the API shows them: with progress, without hidden parameters."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.records import ExperimentRead, RepetitionRead, StudyRead
+from gaplab.schemas.records import BestRead, ExperimentRead, FitnessRead, Progress, RepetitionRead, StudyRead
 from gaplab.services.experiments.checks import CheckSummary, summaries
+from gaplab.services.experiments.fitness import best_of, fitness_of
 from gaplab.services.experiments.hiding import hidden
-from gaplab.services.experiments.progress import mean_best, progress_of
+from gaplab.services.experiments.progress import caveat_of, mean_best, progress_of, study_caveat_of
+from gaplab.services.experiments.time_left import Span
 from gaplab.services.plugins.refusals import tells_unavailable
 from gaplab.services.store.models import ExperimentRow, RepetitionRow, StudyRow
+from gaplab.services.store.queries import attempts
 from gaplab.services.store.queries.experiments import experiments_of
 from gaplab.services.store.queries.progress import Tally, reasons, tallies
 from gaplab.services.store.queries.results import best_recorded
 from gaplab.services.store.stored_specs import without_truth
+from gaplab.services.store.texts import unpack_tags
+
+_MOVING = (State.RUNNING, State.PAUSING, State.STOPPING)
 
 
 def view_experiments(
@@ -28,17 +35,18 @@ def view_experiments(
         rows: rows of the experiments.
         reveal: include hidden parameters of reality.
     """
-    return _view(session, rows, tallies(session, [row.id for row in rows]), reveal=reveal)
+    return _view(session, rows, _work(session, rows), reveal=reveal)
 
 
 def view_studies(session: Session, rows: Sequence[StudyRow], *, reveal: bool = False) -> tuple[StudyRead, ...]:
     """Return the studies with their experiments; `reveal` includes hidden parameters of reality."""
     experiments = experiments_of(session, [row.id for row in rows])
-    progress = tallies(session, [row.id for row in experiments])
-    by_study: dict[str | None, list[ExperimentRead]] = defaultdict(list)
-    for experiment in _view(session, experiments, progress, reveal=reveal):
-        by_study[experiment.study].append(experiment)
-    return tuple(_study(row, by_study[row.id], progress) for row in rows)
+    work = _work(session, experiments)
+    by_study: dict[str, list[ExperimentRead]] = defaultdict(list)
+    for experiment in _view(session, experiments, work, reveal=reveal):
+        by_study[str(experiment.study)].append(experiment)
+    best = best_of(session, by_study)
+    return tuple(_study(row, by_study[row.id], work, best.get(row.id)) for row in rows)
 
 
 def view_repetition(row: RepetitionRow, *, secret: bool) -> RepetitionRead:
@@ -68,66 +76,105 @@ def state_of(states: Collection[State]) -> State:
     return first
 
 
+@dataclass(frozen=True)
+class _Work:
+    """Work on an experiment: sums over its repetitions, and the times of work on them while it is running."""
+
+    tally: Tally = field(default_factory=Tally)
+    spans: tuple[Span, ...] = ()
+
+    def __add__(self, other: "_Work") -> "_Work":
+        return _Work(self.tally + other.tally, self.spans + other.spans)
+
+    @property
+    def progress(self) -> Progress:
+        return progress_of(self.tally, self.spans)
+
+
+def _work(session: Session, rows: Sequence[ExperimentRow]) -> dict[str, _Work]:
+    """Return the work on each experiment; a study that runs needs the times of those of its members that ended too."""
+    found = tallies(session, [row.id for row in rows])
+    running = {row.study_id or row.id for row in rows if row.state in _MOVING}
+    spans = attempts.work_spans(session, [row.id for row in rows if (row.study_id or row.id) in running])
+    return {row.id: _Work(found.get(row.id, Tally()), tuple(spans.get(row.id, ()))) for row in rows}
+
+
 def _view(
-    session: Session, rows: Sequence[ExperimentRow], progress: Mapping[str, Tally], *, reveal: bool
+    session: Session, rows: Sequence[ExperimentRow], work: Mapping[str, _Work], *, reveal: bool
 ) -> tuple[ExperimentRead, ...]:
     ids = [row.id for row in rows]
     failures, checks, best = reasons(session, ids), summaries(session, rows), best_recorded(session, ids)
+    fitness = fitness_of(session, ids)
     secret = frozenset() if reveal else hidden(session, rows)
-    return tuple(
-        _experiment(
-            row,
-            progress.get(row.id, Tally()),
-            failures.get(row.id, ()),
-            checks.get(row.id, CheckSummary()),
-            best=mean_best(best[row.id]) if row.id in best else None,
-            secret=row.id in secret,
+    found = {
+        id_: _Found(
+            failures=failures.get(id_, ()),
+            check=checks.get(id_, CheckSummary()),
+            fitness=fitness.get(id_),
+            best=mean_best(best[id_]) if id_ in best else None,
         )
-        for row in rows
-    )
+        for id_ in ids
+    }
+    return tuple(_experiment(row, work[row.id], found[row.id], secret=row.id in secret) for row in rows)
 
 
-def _experiment(
-    row: ExperimentRow,
-    tally: Tally,
-    failures: tuple[str, ...],
-    check: CheckSummary,
-    *,
-    best: float | None,
-    secret: bool,
-) -> ExperimentRead:
+@dataclass(frozen=True)
+class _Found:
+    """Findings on an experiment: reasons of failure, its sensitivity check, and its fitness."""
+
+    failures: tuple[str, ...]
+    check: CheckSummary
+    fitness: FitnessRead | None
+    best: float | None
+
+
+def _experiment(row: ExperimentRow, work: _Work, found: _Found, *, secret: bool) -> ExperimentRead:
     return ExperimentRead(
         id=row.id,
         study=row.study_id,
         name=row.name,
         notes=row.notes,
+        tags=unpack_tags(row.tags),
         edits=row.edits,
+        archived_at=row.archived_at,
         strategy=row.strategy,
         direct=row.iterations == 1,  # other strategies have at least one iteration after number 0
         state=row.state,
+        caveat=caveat_of(row.state, work.tally),
         spec=without_truth(row.spec) if secret else row.spec,
         priority=-row.precedence,
         max_parallel=row.max_parallel,
-        progress=progress_of(tally),
-        best_fitness=best,
-        reasons=(*([row.paused_because] if row.paused_because else []), *failures),
-        sensitivity=check.id,
-        warnings=(*check.warnings, *_version_warnings(row, tally)),
+        progress=work.progress,
+        fitness=found.fitness,
+        best_fitness=found.best,
+        reasons=(*([row.paused_because] if row.paused_because else []), *found.failures),
+        sensitivity=found.check.id,
+        warnings=(*found.check.warnings, *_version_warnings(row, work.tally)),
         created_at=row.created_at,
         started_at=row.started_at,
         ended_at=row.ended_at,
     )
 
 
-def _study(row: StudyRow, experiments: Sequence[ExperimentRead], progress: Mapping[str, Tally]) -> StudyRead:
+def _study(
+    row: StudyRow, experiments: Sequence[ExperimentRead], work: Mapping[str, _Work], best: BestRead | None
+) -> StudyRead:
+    together = sum((work[each.id] for each in experiments), _Work())
+    states = Counter(each.state for each in experiments)
+    stopped = sum(each.state is State.COMPLETED and work[each.id].tally.stopped > 0 for each in experiments)
+    state = state_of(states)
     return StudyRead(
         id=row.id,
         name=row.name,
         notes=row.notes,
+        tags=unpack_tags(row.tags),
         edits=row.edits,
-        state=state_of([experiment.state for experiment in experiments]),
+        archived_at=row.archived_at,
+        state=state,
+        caveat=study_caveat_of(state, states, stopped, together.tally),
+        best=best,
         experiments=tuple(experiments),
-        progress=progress_of(sum((progress.get(each.id, Tally()) for each in experiments), Tally())),
+        progress=together.progress,
         created_at=row.created_at,
     )
 

@@ -6,6 +6,7 @@ None stands for a missing value: it interrupts a line, and is left out among poi
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from gaplab.services.figures.axes import Axis as Axis
 from gaplab.services.figures.checks import Number as Number
 from gaplab.services.figures.checks import check_numbers
 from gaplab.services.figures.style import INK, Style
@@ -67,6 +68,27 @@ class Points:
 
     def __post_init__(self) -> None:
         check_numbers(self.name, (self.x, self.y), (self.shades, self.hover))
+
+
+@dataclass(frozen=True)
+class Polylines:
+    """Lines through the same places on x, each in its own shade.
+
+    Attributes:
+        rows: y of each line at each place.
+        shades: a number for each line, as for Points.
+    """
+
+    name: str
+    x: Numbers
+    rows: tuple[Numbers, ...]
+    shades: tuple[float, ...]
+    shades_label: str = ""
+    hover: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_numbers(self.name, (self.x, *self.rows))
+        check_numbers(self.name, (self.shades,), (self.rows, self.hover))
 
 
 @dataclass(frozen=True)
@@ -139,31 +161,7 @@ class Label:
         check_numbers(self.text, ((self.x, self.y),))
 
 
-Mark = Line | Points | Level | Diagonal | Bars | Arrow | Label
-
-
-@dataclass(frozen=True)
-class Axis:
-    """One axis of a panel.
-
-    Attributes:
-        label: name with the unit; empty for none.
-        limits: the ends of the axis, ascending.
-        whole: put ticks at whole numbers only.
-        log: logarithmic; the limits are above 0.
-        ticks: values and the texts that replace their numbers.
-    """
-
-    label: str
-    limits: tuple[float, float]
-    whole: bool = False
-    log: bool = False
-    ticks: tuple[tuple[float, str], ...] = ()
-
-    def __post_init__(self) -> None:
-        check_numbers(self.label, (self.limits,))
-        if not self.limits[0] < self.limits[1] or (self.log and self.limits[0] <= 0):
-            raise ValueError(f"the limits of an axis must ascend, from above 0 if it is logarithmic, not {self.limits}")
+Mark = Line | Points | Polylines | Level | Diagonal | Bars | Arrow | Label
 
 
 @dataclass(frozen=True)
@@ -227,9 +225,9 @@ class FigureDefinition:
         return tuple(mark for panel in self.panels for mark in panel.marks)
 
     @property
-    def shaded(self) -> list[Points]:
-        """The points that are drawn in shades."""
-        return [mark for mark in self.marks if isinstance(mark, Points) and mark.shades]
+    def shaded(self) -> list[Points | Polylines]:
+        """The marks that are drawn in shades."""
+        return [mark for mark in self.marks if isinstance(mark, Points | Polylines) and mark.shades]
 
     @property
     def row_heights(self) -> list[float]:
@@ -247,4 +245,6 @@ def faint_lines(name: str, x: Sequence[Number], rows: Sequence[Sequence[Number]]
 def _has_data(mark: Mark) -> bool:
     if isinstance(mark, Line | Points):
         return any(each is not None for each in mark.y)
+    if isinstance(mark, Polylines):
+        return any(each is not None for row in mark.rows for each in row)
     return isinstance(mark, Level | Arrow) or (isinstance(mark, Bars) and bool(mark.intervals))

@@ -5,8 +5,11 @@ yellow is left out, since it is too light on white. The shades are matplotlib's 
 without its ends, which are too close to white and to dark pages.
 """
 
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
+from zlib import crc32
 
 Dash = Literal["solid", "dashed", "dotted", "dashdot", "long", "longdot"]
 Marker = Literal["circle", "square", "triangle", "diamond", "inverted", "cross", "star"]
@@ -14,6 +17,16 @@ Marker = Literal["circle", "square", "triangle", "diamond", "inverted", "cross",
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES: tuple[Dash, ...] = ("solid", "dashed", "dashdot", "long", "dotted", "longdot")
 MARKERS: tuple[Marker, ...] = ("circle", "square", "triangle", "diamond", "inverted", "cross")
+STRATEGIES = (
+    "simulated_fit",
+    "simulated_fit_and_unique",
+    "informative",
+    "simulated_fit_and_informative",
+    "random",
+    "known_fit",
+)
+"""gaplab's strategies with a curve, in the order of the colours, so that each has its own."""
+
 INK = "#222222"
 """The colour of text; a dark page replaces it by a light colour."""
 
@@ -41,7 +54,40 @@ def style_of(position: int) -> Style:
     return Style(COLORS[index], DASHES[(index + turn) % len(DASHES)], MARKERS[(index + turn) % len(MARKERS)])
 
 
+def strategy_style(strategy: str) -> Style:
+    """Return the style of a strategy, which is the same in every figure: its name alone decides.
+
+    Each of gaplab's strategies has a colour of its own. Another has one of the 30 remaining styles, by a checksum of
+    its name.
+    """
+    if strategy in STRATEGIES:
+        return style_of(STRATEGIES.index(strategy))
+    known, all_ = len(COLORS), len(COLORS) ** 2
+    return style_of(known + crc32(strategy.encode()) % (all_ - known))
+
+
+def strategy_styles(strategies: Sequence[str]) -> list[Style]:
+    """Return the styles of experiments, by their strategies; the same style again gets another dash."""
+    repeated: Counter[Style] = Counter()
+    styles = []
+    for strategy in strategies:
+        style = strategy_style(strategy)
+        dash = DASHES[(DASHES.index(style.dash) + repeated[style]) % len(DASHES)]
+        styles.append(replace(style, dash=dash))
+        repeated[style] += 1
+    return styles
+
+
 def tint(color: str, opacity: float) -> str:
     """Return a colour like `#0072B2` as a CSS colour with an opacity."""
     red, green, blue = (int(color[at : at + 2], 16) for at in (1, 3, 5))
     return f"rgba({red}, {green}, {blue}, {opacity})"
+
+
+def shade_at(share: float) -> str:
+    """Return the shade at a share of the way from light to dark, as `#0072B2`."""
+    place = min(max(share, 0.0), 1.0) * (len(SHADES) - 1)
+    before = min(int(place), len(SHADES) - 2)
+    both = [[int(SHADES[before + after][at : at + 2], 16) for at in (1, 3, 5)] for after in (0, 1)]
+    parts = (round(first + (second - first) * (place - before)) for first, second in zip(*both, strict=True))
+    return "#" + "".join(f"{part:02X}" for part in parts)

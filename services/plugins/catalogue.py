@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 
-from gaplab.schemas.plugin import BudgetRead, Catalogue
+from gaplab.schemas.plugin import BudgetRead, Catalogue, PluginRead
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.optimizers import optimizers
@@ -11,6 +11,8 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
+from gaplab.services.plugins.ignored import ignored_files
+from gaplab.services.specs.default_engines import default_engine
 from gaplab.services.specs.presets import PRESETS
 
 
@@ -18,12 +20,20 @@ def catalogue() -> Catalogue:
     """Return every plug-in of every kind, by name, and the named budgets."""
     return Catalogue(
         strategies=strategies.describe(),
-        robots=robots.describe(),
+        robots=tuple(map(_with_engine_of_here, robots.describe())),
         engines=engines.describe(),
         tunables=tunables.describe(),
         optimizers=optimizers.describe(),
         discrepancies=discrepancies.describe(),
         tuners=tuners.describe(),
         budgets=tuple(BudgetRead(name=name, **asdict(preset)) for name, preset in PRESETS.items()),
+        ignored=ignored_files(),
         defaults=StudySpec().model_dump(mode="json", exclude_none=True),
     )
+
+
+def _with_engine_of_here(robot: PluginRead) -> PluginRead:
+    """Return a robot's entry with the engine that a spec without one gets on this machine."""
+    if not robot.available or "engine" not in robot.details:
+        return robot
+    return robot.model_copy(update={"details": robot.details | {"engine": default_engine(robots[robot.name])}})

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from gaplab.services.core import external_plugins
 from gaplab.services.plugins.external import REGISTRIES
+from gaplab.services.plugins.ignored import ignored_files
 
 VARIABLE = "GAPLAB_PLUGINS"
 
@@ -40,3 +41,5 @@ def load() -> None:
     unusable = {name: why for registry in REGISTRIES.values() for name, why in registry.unusable.items()}
     for name, why in unusable.items():
         log.warning("the plug-in %r is not available: %s", name, why)
+    for ignored in ignored_files():
+        log.warning("%s in a plug-in folder is not used: %s", ignored.file, ignored.why)

@@ -1,11 +1,15 @@
 """Edits of external plug-ins: the contents of their folders now, and when this process imported them."""
 
+import logging
 from collections.abc import Callable
+from threading import Lock
 from time import monotonic
 
 from gaplab.services.core import external_plugins
 from gaplab.services.plugins import contents
 from gaplab.services.plugins.contents import Contents
+
+log = logging.getLogger("gaplab.plugins")
 
 LOOK_S = 1.0
 """Shortest time between two looks for edited files."""
@@ -72,3 +76,19 @@ def _import() -> Contents:
 
 present = Watch().contents
 imported = Imported()
+_RELOADING = Lock()
+
+
+def reload() -> bool:
+    """Import the plug-ins of this process again if a file was edited, added or removed; return whether.
+
+    Work that has begun keeps the classes that it was created from.
+    """
+    if present().digests == imported.contents().digests:
+        return False
+    with _RELOADING:
+        if contents.read().digests == imported.contents().digests:
+            return False
+        imported.renewed()
+    log.info("the plug-ins were imported again, since their files were changed")
+    return True

@@ -11,15 +11,13 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import curve_points
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.statistics import compare_all
+from gaplab.services.results.texts import cell
 from gaplab.services.specs.resolution import is_direct, spec_of, unit
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, results
 from gaplab.services.store.session import Session, Store
 
 COLUMNS = ("experiment", "name", "strategy", "repetition", "evaluations", "fitness")
-
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""First characters of a formula. Source: https://owasp.org/www-community/attacks/CSV_Injection"""
 
 
 def curve(store: Store, experiment_id: str) -> Curve:
@@ -95,7 +93,21 @@ def compare(
         message = f"the range of real-world evaluations must ascend from 0 or more, not from {first} to {final}"
         raise InvalidSpec([Violation("from_evaluations", first, message, f"0 to {final}")])
     direct = frozenset(row.id for row in rows if is_direct(spec_of(row.spec)))
-    return compare_all(values, direct, first, final)
+    names = {row.id: row.name for row in rows}
+    return tuple(
+        pair.model_copy(update={"first_name": names[pair.first], "second_name": names[pair.second]})
+        for pair in compare_all(values, direct, first, final)
+    )
+
+
+def unit_of(store: Store, experiment_id: str) -> str:
+    """Return the unit of fitness of an experiment; "" if it has none.
+
+    Raises:
+        NotFound: the experiment does not exist.
+    """
+    with store.reading() as session:
+        return unit(spec_of(experiments.get_experiment(session, experiment_id).spec))
 
 
 def curves_csv(curves: Sequence[Curve]) -> str:
@@ -107,19 +119,13 @@ def curves_csv(curves: Sequence[Curve]) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     writer.writerows(
-        (each.experiment, _cell(each.name), _cell(each.strategy), repetition, point.evaluations, value)
+        (each.experiment, cell(each.name), cell(each.strategy), repetition, point.evaluations, value)
         for each in curves
         for point in each.points
         for repetition, value in enumerate(point.values)
         if value is not None
     )
     return text.getvalue()
-
-
-def _cell(text: str) -> str:
-    """Return the text as it is written: no formula, and without the line break that `csv` does not quote."""
-    lines = text.replace("\r\n", "\n").replace("\r", "\n")
-    return f"'{lines}" if text.startswith(_FORMULA) else lines
 
 
 def _recorded(session: Session, ids: Sequence[str]) -> tuple[tuple[ExperimentRow, ...], dict[str, FloatArray]]:

@@ -26,8 +26,8 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     spec = spec_of(row.spec)
     tunings: dict[int, list[Tuning]] = defaultdict(list)
     for best in simulators:
-        earlier = sum(iteration <= best.iteration for iteration in measured.get(best.repetition, ()))
-        tunings[best.iteration].append(_tuning(best, earlier))
+        samples = results.samples_until(measured, best.repetition, best.iteration)
+        tunings[best.iteration].append(_tuning(best, samples))
     names = [each.name for each in spec.tunables]
     points = tuple(
         misfit_point(iteration, tunings[iteration], names, parameters_of(spec.tunables))

@@ -23,14 +23,18 @@ class TunedSimulators:
         dimensions: the tunables.
         simulators: the best of each iteration of each repetition.
         errors: squared errors by iteration and repetition, without iteration 0; None if the physics failed.
-        truth: the known parameters of reality; None as long as they are hidden.
+        samples: numbers of samples that the simulators were tuned on, by iteration and repetition.
+        truth: the known parameters of reality; None as long as they are hidden, empty if reality has none.
+        real_engine: the engine of reality, if it is not that of the simulators.
     """
 
     unit: str
     dimensions: tuple[Dimension, ...]
     simulators: tuple[SimulatorPoint, ...]
     errors: Mapping[int, Mapping[int, float | None]]
+    samples: Mapping[int, Mapping[int, int]]
     truth: Mapping[str, float] | None
+    real_engine: str | None
 
 
 def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
@@ -42,12 +46,16 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
         simulators = results.best_simulators(session, experiment_id)
+        measured = results.measured_iterations(session, experiment_id)
         hidden = row.id in hiding.hidden(session, [row])
     spec = spec_of(row.spec)
     errors: dict[int, dict[int, float | None]] = defaultdict(dict)
+    samples: dict[int, dict[int, int]] = defaultdict(dict)
     for simulator in simulators:
-        if simulator.iteration:
-            errors[simulator.iteration][simulator.repetition] = simulator.squared_error
+        if at := simulator.iteration:
+            errors[at][simulator.repetition] = simulator.squared_error
+            samples[at][simulator.repetition] = results.samples_until(measured, simulator.repetition, at)
+    elsewhere = spec.reality.engine.name != spec.engine.name
     return TunedSimulators(
         unit=unit(spec),
         dimensions=_dimensions(spec),
@@ -55,7 +63,9 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
             SimulatorPoint(each.repetition, each.iteration, tuple(each.parameters)) for each in simulators
         ),
         errors=errors,
-        truth=None if hidden else spec.reality.parameters,
+        samples=samples,
+        truth={} if elsewhere else None if hidden else spec.reality.parameters,
+        real_engine=spec.reality.engine.name if elsewhere else None,
     )
 
 

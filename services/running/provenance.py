@@ -44,7 +44,7 @@ def read(session: Session, experiment_id: str) -> ProvenanceRead:
     """
     experiment = get_experiment(session, experiment_id)
     return ProvenanceRead(
-        computed_with=experiment.computed_with, refused_by=experiment.refused_by, uses=_uses(session, experiment_id)
+        computed_with=experiment.computed_with, refused_by=experiment.refused_by, uses=uses(session, experiment_id)
     )
 
 
@@ -182,7 +182,8 @@ def _tell(session: Session, experiment: str, before: str | None, theirs: str) ->
     note(session, EventKind.VERSIONS_REFUSED, experiment, computed_with=before, refused_by=theirs)
 
 
-def _uses(session: Session, experiment_id: str) -> tuple[ProvenanceUse, ...]:
+def uses(session: Session, experiment_id: str) -> tuple[ProvenanceUse, ...]:
+    """Return each provenance that computed a part of the experiment, the earliest first."""
     use, fact, row = ExperimentProvenanceRow, ProvenanceRow, RepetitionRow
     claimed = (
         select(func.count())

@@ -108,7 +108,7 @@ def _refuse_unfinished(session: Session, which: ColumnElement[bool]) -> None:
 def pause(session: Session, experiment: str, reason: str) -> None:
     """Pause an experiment for a reason that a person should see; one that is ending ends."""
     row = ExperimentRow
-    state = lock(session, [experiment])[experiment]
+    state = lock(session, [experiment]).get(experiment)
     if state not in (*_PAUSABLE, State.PAUSING, State.PAUSED):
         return
     session.execute(update(row).where(row.id == experiment).values(paused_because=reason))

@@ -1,6 +1,7 @@
 """Resolution: from a submitted spec to a resolved one, with every default; all violations are raised together."""
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef, TunableRef
@@ -19,6 +20,7 @@ from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.specs.default_engines import default_engine, runs
 from gaplab.services.specs.presets import PRESETS
 from gaplab.services.specs.violations import (
     bounds_of,
@@ -42,7 +44,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         lambda: discrepancies.create(spec.discrepancy, "/discrepancy"),
         lambda: tuners.create(spec.tuner, "/tuner"),
     )
-    simulated = spec.engine or PluginRef(name=robot.engine)
+    simulated = spec.engine or PluginRef(name=default_engine(robot))
     real = spec.reality.engine or simulated
     engine, reality_engine = gather(
         lambda: _engine(simulated, robot, "/engine"),
@@ -97,7 +99,19 @@ def resolve_study(spec: StudySpec) -> tuple[ResolvedSpec, ...]:
             violations.update({(each.pointer, each.message): each for each in found})
     if violations:
         raise InvalidSpec(violations.values())
-    return tuple(resolved)
+    return _named_apart(resolved)
+
+
+def _named_apart(resolved: Sequence[ResolvedSpec]) -> tuple[ResolvedSpec, ...]:
+    """Return the specs of a study with distinct names: options that differ are in them, equal specs get numbers."""
+    often, met = Counter(spec.name for spec in resolved), Counter[str]()
+    named = []
+    for spec in resolved:
+        met[spec.name] += 1
+        number = f" ({met[spec.name]})"
+        name = spec.name[: 200 - len(number)] + number if often[spec.name] > 1 else spec.name
+        named.append(spec.model_copy(update={"name": name}))
+    return tuple(named)
 
 
 def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
@@ -151,7 +165,7 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
 def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
     """Return the engine if it is installed and can run the robot."""
     engine, _ = engines.check(ref, pointer)
-    able = [name for name, each in engines.items() if _runs(each, robot)]
+    able = [name for name, each in engines.items() if runs(each, robot.world)]
     if ref.name not in able:
         message = f"{ref.name} cannot run the {robot.name}; {' and '.join(able)} can"
         raise InvalidSpec([Violation(pointer, ref.name, message, able)])
@@ -159,14 +173,6 @@ def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
         installed = [name for name in able if engines[name].available()]
         raise InvalidSpec([Violation(pointer, ref.name, f"not installed: {engine.install}", installed)])
     return engine
-
-
-def _runs(engine: type[Engine], robot: Robot) -> bool:
-    """Return whether the engine can run the robot; one that raises cannot."""
-    try:
-        return engine.runs(robot.world)
-    except Exception:  # noqa: BLE001 - an external engine concerns only the specs that name it
-        return False
 
 
 def _completed(registry: Registry[Any], ref: PluginRef) -> PluginRef:

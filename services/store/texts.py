@@ -1,5 +1,7 @@
 """Texts as a database takes them."""
 
+from collections.abc import Iterable
+
 LONGEST_REASON = 2_000
 """Characters of a reason; lists of experiments have those of every failed repetition."""
 
@@ -16,3 +18,13 @@ def brief(text: str) -> str:
     if len(text) <= LONGEST_REASON:
         return text
     return f"{text[:_BEGINNING]}… (the beginning of {len(text):,} characters, which are in the log)"
+
+
+def pack_tags(tags: Iterable[str]) -> str | None:
+    """Return tags as one text, sorted, with a space before and after each; None for no tags."""
+    return f" {' '.join(names)} " if (names := sorted({storable(tag) for tag in tags})) else None
+
+
+def unpack_tags(text: str | None) -> tuple[str, ...]:
+    """Return the tags in a text of `pack_tags`."""
+    return tuple((text or "").split())

@@ -84,10 +84,6 @@ EDITS: dict[str, Callable[[World], World]] = {
 }
 
 
-def test_a_rollout_is_bit_equal_on_repeat(pair: Pair) -> None:
-    assert np.array_equal(pair.roll(), pair.roll())
-
-
 def test_a_rollout_is_bit_equal_whatever_the_engine_ran_before(pair: Pair) -> None:
     expected = pair.roll()
 
@@ -161,16 +157,6 @@ def test_a_trajectory_has_a_pose_for_each_observation(pair: Pair) -> None:
     assert trajectory.positions_m.shape == (count, 3)
     assert trajectory.orientations.shape == (count, 4)
     assert np.isfinite(pair.robot.fitness(trajectory))
-
-
-def test_many_rollouts_at_once_equal_as_many_single_ones(pair: Pair) -> None:
-    motion, world = pair.robot.motion(pair.robot.known), pair.robot.world
-    worlds = [world, replace(world, material=Material(0.7, 0.3, 0.2))]
-
-    together = pair.engine.rollouts(worlds, [motion, motion])
-
-    apart = [pair.engine.rollout(each, motion).positions_m for each in worlds]
-    assert np.array_equal(together.positions_m, np.array([apart, apart]))
 
 
 def test_a_robot_left_alone_stands_still_at_the_height_of_its_legs(embodied: Pair) -> None:

@@ -119,10 +119,23 @@ def test_what_differs_is_what_the_service_found(archive: Any, ids: Any, visit: A
     rows = page.get_by_role("region", name="Pairs").locator("tbody tr")
     expect(rows).to_have_count(len(found))
     heads = page.get_by_role("region", name="Pairs").locator("thead th").all_inner_texts()
-    assert heads[1:4] == ["At 1", "At 1–5", "At 3–5"]
-    page.get_by_role("button", name="3–5", exact=True).click()
-    expect(page.get_by_text("The row against the column")).to_contain_text("over 3 to 5")
-    expect(page.get_by_role("button", name="3–5", exact=True)).to_have_attribute("aria-pressed", "true")
+    pooled = ["Pooled 1–5, p too small", "Pooled 3–5, p too small"]
+    assert heads[1:5] == ["At 1", pooled[0], pooled[1], "At 5"]
+    caution = page.get_by_text("are not independent")
+    expect(caution).to_be_hidden()
+    button = page.get_by_role("button", name="3–5, pooled as in the paper", exact=True)
+    button.click()
+    expect(page.get_by_text("The row against the column")).to_contain_text("pooled over 3 to 5")
+    expect(button).to_have_attribute("aria-pressed", "true")
+    expect(caution).to_be_visible()
+
+
+def test_a_comparison_begins_at_the_last_number_that_all_share(archive: Any, ids: Any, visit: Any) -> None:
+    page = visit(address(archive, *ids))
+
+    expect(page.get_by_text("The row against the column")).to_contain_text("after 5 real-world evaluations")
+    expect(page.get_by_role("button", name="at 5", exact=True)).to_have_attribute("aria-pressed", "true")
+    assert "from=" not in fragment(page)
 
 
 def test_what_should_not_be_compared_is_warned_of(archive: Any, ids: Any, visit: Any) -> None:
@@ -174,7 +187,7 @@ def test_its_figure_is_saved_in_every_format(archive: Any, ids: Any, visit: Any)
     page = visit(address(archive, *ids, band="sd", x="rollouts"))
     for words, begins in (("SVG", b"<?xml"), ("PNG", b"\x89PNG"), ("PDF", b"%PDF"), ("CSV", b"experiment,")):
         with page.expect_download(timeout=SLOW_MS) as saved:
-            page.get_by_role("link", name=words).click()
+            page.get_by_role("link", name=words).first.click()
         assert saved.value.path().read_bytes().startswith(begins)
 
 
@@ -189,3 +202,16 @@ def test_it_is_accessible_and_fits_a_phone(archive: Any, ids: Any, visit: Any, d
         fits(page)
         page.get_by_text("Every pair, at every range").click()
         screenshot(page, f"compare-{'dark' if dark else 'light'}-{width}")
+
+
+def test_the_tests_of_all_pairs_are_copied_as_a_table(archive: Any, ids: Any, visit: Any) -> None:
+    page = visit(address(archive, *ids[:3]))
+    page.get_by_role("button", name="Copy as LaTeX").click()
+    expect(page.get_by_role("button", name="Copied")).to_be_visible()
+    latex = page.evaluate("() => navigator.clipboard.readText()")
+    page.get_by_role("button", name="Copy as CSV").click()
+    expect(page.get_by_role("button", name="Copied").first).to_be_visible()
+
+    page.wait_for_function("async () => (await navigator.clipboard.readText()).startsWith('first,')")
+    assert latex.count(r" \\") == 1 + 3
+    assert r"\toprule" in latex

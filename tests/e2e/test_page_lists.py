@@ -9,9 +9,11 @@ import pytest
 
 from gaplab.schemas.access import Role
 from gaplab.services.access import create_token
+from gaplab.services.experiments import submission
 from gaplab.services.store.session import Store
 from tests.e2e.api_alone import Api
 from tests.e2e.browser import axe, fits, screenshot
+from tests.experiments import toy
 
 PUBLISHED = "MuJoCo in MuJoCo"
 QUEUED = {"robot": "toy_function", "strategies": ["random", "direct"], "budget": "smoke"}
@@ -58,7 +60,7 @@ def test_studies_are_found_opened_ticked_and_compared(visit: Any, archive: Any, 
     page = visit(archive.url)
     page.locator("tr.study").nth(10).wait_for()
 
-    page.get_by_label("Search by name or id").fill("mujoco")
+    page.get_by_label("Search by words or a query").fill("mujoco")
     page.locator("tr.study").nth(1).wait_for(state="detached")
     page.get_by_role("button", name=f"Experiments of {PUBLISHED}").press("Enter")
     page.locator("tr.nested").nth(6).wait_for()
@@ -71,7 +73,7 @@ def test_studies_are_found_opened_ticked_and_compared(visit: Any, archive: Any, 
     ids = parse_qs(urlsplit(found.removeprefix("#")).query)["experiments"][0].split(",")
     wanted = {each["id"] for each in published["experiments"] if each["name"] in {"known_fit", "direct"}}
     assert set(ids) == wanted
-    assert "text=mujoco" in page.url
+    assert "q=mujoco" in page.url
     page.reload()
     page.locator("tr.study").first.wait_for()
     assert page.locator("tr.study").count() == 1
@@ -112,7 +114,7 @@ def test_a_study_is_renamed_and_nobody_is_written_over(visit: Any, archive: Any)
     visit.forgive("412")
     made = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
     page = visit(f"{archive.url}/#/studies/{made}")
-    page.get_by_role("button", name="Edit name and notes").click()
+    page.get_by_role("button", name="Edit name, notes and tags").click()
     archive.http.patch(f"/studies/{made}", json={"notes": "of somebody else"}, headers={"If-Match": "*"})
     page.get_by_label("Name", exact=True).fill("second name")
 
@@ -208,7 +210,7 @@ def test_an_empty_service_says_how_to_begin(visit: Any, sqlite_url: str, tmp_pat
     api = Api(sqlite_url, tmp_path / "api.log").start()
     try:
         page = visit(api.url)
-        page.get_by_text("There are no studies yet").wait_for()
+        page.get_by_text("Nothing was submitted yet").wait_for()
         axe(page)
         screenshot(page, "empty")
 
@@ -217,6 +219,25 @@ def test_an_empty_service_says_how_to_begin(visit: Any, sqlite_url: str, tmp_pat
         page.get_by_text("No worker is running now").wait_for()
     finally:
         api.close()
+
+
+def test_a_single_experiment_is_in_the_list_beside_the_studies(visit: Any, api: Any, written: Store) -> None:
+    submission.submit_experiment(written, toy(name="all alone"))
+    page = visit(api.url)
+
+    row = page.locator("tr.experiment", has=page.get_by_role("link", name="all alone"))
+
+    row.get_by_text("Single experiment").wait_for()
+    assert page.get_by_role("button", name="All", exact=True).get_attribute("aria-pressed") == "true"
+
+
+def test_what_is_typed_into_the_search_is_in_the_address_at_once(visit: Any, archive: Any) -> None:
+    page = visit(archive.url)
+    page.locator("tr.study").first.wait_for()
+
+    page.get_by_label("Search by words or a query").press_sequentially("mujoco in")
+
+    assert page.url.endswith("#/?q=mujoco+in")
 
 
 def test_a_service_with_tokens_asks_for_one_and_a_reader_may_look_and_estimate(
@@ -248,3 +269,28 @@ def test_the_line_for_curl_is_one_that_every_shell_takes(visit: Any, archive: An
     call = page.locator(".calls code").first.text_content()
 
     assert call == f"curl '{archive.url}/studies/{published['id']}/curves?format=csv'"
+
+
+def test_a_study_is_opened_in_the_form_changed_and_pasted(visit: Any, archive: Any, published: Any) -> None:
+    visit.forgive(*REFUSED)
+    page = visit(f"{archive.url}/#/studies/{published['id']}")
+    page.get_by_role("button", name="New from this").click()
+    page.locator(".panel .big").wait_for()
+    spec = json.loads(page.locator("#panel-json code").text_content())
+    again = archive.get(f"/studies/{published['id']}/spec")["spec"]
+    answers = [archive.http.post("/studies/estimate", json=each).json()["specs"] for each in (spec, again)]
+    assert answers[0] == answers[1]
+
+    page.get_by_text("Paste a spec").click()
+    pasted = page.get_by_label("Spec of a study or an experiment, as JSON")
+    pasted.fill('{"strategy": "randon", "robot": "toy_function"}')
+    page.get_by_role("button", name="Fill the form").click()
+    page.locator(".paste .trouble", has_text="random").wait_for()
+    axe(page)
+    screenshot(page, "new-pasted")
+    pasted.fill('{"strategy": "random", "robot": "toy_function"}')
+    page.get_by_role("button", name="Fill the form").click()
+    page.locator(".paste:not([open])").wait_for()
+
+    spec = json.loads(page.locator("#panel-json code").text_content())
+    assert (spec["strategies"], spec["robot"]) == (["random"], "toy_function")

@@ -69,7 +69,7 @@ def test_what_was_typed_just_before_one_left_does_not_change_the_address_of_anot
     page = visit(archive.url)
     page.locator("tr.study").first.wait_for()
 
-    page.get_by_label("Search by name or id").fill("mujoco")
+    page.get_by_label("Search by words or a query").fill("mujoco")
     page.evaluate(f"() => {{ location.hash = '{QUIET}'; }}")
     page.get_by_role("heading", name="The toy function").wait_for()
     page.wait_for_timeout(500)
@@ -84,7 +84,7 @@ def test_more_of_a_list_that_another_has_replaced_is_not_added_to_it(visit: Any,
     page.route("**/experiments?*cursor=*", lambda route: late.append(route))
 
     page.get_by_role("button", name="Show more").click()
-    page.get_by_label("Search by name or id").fill("nothing is called so")
+    page.get_by_label("Search by words or a query").fill("nothing is called so")
     page.get_by_text("Nothing fits these filters.").wait_for()
     (asked,) = late
     with page.expect_response("**/experiments?*cursor=*"):
@@ -101,6 +101,7 @@ def test_earlier_events_and_the_next_page_of_samples_come_once_however_fast_one_
     ended = next(each["id"] for each in found if each["spec"]["robot"]["name"] == "quadruped")
     page = visit(f"{archive.url}/#/experiments/{ended}?tab=samples")
     more, events = page.get_by_role("button", name="Earlier"), page.locator(".events li")
+    page.get_by_role("tabpanel").scroll_into_view_if_needed()
     page.get_by_text("Page 1", exact=True).wait_for()
     events.first.wait_for()
 
@@ -235,7 +236,7 @@ def test_what_was_saved_is_shown_though_nothing_can_be_looked_at_any_more(visit:
     visit.forgive("ERR_FAILED")
     study = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
     page = visit(f"{archive.url}/#/studies/{study}")
-    page.get_by_role("button", name="Edit name and notes").click()
+    page.get_by_role("button", name="Edit name, notes and tags").click()
     page.get_by_label("Name", exact=True).fill("second name")
 
     page.route("**/*", lambda route: route.abort() if route.request.method == "GET" else route.continue_())
@@ -251,7 +252,7 @@ def test_a_change_whose_answer_was_lost_is_not_taken_for_somebody_elses(visit: A
     visit.forgive("ERR_FAILED", "412")
     study = archive.http.post("/studies", json=QUEUED | {"name": "first name"}).json()["id"]
     page = visit(f"{archive.url}/#/studies/{study}")
-    page.get_by_role("button", name="Edit name and notes").click()
+    page.get_by_role("button", name="Edit name, notes and tags").click()
     page.get_by_label("Name", exact=True).fill("second name")
 
     page.route(f"**/studies/{study}", lambda route: (route.fetch(), route.abort()))

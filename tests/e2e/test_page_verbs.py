@@ -39,7 +39,7 @@ def test_the_verbs_do_what_they_say_and_refuse_with_the_reason(api: Any, written
     verbs = page.get_by_role("group", name="Actions on this experiment")
     state = page.locator(".state-now")
     verbs.get_by_role("button", name="Resume").press("Enter")
-    expect(page.locator(".life-cycle .outcome")).to_contain_text(
+    expect(page.locator(".life-cycle .outcome").first).to_contain_text(
         "queued cannot be resumed, only one that is pausing or paused"
     )
 
@@ -83,7 +83,7 @@ def test_nobody_writes_over_a_name_that_was_changed_meanwhile_unseen(api: Any, w
     submitted = submission.submit_experiment(written, toy(name="mine"))
     visit.forgive("412")
     page = visit(address(api, submitted.id))
-    page.get_by_role("button", name="Edit name and notes").click()
+    page.get_by_role("button", name="Edit name, notes and tags").click()
     page.get_by_label("Notes", exact=True).fill("On the second robot")
     theirs = api.http.patch(f"/experiments/{submitted.id}", json={"name": "theirs"}, headers={"If-Match": "*"})
     assert theirs.status_code == 200
@@ -106,5 +106,5 @@ def test_with_a_token_files_are_saved_and_a_reader_is_told_that_he_may_only_look
     assert saved.value.url.startswith("blob:")
     assert saved.value.path().read_bytes().startswith(b"PK")
     page.get_by_role("button", name="Pause").click()
-    expect(page.locator(".life-cycle .outcome")).to_contain_text("runner")
+    expect(page.locator(".life-cycle .outcome").first).to_contain_text("runner")
     expect(page.locator(".state-now")).to_contain_text("queued")

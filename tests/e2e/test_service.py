@@ -197,7 +197,7 @@ def test_a_plug_in_that_is_broken_when_the_service_starts_holds_up_its_own_exper
     service.start()
     why = "own.py cannot be imported: SyntaxError: '(' was never closed (own.py, line 1)"
     (entry,) = [each for each in service.get("/catalogue")["strategies"] if each["name"] == "own"]
-    assert (entry["available"], entry["note"]) == (False, f"{why}; repair the file, then restart the service")
+    assert (entry["available"], entry["note"]) == (False, f"{why}; repair the file, which is then imported again")
     refused = service.http.post("/experiments", json=QUICK | {"strategy": "own"})
     assert refused.status_code == 422
     assert why in refused.text

@@ -309,7 +309,7 @@ def test_whoever_opens_an_archive_finds_tables_and_curves(sqlite_store: Store) -
     assert curve["points"][0]["n"] == 3
     assert row["spec"]["strategy"]["name"] == "simulated_fit"
     assert {"owner", "heartbeat_at"}.isdisjoint(row)
-    assert {name.partition(".")[0] for name in manifest["members"]} == {*EXPORTED, "curves"}
+    assert {name.partition(".")[0] for name in manifest["members"]} == {*EXPORTED, "curves", "spec"}
 
 
 def test_attempts_go_with_it_and_none_goes_on(store: Store, other: Any) -> None:

@@ -116,7 +116,15 @@ def test_simulators_are_a_frame_with_a_column_for_each_tunable(client: Client, f
 
     found = client.simulators(experiment.id)
 
-    assert list(found) == ["repetition", "iteration", "rank", "squared_error", "static_friction", "restitution"]
+    assert list(found) == [
+        "repetition",
+        "iteration",
+        "rank",
+        "squared_error",
+        "error",
+        "static_friction",
+        "restitution",
+    ]
     assert found["squared_error"].isna().any()  # infinite there, null on the wire
     assert set(client.simulators(experiment.id, iteration=0)["iteration"]) == {0}
 

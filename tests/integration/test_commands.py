@@ -98,6 +98,7 @@ def test_every_command_prints_one_document_and_nothing_else(
     live_and_die(ask, finish)
     look(ask, *(each["id"] for each in said["list"][::-1]))
     keep(ask, said["list"][-1]["id"], tmp_path)
+    tidy(ask, said["list"][-1]["id"])
     with monkeypatch.context() as patch:
         patch.setenv("GAPLAB_DATABASE_URL", f"sqlite:///{tmp_path / 'restored.db'}")
         assert ask("restore", str(tmp_path / "copy.db"))["file"] == str(tmp_path / "restored.db")
@@ -107,8 +108,19 @@ def test_every_command_prints_one_document_and_nothing_else(
     assert ask("token revoke", token["token"]["id"]) == {"id": token["token"]["id"], "revoked": True}
     assert set(ask("help")) == {str(each.value) for each in Exit}
 
-    elsewhere = {"sensitivity", "accept-versions", "retry"}  # want a worker, an experiment under way, and a failed one
+    # want a body, a worker, an experiment under way, and a failed one
+    elsewhere = {"replay", "sensitivity", "accept-versions", "retry"}
     assert set(said) | elsewhere == set(NAMES) - UNTIL_STOPPED
+
+
+def tidy(ask: Callable[..., Any], ended: str) -> None:
+    assert ask("tag", ended, "gait")["tags"] == ["gait"]
+    assert ask("notify", ended) == {"host": None}
+    assert ask("archive", ended)["archived_at"]
+    assert ask("unarchive", ended)["archived_at"] is None
+    assert ask("views save", "mine", "--query", "tag = gait")["name"] == "mine"
+    assert ask("views delete", "mine")["query"] == "tag = gait"
+    assert ask("delete", ended)["id"] == ended
 
 
 def live_and_die(ask: Callable[..., Any], finish: Callable[[], None]) -> None:
@@ -131,6 +143,10 @@ def look(ask: Callable[..., Any], id: str, other: str) -> None:
     experiments = [each["id"] for each in ask("show", id)["study"]["experiments"]]
     assert set(ask("show", experiments[0])) == {"experiment", "repetitions", "provenance", "misfit"}
     assert [each["experiment"] for each in ask("curve", id)] == experiments
+    assert [column["id"] for column in ask("diff", id, other)["columns"]] == [id, other]
+    assert ask("report", id)["headline"]
+    assert ask("compare", id)[0]["first"] == experiments[0]
+    assert ask("spec", id)["spec"]["strategies"] == STUDY["strategies"]
     assert "strategies" in ask("catalogue")
     assert ask("catalogue", "random")["name"] == "random"
     assert {each["kind"] for each in ask("events", id)} > {"submitted", "completed"}
@@ -141,6 +157,9 @@ def keep(ask: Callable[..., Any], id: str, folder: Path) -> None:
     archive, figure, copy = (str(folder / name) for name in ("a.zip", "f.svg", "copy.db"))
     assert ask("export", id, "--to", archive)["file"] == archive
     assert ask("import", archive)["renamed"]
+    assert ask("rerun", archive)["state"] == "QUEUED"
+    plugin = ask("plugin new", "strategy", "mine", "--folder", str(folder))["file"]
+    assert ask("plugin check", plugin)[0]["name"] == "mine"
     assert ask("figure", "curves", id, "--out", figure)[0]["bytes"] == Path(figure).stat().st_size
     assert ask("backup", copy)["bytes"] > 0
 

@@ -8,6 +8,7 @@ import time
 from collections.abc import AsyncIterator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from itertools import count
 from typing import Any
 
@@ -26,14 +27,18 @@ from gaplab.api.http import event_feed as feeding
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.process.server import Server, listen
 from gaplab.schemas.access import Role
+from gaplab.schemas.editing import Edit
 from gaplab.schemas.events import EventKind, EventPage, EventRead
 from gaplab.schemas.lifecycle import Verb
+from gaplab.schemas.notifications import Channel
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.services import access, archives, events
 from gaplab.services.core.errors import NotFound
 from gaplab.services.events import WantedEvents
-from gaplab.services.experiments import extension, lifecycle, submission
+from gaplab.services.experiments import archiving, deletion, editing, extension, lifecycle, submission
 from gaplab.services.experiments.checks import queue_for
+from gaplab.services.experiments.deletion import Deleter
+from gaplab.services.notifications import outbox
 from gaplab.services.running import execution, provenance, sensitivity
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.running.versions import provenance as own
@@ -112,6 +117,21 @@ def everything_that_can_happen(store: Store) -> None:
     assert check is not None
     sensitivity.fail(store, check, "no legs")
     lifecycle.ask_experiment(store, waits.experiment_id, Verb.RETRY)
+    kept_and_told_of(store)
+
+
+def kept_and_told_of(store: Store) -> None:
+    outbox.collect(store, "me", [Channel.COMMAND])
+    ended = cancel(store, submission.submit_experiment(store, toy()).id).id
+    outbox.collect(store, "me", [Channel.COMMAND])
+    letter = outbox.next_letter(store)
+    assert letter is not None
+    outbox.settle(store, letter, "no answer")
+    outbox.settle(store, replace(letter, attempt=2), None)
+    editing.edit_experiment(store, ended, Edit(tags=("gait",)), starting_from=None)
+    archiving.archive_experiment(store, ended)
+    archiving.archive_experiment(store, ended, archived=False)
+    deletion.delete_experiment(store, ended, Deleter(None))
 
 
 def all_verbs(store: Store) -> None:

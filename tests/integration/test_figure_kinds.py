@@ -15,16 +15,18 @@ from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.predictions import AFTER, BEFORE, predictions_figure
 from gaplab.services.figures.kinds.simulators import MOST, REALITY, simulators_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
-from gaplab.services.figures.marks import Diagonal, FigureDefinition, Level, Line, Mark, Points
+from gaplab.services.figures.marks import Diagonal, FigureDefinition, Label, Level, Line, Mark, Points, Polylines
 from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.figures.plotly.chart import chart
 from gaplab.services.results import curves
+from gaplab.services.results.coordinates import experiment_coordinates
 from gaplab.services.results.curve_costs import cost_axis
 from gaplab.services.results.tuned_simulators import tuned_simulators
 from gaplab.services.running import execution
+from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, toy
-from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, curve, point, prediction, tuned
+from tests.figures import DIMENSIONS, ERRORS, PREDICTIONS, TRUTH, coordinates, curve, point, prediction, tuned
 
 
 def marks(figure: FigureDefinition, panel: int = 0) -> dict[str, Mark]:
@@ -73,6 +75,23 @@ def test_reality_is_a_point_where_both_are_known_a_level_where_one_is_and_within
     assert "ended" not in figure.caption
 
 
+def test_a_reality_of_another_engine_has_no_place_among_the_simulators(store: Store) -> None:
+    elsewhere = submission.submit_experiment(store, toy(repetitions=1)).id
+    (claim,) = execution.claim(store, "test", limit=1)
+    run(store, claim)
+    with store.transaction() as session:
+        row = session.get_one(ExperimentRow, elsewhere)
+        row.spec = row.spec | {"reality": row.spec["reality"] | {"engine": {"name": "a_lab", "options": {}}}}
+
+    found = tuned_simulators(store, elsewhere)
+    truth, engine = found.truth, found.real_engine
+    figure = simulators_figure(found.simulators, found.dimensions, truth=truth, real_engine=engine)
+
+    assert truth == {}
+    assert REALITY not in marks(figure)
+    assert "Reality is the engine a_lab: no setting of the simulators is reality." in figure.caption
+
+
 def test_of_very_many_simulators_the_first_repetitions_are_drawn() -> None:
     figure = simulators_figure(tuned(2, repetitions=4000, iterations=1), DIMENSIONS[:2], truth=None)
 
@@ -85,6 +104,36 @@ def test_simulators_of_nothing_do_not_tell_where_reality_is() -> None:
 
     assert figure.empty
     assert figure.panels[0].marks == ()
+
+
+def test_parallel_coordinates_have_one_line_for_each_and_axes_with_their_ends() -> None:
+    figure = coordinates()
+
+    (panel,) = figure.panels
+    (lines,) = [mark for mark in panel.marks if isinstance(mark, Polylines)]
+    labels = {(mark.x, mark.text) for mark in panel.marks if isinstance(mark, Label)}
+    assert lines.shades == (0.25, 0.5, 0.75)
+    assert lines.rows[0] == (0.0, pytest.approx(0.2 / 1.5), 0.0, 0.5)
+    assert lines.rows[1][2] is None
+    assert lines.rows[2] == (1.0, pytest.approx(1 / 1.5), 1.0, 0.5)
+    assert {(1, "0"), (1, "1.5"), (0, "random"), (3, "8")} <= labels
+    assert [words for _, words in panel.x.ticks] == ["Strategy", "Static friction", "RMS error (m/s)", "Repetitions"]
+    assert "3\N{NO-BREAK SPACE}experiments" in figure.caption
+    assert figure.table is not None
+    assert figure.table.rows[1] == ("random", "0.4", "", "8")
+    assert coordinates(0).empty
+
+
+def test_the_coordinates_of_experiments_are_the_settings_that_differ_and_their_fitness(sqlite_store: Store) -> None:
+    ids = [submission.submit_experiment(sqlite_store, toy(seed=seed)).id for seed in (1, 2)]
+    for claim in execution.claim(sqlite_store, "test", limit=10):
+        run(sqlite_store, claim)
+
+    figure = experiment_coordinates(sqlite_store, [], ids)
+
+    assert figure.table is not None
+    assert figure.table.head == ("Seed", "Rollouts", "Final fitness (m/s)")
+    assert [row[0] for row in figure.table.rows] == ["1", "2"]
 
 
 def test_predictions_are_drawn_before_and_after_with_the_line_of_agreement() -> None:
@@ -118,11 +167,30 @@ def test_squared_errors_have_their_median_and_quartiles_and_failures_are_counted
     line = marks(figure)["Best simulator"]
     assert (line.x, line.y) == ((1, 2), (2.0, 4.0))  # type: ignore[union-attr]
     assert (line.lower, line.upper) == ((1.5, None), (5.5, None))  # type: ignore[union-attr]
-    assert figure.panels[0].y.label == "Squared error ((m/s)²)"
+    assert (figure.panels[0].title, figure.panels[0].y.label) == ("Sum of squared errors", "Sum ((m/s)²)")
     assert not figure.panels[0].y.log
     told = figure.caption.replace("\N{NO-BREAK SPACE}", " ")
     assert "Median over 1\N{EN DASH}3 repetitions" in told
     assert "1 value left out, since the physics failed." in told
+
+
+def test_the_error_per_sample_stands_beside_the_sum_which_grows_with_the_samples() -> None:
+    figure = squared_error_figure(
+        {1: {0: 0.04, 1: 0.16}, 2: {0: 0.08, 1: None}, 3: {0: 0.12, 1: 0.3}},
+        samples={1: {0: 1, 1: 1}, 2: {0: 2, 1: 2}, 3: {0: 3, 1: 0}},
+        unit="m/s",
+    )
+
+    per_sample, total = (marks(figure, panel)["Best simulator"] for panel in (0, 1))
+    assert [panel.y.label for panel in figure.panels] == ["Per sample (m/s)", "Sum ((m/s)²)"]
+    assert [panel.title for panel in figure.panels] == ["Error per sample", "Sum of squared errors"]
+    assert per_sample.y == pytest.approx((0.3, 0.2, 0.2))  # type: ignore[union-attr]
+    assert total.y == pytest.approx((0.1, 0.08, 0.21))  # type: ignore[union-attr]
+    assert "root mean square" in figure.caption
+    assert figure.table
+    assert figure.table.rows[1] == ("2", "0.2", "", "", "0.08", "", "", "1")
+    assert len(figure.table.head) == 8
+    assert "error per sample (m/s): 0.3 after iteration 1" in figure.alt
 
 
 def test_squared_errors_of_many_magnitudes_are_on_a_logarithmic_axis_without_zeros() -> None:

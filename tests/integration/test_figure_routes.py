@@ -34,7 +34,7 @@ STUDY = {
     "repetitions": 3,
     "budget": "smoke",
 }
-KINDS = ["curves", "simulators", "squared-error"]
+KINDS = ["curves", "simulators", "squared-error", "coordinates"]
 HIDDEN = 0.7319462853
 DEADLINE_S = 120.0
 
@@ -73,7 +73,7 @@ def test_every_kind_is_served_in_every_format(api: TestClient, experiment: str, 
     assert Figure(found["figure"]).data
     assert found["empty"] is False
     assert found["alt"].endswith(".")
-    assert "3\N{NO-BREAK SPACE}repetitions" in found["caption"] or kind == "curves"
+    assert "3\N{NO-BREAK SPACE}repetitions" in found["caption"] or kind in {"curves", "coordinates"}
     assert found["table"]["rows"]
     assert ET.fromstring(answers["svg"].text).tag.endswith("svg")
     assert answers["pdf"].content.startswith(b"%PDF")

@@ -1,11 +1,14 @@
 """The figure of curves: what is in it."""
 
+from typing import Any
+
 import pytest
 
 from gaplab.schemas.curves import CurvePoint
+from gaplab.services.core.strategies import strategies
 from gaplab.services.figures.kinds.curves import CostAxis, curves_figure
 from gaplab.services.figures.marks import Arrow, Axis, Bars, FigureDefinition, Label, Level, Line, Points
-from gaplab.services.figures.style import COLORS, style_of
+from gaplab.services.figures.style import COLORS, STRATEGIES, strategy_style, strategy_styles, style_of
 from gaplab.services.figures.words import limits, power
 from tests.figures import DIRECT, RISING, curve, point
 
@@ -91,15 +94,40 @@ def test_curves_are_drawn_against_what_they_cost_where_that_is_known() -> None:
     assert levels(figure)
 
 
-def test_the_frame_shows_the_means_however_wide_a_band_is() -> None:
-    wild = CurvePoint(evaluations=1, n=2, mean=1.2, sd=0.1, lower=-50, upper=50, values=(1.1, 1.3))
-    least, most = curves_figure([curve("a", point(0, 1.0), wild)], band="interval").panels[0].y.limits
-    tame = curves_figure([RISING]).panels[0].y.limits
+@pytest.mark.parametrize("band", ["interval", "sd"])
+def test_nothing_that_is_drawn_is_cut_off_by_the_frame(band: Any) -> None:
+    wide = CurvePoint(evaluations=1, n=2, mean=1.2, sd=3.0, lower=-50, upper=50, values=(-8.1, 9.3))
+    figure = curves_figure([curve("a", point(0, 1.0), wide), DIRECT], band=band, each=True)
 
-    assert 0.7 < least < 1.0
-    assert 1.2 < most < 1.5
-    assert tame[0] <= 0.7
-    assert tame[1] > 1.5
+    least, most = figure.panels[0].y.limits
+    drawn = [y for line in lines(figure) for ys in (line.y, line.lower, line.upper) for y in ys if y is not None]
+    drawn += [end for level in levels(figure) for end in (level.lower, level.upper) if end is not None]
+    assert min(drawn) == (-50 if band == "interval" else -8.1)
+    assert least < min(drawn) < max(drawn) < most
+
+
+def test_a_strategy_keeps_its_colour_and_mark_whatever_is_drawn_beside_it() -> None:
+    named = [curve(name).model_copy(update={"strategy": name, "points": (point(0, 1.0),)}) for name in STRATEGIES]
+    own = curve("mine", point(0, 1.0)).model_copy(update={"strategy": "mine"})
+
+    together = {line.name: line.style for line in lines(curves_figure([*named, own]))}
+    alone = {line.name: line.style for each in (own, *named) for line in lines(curves_figure([each]))}
+
+    assert together == alone
+    assert len({style.color for style in together.values()}) == len(COLORS)
+    assert together["Mine"] not in [strategy_style(name) for name in STRATEGIES]
+
+
+def test_experiments_of_one_strategy_share_colour_and_mark_and_differ_in_their_dashes() -> None:
+    first, second, third = strategy_styles(["random", "random", "random"])
+
+    assert len({first.color, second.color, third.color}) == len({first.marker, second.marker, third.marker}) == 1
+    assert len({first.dash, second.dash, third.dash}) == 3
+
+
+def test_every_strategy_of_gaplab_with_a_curve_has_a_colour_of_its_own() -> None:
+    assert {name for name, strategy in strategies.items() if not strategy.in_reality} >= set(STRATEGIES)
+    assert len(STRATEGIES) == len(COLORS)
 
 
 def test_experiments_of_one_name_are_told_apart_by_their_ids() -> None:

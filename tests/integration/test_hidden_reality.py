@@ -17,9 +17,10 @@ from pyarrow import parquet
 from gaplab.api.app import create_app
 from gaplab.schemas.access import Role
 from gaplab.schemas.spec import StudySpec
+from gaplab.schemas.views import ViewSpec
 from gaplab.services.access import create_token
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import saved_views, submission
 from gaplab.services.running import execution
 from gaplab.services.settings import Limits
 from gaplab.services.specs.assembly import setting
@@ -70,6 +71,7 @@ def running(store: Store, log: pytest.LogCaptureFixture) -> dict[str, str]:
     """Ids of a study that runs, by what they are of."""
     study = submission.submit_study(store, StudySpec.model_validate(STUDY))
     run_halfway(store)
+    saved_views.save_view(store, "mine", ViewSpec(query="strategy = random"))
     first, second, _ = study.experiments
     return {"studies": study.id, "experiments": first.id, "other": second.id, "sensitivity": first.sensitivity or ""}
 
@@ -81,6 +83,7 @@ def addresses(document: dict[str, Any], ids: dict[str, str]) -> Iterator[str]:
             continue
         noun = path.split("/")[1]
         address = path.replace("{id}", ids.get(noun, ids["experiments"])).replace("{number}", "0")
+        address = address.replace("{name}", "mine")
         assert "{" not in address, f"{path} has a parameter that this test does not know"
         names = {each["name"]: str(each["schema"]) for each in operations["get"].get("parameters", ())}
         queries = [""]

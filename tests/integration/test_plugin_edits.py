@@ -190,7 +190,7 @@ def test_an_experiment_whose_plug_in_is_broken_stays_queued_and_says_why(store: 
     assert claimed(store) == []
     found = reading.read_experiment(store, named)
     assert found.state is (State.RUNNING if begun else State.QUEUED)
-    assert [each for each in found.warnings if WHY in each and "restart the service" in each]
+    assert [each for each in found.warnings if WHY in each and "imported again" in each]
     assert [each.experiment for each in refusals(store)] == [named]
     put(careful=CAREFUL)
     assert claimed(store) == [named]

@@ -3,11 +3,13 @@
 import os
 import signal
 from collections.abc import Iterator
+from io import BytesIO
 from typing import Any
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
+from PIL import Image
 
 from gaplab.api.app import create_app
 from gaplab.schemas.replays import Replay
@@ -36,6 +38,7 @@ def app(sqlite_store: Store) -> Iterator[Any]:
     found = create_app(sqlite_store)
     yield found
     found.state.rollout_process.close()
+    found.state.drawing_process.close()
 
 
 @pytest.fixture
@@ -119,6 +122,21 @@ def test_no_replay_moves_hardware(sqlite_store: Store, api: Any, monkeypatch: py
 
     assert (replay.json()["reality"], replay.json()["simulation"]["fitness"]) == (None, log[6].fitness)
     assert gait.status_code == 200, gait.text
+
+
+def test_a_video_shows_the_simulator_alone_if_reality_is_hardware(
+    sqlite_store: Store, api: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(monkeypatch, engines, Lab)
+    experiment, *_ = walked(sqlite_store, reality={"engine": "lab", "parameters": HIDDEN})
+    monkeypatch.setattr(Lab, "rollout", lambda *_: pytest.fail("it moved"))
+
+    answer = api.get(f"/experiments/{experiment}/video?iteration=1&width=240&format=webp")
+
+    assert answer.status_code == 200, answer.text
+    assert answer.headers["content-type"] == "image/webp"
+    with Image.open(BytesIO(answer.content)) as film:
+        assert (film.width, film.n_frames) == (240, 76)  # type: ignore[attr-defined]
 
 
 def test_a_sample_is_shown_in_the_simulator_that_it_was_selected_in_or_in_any_other(

@@ -127,7 +127,9 @@ def test_what_a_check_finds_is_shown_and_warns_the_experiments(store: Store) -> 
     assert read.tunables[:2] == found
     assert read.warnings == (
         "grip over 0 to 1.5 does nothing: its effect on fitness is 0.1 % of the spread between controllers",
-        "slip over 0 to 1.5 is rough: 70 % of its effect on fitness is noise between neighbouring values",
+        "slip over 0 to 1.5: 70 % of its effect on fitness is noise between neighbouring values; the larger "
+        "this share, the less certain its tuned value (called rough above 50 %; 100 % is chance). Leave it out of "
+        "the tunables, or check other bounds or another engine with the command gaplab sensitivity",
     )
     assert reading.read_experiment(store, experiment).warnings == read.warnings
     assert listing.list_experiments(store).items[0].warnings == read.warnings

@@ -30,6 +30,8 @@ test("an address of the list holds its filters, and nothing that is usual", () =
   const address = "#/?state=FAILED&strategy=random&text=a+b&show=experiments&sort=name";
   assert.equal(listAddress(filtersOf(parametersOf(address))), address);
   assert.equal(listAddress(filtersOf(new URLSearchParams())), "#/");
+  assert.equal(filtersOf(new URLSearchParams()).show, "all");
+  assert.equal(listAddress(filtersOf(parametersOf("#/?show=studies"))), "#/?show=studies");
 });
 
 test("a list of studies is not sorted by what only experiments have", () => {

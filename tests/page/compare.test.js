@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { letter, paperRanges, rangeText } from "../../api/dashboard/views/compare/ranges.js";
+import { commonCount, isPooled, letter, rangesOf, rangeText } from "../../api/dashboard/views/compare/ranges.js";
 import { differentSettings, warnings } from "../../api/dashboard/views/compare/remarks.js";
 import { probability, signed, swapped, verdict } from "../../api/dashboard/views/compare/verdict.js";
 
@@ -17,11 +17,21 @@ test("letters go on after Z", () => {
   assert.deepEqual([0, 25, 26, 51, 52, 701, 702].map(letter), ["A", "Z", "AA", "AZ", "BA", "ZZ", "AAA"]);
 });
 
-test("the paper's ranges end where the experiments do", () => {
-  assert.deepEqual(paperRanges(10), [[1, 1], [3, 10], [6, 10], [1, 10]]);
-  assert.deepEqual(paperRanges(5), [[1, 1], [3, 5], [1, 5]]);
-  assert.deepEqual(paperRanges(1), [[1, 1]]);
+test("a comparison begins at the last shared number, and the paper's pooled ranges end where the experiments do", () => {
+  assert.deepEqual(rangesOf(10, 10), [[10, 10], [1, 1], [3, 10], [6, 10], [1, 10]]);
+  assert.deepEqual(rangesOf(3, 5), [[3, 3], [1, 1], [3, 5], [1, 5]]);
+  assert.deepEqual(rangesOf(1, 1), [[1, 1]]);
+  assert.deepEqual(rangesOf(0, 1), [[0, 0], [1, 1]]);
   assert.deepEqual([rangeText([3, 3]), rangeText([3, 10])], ["3", "3–10"]);
+  assert.deepEqual([isPooled([3, 3]), isPooled([3, 10])], [false, true]);
+});
+
+test("the last shared number is that of experiments which go on or have completed, without the direct baseline", () => {
+  const at = (evaluations, state = "COMPLETED", direct = false) => ({ state, direct, fitness: evaluations === null ? null : { evaluations } });
+  assert.equal(commonCount([at(5), at(3), at(0, "COMPLETED", true), at(null)]), 3);
+  assert.equal(commonCount([at(5), at(1, "CANCELLED"), at(2, "FAILED")]), 5);
+  assert.equal(commonCount([at(1, "CANCELLED"), at(2, "FAILED")]), 1);
+  assert.equal(commonCount([]), 0);
 });
 
 test("a pair differs below 0.05, and its sign says which is higher", () => {

@@ -20,8 +20,11 @@ test("an action that a state forbids says what would permit it", () => {
 test("events are sentences, and a kind that is newer than the page has its name", () => {
   const event = { kind: "repetition_failed", repetition: 3, body: { reason: "a foot fell off" } };
   assert.equal(eventText(event), "Repetition 3 failed: a foot fell off");
-  assert.equal(eventText({ kind: "measured", repetition: 0, body: { iteration: 2, fitness: null } }), "Repetition 0, iteration 2: measured in reality, physics failed");
-  assert.match(eventText({ kind: "tuned", repetition: 0, body: { iteration: 1, squared_error: 0.00001 } }), /squared error 1\.0e-5$/);
+  assert.equal(eventText({ kind: "measured", repetition: 0, body: { iteration: 2, fitness: null } }), "Repetition 0, iteration 2: the physics failed in reality");
+  assert.equal(eventText({ kind: "probed", repetition: 0, body: { iteration: 2, fitness: null } }), "Repetition 0, iteration 2: the physics failed in reality");
+  assert.equal(eventText({ kind: "probed", repetition: 0, body: { iteration: 2, fitness: 0.5 } }), "Repetition 0, iteration 2: the controller reaches 0.5 in reality");
+  assert.equal(eventText({ kind: "transferred", repetition: 0, body: { iteration: 2, simulated_fitness: null } }), "Repetition 0, iteration 2: controller evolved, the physics failed in simulation");
+  assert.match(eventText({ kind: "tuned", repetition: 0, body: { iteration: 1, squared_error: 0.00001 } }), /sum of squared errors 1\.0e-5$/);
   assert.equal(eventText({ kind: "something_new" }), "something new");
 });
 

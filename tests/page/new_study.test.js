@@ -1,6 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { draftOf, specOf, ticked } from "../../api/dashboard/views/new/draft.js";
+import { specIn, studyOf } from "../../api/dashboard/views/new/paste.js";
 import { nearestPlace } from "../../api/dashboard/views/new/fields.js";
 import { curlLines, pythonLines } from "../../api/dashboard/views/new/panel.js";
 
@@ -61,4 +62,12 @@ test("a name with quotes is safe in a shell and in a program", () => {
   assert.ok(curlLines("http:/x/", `{"name":"it's"}`).endsWith(`-d '{"name":"it'\\''s"}'`));
   assert.ok(pythonLines("http:/x/", '{"name": "a"}').includes(`json.loads(r'''{"name": "a"}''')`));
   assert.ok(pythonLines("http:/x/", `{"name": "'''"}`).includes(`json.loads("{\\"name\\": \\"'''\\"}")`));
+});
+
+test("a pasted experiment becomes a study of one strategy, and what is no spec is told", () => {
+  assert.deepEqual(studyOf({ strategy: "random", seed: 1 }), { seed: 1, strategies: ["random"] });
+  assert.deepEqual(studyOf({ strategies: ["random"] }), { strategies: ["random"] });
+  assert.deepEqual(specIn('{"seed": 18446744073709551615}'), { seed: 18446744073709551615n });
+  assert.throws(() => specIn("{"), /This is not JSON/);
+  assert.throws(() => specIn("[1]"), /A spec is an object/);
 });

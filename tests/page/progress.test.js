@@ -1,8 +1,9 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { fraction, repetitionsDone, timeLeft, timeLeftFact } from "../../api/dashboard/lib/progress.js";
+import { durationRange } from "../../api/dashboard/lib/format.js";
+import { fraction, iterationsDone, repetitionsDone, rolloutsDone, timeLeft, timeLeftFact } from "../../api/dashboard/lib/progress.js";
 
-test("rollouts that were not needed are done, and no progress is beyond the end", () => {
+test("rollouts that were saved are done, and no progress is beyond the end", () => {
   assert.equal(fraction({ rollouts: 100, rollouts_done: 20, rollouts_saved: 30 }), 0.5);
   assert.equal(fraction({ rollouts: 100, rollouts_done: 90, rollouts_saved: 30 }), 1);
   assert.equal(fraction({ rollouts: 0, rollouts_done: 0, rollouts_saved: 0 }), 0);
@@ -13,8 +14,16 @@ test("failed repetitions are named, where there are any", () => {
   assert.equal(repetitionsDone({ completed: 1, repetitions: 4, failed: 2 }), "1 of 4, 2 failed");
 });
 
-test("only what runs has a time left", () => {
-  const at = (state, seconds) => ({ state, progress: { seconds_left: seconds } });
-  assert.deepEqual([timeLeft(at("RUNNING", 60)), timeLeft(at("STOPPING", null)), timeLeft(at("PAUSED", 60))], ["60 s", "…", ""]);
-  assert.deepEqual([timeLeftFact(at("RUNNING", 60)), timeLeftFact(at("RUNNING", null)), timeLeftFact(at("QUEUED", 60))], ["60 s", "not known yet", "–"]);
+test("only what runs has a time left, which is an interval or not known yet", () => {
+  const at = (state, left) => ({ state, progress: { time_left: left, seconds_left: 1 } });
+  const minutes = { low_s: 130, high_s: 230 };
+  assert.deepEqual([timeLeft(at("RUNNING", minutes)), timeLeft(at("STOPPING", null)), timeLeft(at("PAUSED", minutes))], ["2 to 4 min", "not known yet", ""]);
+  assert.deepEqual([timeLeftFact(at("RUNNING", minutes)), timeLeftFact(at("RUNNING", null)), timeLeftFact(at("QUEUED", minutes))], ["2 to 4 min", "not known yet", "–"]);
+  assert.deepEqual([durationRange({ low_s: 5, high_s: 40 }), durationRange({ low_s: 28_800, high_s: 45_000 })], ["less than 1 min", "8 to 13 h"]);
+});
+
+test("iterations are counted as in a spec, and saved rollouts are named where there are any", () => {
+  assert.equal(iterationsDone({ iterations: 20, iterations_done: 20, counted_iterations: 15, counted_iterations_done: 15 }), "15 of 15");
+  assert.equal(rolloutsDone({ rollouts: 1000, rollouts_done: 900, rollouts_saved: 0 }), "900 of 1,000");
+  assert.equal(rolloutsDone({ rollouts: 1000, rollouts_done: 900, rollouts_saved: 100 }), "900 of 1,000, 100 saved");
 });

@@ -23,13 +23,15 @@ from tests.soak.stage import Kept, send
 CLOCK_JUMP = timedelta(hours=1)
 
 
-def _shift_heartbeats(url: str, by: timedelta) -> None:
+def _shift_heartbeats(url: str, by: timedelta) -> bool:
     store = Store(url)
     try:
         with store.transaction() as session:
-            for model in (RepetitionRow, SensitivityRow, SupervisorRow):
+            models: tuple[Any, ...] = (RepetitionRow, SensitivityRow, SupervisorRow)
+            for model in models:
                 for row in session.scalars(select(model).where(model.heartbeat_at.is_not(None))).all():
                     row.heartbeat_at += by
+        return True
     finally:
         store.dispose()
 
@@ -84,9 +86,9 @@ class Sqlite:
         finally:
             connection.close()
 
-    def set_clock(self, by: timedelta) -> None:
+    def set_clock(self, by: timedelta) -> bool:
         """Let all holders' heartbeats have been given before the clock was set."""
-        _shift_heartbeats(self.url, -by)
+        return _shift_heartbeats(self.url, -by)
 
     def restore(self, stage: Any, meanwhile: Any) -> None:
         """Back up, end the service some time later, restore the backup, and start the service again."""
@@ -136,21 +138,25 @@ class Postgres:
         for pid in [self._kept.pid, *self._children()]:
             send(pid, signal.SIGKILL)
 
-    def hang_up(self) -> None:
-        """End every connection of clients."""
-        with psycopg.connect(self.url, autocommit=True) as connection:
-            connection.execute(
-                "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
-                "WHERE backend_type = 'client backend' AND pid <> pg_backend_pid()"
-            )
+    def hang_up(self) -> bool:
+        """End every connection of clients; False while the server does not answer."""
+        try:
+            with psycopg.connect(self.url, autocommit=True) as connection:
+                connection.execute(
+                    "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
+                    "WHERE backend_type = 'client backend' AND pid <> pg_backend_pid()"
+                )
+        except psycopg.OperationalError:
+            return False
+        return True
 
     def fall_silent(self) -> None:
         """Let every connection of the service die without a word to either side."""
         self._proxy.hang()
 
-    def set_clock(self, by: timedelta) -> None:
+    def set_clock(self, by: timedelta) -> bool:
         """Let all holders' heartbeats have been given before the clock was set."""
-        _shift_heartbeats(self.url, -by)
+        return _shift_heartbeats(self.url, -by)
 
     def restore(self, stage: Any, meanwhile: Any) -> None:
         """Copy the server's files, and some time later put the copy in their place; the service runs all the time."""

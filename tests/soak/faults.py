@@ -19,6 +19,9 @@ DISK_S = 3.0
 EARLIER_S = 3.0
 """Age of the state that is restored."""
 
+DATABASE_S = 30.0
+"""For how long a fault waits for a database that another fault has made unavailable."""
+
 Fault = namedtuple("Fault", "name inflict alone", defaults=(False,))
 
 
@@ -76,8 +79,7 @@ def _kill_database(stage: Any) -> bool:
 
 
 def _hang_up(stage: Any) -> bool:
-    stage.database.hang_up()
-    return True
+    return until(stage.database.hang_up, DATABASE_S)
 
 
 def _fall_silent(stage: Any) -> bool:
@@ -87,7 +89,8 @@ def _fall_silent(stage: Any) -> bool:
 
 def _set_clock(by: Any) -> Any:
     def inflict(stage: Any) -> bool:
-        stage.database.set_clock(by)
+        if not until(lambda: stage.database.set_clock(by), DATABASE_S):
+            return False
         return _signal(stage, "supervisor", signal.SIGKILL) is not None
 
     return inflict

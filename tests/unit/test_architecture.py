@@ -23,11 +23,26 @@ ROOMS = {
     "figures": ((), {"plotly", "matplotlib"}),
     "specs": (("core", "engines"), {"numpy"}),
     "plugins": (("core", "engines", "specs"), set()),
-    "experiments": (("core", "engines", "store", "specs", "plugins", "settings"), {"sqlalchemy"}),
+    "contract": (("core", "engines", "specs", "plugins"), {"numpy"}),
+    "experiments": (
+        ("core", "engines", "store", "specs", "plugins", "settings"),
+        {"sqlalchemy", "lark", "markdown_it"},
+    ),
     "running": (("core", "engines", "store", "plugins", "experiments"), {"sqlalchemy"}),
     "results": (("core", "store", "figures", "specs", "experiments"), {"numpy"}),
-    "replay": (("core", "store", "specs", "plugins", "experiments", "waiting_line"), {"numpy", "cachetools"}),
-    "archives": (("core", "store", "specs", "experiments", "results", "settings"), {"pydantic", "pyarrow"}),
+    "replay": (
+        ("core", "store", "specs", "plugins", "experiments", "waiting_line"),
+        {"numpy", "scipy", "cachetools", "PIL", "av"},
+    ),
+    "notifications": (("core", "store", "experiments", "settings"), {"sqlalchemy", "httpx2"}),
+    "archives": (
+        ("core", "engines", "store", "specs", "plugins", "experiments", "running", "results", "settings"),
+        {"numpy", "pydantic", "pyarrow"},
+    ),
+    "reports": (
+        ("core", "store", "figures", "specs", "experiments", "running", "results"),
+        {"numpy", "jinja2", "fpdf", "matplotlib", "PIL"},
+    ),
 }
 """Rooms of services, each below those that may import it: what of services each may import, and what of others."""
 

@@ -1,5 +1,6 @@
 """The documents: no link is dead, and the reference is what the code says."""
 
+import json
 import re
 import subprocess
 from pathlib import Path
@@ -97,3 +98,12 @@ def test_documents_name_no_path_of_a_machine() -> None:
     texts = [ROOT / name for name in listed.stdout.split() if name.endswith((".md", ".ipynb"))]
 
     assert [path for path in texts if re.search(r"(/home|/Users|/work)/\w", path.read_text())] == []
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_has_the_outputs_of_a_whole_run_and_names_no_folder_of_a_machine(path: Path) -> None:
+    cells = [cell for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "code"]
+
+    assert [cell.execution_count for cell in cells] == list(range(1, len(cells) + 1))
+    assert sum(bool(cell.outputs) for cell in cells) > len(cells) / 2
+    assert not re.search(r"/(root|tmp|home|work|Users|var)/", json.dumps([cell.outputs for cell in cells]))

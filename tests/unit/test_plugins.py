@@ -108,7 +108,7 @@ def test_a_broken_file_is_unavailable_with_the_reason_and_stops_nothing_else(
     (entry,) = [each for each in found.describe() if not each.available]
     assert (entry.name, entry.source) == (name, "broken.py of GAPLAB_PLUGINS")
     assert re.search(says, entry.note)
-    assert entry.note.endswith("; repair the file, then restart the service")
+    assert entry.note.endswith("; repair the file, which is then imported again")
     with pytest.raises(InvalidSpec, match=f"'{re.escape(name)}' is not available: ") as refused:
         found.create(PluginRef(name=name), "/strategy")
     assert refused.value.violations[0].pointer == "/strategy"

@@ -118,7 +118,11 @@ def test_everything_that_is_wrong_is_said_at_once() -> None:
         ({"tunables": [{"name": "restitution", "upper": 2}]}, "/tunables/0/upper", "0 to 0.9"),
         ({"tunables": ["restitution", "restitution"]}, "/tunables/1", None),
         ({"budget": {"simulator_evaluations": 19}}, "/budget/simulator_evaluations", "at least 20"),
-        ({"optimizer": {"name": "steady_state", "options": {"population": 1}}}, "/optimizer/options/population", None),
+        (
+            {"optimizer": {"name": "steady_state", "options": {"population": 1}}},
+            "/optimizer/options/population",
+            "at least 2",
+        ),
         ({"strategy": {"name": "known_fit", "options": {"spred": 1}}}, "/strategy/options/spred", ("spread",)),
     ],
 )
@@ -139,7 +143,7 @@ def test_an_engine_that_is_not_installed_is_refused_with_its_install_line(monkey
 
     monkeypatch.setattr(engines["pybullet"], "library", "a_library_that_is_not_there")
 
-    assert "pip install" in refused()["/engine"].message
+    assert "pip install" in refused(engine="pybullet")["/engine"].message
 
 
 def test_what_is_wrong_with_a_study_points_into_the_study() -> None:

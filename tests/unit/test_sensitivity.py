@@ -59,7 +59,23 @@ def test_a_tunable_whose_effect_is_noise_is_rough() -> None:
 
     assert second.verdict is Verdict.ROUGH
     assert second.roughness == pytest.approx(1.0, abs=0.2)
-    assert "is rough" in warning(second)
+    assert "the less certain its tuned value" in warning(second)
+    assert "Leave it out of the tunables" in warning(second)
+
+
+def test_what_is_said_of_roughness_does_not_jump_at_the_limit_of_its_verdict() -> None:
+    below, above = (rough(roughness) for roughness in (0.496, 0.52))
+
+    assert (below.verdict, above.verdict) == (Verdict.SMOOTH, Verdict.ROUGH)
+    assert warning(below) == warning(above).replace("52 %", "50 %")
+    assert "called rough above 50 %" in warning(below)
+    assert warning(rough(0.4)) is None
+
+
+def rough(roughness: float) -> Any:
+    """The result of a profile with this roughness."""
+    shown = sensitivity("grip", VALUES, np.tile(VALUES, (3, 1)), spread=0.1)
+    return shown.model_copy(update={"roughness": roughness, "verdict": verdict(1.0, roughness)})
 
 
 def test_a_straight_line_has_no_roughness_and_its_standard_deviation_as_its_effect() -> None:

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
-from gaplab.api.clients.progress.text import counts, percent
+from gaplab.api.clients.progress.text import counts, percent, state_text
 from gaplab.api.clients.records import Record
 
 LINE_EVERY_S = 10.0
@@ -19,7 +19,7 @@ def show(snapshots: Iterable[Snapshot], console: Console) -> Record:
     ended: set[str] = set()
     for snapshot in snapshots:
         lines = [
-            f"{row.record.name}: {row.record.state}, {counts(row.record.progress)}"
+            f"{row.record.name}: {state_text(row.record)}; {counts(row.record.progress)}"
             for row in snapshot.rows[1:]
             if row.record.state.ended and row.record.id not in ended
         ]
@@ -34,5 +34,6 @@ def show(snapshots: Iterable[Snapshot], console: Console) -> Record:
 
 def _line(row: RecordProgress) -> str:
     progress, state = row.record.progress, row.record.state
-    rest = state if state.ended else f"{row.time_left} left" if row.time_left else "time left not known yet"
+    left = f"{row.time_left} left" if row.time_left else "time left not known yet"
+    rest = state_text(row.record) if state.ended else left
     return f"{row.record.name}: {percent(progress)}, {counts(progress)}; {rest}"

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from gaplab.api.clients.progress.snapshots import RecordProgress, Snapshot
+from gaplab.api.clients.progress.text import state_text
 from gaplab.api.clients.records import Record
 from gaplab.schemas.records import StudyRead
 
@@ -40,6 +41,6 @@ def _row(row: RecordProgress) -> str:
     return (
         f"<tr><td>{f'<b>{name}</b>' if isinstance(record, StudyRead) else name}</td>"
         f'<td><progress max="1" value="{row.done:.3f}" aria-label="{name}">{row.done:.0%}</progress></td>'
-        f"<td>{record.state}</td><td>{record.progress.rollouts_done:,} rollouts</td>"
+        f"<td>{escape(state_text(record))}</td><td>{record.progress.rollouts_done:,} rollouts</td>"
         f"<td>{f'{row.time_left} left' if row.time_left else ''}</td></tr>"
     )

@@ -5,8 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable, is_final
-from gaplab.api.clients.progress.pace import Pace
-from gaplab.api.clients.progress.text import fraction
+from gaplab.api.clients.progress.text import fraction, time_left
 from gaplab.api.clients.records import Record, Records, experiments_of
 from gaplab.api.clients.results import Results
 from gaplab.schemas.curves import Curve
@@ -19,15 +18,18 @@ class RecordProgress:
 
     Attributes:
         record: the study or the experiment.
-        time_left: range like "2 to 4 min"; None while unknown.
         curve: an experiment's curve so far; None unless asked for.
         repetitions: an experiment's repetitions; empty unless asked for.
     """
 
     record: Record
-    time_left: str | None
     curve: Curve | None = None
     repetitions: tuple[RepetitionRead, ...] = ()
+
+    @property
+    def time_left(self) -> str | None:
+        """The interval of the time left, like "2 to 4 min"; None while unknown."""
+        return time_left(self.record)
 
     @property
     def name(self) -> str:
@@ -36,8 +38,8 @@ class RecordProgress:
 
     @property
     def done(self) -> float:
-        """The finished fraction, 1 after any ending."""
-        return 1.0 if self.record.state.ended else fraction(self.record.progress)
+        """The finished fraction."""
+        return fraction(self.record.progress)
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,6 @@ class Snapshots:
     def __init__(self, records: Records, results: Results | None = None) -> None:
         self._records = records
         self._results = results
-        self._pace = Pace()
         self._details: dict[str, tuple[Curve, tuple[RepetitionRead, ...]]] = {}
         self._settled: set[str] = set()
 
@@ -112,9 +113,9 @@ class Snapshots:
         experiments = experiments_of(record)
         if self._results:
             self._read_details(experiments, self._results)
-        rows = [RecordProgress(each, self._pace.left(each), *self._details.get(each.id, ())) for each in experiments]
+        rows = [RecordProgress(each, *self._details.get(each.id, ())) for each in experiments]
         if isinstance(record, StudyRead):
-            rows.insert(0, RecordProgress(record, self._pace.left(record)))
+            rows.insert(0, RecordProgress(record))
         return Snapshot(tuple(rows))
 
     def _read_details(self, experiments: Sequence[ExperimentRead], results: Results) -> None:

@@ -3,9 +3,11 @@
 import math
 
 from rich.console import Console
+from rich.markup import escape
 
+from gaplab.api.clients.records import Record
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.records import Progress
+from gaplab.schemas.records import Progress, StudyRead, TimeLeft
 
 COLORS = {
     State.QUEUED: "dim",
@@ -30,6 +32,46 @@ def colored(state: State) -> str:
     return f"[{COLORS[state]}]{state}[/]"
 
 
+def standing(record: Record) -> str:
+    """Return the state of a study or an experiment in its colour, with what the state alone does not say."""
+    if not record.caveat:
+        return colored(record.state)
+    return f"[yellow]{record.state}, {escape(record.caveat)}[/]"
+
+
+def state_text(record: Record) -> str:
+    """Return the state of a study or an experiment, with what the state alone does not say."""
+    return f"{record.state}, {record.caveat}" if record.caveat else str(record.state)
+
+
+def time_left(record: Record) -> str | None:
+    """Return the interval of the time left, like "2 to 4 min"; None while it is unknown, and unless it runs."""
+    left = record.progress.time_left
+    return span(left) if left and record.state is State.RUNNING else None
+
+
+def span(left: TimeLeft) -> str:
+    """Return an interval in minutes, or in hours if it is long."""
+    unit, name = (3600, "h") if left.high_s > 3 * 3600 else (60, "min")
+    low, high = math.floor(left.low_s / unit), math.ceil(left.high_s / unit)
+    return f"{low} to {high} {name}" if low else f"less than {high} {name}"
+
+
+def fitness(record: Record) -> str:
+    """Return the fitness of an experiment, or of a study's best, with its number of evaluations: "0.585 at 10"."""
+    found = record.best if isinstance(record, StudyRead) else record.fitness
+    return f"{found.mean:.3f} at {found.evaluations}" if found else "-"
+
+
+def best(study: StudyRead) -> list[str]:
+    """Return a sentence about the fittest experiment of a study; none without a result."""
+    found = study.best
+    if not found:
+        return []
+    evaluations = f"{found.evaluations} real-world evaluation{'' if found.evaluations == 1 else 's'}"
+    return [f"best: {found.name.replace('_', ' ')}, mean {found.mean:.3f} after {evaluations} (n = {found.n})"]
+
+
 def fraction(progress: Progress) -> float:
     """Return the finished fraction of the rollouts, because they take most of the time."""
     finished = progress.rollouts_done + progress.rollouts_saved
@@ -42,10 +84,12 @@ def percent(progress: Progress) -> str:
 
 
 def counts(progress: Progress) -> str:
-    """Return the finished repetitions and rollouts as a sentence."""
+    """Return the finished repetitions, iterations and rollouts as a sentence."""
     failed = f", {progress.failed} failed" if progress.failed else ""
     physics = f", {progress.rollouts_failed:,} of them nan" if progress.rollouts_failed else ""
+    iterations = f"{progress.counted_iterations_done} of {progress.counted_iterations} iterations; "
     return (
         f"{progress.completed} of {progress.repetitions} repetitions{failed}; "
+        f"{iterations if progress.counted_iterations else ''}"
         f"{progress.rollouts_done:,} rollouts{physics}, {progress.rollouts_saved:,} saved, of {progress.rollouts:,}"
     )

@@ -69,6 +69,23 @@ export const post = async (path, body = undefined, headers = {}) => (await send(
 export const patch = async (path, body, headers = {}) => tagged(await send("PATCH", path, body, headers));
 
 /**
+ * Send a PUT, and return the JSON of the answer.
+ *
+ * @param {string} path
+ * @param {unknown} body
+ * @returns {Promise<any>}
+ */
+export const put = async (path, body) => (await send("PUT", path, body, {})).json();
+
+/**
+ * Send a DELETE, and return the JSON of the answer.
+ *
+ * @param {string} path
+ * @returns {Promise<any>}
+ */
+export const remove = async (path) => (await send("DELETE", path, undefined, {})).json();
+
+/**
  * Return a query as it stands in an address: `?a=1&a=2`, or nothing.
  *
  * @param {Page.Query} query

@@ -9,13 +9,18 @@ const SHOWN_MS = 2000;
  * Return a button that copies what `text()` returns, and says whether it could.
  *
  * @param {string} label
- * @param {() => string} text
+ * @param {() => string | Promise<string>} text
  */
 export function copyButton(label, text) {
-  const button = h("button", { type: "button", class: "quiet", onclick: async () => {
-    button.textContent = await copy(text()) ? "Copied" : "Copying is not permitted here";
+  const press = async () => {
+    try {
+      button.textContent = await copy(await text()) ? "Copied" : "Copying is not permitted here";
+    } catch (error) {
+      button.textContent = `Not copied: ${error.message}`;
+    }
     setTimeout(() => { button.textContent = label; }, SHOWN_MS);
-  } }, label);
+  };
+  const button = h("button", { type: "button", class: "quiet", onclick: press }, label);
   return button;
 }
 

@@ -14,21 +14,25 @@ const FORMATS = ["svg", "png", "pdf"];
  * @param {string} path
  * @param {Page.Query} query
  * @param {string} name of the saved file
+ * @param {string} [busy] what the service does meanwhile; a file that takes long, or may be refused, is fetched by script
  */
-export function downloadLink(label, path, query, name) {
-  const status = h("span", { role: "alert", class: "failed" });
+export function downloadLink(label, path, query, name, busy = "") {
+  const progress = h("span", { role: "status", class: "note" });
+  const failure = h("span", { role: "alert", class: "failed" });
   const click = async (/** @type {Event} */ event) => {
-    if (!token()) return;
+    if (!token() && !busy) return;
     event.preventDefault();
-    status.textContent = "";
+    failure.textContent = "";
+    progress.textContent = busy && ` ${busy}…`;
     try {
       save(await getFile(path, query), name);
     } catch (error) {
-      status.textContent = ` ${error.message}`;
+      failure.textContent = ` ${error.message}`;
     }
+    progress.textContent = "";
   };
   const link = h("a", { href: path.replace(/^\//, "") + queryString(query), download: name, onclick: click }, label);
-  return h("span", { class: "download" }, link, status);
+  return h("span", { class: "download" }, link, progress, failure);
 }
 
 /**

@@ -54,6 +54,24 @@ export function duration(seconds) {
 }
 
 /**
+ * Format an interval of seconds in whole minutes, or hours if it is long.
+ *
+ * @param {{ low_s: number, high_s: number }} interval
+ */
+export function durationRange({ low_s: low, high_s: high }) {
+  const [unit, name] = high > 3 * 3600 ? [3600, "h"] : [60, "min"];
+  const [least, most] = [Math.floor(low / unit), Math.ceil(high / unit)];
+  return least ? `${least} to ${most} ${name}` : `less than ${most} ${name}`;
+}
+
+/**
+ * Format a number of real-world evaluations.
+ *
+ * @param {number} evaluations
+ */
+export const evaluationsText = (evaluations) => `${count(evaluations)} real-world evaluation${evaluations === 1 ? "" : "s"}`;
+
+/**
  * Format the time between two moments; a dash unless both are known.
  *
  * @param {string | null} start

@@ -6,6 +6,7 @@ import { byId, setText } from "./dom.js";
 
 const INTERVAL_MS = 1000;
 const MOST_EVENTS = 1000;
+const GONE = 404;
 
 /**
  * Call `refresh` soon after events that fit a query, at most once a second, with the events since the last call.
@@ -39,6 +40,10 @@ export function follow(query, refresh, signal) {
       await refresh(taken);
     } catch (error) {
       if (signal.aborted) return;
+      if (error.status === GONE) {  // it was deleted: the page says so once it is loaded again
+        location.reload();
+        return;
+      }
       console.warn(error.message);
       events = [...taken, ...events];
       hasGap ||= !taken.length;

@@ -38,7 +38,8 @@ export function failed(error, retry, heading = "h1") {
   if (error.status === 401 || error.status === 403) return tokenForm(error, retry);
   if (error.status === 0) return away(error, retry, heading);
   const items = error.errors.map(({ pointer, message }) => h("li", {}, pointer ? h("code", {}, pointer) : "", " ", message));
-  return failure(error.title, error.message, heading, retry, items);
+  const home = heading === "h1" && error.status === 404 ? h("a", { class: "button quiet", href: "#/" }, "To the experiments") : null;
+  return failure(error.title, error.message, heading, retry, items, home);
 }
 
 /**
@@ -47,10 +48,11 @@ export function failed(error, retry, heading = "h1") {
  * @param {"h1" | "h2" | "h3"} heading
  * @param {() => unknown} retry
  * @param {HTMLElement[]} [items]
+ * @param {HTMLElement | null} [home]
  */
-function failure(title, text, heading, retry, items = []) {
+function failure(title, text, heading, retry, items = [], home = null) {
   return h("div", { class: "state failed", role: "alert" }, h(heading, {}, title), h("p", {}, text), items.length ? h("ul", {}, ...items) : null,
-    h("button", { type: "button", onclick: () => retry() }, "Try again"));
+    h("button", { type: "button", onclick: () => retry() }, "Try again"), " ", home);
 }
 
 /**

@@ -2,12 +2,12 @@
 /** Progress as a bar and in per cent of the rollouts, which take nearly all of the time. */
 
 import { h, setText } from "./dom.js";
-import { count, duration, percent } from "./format.js";
+import { count, durationRange, percent } from "./format.js";
 
 const WORKING = ["RUNNING", "PAUSING", "STOPPING"];
 
 /**
- * Return the share that is done, between 0 and 1; a rollout that was not needed is done.
+ * Return the share that is done, between 0 and 1; a saved rollout is done.
  *
  * @param {Api.Progress} progress
  */
@@ -25,6 +25,21 @@ export function repetitionsDone({ completed, repetitions, failed }) {
 }
 
 /**
+ * Return the number of completed iterations, as a spec counts them: without number 0.
+ *
+ * @param {Api.Progress} progress
+ */
+export const iterationsDone = ({ counted_iterations_done: done, counted_iterations: all }) => `${count(done)} of ${count(all)}`;
+
+/**
+ * Return the number of rollouts, with those that were saved.
+ *
+ * @param {Api.Progress} progress
+ */
+export const rolloutsDone = ({ rollouts_done: done, rollouts: all, rollouts_saved: saved }) =>
+  `${count(done)} of ${count(all)}${saved ? `, ${count(saved)} saved` : ""}`;
+
+/**
  * Return a bar with its per cent.
  *
  * @param {string} label
@@ -36,8 +51,7 @@ export function progressBar(label) {
   const update = (/** @type {Api.Progress} */ progress) => {
     bar.value = fraction(progress);
     setText(shownPercent, percent(fraction(progress)));
-    const rollouts = `${count(progress.rollouts_done)} of ${count(progress.rollouts)} rollouts, ${count(progress.rollouts_saved)} not needed`;
-    bar.title = `${count(progress.completed)} of ${count(progress.repetitions)} repetitions; ${rollouts}`;
+    bar.title = `${count(progress.completed)} of ${count(progress.repetitions)} repetitions; rollouts: ${rolloutsDone(progress)}`;
   };
   return { element: h("span", { class: "bar-of" }, bar, shownPercent), update };
 }
@@ -49,7 +63,7 @@ export function progressBar(label) {
  */
 export function timeLeft({ state, progress }) {
   if (!WORKING.includes(state)) return "";
-  return progress.seconds_left === null ? "…" : duration(progress.seconds_left);
+  return progress.time_left ? durationRange(progress.time_left) : "not known yet";
 }
 
 /**
@@ -59,5 +73,5 @@ export function timeLeft({ state, progress }) {
  */
 export function timeLeftFact({ state, progress }) {
   if (state !== "RUNNING") return "–";
-  return progress.seconds_left === null ? "not known yet" : duration(progress.seconds_left);
+  return progress.time_left ? durationRange(progress.time_left) : "not known yet";
 }

@@ -12,10 +12,15 @@ export const STATES = /** @type {Api.State[]} */ (Object.keys(SIGNS));
 /** The states in which nothing happens any more. */
 export const ENDED = /** @type {Api.State[]} */ (["COMPLETED", "FAILED", "CANCELLED"]);
 
+const PARTLY = "◑";
+
 /**
- * Return a state as an element.
+ * Return a state as an element; a caveat is what the state alone does not say.
  *
  * @param {Api.State} state
+ * @param {string | null} [caveat]
  */
-export const stateBadge = (state) =>
-  h("span", { class: `state-badge ${state.toLowerCase()}` }, h("span", { "aria-hidden": "true" }, SIGNS[state]), " ", state.toLowerCase());
+export const stateBadge = (state, caveat = null) =>
+  h("span", { class: `state-badge ${state.toLowerCase()}${caveat ? " partly" : ""}`, title: caveat ?? undefined },
+    h("span", { "aria-hidden": "true" }, caveat && ENDED.includes(state) ? PARTLY : SIGNS[state]), " ", state.toLowerCase(),
+    caveat ? h("span", { class: "caveat" }, `, ${caveat}`) : null);

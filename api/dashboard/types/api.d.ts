@@ -12,6 +12,14 @@ declare namespace Api {
     ending: Ending | null;
     reason: string | null;
   }
+  interface BestRead {
+    evaluations: number;
+    n: number;
+    mean: number;
+    sd: number | null;
+    experiment: string;
+    name: string;
+  }
   interface BudgetRead {
     name: string;
     iterations: number;
@@ -34,6 +42,7 @@ declare namespace Api {
     tunables: Array<PluginRead>;
     optimizers: Array<PluginRead>;
     budgets: Array<BudgetRead>;
+    ignored: Array<IgnoredFile>;
     defaults: Record<string, any>;
   }
   interface Chart {
@@ -50,8 +59,11 @@ declare namespace Api {
   interface Comparison {
     first: string;
     second: string;
+    first_name: string;
+    second_name: string;
     from_evaluations: number;
     to_evaluations: number;
+    caution: string | null;
     n_first: number;
     n_second: number;
     difference: number | null;
@@ -79,6 +91,17 @@ declare namespace Api {
     upper: number | null;
     values: Array<number | null>;
   }
+  interface DeletionRead {
+    id: string;
+    name: string;
+    study: string | null;
+    deleted_at: string;
+  }
+  interface DiffColumn {
+    id: string;
+    name: string;
+    experiments: number;
+  }
   interface Distribution {
     n: number;
     mean: number | null;
@@ -89,6 +112,9 @@ declare namespace Api {
   interface Edit {
     name: string | null;
     notes: string | null;
+    tags: Array<string> | null;
+    add_tags: Array<string>;
+    remove_tags: Array<string>;
   }
   type Ending = "completed" | "paused" | "stopped" | "cancelled" | "handed back" | "lost" | "failed";
   interface EngineCost {
@@ -104,8 +130,9 @@ declare namespace Api {
     cores: number;
     seconds: number;
     supervisors: number;
+    specs: Array<Record<string, any>>;
   }
-  type EventKind = "submitted" | "imported" | "started" | "pausing" | "paused" | "resumed" | "stopping" | "extended" | "retried" | "completed" | "failed" | "cancelled" | "sensitivity_ended" | "versions_refused" | "versions_accepted" | "repetition_claimed" | "repetition_completed" | "repetition_failed" | "repetition_lost" | "repetition_handed_back" | "repetition_paused" | "repetition_stopped" | "repetition_cancelled" | "selected" | "measured" | "tuned" | "transferred" | "probed";
+  type EventKind = "submitted" | "imported" | "started" | "pausing" | "paused" | "resumed" | "stopping" | "extended" | "retried" | "completed" | "failed" | "cancelled" | "edited" | "archived" | "unarchived" | "deleted" | "notified" | "notification_failed" | "sensitivity_ended" | "versions_refused" | "versions_accepted" | "repetition_claimed" | "repetition_completed" | "repetition_failed" | "repetition_lost" | "repetition_handed_back" | "repetition_paused" | "repetition_stopped" | "repetition_cancelled" | "selected" | "measured" | "tuned" | "transferred" | "probed";
   interface EventPage {
     items: Array<EventRead>;
     last: number;
@@ -134,7 +161,9 @@ declare namespace Api {
     study: string | null;
     name: string;
     notes: string | null;
+    tags: Array<string>;
     edits: number;
+    archived_at: string | null;
     strategy: string;
     direct: boolean;
     state: State;
@@ -142,6 +171,8 @@ declare namespace Api {
     priority: number;
     max_parallel: number | null;
     progress: Progress;
+    caveat: string | null;
+    fitness: FitnessRead | null;
     best_fitness: number | null;
     reasons: Array<string>;
     sensitivity: string | null;
@@ -177,9 +208,19 @@ declare namespace Api {
     empty: boolean;
     table: TableRead | null;
   }
+  interface FitnessRead {
+    evaluations: number;
+    n: number;
+    mean: number;
+    sd: number | null;
+  }
   interface Health {
     status: "ok" | "degraded";
     warnings: Array<string>;
+  }
+  interface IgnoredFile {
+    file: string;
+    why: string;
   }
   interface ImportRead {
     study: string | null;
@@ -199,6 +240,9 @@ declare namespace Api {
     unit: string;
     points: Array<MisfitPoint>;
     remarks: Array<string>;
+  }
+  interface NotesRead {
+    html: string;
   }
   interface Page_ExperimentRead_ {
     items: Array<ExperimentRead>;
@@ -253,11 +297,14 @@ declare namespace Api {
     failed: number;
     iterations: number;
     iterations_done: number;
+    counted_iterations: number;
+    counted_iterations_done: number;
     rollouts: number;
     rollouts_done: number;
     rollouts_failed: number;
     rollouts_saved: number;
     seconds_left: number | null;
+    time_left: TimeLeft | null;
   }
   interface Provenance {
     gaplab: string;
@@ -376,6 +423,11 @@ declare namespace Api {
     points: number;
     evaluations: number;
   }
+  interface SettingRead {
+    pointer: string;
+    setting: string;
+    values: Array<Array<any>>;
+  }
   interface Shape {
     kind: "box" | "sphere" | "capsule" | "plane";
     size_m: Array<number>;
@@ -390,6 +442,13 @@ declare namespace Api {
     rank: number;
     parameters: Record<string, number>;
     squared_error: number | null;
+    error: number | null;
+  }
+  interface SpecDiff {
+    columns: Array<DiffColumn>;
+    settings: Array<SettingRead>;
+    equal: number;
+    hidden: Array<string>;
   }
   interface SpecError {
     pointer: string;
@@ -398,13 +457,22 @@ declare namespace Api {
     permitted: Array<string> | string | null;
     nearest: string | null;
   }
+  interface SpecRead {
+    spec: Record<string, any> | null;
+    resolved: Array<Record<string, any>>;
+    remarks: Array<string>;
+  }
   type State = "QUEUED" | "RUNNING" | "PAUSING" | "PAUSED" | "STOPPING" | "COMPLETED" | "FAILED" | "CANCELLED";
   interface StudyRead {
     id: string;
     name: string;
     notes: string | null;
+    tags: Array<string>;
     edits: number;
+    archived_at: string | null;
     state: State;
+    caveat: string | null;
+    best: BestRead | null;
     experiments: Array<ExperimentRead>;
     progress: Progress;
     created_at: string;
@@ -435,6 +503,24 @@ declare namespace Api {
     p_holm: number | null;
     degrees_of_freedom: number | null;
   }
+  interface TimeLeft {
+    low_s: number;
+    high_s: number;
+  }
+  type Trend = "rising" | "flat" | "falling" | "unclear" | "too_few";
+  interface TrendRead {
+    experiment: string;
+    name: string;
+    trend: Trend;
+    n: number;
+    since: number | null;
+    last: number;
+    gain: number | null;
+    lower: number | null;
+    upper: number | null;
+    continuing: boolean | null;
+    sentence: string;
+  }
   interface TunableDistribution {
     n: number;
     mean: number | null;
@@ -449,4 +535,29 @@ declare namespace Api {
   }
   type TunableRef = string | Record<string, any>;
   type Verdict = "nothing" | "rough" | "smooth" | "unknown";
+  interface VerdictRead {
+    headline: string;
+    sentences: Array<string>;
+    trends: Array<TrendRead>;
+    evaluations: number | null;
+    rules: Array<string>;
+  }
+  interface ViewRead {
+    shows: "all" | "studies" | "experiments";
+    query: string | null;
+    sort: "created_at" | "-created_at" | "name" | "-name" | "strategy" | "-strategy" | "state" | "-state";
+    name: string;
+    created_at: string;
+  }
+  interface ViewSpec {
+    shows: "all" | "studies" | "experiments";
+    query: string | null;
+    sort: "created_at" | "-created_at" | "name" | "-name" | "strategy" | "-strategy" | "state" | "-state";
+  }
+  interface WebhookRead {
+    host: string | null;
+  }
+  interface WebhookSpec {
+    url: string;
+  }
 }

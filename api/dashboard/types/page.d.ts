@@ -55,6 +55,7 @@ declare namespace Page {
     latest: number;
     experiment: Api.ExperimentRead;
     isFunction: boolean;
+    unit(experiment: Api.ExperimentRead | undefined): string;
     sections: Sections;
   }
 

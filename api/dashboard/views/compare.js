@@ -13,6 +13,7 @@ import { chosenList } from "./compare/chosen.js";
 import { controls } from "./compare/controls.js";
 import { figure } from "./compare/figure.js";
 import { remarks } from "./compare/remarks.js";
+import { settings } from "./compare/settings.js";
 import { significance } from "./compare/significance.js";
 
 const KINDS = ["transferred", "probed", "repetition_completed", "started", "paused", "completed", "failed", "cancelled", "extended"];
@@ -37,7 +38,7 @@ export async function show(root, parameters, signal) {
       if (!signal.aborted) update();
     },
   };
-  const parts = [chooser, chosenList, remarks, controls, figure, significance].map((make) => make(view));
+  const parts = [chooser, chosenList, remarks, controls, figure, significance, settings].map((make) => make(view));
   const [search, chosen, warnings, ...others] = parts.map(({ element }) => element);
   const results = h("div", { class: "results" }, ...others);
   const nothing = empty("Choose experiments above: one, two, or all of a study. The address then holds the comparison, to be shared.");

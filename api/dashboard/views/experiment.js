@@ -6,7 +6,7 @@ import { h } from "../lib/dom.js";
 import { follow, reloadEvery } from "../lib/live.js";
 import { sections } from "../lib/sections.js";
 import { tabs } from "../lib/tabs.js";
-import { isFunction } from "../lib/robots.js";
+import { isFunction, unitsOf } from "../lib/robots.js";
 import { eventList } from "./experiment/event_list.js";
 import { curve, otherFigures } from "./experiment/figures.js";
 import { head } from "./experiment/head.js";
@@ -31,7 +31,7 @@ export async function show(root, parameters, signal) {
   const [loaded, catalogue] = await Promise.all([getTagged(`/experiments/${id}`, signal), get("/catalogue", {}, signal)]);
   /** @type {Page.ExperimentPage} */
   const page = {
-    id, signal, latest, experiment: loaded.value, tag: loaded.tag, isFunction: isFunction(catalogue, loaded.value), sections: sections(signal),
+    id, signal, latest, experiment: loaded.value, tag: loaded.tag, isFunction: isFunction(catalogue, loaded.value), unit: unitsOf(catalogue), sections: sections(signal),
     take({ value, tag }) {
       Object.assign(page, { experiment: value, tag });
       top.update();

@@ -2,15 +2,16 @@
 /** The list of studies and experiments, live: to find them, to open them, and to choose some for a comparison. */
 
 import { get } from "../lib/api.js";
-import { h } from "../lib/dom.js";
+import { h, setText } from "../lib/dom.js";
 import { keyedRows } from "../lib/keyed_rows.js";
 import { follow } from "../lib/live.js";
 import { empty, failed, loading } from "../lib/placeholders.js";
 import { unitsOf } from "../lib/robots.js";
 import { addressOf, filterForm, filtersOf, isFiltered } from "./list/filters.js";
-import { restOfList } from "./list/merging.js";
 import { experimentRow, headCells, studyRow } from "./list/rows.js";
+import { savedViews } from "./list/saved_views.js";
 import { selectionBar } from "./list/selection.js";
+import { lengthened, merged, refreshed, sourcesOf } from "./list/sources.js";
 
 const AT_FIRST = 20;
 const MOST = 500;
@@ -37,6 +38,7 @@ export async function show(root, parameters, signal) {
     if (signal.aborted) return;  // words typed just before the reader left would change the address of another view
     history.replaceState(null, "", addressOf(filters));
     const loaded = list.change({ ...filters });
+    views.update();
     if (filters.show !== shown) {
       const focused = place.querySelector(":focus")?.textContent;
       makeForm();
@@ -48,7 +50,8 @@ export async function show(root, parameters, signal) {
   let shown = list.filters.show;
   makeForm();
   const title = h("div", { class: "titled" }, h("h1", {}, "Studies and experiments"), h("a", { class: "button", href: "#/new" }, "New study"));
-  root.replaceChildren(title, place, list.element);
+  const views = savedViews(() => list.filters, signal);
+  root.replaceChildren(title, place, views.element, list.element);
   await changed(list.filters);
   if (signal.aborted) return;
   follow({}, () => list.refresh(), signal);
@@ -69,10 +72,8 @@ class List {
     this.filters = filters;
     /** @type {Set<string>} */
     this.unfolded = new Set();
-    /** @type {Item[]} */
-    this.items = [];
-    /** @type {string | null} */
-    this.cursor = null;
+    /** @type {import("./list/sources.js").Source[]} */
+    this.sources = sourcesOf(filters);
     /** @type {HTMLElement | null} */
     this.error = null;
     this.requests = 0;
@@ -82,7 +83,8 @@ class List {
     this.more = h("button", { type: "button", class: "quiet more", onclick: () => { this.lengthen(); } }, "Show more");
     this.bar = selectionBar(() => this.draw());
     this.note = h("div", {}, loading());
-    this.element = h("div", {}, this.bar.element, this.table, this.note, this.more);
+    this.mistake = h("p", { class: "mistake", role: "status" });
+    this.element = h("div", {}, this.mistake, this.bar.element, this.table, this.note, this.more);
     this.ticked = () => {
       this.bar.update();
       this.draw();
@@ -103,14 +105,18 @@ class List {
    * @param {Filters} filters
    */
   async change(filters) {
-    Object.assign(this, { filters, cursor: null });
-    const loaded = this.refresh(AT_FIRST, []);
+    Object.assign(this, { filters });
+    const loaded = this.refresh(sourcesOf(filters));
     const { requests } = this;
     try {
       await loaded;
     } catch (error) {
       if (requests !== this.requests || this.signal.aborted) return;
-      this.items = [];
+      if (error.errors?.[0]?.pointer === "q") {  // half a query: the former list stays until it is whole
+        setText(this.mistake, error.errors[0].message);
+        return;
+      }
+      this.sources = sourcesOf(filters);
       this.fail(error, () => this.change(filters));
     }
   }
@@ -118,32 +124,34 @@ class List {
   /**
    * Load the list again, as long as it is.
    *
-   * @param {number} [limit] of the part that is loaded
-   * @param {Item[] | null} [former] the list so far
+   * @param {import("./list/sources.js").Source[] | null} [others] the sources of another list
    */
-  async refresh(limit = Math.min(MOST, Math.max(AT_FIRST, this.items.length)), former = null) {
+  async refresh(others = null) {
     const request = ++this.requests;
-    const { show: kind, ...query } = this.filters;
-    const page = await get(`/${kind}`, { ...query, limit }, this.signal);
+    const limit = (/** @type {{ items: Item[] }} */ { items }) => Math.min(MOST, Math.max(AT_FIRST, items.length));
+    const sources = await Promise.all((others ?? this.sources).map((source) => refreshed(source, limit(source), this.signal)));
     if (request !== this.requests || this.signal.aborted) return;
-    const all = former ?? this.items;
-    const rest = all.length > limit ? restOfList(page.items, all) : [];
-    if (former || !this.items.length) this.error = null;
-    Object.assign(this, { items: [...page.items, ...rest], cursor: rest.length ? this.cursor : page.next });
+    if (others || !this.shown().items.length) this.error = null;
+    if (others) setText(this.mistake, "");
+    this.sources = sources;
     this.draw();
+  }
+
+  /** Return the items so far, and the sources whose next part must be loaded for more. */
+  shown() {
+    return merged(this.sources, this.filters.sort);
   }
 
   /** Load the next part of the list; an error stands below it. */
   async lengthen() {
     const { filters } = this;
-    const { show: kind, ...query } = filters;
+    const { ending } = this.shown();
     this.more.disabled = true;
     this.error = null;
     try {
-      const page = await get(`/${kind}`, { ...query, limit: AT_FIRST * 2, cursor: this.cursor }, this.signal);
+      const longer = await Promise.all(ending.map((source) => lengthened(source, AT_FIRST * 2, this.signal)));
       if (filters !== this.filters) return;  // another list has taken its place
-      this.items.push(...page.items);
-      this.cursor = page.next;
+      this.sources = this.sources.map((source) => longer.find(({ path }) => path === source.path) ?? source);
       this.draw();
     } catch (error) {
       if (filters === this.filters && !this.signal.aborted) this.fail(error, () => this.lengthen());
@@ -170,10 +178,11 @@ class List {
   draw() {
     const below = (/** @type {Item} */ value) =>
       ("experiments" in value && this.unfolded.has(value.id) ? value.experiments.map((experiment) => ({ value: experiment, isNested: true })) : []);
-    const rows = this.items.flatMap((value) => [{ value }, ...below(value)]);
+    const { items, ending } = this.shown();
+    const rows = items.flatMap((value) => [{ value }, ...below(value)]);
     this.fill(rows);
     this.table.hidden = !rows.length;
-    this.more.hidden = !this.cursor;
+    this.more.hidden = !ending.length;
     const note = this.error ?? (rows.length ? null : this.nothing());
     if (!note || note !== this.note.firstChild) this.note.replaceChildren(...(note ? [note] : []));
   }
@@ -183,6 +192,7 @@ class List {
       const again = () => dispatchEvent(new HashChangeEvent("hashchange"));  // also where the address is the same already
       return empty("Nothing fits these filters.", h("a", { class: "button quiet", href: "#/", onclick: again }, "Show everything"));
     }
-    return empty("There are no studies yet.", h("a", { class: "button", href: "#/new" }, "Submit a study"));
+    const what = this.filters.show === "studies" ? "There are no studies yet." : "Nothing was submitted yet.";
+    return empty(what, h("a", { class: "button", href: "#/new" }, "Submit a study"));
   }
 }

@@ -8,6 +8,7 @@ import { draftOf, specOf } from "./new/draft.js";
 import { ErrorPlaces } from "./new/fields.js";
 import { budgetPart, realityPart, simulationPart, strategiesPart, studyPart, tunablesPart } from "./new/form_parts.js";
 import { panel } from "./new/panel.js";
+import { pasteField } from "./new/paste.js";
 
 const TYPING_MS = 300;
 const PARTS = [studyPart, strategiesPart, simulationPart, tunablesPart, realityPart, budgetPart];
@@ -15,21 +16,25 @@ const PARTS = [studyPart, strategiesPart, simulationPart, tunablesPart, realityP
 /** @typedef {{ name: string, summary: string, spec: Record<string, any> }} Preset */
 
 /**
- * Fill `root` with the form, until `signal`.
+ * Fill `root` with the form, until `signal`. A spec in the address fills the form.
  *
  * @param {HTMLElement} root
- * @param {URLSearchParams} _parameters
+ * @param {URLSearchParams} parameters
  * @param {AbortSignal} signal
  */
-export async function show(root, _parameters, signal) {
+export async function show(root, parameters, signal) {
   /** @type {[Api.Catalogue, Preset[]]} */
   const [catalogue, presets] = await Promise.all([get("/catalogue", {}, signal), get("/assets/dashboard/presets.json", {}, signal)]);
   const form = new Form(catalogue, presets[0].spec, signal);
   const starts = presets.map(({ name, summary, spec }) =>
     h("button", { type: "button", class: "quiet", title: summary, onclick: () => form.start(spec) }, name));
-  root.replaceChildren(h("h1", {}, "New study"),
-    h("div", { class: "starts", role: "group", "aria-label": "Start from" }, h("span", { class: "note" }, "Start from"), ...starts), form.element);
+  const paste = pasteField((spec) => { form.start(spec); });
+  const note = parameters.get("note");
+  root.replaceChildren(h("h1", {}, "New study"), ...(note ? [h("p", { class: "remark" }, note)] : []),
+    h("div", { class: "starts", role: "group", "aria-label": "Start from" }, h("span", { class: "note" }, "Start from"), ...starts), paste.element, form.element);
   form.remake();
+  const given = parameters.get("spec");
+  if (given !== null) await paste.take(given);
 }
 
 /** The form, its content, and what the service says about it. */

@@ -3,12 +3,15 @@
 
 import { get, queryString } from "../lib/api.js";
 import { h } from "../lib/dom.js";
+import { downloadLink } from "../lib/downloads.js";
 import { number, readableName } from "../lib/format.js";
 import { empty, failed, loading } from "../lib/placeholders.js";
 import { choices } from "./replay/choices.js";
 import { gait } from "./replay/gait.js";
 import { player } from "./replay/player.js";
 import { worlds } from "./replay/worlds.js";
+
+const VIDEOS = ["gif", "webp", "mp4"];
 
 /**
  * Fill `root` with the replay that the parameters ask for, until `signal`.
@@ -93,7 +96,7 @@ async function fill(place, choice, signal) {
     };
     const timeline = player(replay.times_s[replay.times_s.length - 1], showTime, signal);
     const figure = gait(choice, (time) => timeline.goTo(time), signal);
-    place.replaceChildren(stages.element, timeline.element, ...differences(replay), figure.element);
+    place.replaceChildren(stages.element, timeline.element, videos(choice), ...differences(replay), figure.element);
     timeline.begin();
   } catch (error) {
     if (signal.aborted) return;
@@ -101,6 +104,18 @@ async function fill(place, choice, signal) {
     const button = h("button", { type: "button", class: "quiet", onclick: again }, "Try again");
     place.replaceChildren(error.status === 409 ? empty(`${error.message[0].toUpperCase()}${error.message.slice(1)}.`, button) : failed(error, again, "h2"));
   }
+}
+
+/**
+ * Return links to the replay as a video; the service draws it, so it looks the same wherever it was made.
+ *
+ * @param {Page.ReplayChoice} choice
+ */
+function videos({ experiment, ...query }) {
+  const name = `gaplab-${experiment}-${query.repetition}-${query.iteration}`;
+  const links = VIDEOS.map((format) =>
+    downloadLink(format.toUpperCase(), `/experiments/${experiment}/video`, { ...query, format }, `${name}.${format}`, "Drawing the video"));
+  return h("p", { class: "files" }, "Save the replay as ", ...links.flatMap((link) => [link, " "]));
 }
 
 /**

@@ -20,7 +20,7 @@ class PyBullet(SteppedEngine[PyBulletScene]):
     name = "pybullet"
     source = "https://pybullet.org, version 3.2.7"
     library = "pybullet"
-    install = "pip install 'pybullet>=3.2.7' (it has wheels for Python up to 3.11)"
+    install = "pip install pybullet, which has wheels up to Python 3.11, or choose another engine, like mujoco"
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)

@@ -6,8 +6,8 @@ from typing import Literal
 
 from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.services.figures.marks import Axis, FigureDefinition, Level, Line, Mark, Panel, Table, faint_lines
-from gaplab.services.figures.style import INK, Style, style_of
-from gaplab.services.figures.words import distinct_names, drawable, heading, number, number_of, with_unit
+from gaplab.services.figures.style import INK, Style, strategy_styles, style_of
+from gaplab.services.figures.words import distinct_names, drawable, heading, limits, number, number_of, with_unit
 
 Band = Literal["interval", "sd"]
 
@@ -68,8 +68,11 @@ def curves_figure(
     placed = [_placed(name, one, against) for name, one in zip(names, curves, strict=True)]
     lines = [one for one in placed if not one.curve.direct]
     levels = [one for one in placed if one.curve.direct and one.points]
-    marks: list[Mark] = [_mean(one, band, style_of(at)) for at, one in enumerate(lines)]
-    marks += [_repetitions(one, against, style_of(at)) for at, one in enumerate(lines) if each and one.points]
+    styles = strategy_styles([one.curve.strategy for one in lines])
+    marks: list[Mark] = [_mean(one, band, style) for one, style in zip(lines, styles, strict=True)]
+    marks += [
+        _repetitions(one, against, style) for one, style in zip(lines, styles, strict=True) if each and one.points
+    ]
     marks += [_level(one, at) for at, one in enumerate(levels)]
     span = max([1.0, *(x for one in lines for x, _, _ in one.points)])
     x = Axis(against.label if against else EVALUATIONS, (-0.02 * span, 1.02 * span), whole=against is None)
@@ -150,18 +153,11 @@ def _ends(point: CurvePoint, band: Band) -> tuple[float | None, float | None]:
 
 
 def _limits(marks: Sequence[Mark]) -> tuple[float, float]:
-    """Return limits around all means, extended for bands and single repetitions by the range of the means at most."""
+    """Return limits around all that is drawn: means, bands and single repetitions. Nothing is cut off."""
     lines = [mark for mark in marks if isinstance(mark, Line)]
     levels = [mark for mark in marks if isinstance(mark, Level)]
-    means = [y for mark in lines if not mark.faint for y in mark.y if y is not None] + [each.value for each in levels]
-    around = [y for mark in lines for ys in (mark.y, mark.lower, mark.upper) for y in ys if y is not None]
-    around += [end for each in levels for end in (each.value, each.lower, each.upper) if end is not None]
-    if not means:
-        return 0.0, 1.0
-    room = max(max(means) - min(means), 0.1 * abs(max(means)), 1e-9)
-    lowest, highest = max(min(means) - room, min(around)), min(max(means) + room, max(around))
-    margin = 0.05 * max(highest - lowest, room)
-    return lowest - margin, highest + margin
+    values = [y for mark in lines for ys in (mark.y, mark.lower, mark.upper) for y in ys]
+    return limits([*values, *(end for each in levels for end in (each.value, each.lower, each.upper))])
 
 
 def _caption(

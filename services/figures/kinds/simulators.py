@@ -6,7 +6,7 @@ from itertools import combinations
 
 from gaplab.services.figures.marks import Axis, FigureDefinition, Level, Mark, Panel, Points, Table
 from gaplab.services.figures.style import INK, Style
-from gaplab.services.figures.words import heading, limits, number, number_of, spoken, with_unit
+from gaplab.services.figures.words import heading, limits, number, number_of, printable, spoken, with_unit
 
 IN_PAIRS = 3
 """Most tunables that are drawn pair by pair; of more, each has a panel against iterations."""
@@ -47,6 +47,7 @@ def simulators_figure(
     dimensions: Sequence[Dimension],
     *,
     truth: Mapping[str, float] | None,
+    real_engine: str | None = None,
     title: str = "",
     columns: int = 3,
 ) -> FigureDefinition:
@@ -58,6 +59,7 @@ def simulators_figure(
         tuned: the best simulator of each iteration of each repetition.
         dimensions: the tunables.
         truth: the known parameters of reality by name; None as long as they are hidden.
+        real_engine: engine of reality, if it is not that of the simulators: reality then has no such parameters.
         title: text above the figure.
         columns: most panels in a row.
     """
@@ -72,7 +74,7 @@ def simulators_figure(
         name="simulators",
         title=heading(title),
         panels=tuple(panels),
-        caption=_caption(tuned, shown, truth),
+        caption=_caption(tuned, shown, truth, real_engine),
         alt=_alt(shown, dimensions, truth or {}),
         columns=min(columns, len(panels)),
         table=_table(shown, dimensions, truth or {}),
@@ -132,7 +134,10 @@ def _first_repetitions(tuned: Sequence[SimulatorPoint]) -> list[SimulatorPoint]:
 
 
 def _caption(
-    tuned: Sequence[SimulatorPoint], shown: Sequence[SimulatorPoint], truth: Mapping[str, float] | None
+    tuned: Sequence[SimulatorPoint],
+    shown: Sequence[SimulatorPoint],
+    truth: Mapping[str, float] | None,
+    real_engine: str | None,
 ) -> str:
     if not shown:
         return ""
@@ -142,7 +147,9 @@ def _caption(
         f"The best simulator after each iteration of {number_of('repetition', repetitions)}{of}, within the bounds of "
         "tuning; those of iteration 0 are random."
     ]
-    if truth is None:
+    if real_engine:
+        parts.append(f"Reality is the engine {printable(real_engine)}: no setting of the simulators is reality.")
+    elif truth is None:
         parts.append("Reality is shown once its experiments have ended.")
     return " ".join(parts)
 

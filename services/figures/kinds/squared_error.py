@@ -1,12 +1,16 @@
-"""The squared error of the best simulator on the samples, over iterations."""
+"""The error of the best simulator on the samples, over iterations: per sample, and as the sum that tuning minimises.
+
+The sum grows with every sample, so it can rise while tuning gets better. The error per sample cannot mislead like that.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from math import sqrt
 from statistics import median, quantiles
 
 from gaplab.services.figures.marks import Axis, FigureDefinition, Line, Number, Panel, Table, faint_lines
 from gaplab.services.figures.style import style_of
-from gaplab.services.figures.words import drawable, heading, limits, number, number_of, printable
+from gaplab.services.figures.words import drawable, heading, limits, number, number_of, printable, with_unit
 
 WIDE = 30.0
 """Ratio of the greatest to the least median above which the axis is logarithmic."""
@@ -17,18 +21,77 @@ Errors = Mapping[int, Number]
 """Squared errors by repetition; None if the physics failed on a sample."""
 
 
+Counts = Mapping[int, int]
+"""Numbers of samples by repetition."""
+
+
+@dataclass(frozen=True)
+class _Measure:
+    """One measure of the error, by iteration and repetition.
+
+    Attributes:
+        name: its name, with the unit.
+        line: its median and quartiles.
+        values: the known values by iteration.
+        panel: the panel.
+    """
+
+    name: str
+    line: Line
+    values: Mapping[int, Sequence[float]]
+    panel: Panel
+
+
 def squared_error_figure(
-    errors: Mapping[int, Errors], *, unit: str = "", title: str = "", each: bool = False
+    errors: Mapping[int, Errors],
+    *,
+    samples: Mapping[int, Counts] | None = None,
+    unit: str = "",
+    title: str = "",
+    each: bool = False,
 ) -> FigureDefinition:
-    """Return a figure of the median and quartiles of the squared error after each iteration with tuning.
+    """Return a figure of median and quartiles of the error after each iteration with tuning.
+
+    One panel has the root mean square error per sample, the other the sum of squared errors.
 
     Args:
         errors: squared errors by iteration; values too large to compute with are left out.
+        samples: numbers of samples by iteration; left out: the figure has only the sum.
         unit: unit of fitness.
         title: text above the figure.
         each: draw a thin line for every repetition.
     """
     errors = {at: {one: drawable(value) for one, value in found.items()} for at, found in errors.items()}
+    shown = printable(unit)
+    square = f"({shown})²" if shown not in {"", "1"} else ""
+    measures = [_measure(errors, "Sum of squared errors", "Sum", square, each=each)]
+    if samples:
+        per_sample = _per_sample(errors, samples)
+        measures.insert(0, _measure(per_sample, "Error per sample", "Per sample", unit, each=each))
+    return FigureDefinition(
+        name="squared-error",
+        title=heading(title),
+        panels=tuple(measure.panel for measure in measures),
+        caption=_caption(errors, measures, each=each),
+        alt=_alt(measures),
+        share_x=True,
+        table=_table(measures),
+    )
+
+
+def _per_sample(errors: Mapping[int, Errors], samples: Mapping[int, Counts]) -> dict[int, dict[int, Number]]:
+    """Return the root mean square errors, where the number of samples is known."""
+    return {
+        at: {
+            repetition: None if value is None else sqrt(value / samples[at][repetition])
+            for repetition, value in found.items()
+            if samples.get(at, {}).get(repetition)
+        }
+        for at, found in errors.items()
+    }
+
+
+def _measure(errors: Mapping[int, Errors], name: str, label: str, unit: str, *, each: bool) -> _Measure:
     there = {at: [value for value in found.values() if value is not None] for at, found in sorted(errors.items())}
     there = {at: found for at, found in there.items() if found}
     line = _median(there)
@@ -37,16 +100,10 @@ def squared_error_figure(
     panel = Panel(
         tuple(_above_zero(mark) for mark in marks) if logarithmic else marks,
         Axis("Iteration (real-world evaluations so far)", _frame(there), whole=True),
-        Axis(_label(unit), _limits(marks, logarithmic=logarithmic), log=logarithmic),
+        Axis(with_unit(label, {unit}), _limits(marks, logarithmic=logarithmic), log=logarithmic),
+        title=name,
     )
-    return FigureDefinition(
-        name="squared-error",
-        title=heading(title),
-        panels=(panel,),
-        caption=_caption(errors, there, each=each),
-        alt=_alt(line),
-        table=_table(line, there),
-    )
+    return _Measure(with_unit(name, {unit}), line, there, panel)
 
 
 def _median(there: Mapping[int, Sequence[float]]) -> Line:
@@ -95,36 +152,44 @@ def _limits(lines: Sequence[Line], *, logarithmic: bool) -> tuple[float, float]:
     return 0.0, limits([0.0, *found])[1] if found else 1.0
 
 
-def _label(unit: str) -> str:
-    shown = printable(unit)
-    return f"Squared error (({shown})²)" if shown not in {"", "1"} else "Squared error"
-
-
-def _caption(errors: Mapping[int, Errors], there: Mapping[int, Sequence[float]], *, each: bool) -> str:
+def _caption(errors: Mapping[int, Errors], measures: Sequence[_Measure], *, each: bool) -> str:
+    there = measures[-1].values
     if not there:
         return ""
     counts = [len(found) for found in there.values()]
     band = "; band: from the first to the third quartile" if max(counts) > 1 else ""
     failed = sum(value is None for found in errors.values() for value in found.values())
-    parts = [
-        "Sum over the samples so far of the squared difference between fitness in simulation and in reality.",
+    difference = "difference between fitness in simulation and in reality"
+    parts = [f"Error per sample: root mean square {difference}."] if len(measures) > 1 else []
+    parts += [
+        f"The sum of the squared {difference} over the samples so far grows with their number.",
         f"Median over {number_of('repetition', *counts)}{band}.",
     ]
     parts += ["Thin lines: single repetitions."] if each else []
     parts += [f"{number_of('value', failed)} left out, since the physics failed."] if failed else []
+    logarithmic = any(measure.panel.y.log for measure in measures)
+    zeros = logarithmic and any(value == 0 for found in there.values() for value in found)
+    parts += ["Errors of 0 are left out of a logarithmic axis."] if zeros else []
     return " ".join(parts)
 
 
-def _alt(line: Line) -> str:
-    if not line.x:
-        return "Squared error of the best simulator over iterations: no results yet."
-    ends = f"{number(line.y[0])} after iteration {line.x[0]} to {number(line.y[-1])} after iteration {line.x[-1]}"
-    return f"Squared error of the best simulator over iterations: its median goes from {ends}."
+def _alt(measures: Sequence[_Measure]) -> str:
+    if not measures[-1].line.x:
+        return "Error of the best simulator over iterations: no results yet."
+    told = [f"{measure.name.lower()}: {_ends(measure.line)}" for measure in measures if measure.line.x]
+    return f"Error of the best simulator over iterations; the median goes from: {'; '.join(told)}."
 
 
-def _table(line: Line, there: Mapping[int, Sequence[float]]) -> Table:
-    rows = zip(there, line.y, line.lower, line.upper, map(len, there.values()), strict=True)
-    return Table(
-        ("Iteration", "Median", "First quartile", "Third quartile", "n"),
-        tuple((str(at), number(middle), number(low), number(high), str(n)) for at, middle, low, high, n in rows),
-    )
+def _ends(line: Line) -> str:
+    return f"{number(line.y[0])} after iteration {line.x[0]} to {number(line.y[-1])} after iteration {line.x[-1]}"
+
+
+def _table(measures: Sequence[_Measure]) -> Table:
+    """Return the table: quartiles of the error per sample, then of the sum, then the number of repetitions."""
+    heads = [f"{measure.name}, {which}" for measure in measures for which in ("median", "quartile 1", "quartile 3")]
+    rows = {str(at): [str(len(found))] for at, found in measures[-1].values.items()}
+    for measure in reversed(measures):
+        line = measure.line
+        for at, *quartiles in zip(measure.values, line.y, line.lower, line.upper, strict=True):
+            rows[str(at)][:0] = map(number, quartiles)
+    return Table(("Iteration", *heads, "n"), tuple((at, *cells) for at, cells in rows.items()))

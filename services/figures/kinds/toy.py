@@ -1,6 +1,7 @@
 """The toy function, as in the paper's Fig. 3: the true function, its approximations, the samples, and the transfer."""
 
 from collections.abc import Sequence
+from math import sqrt
 
 from gaplab.schemas.toy import ToyIteration
 from gaplab.services.figures.marks import Arrow, Axis, FigureDefinition, Line, Mark, Panel, Points, Table
@@ -82,22 +83,36 @@ def _transfer(toy: ToyIteration) -> list[Mark]:
 
 def _caption(toys: Sequence[ToyIteration]) -> str:
     most = max(len(toy.approximations) for toy in toys)
-    parts = [f"Solid: the best simulator{'; thin: the others' if most > 1 else ''}."] if most else []
+    cut = ", cut off where they leave the frame" if any(map(_is_cut, toys)) else ""
+    parts = [f"Solid: the best simulator{f'; thin: the others{cut}' if most > 1 else ''}."] if most else []
     hidden = "Reality's function is shown once the experiment has ended."
     parts += ["Dashed: reality." if toys[0].truth is not None else hidden]
     parts += ["The arrow goes from the simulated to the real fitness of the transferred controller."]
     return " ".join([*parts, *(map(_told, toys) if len(toys) == 1 else ())])
 
 
+def _is_cut(toy: ToyIteration) -> bool:
+    """Return whether a simulator leaves the frame, which has room for the best one."""
+    low, high = toy.limits
+    values = [value for each in toy.approximations for value in each if value is not None]
+    return bool(values) and not low <= min(values) <= max(values) <= high
+
+
 def _told(toy: ToyIteration) -> str:
     parts = [f"after {number_of('sample', len(toy.samples))}"]
     if toy.squared_error is not None:
-        parts.append(f"the best simulator's squared error is {number(toy.squared_error)}")
+        parts.append(f"the best simulator errs by {number(_per_sample(toy))} a sample")
     gene, simulated, real = _transfer_in_words(toy)
     if gene:
         fitness = f"{simulated or 'nothing'} in simulation and {real or 'nothing'} in reality"
         parts.append(f"the transferred gene {gene} reaches {fitness}")
     return f"Iteration {toy.iteration}: {', '.join(parts)}."
+
+
+def _per_sample(toy: ToyIteration) -> float | None:
+    """Return the root mean square error of the best simulator; None without samples."""
+    samples = sum(sample.fitness is not None for sample in toy.samples)
+    return sqrt(toy.squared_error / samples) if toy.squared_error is not None and samples else None
 
 
 def _transfer_in_words(toy: ToyIteration) -> tuple[str, str, str]:
@@ -106,9 +121,20 @@ def _transfer_in_words(toy: ToyIteration) -> tuple[str, str, str]:
     return (number(transfer.gene), number(transfer.simulated), number(transfer.real)) if transfer else ("", "", "")
 
 
+def _row(toy: ToyIteration) -> tuple[str, ...]:
+    errors = number(_per_sample(toy)), number(toy.squared_error)
+    return str(toy.iteration), str(len(toy.samples)), *errors, *_transfer_in_words(toy)
+
+
 def _table(toys: Sequence[ToyIteration]) -> Table:
-    rows = [
-        (str(toy.iteration), str(len(toy.samples)), number(toy.squared_error), *_transfer_in_words(toy)) for toy in toys
-    ]
-    head = ("Iteration", "Samples", "Squared error", "Transferred gene", "Fitness in simulation", "Fitness in reality")
+    rows = [_row(toy) for toy in toys]
+    head = (
+        "Iteration",
+        "Samples",
+        "Error per sample",
+        "Sum of squared errors",
+        "Transferred gene",
+        "Fitness in simulation",
+        "Fitness in reality",
+    )
     return Table(head, tuple(rows))

@@ -2,12 +2,25 @@
 
 from typing import TYPE_CHECKING, Any
 
-from gaplab.services.figures.marks import Arrow, Bars, Diagonal, Label, Level, Line, Mark, Number, Panel, Points
+from gaplab.services.figures.marks import (
+    Arrow,
+    Bars,
+    Diagonal,
+    Label,
+    Level,
+    Line,
+    Mark,
+    Number,
+    Panel,
+    Points,
+    Polylines,
+)
 from gaplab.services.figures.matplotlib.text_size import printable
 from gaplab.services.figures.style import INK, SHADES, Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
 
 DASHES: dict[str, Any] = {
     "solid": "-",
@@ -38,8 +51,8 @@ def _draw(mark: Mark, axes: "Axes", order: float, shades: tuple[float, float]) -
     match mark:
         case Line():
             _line(mark, axes, order)
-        case Points():
-            _points(mark, axes, order + 5, shades)
+        case Points() | Polylines():
+            _shaded(mark, axes, order, shades)
         case Level():
             _level(mark, axes)
         case Diagonal():
@@ -75,14 +88,39 @@ def _line(line: Line, axes: "Axes", order: float) -> None:
         axes.fill_between(x, lower, upper, color=look.color, alpha=0.13, linewidth=0, zorder=1, **step)
 
 
-def _points(points: Points, axes: "Axes", order: float, shades: tuple[float, float]) -> None:
+def _shaded(mark: Points | Polylines, axes: "Axes", order: float, shades: tuple[float, float]) -> None:
+    if isinstance(mark, Points):
+        _points(mark, axes, order + 5, shades)
+    else:
+        _polylines(mark, axes, order, shades)
+
+
+def _polylines(lines: Polylines, axes: "Axes", order: float, shades: tuple[float, float]) -> None:
+    from matplotlib.collections import LineCollection
+
+    drawn = LineCollection(
+        [list(zip(_floats(lines.x), _floats(row), strict=True)) for row in lines.rows],
+        array=list(lines.shades),
+        cmap=_shades(),
+        linewidths=0.7,
+        alpha=0.75,
+        zorder=order,
+    )
+    drawn.set_clim(*shades)
+    axes.add_collection(drawn)
+
+
+def _shades() -> "Colormap":
     from matplotlib.colors import LinearSegmentedColormap
 
+    return LinearSegmentedColormap.from_list("shades", SHADES)
+
+
+def _points(points: Points, axes: "Axes", order: float, shades: tuple[float, float]) -> None:
     look = points.style
     drawn: dict[str, Any] = {"marker": MARKERS[look.marker], "s": 16 * points.size**2, "zorder": order}
     if points.shades:
-        colors = LinearSegmentedColormap.from_list("shades", SHADES)
-        drawn |= {"c": points.shades, "cmap": colors, "vmin": shades[0], "vmax": shades[1]}
+        drawn |= {"c": points.shades, "cmap": _shades(), "vmin": shades[0], "vmax": shades[1]}
         drawn |= {"edgecolors": "white", "linewidths": 0.3}
     elif points.hollow:
         drawn |= {"facecolors": "none", "edgecolors": look.color, "linewidths": 0.9}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from gaplab.services.figures.marks import Axis, FigureDefinition
 from gaplab.services.figures.matplotlib.artists import draw_marks
 from gaplab.services.figures.matplotlib.page_layout import PageLayout, add_surroundings, draw_bar_of_shades, shades_of
-from gaplab.services.figures.matplotlib.text_size import FAMILY, printable
+from gaplab.services.figures.matplotlib.text_size import FAMILY, printable, width_in
 from gaplab.services.figures.style import INK
 from gaplab.services.figures.words import power
 
@@ -27,6 +27,9 @@ DPI = 300
 SIZE_PT = 8
 PANEL_IN, LOW_IN = 2.1, 1.1
 """Height of the only row of panels, and of one of several rows."""
+
+FREE = 0.85
+"""Share of the width of a file that its panels have."""
 
 SQUARE_IN = 3.2
 """Greatest height of a square panel."""
@@ -146,6 +149,12 @@ def _set_up(axes: "Axes", x: Axis, y: Axis, *, labelled: bool) -> None:
     axes.set_axisbelow(True)
 
 
+def _fit_side_by_side(axis: Any, of: Axis) -> bool:  # noqa: ANN401 - XAxis or YAxis
+    """Return whether the widest words of an axis fit between two ticks."""
+    between_in = FREE * axis.get_figure().get_figwidth() / max(1, len(of.ticks))
+    return bool(max(width_in(words, SIZE_PT) for _, words in of.ticks) < between_in)
+
+
 def _ticks(axis: Any, of: Axis) -> None:  # noqa: ANN401 - XAxis or YAxis
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
@@ -157,5 +166,9 @@ def _ticks(axis: Any, of: Axis) -> None:  # noqa: ANN401 - XAxis or YAxis
         axis.set_minor_formatter(NullFormatter())
     elif of.ticks:
         axis.set_ticks([at for at, _ in of.ticks], [printable(words) for _, words in of.ticks])
+        if axis.axis_name == "x" and not _fit_side_by_side(axis, of):
+            axis.set_tick_params(rotation=25, rotation_mode="anchor")
+            for label in axis.get_ticklabels():
+                label.set_horizontalalignment("right")
     elif of.whole:
         axis.set_major_locator(MaxNLocator(nbins=11, integer=True))

@@ -5,7 +5,7 @@ from itertools import accumulate
 from math import ceil, inf
 from typing import TYPE_CHECKING, Any
 
-from gaplab.services.figures.marks import Arrow, FigureDefinition, Label, Line
+from gaplab.services.figures.marks import Arrow, FigureDefinition, Label, Line, Polylines
 from gaplab.services.figures.matplotlib.artists import legend_name
 from gaplab.services.figures.matplotlib.text_size import lines, printable, shortened, width_in
 
@@ -112,7 +112,9 @@ def _legend(canvas: "Canvas", names: list[str], layout: PageLayout, bottom: floa
 def shades_of(figure: FigureDefinition) -> tuple[float, float]:
     """Return the numbers of the lightest and the darkest shade."""
     values = [value for points in figure.shaded for value in points.shades]
-    return (min(values), max(min(values) + 1, *values)) if values else (0.0, 1.0)
+    if not values:
+        return 0.0, 1.0
+    return min(values), max(values) if max(values) > min(values) else min(values) + 1
 
 
 def draw_bar_of_shades(canvas: "Canvas", figure: FigureDefinition) -> None:
@@ -125,7 +127,8 @@ def draw_bar_of_shades(canvas: "Canvas", figure: FigureDefinition) -> None:
     bar = canvas.colorbar(drawn[0], ax=canvas.axes, aspect=30, pad=0.02, fraction=0.05)
     bar.set_label(printable(figure.shaded[0].shades_label))
     bar.outline.set_visible(False)
-    bar.locator = MaxNLocator(nbins=6, integer=True)
+    whole = all(value == int(value) for points in figure.shaded for value in points.shades)
+    bar.locator = MaxNLocator(nbins=6, integer=whole)
     bar.update_ticks()
 
 
@@ -144,6 +147,6 @@ def _legend_in(names: list[str], columns: int) -> float:
 
 def _names(figure: FigureDefinition) -> list[str]:
     """Return the names in the legend."""
-    marks = [mark for mark in figure.marks if not isinstance(mark, Label | Arrow)]
+    marks = [mark for mark in figure.marks if not isinstance(mark, Label | Arrow | Polylines)]
     named = [each.name for each in marks if each.name and not (isinstance(each, Line) and each.faint)]
     return list(dict.fromkeys(map(legend_name, named)))

@@ -8,7 +8,7 @@ the fill, whose opacity it keeps. The same holds for an annotation named `ink`.
 from math import log10
 from typing import Any
 
-from gaplab.services.figures.marks import Arrow, Axis, FigureDefinition, Label, Line, Panel, Points
+from gaplab.services.figures.marks import Arrow, Axis, FigureDefinition, Label, Line, Panel, Points, Polylines
 from gaplab.services.figures.plotly.trace_dicts import Trace, short, text, traces
 from gaplab.services.figures.style import SHADES
 
@@ -147,7 +147,7 @@ def _arrow(arrow: Arrow) -> dict[str, Any]:
     return {"text": "", "showarrow": True} | ends | look | ({"name": "ink"} if arrow.style.ink else {})
 
 
-def _shades(shaded: list[Points]) -> dict[str, Any]:
+def _shades(shaded: list[Points | Polylines]) -> dict[str, Any]:
     values = [each for points in shaded for each in points.shades]
     last = len(SHADES) - 1
     whole = all(each == int(each) for each in values)
@@ -168,4 +168,4 @@ def _shades(shaded: list[Points]) -> dict[str, Any]:
 def _is_read_along_x(figure: FigureDefinition) -> bool:
     """Return whether one hover text can show the values of all lines at an x: without points, each line has one."""
     kinds = {type(mark) for mark in figure.marks}
-    return Line in kinds and Points not in kinds
+    return Line in kinds and not kinds & {Points, Polylines}

@@ -5,14 +5,17 @@ from html import escape
 from itertools import pairwise, zip_longest
 from typing import Any
 
-from gaplab.services.figures.marks import Bars, Diagonal, Level, Line, Mark, Number, Panel, Points
-from gaplab.services.figures.style import SHADES, Style, tint
+from gaplab.services.figures.marks import Bars, Diagonal, Level, Line, Mark, Number, Panel, Points, Polylines
+from gaplab.services.figures.style import SHADES, Style, shade_at, tint
 
 Trace = dict[str, Any]
 
 DASHES = {"dashed": "dash", "dotted": "dot", "long": "longdash", "longdot": "longdashdot"}
 MARKERS = {"triangle": "triangle-up", "inverted": "triangle-down", "cross": "x"}
 """Plotly's names of dashes and markers, where they differ from ours."""
+
+SHADED = Style(SHADES[0], "solid", "circle")
+"""The look of a mark whose colour is that of its shade."""
 
 DIGITS = 6
 """Significant digits of a coordinate: more than a screen can show."""
@@ -36,8 +39,8 @@ def _layers(mark: Mark, panel: Panel) -> list[tuple[int, Trace]]:
     match mark:
         case Line():
             return [*((0, each) for each in _band(mark)), (1 if mark.faint else 3, _line(mark))]
-        case Points():
-            return [(4, each) for each in _points(mark)]
+        case Points() | Polylines():
+            return [(4, each) for each in (_points(mark) if isinstance(mark, Points) else _polylines(mark))]
         case Level():
             return _level(mark, panel)
         case Diagonal():
@@ -102,6 +105,23 @@ def _points(points: Points) -> list[Trace]:
     shaded = marker | {"color": [short(each) for each in points.shades], "coloraxis": "coloraxis"}
     in_the_legend = trace | {"x": [None], "y": [None], "marker": marker | {"color": SHADES[len(SHADES) // 2]}}
     return [trace | {"marker": shaded, "showlegend": False}, in_the_legend]
+
+
+def _polylines(lines: Polylines) -> list[Trace]:
+    """Return a trace for the lines of each shade, and points without place that bring the bar of shades."""
+    least, most = min(lines.shades, default=0.0), max(lines.shades, default=0.0)
+    found = []
+    for shade in sorted(set(lines.shades)):
+        rows = [(at, row) for at, row in enumerate(lines.rows) if lines.shades[at] == shade]
+        x = [place for _ in rows for place in (*lines.x, None)]
+        y = [value for _, row in rows for value in (*row, None)]
+        told = [text(lines.hover[at]) for at, row in rows for _ in (*row, None)] if lines.hover else []
+        color = shade_at((shade - least) / ((most - least) or 1.0))
+        trace = _scatter(lines.name, SHADED, x, y, "lines") | {"line": {"color": color, "width": 1.25}, "opacity": 0.75}
+        hover = {"customdata": told, "hovertemplate": "%{customdata}<extra></extra>"} if told else {"hoverinfo": "skip"}
+        found.append(trace | hover | {"showlegend": False})
+    bar = {"color": [short(least), short(most)], "coloraxis": "coloraxis"}
+    return [*found, _quiet(_scatter(lines.name, SHADED, [None, None], [None, None], "markers")) | {"marker": bar}]
 
 
 def _level(level: Level, panel: Panel) -> list[tuple[int, Trace]]:

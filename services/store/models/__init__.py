@@ -8,6 +8,8 @@
     provenance, shared by experiments through experiment_provenance; its id is a hash of its facts
     event, numbered by event_counter
     supervisor
+    notification, of an event; notifier, which finds them
+    deletion, of a study or an experiment;  view, a saved query
     token, of a caller;  idempotency, a request with its answer
 
 Values that are plotted or filtered are columns; vectors are JSON arrays, in which floats round-trip exactly. Neither a
@@ -32,6 +34,10 @@ from gaplab.services.store.models.experiments import ExperimentRow as Experiment
 from gaplab.services.store.models.experiments import RepetitionRow as RepetitionRow
 from gaplab.services.store.models.experiments import StudyRow as StudyRow
 from gaplab.services.store.models.leased import LeasedRow as LeasedRow
+from gaplab.services.store.models.lists import DeletionRow as DeletionRow
+from gaplab.services.store.models.lists import ViewRow as ViewRow
+from gaplab.services.store.models.notifications import NotificationRow as NotificationRow
+from gaplab.services.store.models.notifications import NotifierRow as NotifierRow
 from gaplab.services.store.models.provenance import ExperimentProvenanceRow as ExperimentProvenanceRow
 from gaplab.services.store.models.provenance import ProvenanceRow as ProvenanceRow
 from gaplab.services.store.models.provenance import SupervisorRow as SupervisorRow

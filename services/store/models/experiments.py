@@ -15,7 +15,7 @@ class StudyRow(Base):
     """Experiments that belong together to be compared.
 
     Attributes:
-        notes, edits: as in `ExperimentRow`.
+        notes, tags, edits, archived_at, webhook: as in `ExperimentRow`.
     """
 
     __tablename__ = "study"
@@ -24,7 +24,10 @@ class StudyRow(Base):
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     name: Mapped[str] = mapped_column(String(200))
     notes: Mapped[str | None] = mapped_column(Text)
+    tags: Mapped[str | None] = mapped_column(Text)
     edits: Mapped[int] = mapped_column(default=0, server_default="0")
+    archived_at: Mapped[datetime | None]
+    webhook: Mapped[str | None] = mapped_column(Text)
     created_at: Mapped[datetime]
 
 
@@ -46,8 +49,11 @@ class ExperimentRow(Base):
         hardware: name of the hardware that is its reality; NULL if reality is only computed.
         sensitivity_id: id of its sensitivity check.
         token_id: id of the token that submitted it; NULL without a token.
-        notes: free text by people.
-        edits: number of changes of its name or notes.
+        notes: Markdown by people.
+        tags: tags with a space before and after each, as `gaplab.services.store.texts` packs them; NULL for none.
+        edits: number of changes of its name, notes or tags.
+        archived_at: time since which lists leave it out; NULL if they do not.
+        webhook: address that is told of its end; NULL for none.
     """
 
     __tablename__ = "experiment"
@@ -82,7 +88,10 @@ class ExperimentRow(Base):
     sensitivity_id: Mapped[str | None] = mapped_column(String(32), index=True)
     token_id: Mapped[str | None] = mapped_column(String(32))
     notes: Mapped[str | None] = mapped_column(Text)
+    tags: Mapped[str | None] = mapped_column(Text)
     edits: Mapped[int] = mapped_column(default=0, server_default="0")
+    archived_at: Mapped[datetime | None]
+    webhook: Mapped[str | None] = mapped_column(Text)
     created_at: Mapped[datetime]
     started_at: Mapped[datetime | None]
     ended_at: Mapped[datetime | None]
@@ -90,6 +99,8 @@ class ExperimentRow(Base):
 
 class RepetitionRow(LeasedRow):
     """One run of the algorithm, with its lease and its tallies.
+
+    SQLite never uses the id of a deleted repetition again: a worker that has not heard of its end may still send steps.
 
     Attributes:
         losses: number of workers lost since a step or a checkpoint was last recorded.
@@ -108,6 +119,7 @@ class RepetitionRow(LeasedRow):
         UniqueConstraint("hardware"),
         Index(None, "state", "heartbeat_at"),
         Index(None, "experiment_id", "state", "number"),
+        {"sqlite_autoincrement": True},
     )
 
     id: Mapped[int] = mapped_column(primary_key=True)

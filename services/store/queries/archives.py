@@ -6,12 +6,19 @@ from enum import Enum
 from itertools import islice
 from typing import Any
 
-from sqlalchemy import Select, insert, select, text
+from sqlalchemy import Select, delete, insert, select, text
 from sqlalchemy.exc import DataError, IntegrityError
 from sqlalchemy.orm import Session
 
 from gaplab.services.store.clock import now
-from gaplab.services.store.models import Base, ExperimentProvenanceRow, ExperimentRow, RepetitionRow, StudyRow
+from gaplab.services.store.models import (
+    Base,
+    DeletionRow,
+    ExperimentProvenanceRow,
+    ExperimentRow,
+    RepetitionRow,
+    StudyRow,
+)
 from gaplab.services.store.queries import provenance
 
 Row = dict[str, Any]
@@ -49,6 +56,11 @@ def taken_ids(session: Session, model: type[StudyRow | ExperimentRow], ids: Iter
     if session.get_bind().dialect.name == "postgresql":  # in SQLite no two transactions that write ever overlap
         session.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
     return set(session.scalars(select(model.id).where(model.id.in_(list(ids)))))
+
+
+def forget_deletions(session: Session, ids: Iterable[str]) -> None:
+    """Forget that studies and experiments with these ids were deleted: they are there again."""
+    session.execute(delete(DeletionRow).where(DeletionRow.id.in_(list(ids))))
 
 
 def database_time(session: Session) -> datetime:

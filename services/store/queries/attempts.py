@@ -1,6 +1,7 @@
 """Attempts: the history of a repetition's leases, written in the transactions that begin and end them."""
 
 from collections.abc import Sequence
+from datetime import datetime, timedelta
 
 from sqlalchemy import func, insert, select, update
 from sqlalchemy.orm import Session
@@ -9,7 +10,7 @@ from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.records import AttemptRead
 from gaplab.services.core.errors import NotFound
-from gaplab.services.store.clock import now
+from gaplab.services.store.clock import moment, now
 from gaplab.services.store.models import AttemptRow, RepetitionRow
 from gaplab.services.store.queries.events import note
 
@@ -54,6 +55,28 @@ def latest(session: Session, experiment: str) -> dict[int, int]:
     of_it = select(row.repetition_id, func.max(row.epoch)).join(repetition, repetition.id == row.repetition_id)
     found = of_it.where(repetition.experiment_id == experiment).group_by(row.repetition_id)
     return dict(session.execute(found).all())
+
+
+def work_spans(session: Session, experiments: Sequence[str]) -> dict[str, list[tuple[datetime, datetime]]]:
+    """Return begin and end of the work whose results are stored, by experiment.
+
+    Attempts also contain waiting for a core, the step under way, and silence before a loss is noticed. Each span is
+    therefore as long as the stored steps took, and ends with its attempt; an attempt that runs ends now.
+    """
+    if not experiments:
+        return {}
+    row, repetition, present = AttemptRow, RepetitionRow, moment(session)
+    columns = repetition.experiment_id, repetition.id, repetition.seconds, row.started_at, row.ended_at
+    query = select(*columns).join(repetition, repetition.id == row.repetition_id)
+    query = query.where(repetition.experiment_id.in_(experiments), repetition.seconds > 0)
+    found: dict[str, list[tuple[datetime, datetime]]] = {}
+    left: dict[int, timedelta] = {}
+    for experiment, id_, seconds, started_at, ended_at in session.execute(query.order_by(row.epoch.desc())):
+        end = ended_at or present
+        took = min(left.get(id_, timedelta(seconds=seconds)), end - started_at)
+        left[id_] = left.get(id_, timedelta(seconds=seconds)) - took
+        found.setdefault(experiment, []).append((end - took, end))
+    return found
 
 
 def attempts_of(session: Session, experiment: str, number: int, *, secret: bool = True) -> tuple[AttemptRead, ...]:

@@ -1,11 +1,14 @@
-"""Rollouts and their time, by experiment."""
+"""Rollouts, real-world evaluations and their time, by experiment."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from gaplab.services.store.models import ExperimentRow, RepetitionRow
+from gaplab.schemas.records import MeasurementKind
+from gaplab.services.store.models import ExperimentRow, MeasurementRow, RepetitionRow
 
 
 def latest(session: Session, count: int) -> tuple[tuple[dict[str, Any], float, int], ...]:
@@ -25,3 +28,35 @@ def latest(session: Session, count: int) -> tuple[tuple[dict[str, Any], float, i
     )
     found = {id_: (float(seconds), int(rollouts)) for id_, seconds, rollouts in session.execute(sums)}
     return tuple((spec, *found[id_]) for id_, spec in specs.items() if id_ in found)
+
+
+@dataclass(frozen=True)
+class Work:
+    """The work of an experiment so far.
+
+    Attributes:
+        seconds: seconds of computation in its recorded steps.
+        samples: real-world evaluations that the strategy learned from.
+        probes: real-world evaluations that were only recorded.
+    """
+
+    seconds: float = 0.0
+    samples: int = 0
+    probes: int = 0
+
+
+def work_of(session: Session, experiments: Sequence[str]) -> dict[str, Work]:
+    """Return the work of each experiment."""
+    run, row = RepetitionRow, MeasurementRow
+    seconds = select(run.experiment_id, func.sum(run.seconds)).where(run.experiment_id.in_(experiments))
+    measured = select(run.experiment_id, row.kind, func.count()).join(run, run.id == row.repetition_id)
+    measured = measured.where(run.experiment_id.in_(experiments)).group_by(run.experiment_id, row.kind)
+    counts = {(id_, kind): count for id_, kind, count in session.execute(measured)}
+    return {
+        id_: Work(
+            float(spent or 0.0),
+            counts.get((id_, MeasurementKind.SAMPLE), 0),
+            counts.get((id_, MeasurementKind.PROBE), 0),
+        )
+        for id_, spent in session.execute(seconds.group_by(run.experiment_id))
+    }

@@ -14,7 +14,7 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import Schedule
 from gaplab.services.core.errors import NotFound, StoreUnavailable
 from gaplab.services.store.clock import moment
-from gaplab.services.store.models import SPEC_VERSION, ExperimentRow, RepetitionRow, StudyRow
+from gaplab.services.store.models import SPEC_VERSION, DeletionRow, ExperimentRow, RepetitionRow, StudyRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.statements import storable
 
@@ -118,7 +118,9 @@ def get_experiments(session: Session, ids: Sequence[str]) -> tuple[ExperimentRow
     named = ExperimentRow.id.in_([storable(each) for each in ids])
     found = {row.id: row for row in session.scalars(select(ExperimentRow).where(named))}
     if missing := [each for each in ids if each not in found]:
-        raise NotFound(f"there is no experiment {', '.join(map(repr, missing))}")
+        raise NotFound(
+            _of_another_kind(session, missing[0]) or f"there is no experiment {', '.join(map(repr, missing))}"
+        )
     return tuple(found[each] for each in ids)
 
 
@@ -129,6 +131,11 @@ def get_study(session: Session, study_id: str) -> StudyRow:
         NotFound: there is none.
     """
     return _get(session, StudyRow, "study", study_id)
+
+
+def was_deleted(session: Session, id_: str) -> bool:
+    """Return whether a study or an experiment with this id was deleted."""
+    return session.get(DeletionRow, storable(id_)) is not None
 
 
 def experiments_of(session: Session, studies: Sequence[str]) -> tuple[ExperimentRow, ...]:
@@ -168,9 +175,21 @@ def lock(session: Session, experiments: Sequence[str]) -> dict[str, State]:
 
 
 def _get(session: Session, table: type[R], noun: str, id_: str) -> R:
-    if (found := session.get(table, storable(id_))) is None:
-        raise NotFound(f"there is no {noun} {id_!r}")
-    return found
+    if (found := session.get(table, storable(id_))) is not None:
+        return found
+    if deletion := session.get(DeletionRow, storable(id_)):
+        raise NotFound(f"{noun} {id_!r}, {deletion.name!r}, was deleted at {deletion.deleted_at:%Y-%m-%d %H:%M} UTC")
+    raise NotFound(_of_another_kind(session, id_) or f"there is no {noun} {id_!r}")
+
+
+def _of_another_kind(session: Session, id_: str) -> str | None:
+    """Return that an id is of a study and not of an experiment, or the reverse; None if it is of neither."""
+    if session.get(StudyRow, storable(id_)) is not None:
+        names = [f"{row.id} ({row.name})" for row in experiments_of(session, [id_])]
+        return f"{id_!r} is a study, and this needs an experiment: {', '.join(names) or 'it has none'}"
+    if session.get(ExperimentRow, storable(id_)) is not None:
+        return f"{id_!r} is an experiment, and this needs a study"
+    return None
 
 
 @event.listens_for(ExperimentRow, "load")

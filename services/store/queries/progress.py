@@ -11,6 +11,8 @@ from gaplab.services.store.models import ExperimentRow, RepetitionRow
 
 _OPEN = (State.QUEUED, State.RUNNING)
 
+_STOPPED = (State.COMPLETED, State.CANCELLED)
+
 
 @dataclass(frozen=True)
 class Tally:
@@ -18,6 +20,8 @@ class Tally:
 
     Attributes:
         running: repetitions with a stored step; a claimed repetition without one may still wait for a core.
+        stopped: repetitions that ended before their last iteration without failing.
+        counted_iterations, counted_iterations_done: iterations without number 0.
         rollouts_left: remaining rollouts of repetitions that have not ended.
         seconds: seconds of work in the completed rollouts.
     """
@@ -27,8 +31,11 @@ class Tally:
     failed: int = 0
     running: int = 0
     open: int = 0
+    stopped: int = 0
     iterations: int = 0
     iterations_done: int = 0
+    counted_iterations: int = 0
+    counted_iterations_done: int = 0
     rollouts: int = 0
     rollouts_done: int = 0
     rollouts_failed: int = 0
@@ -52,8 +59,11 @@ def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
             _count(row.state == State.FAILED),
             _count((row.state == State.RUNNING) & (row.steps > 0)),
             _count(row.state.in_(_OPEN)),
+            _count(row.state.in_(_STOPPED) & (row.iterations_done < ExperimentRow.iterations)),
             func.sum(ExperimentRow.iterations),
             func.sum(row.iterations_done),
+            func.sum(ExperimentRow.iterations - 1),
+            func.sum(case((row.iterations_done > 0, row.iterations_done - 1), else_=0)),
             func.sum(ExperimentRow.rollouts),
             func.sum(row.rollouts_done),
             func.sum(row.rollouts_failed),

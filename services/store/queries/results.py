@@ -2,11 +2,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import sqrt
 from typing import Any
 
-from sqlalchemy import Select, case, func, select, tuple_
+from sqlalchemy import ColumnElement, Select, case, func, select, tuple_
 from sqlalchemy.orm import Session
 
+from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
 from gaplab.services.store.cursor import decode, encode
 from gaplab.services.store.models import ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
@@ -81,12 +83,14 @@ def page_of_simulators(
     query = of_experiments(row, [experiment.id], *key, row)
     wanted = {RepetitionRow.number: repetition, row.iteration: iteration}
     names = [each["name"] for each in experiment.spec["tunables"]]
+    measured = measured_iterations(session, experiment.id)
     return tuple(
-        _simulator(number, found, names) for number, *_, found in _page(session, query, key, wanted, limit, cursor)
+        _simulator(number, found, names, samples_until(measured, number, found.iteration))
+        for number, *_, found in _page(session, query, key, wanted, limit, cursor)
     )
 
 
-def _simulator(repetition: int, row: SimulatorRow, names: Sequence[str]) -> SimulatorRead:
+def _simulator(repetition: int, row: SimulatorRow, names: Sequence[str], samples: int) -> SimulatorRead:
     pairs = None if row.lower is None or row.upper is None else zip(row.lower, row.upper, strict=True)
     return SimulatorRead(
         repetition=repetition,
@@ -94,6 +98,7 @@ def _simulator(repetition: int, row: SimulatorRow, names: Sequence[str]) -> Simu
         rank=row.rank,
         parameters=dict(zip(names, row.parameters, strict=True)),
         squared_error=row.squared_error,
+        error=per_sample(row.squared_error, samples),
         intervals=None if pairs is None else dict(zip(names, pairs, strict=True)),
         weight=row.weight,
     )
@@ -125,6 +130,41 @@ def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, lis
     for experiment, best in session.execute(query):
         if best is not None:
             found.setdefault(experiment, []).append(best)
+    return found
+
+
+def last_common(session: Session, experiments: Sequence[str]) -> dict[str, int]:
+    """Return the last number of real-world evaluations that the repetitions of each experiment share.
+
+    The COMPLETED repetitions count. Without any, those that have begun and may go on count; without any of those, all
+    that have begun. An experiment without a point of its curve is missing.
+    """
+    counted = session.execute(last_common_of_all().where(RepetitionRow.experiment_id.in_(experiments)))
+    return {experiment: done - 1 for experiment, done in counted if done is not None}
+
+
+def last_common_of_all() -> Select[Any, Any]:
+    """Return the query for the iterations that the repetitions of each experiment share, number 0 included."""
+    row = RepetitionRow
+
+    def least(*states: State) -> ColumnElement[int | None]:
+        return func.min(case((row.state.in_(states), row.iterations_done)))
+
+    begun = func.coalesce(least(State.COMPLETED), least(State.QUEUED, State.RUNNING), func.min(row.iterations_done))
+    query = select(row.experiment_id, begun.label("done")).where(row.iterations_done > 0)
+    return query.group_by(row.experiment_id)
+
+
+def recorded_at(session: Session, counts: Mapping[str, int]) -> dict[str, list[float]]:
+    """Return the recorded fitness of repetitions, by number, after one number of evaluations for each experiment."""
+    if not counts:
+        return {}
+    row, found = IterationRow, dict[str, list[float]]()
+    query = of_experiments(row, list(counts), RepetitionRow.experiment_id, row.recorded_fitness)
+    query = query.where(row.number == case(dict(counts), value=RepetitionRow.experiment_id))
+    query = query.where(row.recorded_fitness.is_not(None)).order_by(RepetitionRow.experiment_id, RepetitionRow.number)
+    for experiment, fitness in session.execute(query):
+        found.setdefault(experiment, []).append(fitness)
     return found
 
 
@@ -167,6 +207,22 @@ def measured_iterations(session: Session, experiment: str) -> dict[int, list[int
     ):
         gathered.setdefault(repetition, []).append(iteration)
     return gathered
+
+
+def samples_until(measured: Mapping[int, Sequence[int]], repetition: int, iteration: int) -> int:
+    """Return the number of samples that the simulators of an iteration were tuned on.
+
+    Args:
+        measured: the result of `measured_iterations`.
+        repetition: number of the repetition.
+        iteration: number of the iteration.
+    """
+    return sum(each <= iteration for each in measured.get(repetition, ()))
+
+
+def per_sample(squared_error: float | None, samples: int) -> float | None:
+    """Return the root mean square error; None without samples, or if the physics failed on one."""
+    return sqrt(squared_error / samples) if squared_error is not None and samples else None
 
 
 def iteration_costs(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str, int, int, int, float, bool]]:

@@ -2,6 +2,7 @@
 /** The experiments that are compared, each with its letter and a button that removes it. */
 
 import { byId, h, refill } from "../../lib/dom.js";
+import { fixed } from "../../lib/format.js";
 import { stateBadge } from "../../lib/state_badge.js";
 import { letter } from "./ranges.js";
 
@@ -30,17 +31,20 @@ export function chosenList(view) {
       : h("span", { class: "failed" }, cache.isMissing(id) ? `There is no experiment ${id}` : id);
     const button = h("button", { type: "button", class: "link", "aria-label": `Remove ${cache.nameOf(id)}`, onclick: () => remove(id) }, "✕");
     return h("li", {}, h("b", {}, letter(index)), name, study && areOfSeveralStudies(view) ? h("small", {}, study) : null,
-      experiment ? stateBadge(experiment.state) : null, button);
+      experiment ? stateBadge(experiment.state, experiment.caveat) : null, experiment?.fitness ? fitnessText(experiment.fitness) : null, button);
   };
   const update = () => {
     const { experiments } = view.choice;
     element.hidden = !experiments.length;
     removeAll.hidden = experiments.length < 2;
-    const key = JSON.stringify(experiments.map((id) => [id, cache.get(id)?.state, cache.isMissing(id), cache.nameOf(id)]));
+    const key = JSON.stringify(experiments.map((id) => [id, cache.get(id)?.state, cache.get(id)?.caveat, cache.get(id)?.fitness, cache.isMissing(id), cache.nameOf(id)]));
     refill(list, key, () => experiments.map(item));
   };
   return { element, update };
 }
+
+/** @param {Api.FitnessRead} fitness */
+const fitnessText = ({ mean, evaluations }) => h("small", {}, `${fixed(mean)} after ${evaluations}`);
 
 /** @param {Page.CompareView} view */
 const areOfSeveralStudies = ({ cache, choice }) => new Set(choice.experiments.map((id) => cache.get(id)?.study ?? id)).size > 1;

@@ -17,7 +17,7 @@ export function matrix({ cache, choice }, ids, { range: [from, to], pairs }) {
   const letterOf = (/** @type {string} */ id) => letter(choice.experiments.indexOf(id));
   const names = cache.namesOf(choice.experiments);
   const pairsByIds = new Map([...pairs, ...pairs.map(swapped)].map((pair) => [`${pair.first} ${pair.second}`, pair]));
-  const range = from === to ? `after ${from} real-world evaluation${from === 1 ? "" : "s"}` : `over ${from} to ${to} real-world evaluations`;
+  const range = from === to ? `after ${from} real-world evaluation${from === 1 ? "" : "s"}` : `pooled over ${from} to ${to} real-world evaluations, so p is too small`;
   const title = `The row against the column, ${range}`;
   const head = h("tr", {}, h("td", {}), ...ids.map((id) => h("th", { scope: "col", title: names.get(id) }, letterOf(id))));
   const rows = ids.map((row) => h("tr", {}, h("th", { scope: "row" }, h("b", {}, letterOf(row)), ` ${names.get(row)}`),

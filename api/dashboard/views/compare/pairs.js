@@ -4,7 +4,7 @@
 import { h } from "../../lib/dom.js";
 import { table } from "../../lib/table.js";
 import { TESTS } from "./address.js";
-import { letter, rangeText } from "./ranges.js";
+import { isPooled, letter, rangeText } from "./ranges.js";
 import { probability, signed, verdict } from "./verdict.js";
 
 const NAMES = /** @type {Page.Comparison["test"][]} */ (Object.keys(TESTS));
@@ -21,7 +21,7 @@ export function pairsTable({ choice: { test, experiments }, cache }, results, op
   const label = (/** @type {string} */ id) => `${letter(experiments.indexOf(id))} ${names.get(id)}`;
   const chosen = results[results.length - 1];
   const sorted = [...results].sort((one, other) => one.range[0] - other.range[0] || one.range[1] - other.range[1]);
-  const columns = ["Pair", ...sorted.map(({ range }) => `At ${rangeText(range)}`), `Difference at ${rangeText(chosen.range)}`, "d", "n",
+  const columns = ["Pair", ...sorted.map(({ range }) => (isPooled(range) ? `Pooled ${rangeText(range)}, p too small` : `At ${rangeText(range)}`)), `Difference at ${rangeText(chosen.range)}`, "d", "n",
     ...NAMES.map((name) => `${TESTS[name].short}, p after Holm`)];
   const rows = chosen.pairs.map((pair, index) => [
     `${label(pair.first)} − ${label(pair.second)}`,

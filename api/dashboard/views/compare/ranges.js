@@ -2,16 +2,36 @@
 /** Ranges of numbers of real-world evaluations, and the letters that stand for experiments. */
 
 /**
- * Return the paper's ranges, as far as the longest of the experiments goes.
+ * Return the last number of real-world evaluations that experiments share; 0 without any result.
  *
+ * The direct baseline has a single value, which is compared with every number. Experiments that failed or were cancelled lower the
+ * number only if no other has a result.
+ *
+ * @param {{ direct: boolean, state: Api.State, fitness: Api.FitnessRead | null }[]} experiments
+ */
+export function commonCount(experiments) {
+  const known = experiments.filter(({ fitness, direct }) => fitness && !direct);
+  const lasting = known.filter(({ state }) => state !== "FAILED" && state !== "CANCELLED");
+  const counts = (lasting.length ? lasting : known).map(({ fitness }) => fitness?.evaluations ?? 0);
+  return counts.length ? Math.min(...counts) : 0;
+}
+
+/**
+ * Return the single numbers to compare at, the last shared one first, and then the paper's pooled ranges up to the longest experiment.
+ *
+ * @param {number} shared
  * @param {number} last
  * @returns {Page.Range[]}
  */
-export function paperRanges(last) {
+export function rangesOf(shared, last) {
   /** @type {Page.Range[]} */
-  const ranges = [[1, 1], [3, last], [6, last], ...(last > 1 ? [/** @type {Page.Range} */ ([1, last])] : [])];
-  return ranges.filter(([from]) => from <= last);
+  const ranges = [[shared, shared], [1, 1], [3, last], [6, last], [1, last]];
+  const unique = new Map(ranges.map((range) => [rangeText(range), range]));
+  return [...unique.values()].filter(([from, to]) => from <= to && to <= Math.max(shared, last));
 }
+
+/** @param {Page.Range} range */
+export const isPooled = ([from, to]) => from !== to;
 
 /**
  * Return a range in words.

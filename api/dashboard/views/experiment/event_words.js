@@ -14,8 +14,14 @@ const step = ({ repetition, body }) => `Repetition ${repetition}, iteration ${bo
 /** @type {Words} */
 const reason = ({ body }) => (body.reason ? `: ${body.reason}` : "");
 
-/** @param {number | null | undefined} value */
-const fitness = (value) => (value === null || value === undefined ? "physics failed" : number(value));
+/**
+ * Return a fitness after some words, or that there is none because the physics failed.
+ *
+ * @param {string} words
+ * @param {number | null | undefined} value
+ * @param {string} [where]
+ */
+const reaching = (words, value, where = "") => (value === null || value === undefined ? `the physics failed${where}` : `${words} ${number(value)}${where}`);
 
 /** @type {Record<string, Words>} */
 const WORDS = {
@@ -31,6 +37,13 @@ const WORDS = {
   failed: () => "Failed",
   cancelled: () => "Cancelled",
   retried: () => "Retried",
+  edited: ({ body }) => `${body.of_study ? "Its study was edited" : "Edited"}: ${(body.fields ?? []).join(", ").replaceAll("_", " ")}`,
+  archived: () => "Archived: lists leave it out",
+  unarchived: () => "Listed again",
+  deleted: ({ body }) => `Deleted: ${body.name}`,
+  notified: ({ body }) => `Told ${channel(body)} of the end of the ${body.of}`,
+  notification_failed: ({ body }) =>
+    `Could not tell ${channel(body)} of the end of the ${body.of}: ${body.reason}${body.again_in_s ? `; again in ${count(body.again_in_s)} s` : "; given up"}`,
   sensitivity_ended: ({ body }) =>
     `Sensitivity check ${String(body.state).toLowerCase()}${body.warnings?.length ? `: ${body.warnings.join(" ")}` : ""}`,
   versions_refused: ({ body }) => / \(unavailable: /.test(body.refused_by)
@@ -46,11 +59,14 @@ const WORDS = {
   repetition_stopped: (event) => `${which(event)} stopped`,
   repetition_cancelled: (event) => `${which(event)} cancelled`,
   selected: (event) => `${step(event)}: selected a controller to try in reality`,
-  measured: (event) => `${step(event)}: measured in reality, ${fitness(event.body.fitness)}`,
-  tuned: (event) => `${step(event)}: simulators tuned, squared error ${squaredError(event.body.squared_error)}`,
-  transferred: (event) => `${step(event)}: controller evolved, ${fitness(event.body.simulated_fitness)} in simulation`,
-  probed: (event) => `${step(event)}: the controller reaches ${fitness(event.body.fitness)} in reality`,
+  measured: (event) => `${step(event)}: ${reaching("measured in reality,", event.body.fitness, event.body.fitness === null ? " in reality" : "")}`,
+  tuned: (event) => `${step(event)}: simulators tuned, sum of squared errors ${squaredError(event.body.squared_error)}`,
+  transferred: (event) => `${step(event)}: controller evolved, ${reaching("reaching", event.body.simulated_fitness, " in simulation")}`,
+  probed: (event) => `${step(event)}: ${reaching("the controller reaches", event.body.fitness, " in reality")}`,
 };
+
+/** @param {{ channel?: string }} body */
+const channel = ({ channel: name }) => `the ${String(name).replace("own_webhook", "webhook of its own").replace(/^webhook$/, "service's webhook")}`;
 
 /** @param {number | null | undefined} value */
 function squaredError(value) {

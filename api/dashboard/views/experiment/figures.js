@@ -23,8 +23,9 @@ const CURVE = { kind: "curves", title: "Fitness in reality", events: ["transferr
 /** @type {Figure[]} */
 const OTHERS = [
   { kind: "predictions", title: "Simulation against reality", events: ["measured", "tuned", ...ENDS], isPending: arePredictionsPending },
-  { kind: "squared-error", title: "Squared error", events: ["tuned", ...ENDS] },
+  { kind: "squared-error", title: "Error of the best simulator", events: ["tuned", ...ENDS] },
   { kind: "simulators", title: "Tuned simulators", events: ["tuned", ...ENDS] },
+  { kind: "coordinates", title: "Simulators in parallel coordinates", events: ["tuned", "probed", ...ENDS] },
 ];
 
 /**

@@ -5,10 +5,14 @@ import { get } from "../../lib/api.js";
 import { h, refill, setText } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
 import { editNameAndNotes } from "../../lib/edit_dialog.js";
-import { age, count, percent, readableName, timeBetween } from "../../lib/format.js";
+import { age, count, evaluationsText, fixed, percent, readableName, timeBetween } from "../../lib/format.js";
 import { factItems, remarkBlocks } from "../../lib/head_parts.js";
-import { fraction, repetitionsDone, timeLeftFact } from "../../lib/progress.js";
+import { keepingButtons } from "../../lib/keeping.js";
+import { notesBlock } from "../../lib/markdown.js";
+import { newFromThis } from "../../lib/new_from_this.js";
+import { fraction, iterationsDone, repetitionsDone, rolloutsDone, timeLeftFact } from "../../lib/progress.js";
 import { ENDED, stateBadge } from "../../lib/state_badge.js";
+import { tagList } from "../../lib/tags.js";
 import { actions } from "./actions.js";
 
 /** @typedef {import("../../lib/head_parts.js").Fact} Fact */
@@ -22,7 +26,9 @@ import { actions } from "./actions.js";
 export function head(page) {
   const title = h("h1");
   const state = h("span", { class: "state-now", role: "status" });
-  const notes = h("p", { class: "notes" });
+  const notes = notesBlock(`/experiments/${page.id}`, page.signal);
+  const tags = tagList();
+  const keeping = keepingButtons(page, `/experiments/${page.id}`, () => keptOf(page.experiment));
   const bar = h("progress", { max: 1, "aria-label": "Progress" });
   const facts = h("dl", { class: "facts" });
   const remarks = h("div", { class: "remarks" });
@@ -33,21 +39,22 @@ export function head(page) {
     setText(title, readableName(experiment.name));
     const done = ENDED.includes(experiment.state) ? "" : `${percent(fraction(progress))} · `;
     document.title = `${done}${title.textContent} · gaplab`;
-    setText(notes, experiment.notes ?? "");
-    notes.hidden = !experiment.notes;
-    refill(state, experiment.state, () => stateBadge(experiment.state));
+    notes.update(experiment.notes);
+    tags.update(experiment.tags);
+    keeping.update();
+    refill(state, `${experiment.state} ${experiment.caveat}`, () => stateBadge(experiment.state, experiment.caveat));
     bar.value = fraction(progress);
-    const known = factsOf(experiment);
+    const known = factsOf(page);
     refill(facts, JSON.stringify(known), () => factItems(known));
     refill(remarks, JSON.stringify([warnings, reasons]), () =>
       remarkBlocks(warnings.map((text) => ({ text })), reasons.map((text) => ({ text }))));
     buttons.update();
   };
   const edit = () => editNameAndNotes(page, `/experiments/${page.id}`, () => page.experiment);
-  const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name and notes");
+  const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name, notes and tags");
   update();
-  const element = h("header", { class: "experiment-head" }, trail(page), h("div", { class: "titled" }, title, state, editButton),
-    h("p", { class: "what" }, summary(page.experiment)), notes, bar, facts, remarks, buttons.element, links(page));
+  const element = h("header", { class: "experiment-head" }, trail(page), h("div", { class: "titled" }, title, state, tags.element, editButton, newFromThis(`/experiments/${page.id}`)),
+    h("p", { class: "what" }, summary(page.experiment)), notes.element, bar, facts, remarks, buttons.element, links(page), keeping.element);
   return { element, update };
 }
 
@@ -77,23 +84,26 @@ function trail({ experiment: { study }, signal }) {
 }
 
 /**
- * @param {Api.ExperimentRead} experiment
+ * @param {Page.ExperimentPage} page
  * @returns {Fact[]}
  */
-function factsOf(experiment) {
-  const { progress, max_parallel: maxParallel } = experiment;
-  const saved = progress.rollouts_saved ? `, ${count(progress.rollouts_saved)} not needed` : "";
+function factsOf({ experiment, unit }) {
+  const { progress, fitness, max_parallel: maxParallel } = experiment;
   const broken = progress.rollouts_failed ? `, physics failed in ${count(progress.rollouts_failed)}` : "";
   return [
     ["Done", percent(fraction(progress))],
     ["Repetitions", repetitionsDone(progress)],
-    ["Iterations", `${count(progress.iterations_done)} of ${count(progress.iterations)}`],
-    ["Rollouts", `${count(progress.rollouts_done)} of ${count(progress.rollouts)}${saved}${broken}`],
+    ...(progress.counted_iterations ? [/** @type {Fact} */ (["Iterations", iterationsDone(progress)])] : []),
+    ["Rollouts", `${rolloutsDone(progress)}${broken}`],
+    ...(fitness ? [/** @type {Fact} */ (["Fitness in reality", fitnessText(fitness, unit(experiment))])] : []),
     ...times(experiment),
     ["Priority", experiment.priority],
     ["At once", maxParallel === null ? "any number" : `at most ${count(maxParallel)}`],
   ];
 }
+
+/** @type {(fitness: Api.FitnessRead, unit: string) => string} */
+const fitnessText = ({ mean, evaluations, n }, unit) => `${fixed(mean)} ${unit} after ${evaluationsText(evaluations)} (mean of ${n})`;
 
 /**
  * @param {Api.ExperimentRead} experiment
@@ -113,5 +123,16 @@ function links({ id, isFunction }) {
     ? h("a", { href: `#/toy?experiment=${id}` }, "Step through the function")
     : h("a", { href: `#/replay?experiment=${id}` }, "Replay a controller");
   return h("p", { class: "links" }, h("a", { href: `#/compare?experiments=${id}` }, "Compare with others"), " ", replay, " ",
+    downloadLink("Report", `/experiments/${id}/report`, {}, `gaplab-${id}-report.html`, "Writing the report"), " ",
+    downloadLink("Report as PDF", `/experiments/${id}/report`, { format: "pdf" }, `gaplab-${id}-report.pdf`, "Writing the report"), " ",
     downloadLink("Archive of everything (.zip)", `/experiments/${id}/export`, {}, `gaplab-${id}.zip`));
 }
+
+/**
+ * Return what archiving and deleting must know of the experiment.
+ *
+ * @param {Api.ExperimentRead} experiment
+ */
+const keptOf = ({ name, state, progress, archived_at: archivedAt }) => ({
+  name, what: `${count(progress.repetitions)} repetitions`, hasEnded: ENDED.includes(state), isArchived: Boolean(archivedAt),
+});

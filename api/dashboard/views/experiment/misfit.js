@@ -8,7 +8,7 @@ import { empty } from "../../lib/placeholders.js";
 import { table } from "../../lib/table.js";
 
 const KINDS = ["tuned", "probed"];
-const NOTE = "Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound. Iteration 0 is not tuned.";
+const NOTE = "The error per sample is the root mean square over the samples. Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound. Iteration 0 is not tuned.";
 
 /**
  * Return the service's remarks, and a table with a row for each iteration.
@@ -25,7 +25,7 @@ export function misfit(page) {
       return;
     }
     const tunables = points[0].tunables.map(({ name }) => readableName(name));
-    const columns = ["Iteration", `Error on its samples (${unit})`, `Gap of what it evolved (${unit})`, ...tunables, "n"];
+    const columns = ["Iteration", `Error per sample (${unit})`, `Gap of what it evolved (${unit})`, ...tunables, "n"];
     place.replaceChildren(h("ul", { class: "misfit-remarks" }, ...remarks.map((remark) => h("li", {}, remark))),
       table("Misfit by iteration", columns, points.map(row)), h("p", { class: "note" }, NOTE));
   });

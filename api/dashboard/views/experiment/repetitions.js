@@ -32,7 +32,7 @@ export function repetitions(page) {
     /** @type {Api.RepetitionRead[]} */
     const loaded = await get(`/experiments/${page.id}/repetitions`, {}, page.signal);
     const focused = place.contains(document.activeElement) ? /** @type {HTMLElement} */ (document.activeElement).dataset.repetition : null;
-    place.replaceChildren(table("Repetitions", COLUMNS, loaded.slice(0, shown).map((repetition) => row(repetition, showAttempts))));
+    place.replaceChildren(table("Repetitions", COLUMNS, loaded.slice(0, shown).map((repetition) => row(repetition, page.experiment, showAttempts))));
     more.hidden = loaded.length <= shown;
     more.textContent = `Show more of ${count(loaded.length)}`;
     if (focused) /** @type {HTMLElement | null} */ (place.querySelector(`[data-repetition="${focused}"]`))?.focus();
@@ -47,14 +47,17 @@ export function repetitions(page) {
 
 /**
  * @param {Api.RepetitionRead} repetition
+ * @param {Api.ExperimentRead} experiment
  * @param {(number: number) => Promise<void>} showAttempts
  */
-function row({ number, state, attempts, started_at: started, ended_at: ended, ...others }, showAttempts) {
+function row({ number, state, attempts, started_at: started, ended_at: ended, ...others }, { direct, spec }, showAttempts) {
+  const done = Math.max(0, others.iterations_done - 1);  // number 0 is not counted
+  const caveat = state === "COMPLETED" && !direct && done < spec.iterations ? "stopped early" : null;
   const button = h("button", {
     type: "button", class: "link", dataset: { repetition: number }, "aria-label": `Attempts at repetition ${number}: ${attempts}`,
     onclick: () => showAttempts(number).catch(() => {}),
   }, attempts);
-  return [number, stateBadge(state), count(others.iterations_done), count(others.rollouts_done),
+  return [number, stateBadge(state, caveat), direct ? "–" : `${count(done)} of ${count(spec.iterations)}`, count(others.rollouts_done),
     attempts ? button : "0", started ? age(started) : "–", timeBetween(started, ended), others.error];
 }
 

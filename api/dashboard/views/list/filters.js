@@ -1,18 +1,18 @@
 // @ts-check
-/** The filters of the list: studies or experiments, in which state, with which strategy and words, in which order. */
+/** The filters of the list: all, studies or experiments, in which state, with which strategy and words, in which order. */
 
 import { h } from "../../lib/dom.js";
 import { readableName } from "../../lib/format.js";
 import { STATES } from "../../lib/state_badge.js";
 
-/** @typedef {{ show: "studies" | "experiments", sort: string, state: string, strategy: string, text: string }} Filters */
+/** @typedef {{ show: "all" | "studies" | "experiments", sort: string, state: string, strategy: string, text: string, q: string }} Filters */
 /** @typedef {[value: string, label: string][]} Choices */
 
 /** @type {Choices} */
 const STUDY_ORDERS = [["-created_at", "Newest first"], ["created_at", "Oldest first"], ["name", "By name"]];
-const ORDERS = { studies: STUDY_ORDERS, experiments: /** @type {Choices} */ ([...STUDY_ORDERS, ["strategy", "By strategy"], ["state", "By state"]]) };
+const ORDERS = { all: STUDY_ORDERS, studies: STUDY_ORDERS, experiments: /** @type {Choices} */ ([...STUDY_ORDERS, ["strategy", "By strategy"], ["state", "By state"]]) };
 const NEWEST_FIRST = "-created_at";
-const TYPING_MS = 250;
+const TYPING_MS = 350;
 
 /**
  * Return the filters in an address.
@@ -21,10 +21,11 @@ const TYPING_MS = 250;
  * @returns {Filters}
  */
 export function filtersOf(parameters) {
-  const show = parameters.get("show") === "experiments" ? "experiments" : "studies";
+  const wanted = parameters.get("show");
+  const show = wanted === "studies" || wanted === "experiments" ? wanted : "all";
   const order = ORDERS[show].find(([name]) => name === parameters.get("sort"));
   const value = (/** @type {string} */ name) => parameters.get(name) ?? "";
-  return { show, sort: order ? order[0] : NEWEST_FIRST, state: value("state"), strategy: value("strategy"), text: value("text") };
+  return { show, sort: order ? order[0] : NEWEST_FIRST, state: value("state"), strategy: value("strategy"), text: value("text"), q: value("q") };
 }
 
 /**
@@ -33,7 +34,7 @@ export function filtersOf(parameters) {
  * @param {Filters} filters
  */
 export function addressOf({ show, sort, ...others }) {
-  const values = { ...others, show: show === "studies" ? "" : show, sort: sort === NEWEST_FIRST ? "" : sort };
+  const values = { ...others, show: show === "all" ? "" : show, sort: sort === NEWEST_FIRST ? "" : sort };
   const query = new URLSearchParams(Object.entries(values).filter(([, value]) => value)).toString();
   return query ? `#/?${query}` : "#/";
 }
@@ -43,7 +44,7 @@ export function addressOf({ show, sort, ...others }) {
  *
  * @param {Filters} filters
  */
-export const isFiltered = ({ state, strategy, text }) => Boolean(state || strategy || text);
+export const isFiltered = ({ state, strategy, text, q }) => Boolean(state || strategy || text || q);
 
 /**
  * Return the form of the filters.
@@ -59,22 +60,24 @@ export function filterForm(filters, strategies, changed) {
     Object.assign(filters, changes);
     changed(filters);
   };
-  const kinds = /** @type {const} */ (["studies", "experiments"]).map((show) => {
+  const kinds = /** @type {const} */ (["all", "studies", "experiments"]).map((show) => {
     const press = () => change({ show, sort: NEWEST_FIRST });
     return h("button", { type: "button", "aria-pressed": String(filters.show === show), onclick: press }, readableName(show));
   });
   const type = () => {
     clearTimeout(typing);
-    typing = setTimeout(() => change({ text: search.value.trim() }), TYPING_MS);
+    const words = { text: "", q: search.value.trim() };
+    history.replaceState(null, "", addressOf({ ...filters, ...words }));  // at once, so that it can be copied
+    typing = setTimeout(() => change(words), TYPING_MS);
   };
-  const search = h("input", { type: "search", placeholder: "Name or id", "aria-label": "Search by name or id", maxlength: 200, oninput: type });
-  search.value = filters.text;
+  const search = h("input", { type: "search", placeholder: "Words, or a query like tag = gait", "aria-label": "Search by words or a query", maxlength: 1000, oninput: type });
+  search.value = filters.q || filters.text;
   /** @type {Choices} */
   const states = STATES.map((state) => [state, readableName(state.toLowerCase())]);
   /** @type {Choices} */
   const names = strategies.map((name) => [name, readableName(name)]);
   return h("form", { class: "filters", role: "search", onsubmit: (event) => event.preventDefault() },
-    h("div", { class: "segments", role: "group", "aria-label": "Studies or experiments" }, ...kinds), search,
+    h("div", { class: "segments", role: "group", "aria-label": "All, studies or experiments" }, ...kinds), search,
     select("State", filters.state, [["", "Any state"], ...states], (state) => change({ state })),
     select("Strategy", filters.strategy, [["", "Any strategy"], ...names], (strategy) => change({ strategy })),
     select("Order", filters.sort, ORDERS[filters.show], (sort) => change({ sort })));

@@ -2,9 +2,10 @@
 /** Rows of the list: a study, which can be unfolded, and an experiment, by itself or below its study. */
 
 import { h, refill, setText } from "../../lib/dom.js";
-import { age, fixed, readableName } from "../../lib/format.js";
+import { age, evaluationsText, fixed, readableName } from "../../lib/format.js";
 import { progressBar, timeLeft } from "../../lib/progress.js";
 import { stateBadge } from "../../lib/state_badge.js";
+import { tagList } from "../../lib/tags.js";
 import { tickBox } from "./selection.js";
 
 /**
@@ -21,7 +22,7 @@ import { tickBox } from "./selection.js";
 const COLUMNS = [
   { label: "", key: "ticks" }, { label: "Name", key: "name" }, { label: "State", key: "stands" }, { label: "Progress", key: "progress" },
   { label: "Time left", key: "left", wide: true },
-  { label: "Best fitness", key: "best", title: "Best recorded fitness so far, on average over repetitions; of a study, that of its best experiment" },
+  { label: "Fitness", key: "best", title: "Mean fitness in reality over repetitions, as on the curve, after the number of real-world evaluations beside it; of a study, that of its best experiment" },
   { label: "Submitted", key: "age", wide: true },
 ];
 
@@ -38,7 +39,7 @@ export const headCells = () => COLUMNS.map((column) =>
  * @property {string} link
  * @property {string} subtitle
  * @property {string[]} ids of the experiments that its box ticks
- * @property {number | null} best
+ * @property {Api.FitnessRead | Api.BestRead | null} fitness
  * @property {string} unit
  */
 
@@ -54,26 +55,41 @@ function baseRow(cssClass, name, list, toggle = null) {
   const box = tickBox(`Select ${name}`, list.ticked);
   const link = h("a", {});
   const subtitle = h("span", { class: "sub" });
+  const tags = tagList();
   const bar = progressBar(`Progress of ${name}`);
   const cells = Object.fromEntries(COLUMNS.map((column) => [column.key, h("td", { class: classOf(column) })]));
   cells.ticks.append(box.element);
-  cells.name.append(h("div", { class: "named" }, toggle, h("span", {}, link, subtitle)));
+  cells.name.append(h("div", { class: "named" }, toggle, h("span", {}, link, tags.element, subtitle)));
   cells.progress.append(bar.element);
   const element = h("tr", { class: cssClass }, ...Object.values(cells));
   /** @type {(item: Api.StudyRead | Api.ExperimentRead, content: Content) => void} */
-  const update = (item, { title, link: address, subtitle: words, ids, best, unit }) => {
+  const update = (item, { title, link: address, subtitle: words, ids, fitness, unit }) => {
     setText(link, title);
     link.href = address;
     setText(subtitle, words);
+    tags.update(item.tags);
     box.update(ids);
     bar.update(item.progress);
-    refill(cells.stands, item.state, () => stateBadge(item.state));
+    refill(cells.stands, `${item.state} ${item.caveat}`, () => stateBadge(item.state, item.caveat));
     setText(cells.left, timeLeft(item));
-    refill(cells.best, `${best} ${unit}`, () => (best === null ? "–" : [fixed(best), h("span", { class: "unit" }, ` ${unit}`)]));
+    refill(cells.best, JSON.stringify([fitness, unit]), () => fitnessParts(fitness, unit));
     setText(cells.age, age(item.created_at));
     cells.age.title = new Date(item.created_at).toLocaleString();
   };
   return { element, update };
+}
+
+/**
+ * Return a fitness with its number of real-world evaluations; a dash without a result.
+ *
+ * @param {Api.FitnessRead | Api.BestRead | null} fitness
+ * @param {string} unit
+ */
+function fitnessParts(fitness, unit) {
+  if (!fitness) return "–";
+  const by = "name" in fitness ? `${readableName(fitness.name)}: ` : "";
+  const title = `${by}mean of ${fitness.n} after ${evaluationsText(fitness.evaluations)}`;
+  return h("span", { title }, fixed(fitness.mean), h("span", { class: "unit" }, ` ${unit}`), h("small", { class: "at" }, ` at ${fitness.evaluations}`));
 }
 
 /**
@@ -89,14 +105,13 @@ export function studyRow(first, list) {
   const update = (/** @type {{ value: Api.StudyRead }} */ { value: study }) => {
     toggle.setAttribute("aria-expanded", String(list.unfolded.has(study.id)));
     toggle.setAttribute("aria-label", `Experiments of ${study.name}`);
-    const fitnesses = study.experiments.map(({ best_fitness: best }) => best).filter((best) => best !== null);
     const count = study.experiments.length;
     row.update(study, {
       title: study.name,
       link: `#/studies/${study.id}`,
       subtitle: `${count} ${count === 1 ? "experiment" : "experiments"}${worlds(study.experiments[0])}`,
       ids: study.experiments.map(({ id }) => id),
-      best: fitnesses.length ? Math.max(...fitnesses) : null,
+      fitness: study.best,
       unit: list.unit(study.experiments[0]),
     });
   };
@@ -115,9 +130,9 @@ export function experimentRow({ value: first, isNested = false }, list) {
   const update = (/** @type {ExperimentItem} */ { value: experiment }) => row.update(experiment, {
     title: readableName(experiment.name),
     link: `#/experiments/${experiment.id}`,
-    subtitle: isNested ? "" : `${readableName(experiment.strategy)}${worlds(experiment)}`,
+    subtitle: isNested ? "" : `${experiment.study ? "" : "Single experiment · "}${readableName(experiment.strategy)}${worlds(experiment)}`,
     ids: [experiment.id],
-    best: experiment.best_fitness,
+    fitness: experiment.fitness,
     unit: list.unit(experiment),
   });
   return { element: row.element, update };

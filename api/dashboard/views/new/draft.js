@@ -67,10 +67,11 @@ function strategyDrafts(given, catalogue) {
  */
 function tunableDrafts(given, catalogue) {
   const named = given.map((tunable) => (typeof tunable === "string" ? { name: tunable } : tunable));
-  return catalogue.tunables.map(({ name }) => {
-    const tunable = named.find((other) => other.name === name);
-    return { name, on: Boolean(tunable), lower: tunable?.lower ?? "", upper: tunable?.upper ?? "" };
-  });
+  const others = catalogue.tunables.filter(({ name }) => !named.some((tunable) => tunable.name === name));
+  return [  // their order changes the random numbers of a study
+    ...named.map(({ name, lower = "", upper = "" }) => ({ name, on: true, lower, upper })),
+    ...others.map(({ name }) => ({ name, on: false, lower: "", upper: "" })),
+  ];
 }
 
 /**

@@ -4,10 +4,14 @@
 import { h, refill, setText } from "../../lib/dom.js";
 import { downloadLink } from "../../lib/downloads.js";
 import { editNameAndNotes } from "../../lib/edit_dialog.js";
-import { age, count, fixed, readableName } from "../../lib/format.js";
+import { age, count, evaluationsText, fixed, readableName } from "../../lib/format.js";
 import { factItems, remarkBlocks } from "../../lib/head_parts.js";
-import { progressBar, repetitionsDone, timeLeftFact } from "../../lib/progress.js";
-import { stateBadge } from "../../lib/state_badge.js";
+import { keepingButtons } from "../../lib/keeping.js";
+import { notesBlock } from "../../lib/markdown.js";
+import { newFromThis } from "../../lib/new_from_this.js";
+import { iterationsDone, progressBar, repetitionsDone, rolloutsDone, timeLeftFact } from "../../lib/progress.js";
+import { ENDED, stateBadge } from "../../lib/state_badge.js";
+import { tagList } from "../../lib/tags.js";
 import { actions } from "./actions.js";
 
 /** @typedef {import("../../lib/head_parts.js").Fact} Fact */
@@ -21,7 +25,9 @@ import { actions } from "./actions.js";
 export function head(page) {
   const title = h("h1");
   const state = h("span", { class: "state-now", role: "status" });
-  const notes = h("p", { class: "notes" });
+  const notes = notesBlock(`/studies/${page.id}`, page.signal);
+  const tags = tagList();
+  const keeping = keepingButtons(page, `/studies/${page.id}`, () => keptOf(page.study));
   const bar = progressBar("Progress");
   const facts = h("dl", { class: "facts" });
   const remarks = h("div", { class: "remarks" });
@@ -30,9 +36,10 @@ export function head(page) {
     const { study } = page;
     setText(title, study.name);
     document.title = `${study.name} · gaplab`;
-    setText(notes, study.notes ?? "");
-    notes.hidden = !study.notes;
-    refill(state, study.state, () => stateBadge(study.state));
+    notes.update(study.notes);
+    tags.update(study.tags);
+    keeping.update();
+    refill(state, `${study.state} ${study.caveat}`, () => stateBadge(study.state, study.caveat));
     bar.update(study.progress);
     const known = factsOf(page);
     refill(facts, JSON.stringify(known), () => factItems(known));
@@ -44,9 +51,9 @@ export function head(page) {
   const edit = () => editNameAndNotes(page, `/studies/${page.id}`, () => page.study);
   update();
   const trail = h("nav", { "aria-label": "Place", class: "trail" }, h("a", { href: "#/" }, "Studies"));
-  const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name and notes");
-  const element = h("header", { class: "experiment-head" }, trail, h("div", { class: "titled" }, title, state, editButton),
-    notes, h("div", { class: "whole" }, bar.element), facts, remarks, buttons.element, links(page));
+  const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name, notes and tags");
+  const element = h("header", { class: "experiment-head" }, trail, h("div", { class: "titled" }, title, state, tags.element, editButton, newFromThis(`/studies/${page.id}`)),
+    notes.element, h("div", { class: "whole" }, bar.element), facts, remarks, buttons.element, links(page), keeping.element);
   return { element, update };
 }
 
@@ -56,19 +63,28 @@ export function head(page) {
  */
 function factsOf({ study, unit }) {
   const { progress, experiments } = study;
-  const [best] = experiments.filter(hasFitness).sort((a, b) => b.best_fitness - a.best_fitness);
   const ended = experiments.filter(({ ended_at: endedAt }) => endedAt).length;
   return [
     ["Experiments", `${count(ended)} of ${count(experiments.length)} ended`],
     ["Repetitions", repetitionsDone(progress)],
-    ["Rollouts", `${count(progress.rollouts_done)} of ${count(progress.rollouts)}, ${count(progress.rollouts_saved)} not needed`],
-    ...(best ? [/** @type {Fact} */ (["Best fitness", `${fixed(best.best_fitness)} ${unit(best)} by ${readableName(best.name)}`])] : []),
+    ...(progress.counted_iterations ? [/** @type {Fact} */ (["Iterations", iterationsDone(progress)])] : []),
+    ["Rollouts", rolloutsDone(progress)],
+    ...bestFact(study, unit(experiments[0])),
     ...times(study),
   ];
 }
 
-/** @type {(experiment: Api.ExperimentRead) => experiment is Api.ExperimentRead & { best_fitness: number }} */
-const hasFitness = (experiment) => experiment.best_fitness !== null;
+/**
+ * Return the fittest experiment after the last number of evaluations that all share, as in the figure of the curves.
+ *
+ * @param {Api.StudyRead} study
+ * @param {string} unit
+ * @returns {Fact[]}
+ */
+function bestFact({ best }, unit) {
+  if (!best) return [];
+  return [["Best fitness", `${fixed(best.mean)} ${unit} by ${readableName(best.name)}, after ${evaluationsText(best.evaluations)} (mean of ${best.n})`]];
+}
 
 /**
  * @param {Api.StudyRead} study
@@ -100,5 +116,19 @@ export function gathered({ experiments }, textsOf) {
 function links({ id, study }) {
   const ids = study.experiments.map((experiment) => experiment.id).join(",");
   return h("p", { class: "links" }, h("a", { href: `#/compare?experiments=${ids}` }, "Compare its experiments"),
+    " ", downloadLink("Report", `/studies/${id}/report`, {}, `gaplab-${id}-report.html`, "Writing the report"),
+    downloadLink("Report as PDF", `/studies/${id}/report`, { format: "pdf" }, `gaplab-${id}-report.pdf`, "Writing the report"),
     downloadLink("Archive of everything (.zip)", `/studies/${id}/export`, {}, `gaplab-${id}.zip`));
 }
+
+/**
+ * Return what archiving and deleting must know of the study.
+ *
+ * @param {Api.StudyRead} study
+ */
+const keptOf = ({ name, experiments, progress, archived_at: archivedAt }) => ({
+  name,
+  what: `${count(experiments.length)} experiments and ${count(progress.repetitions)} repetitions`,
+  hasEnded: experiments.every(({ state }) => ENDED.includes(state)),
+  isArchived: Boolean(archivedAt),
+});

@@ -1,0 +1,40 @@
+"""Replays of controllers, as data and as videos."""
+
+from pathlib import Path
+
+from gaplab.api.clients.connection import Connection, segment
+from gaplab.schemas.replays import Replay
+
+FORMATS = ("gif", "webp", "mp4")
+
+
+class Replays:
+    """Replays, which the service computes on request."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def replay(self, id: str, **choice: int | str | None) -> Replay:
+        """Return the motion of a controller in its simulator and in reality.
+
+        Args:
+            id: id of an experiment.
+            choice: repetition, iteration, kind ("transfer" or "sample") and simulator, as in the API.
+        """
+        return self._connection.get(Replay, f"/experiments/{segment(id)}/replay", **choice)
+
+    def video(self, id: str, file: str | Path, **choice: int | str | None) -> Path:
+        """Write a replay into a file with the suffix .gif, .webp or .mp4.
+
+        Args:
+            id: id of an experiment.
+            file: file to write; missing folders are created.
+            choice: as for `replay`, and width in pixels.
+        """
+        path = Path(file)
+        if (format_ := path.suffix.removeprefix(".").lower()) not in FORMATS:
+            raise ValueError(f"{path} has no suffix of a video; permitted: {', '.join(FORMATS)}")
+        content = self._connection.get_bytes(f"/experiments/{segment(id)}/video", format=format_, **choice)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+        return path

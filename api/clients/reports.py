@@ -1,0 +1,31 @@
+"""Reports and verdicts, which the service computes."""
+
+from pathlib import Path
+
+from gaplab.api.clients.connection import Connection
+from gaplab.api.clients.records import Records, path_of
+from gaplab.schemas.reports import VerdictRead
+
+FORMATS = ("html", "pdf")
+
+
+class Reports:
+    """Reports on studies and experiments."""
+
+    def __init__(self, connection: Connection, records: Records) -> None:
+        self._connection = connection
+        self._records = records
+
+    def verdict(self, id: str) -> VerdictRead:
+        """Return the verdict on a study or an experiment: what its curves and tests say, in words."""
+        return self._connection.get(VerdictRead, f"{path_of(self._records.find(id))}/report", format="json")
+
+    def save(self, id: str, file: str | Path) -> Path:
+        """Write the report on a study or an experiment into a file with the suffix .html or .pdf."""
+        path = Path(file)
+        if (format_ := path.suffix.removeprefix(".").lower()) not in FORMATS:
+            raise ValueError(f"{path} has no suffix of a report; permitted: {', '.join(FORMATS)}")
+        content = self._connection.get_bytes(f"{path_of(self._records.find(id))}/report", format=format_)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+        return path

@@ -1,0 +1,80 @@
+"""The command that compares settings."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.markup import escape
+
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.progress.text import console
+from gaplab.api.clients.records import experiments_of
+from gaplab.api.commands import completion, tables
+from gaplab.api.commands.app import RESULTS, AsJson, Url, app, connect
+from gaplab.api.commands.json_output import print_json
+from gaplab.api.commands.spec_columns import column_of
+from gaplab.schemas.differences import SpecDiff, Values
+from gaplab.services.specs.differences import SpecColumn, differences
+
+FILES = {".zip", ".json"}
+
+Compared = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="ID|FILE...",
+        help="studies, experiments, archives (.zip) or specs (.json); a single study is compared within",
+        autocompletion=completion.ids,
+    ),
+]
+
+
+@app.command(rich_help_panel=RESULTS)
+def diff(of: Compared, as_json: AsJson = False, url: Url = None) -> None:
+    """Show the settings in which studies, experiments, archives or specs differ."""
+    if any(Path(name).suffix in FILES for name in of):
+        found = _with_files(of, url)
+    else:
+        with connect(url) as client:
+            found = client.diff(*of)
+    if as_json:
+        print_json(found)
+        return
+    columns = ("setting", *(escape(column.name) for column in found.columns))
+    rows = ((escape(each.setting), *map(_cell, each.values)) for each in found.settings)
+    console().print(tables.table(columns, rows) if found.settings else "No setting differs.")
+    typer.echo(_equal(found))
+
+
+def _with_files(names: list[str], url: str | None) -> SpecDiff:
+    """Compare what files and the service have; without ids, no service is needed."""
+    files = {name: column_of(Path(name)) for name in names if Path(name).suffix in FILES}
+    if len(files) == len(names):
+        columns = [files[name] for name in names]
+    else:
+        with connect(url) as client:
+            columns = [files.get(name) or _stored(client, name) for name in names]
+    if len(columns) == 1:
+        columns = [SpecColumn(f"{at}", spec["name"], (spec,)) for at, spec in enumerate(columns[0].specs)]
+    return differences(columns)
+
+
+def _stored(client: Client, id: str) -> SpecColumn:
+    record = client.find(id)
+    return SpecColumn(record.id, record.name, tuple(experiment.spec for experiment in experiments_of(record)))
+
+
+def _cell(values: Values) -> str:
+    return escape(", ".join(map(_written, values))) or "-"
+
+
+def _written(value: Any) -> str:  # noqa: ANN401 - JSON
+    if isinstance(value, list):
+        return " + ".join(map(_written, value))
+    if value is None or isinstance(value, bool):
+        return {None: "none", True: "yes", False: "no"}[value]
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _equal(found: SpecDiff) -> str:
+    hidden = f"; {len(found.hidden)} parameters of reality are hidden until the end" if found.hidden else ""
+    return f"{found.equal} other settings are equal{hidden}."

@@ -1,0 +1,73 @@
+"""Commands for authors of plug-ins."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+from rich.markup import escape
+
+from gaplab.api.clients.progress.text import console
+from gaplab.api.commands.app import PLUGINS, AsJson, app
+from gaplab.api.commands.exit_codes import Exit
+from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.services.plugins import folders
+
+if TYPE_CHECKING:
+    from gaplab.services.contract.files import Checked
+
+Kind = Literal["strategy", "robot", "engine", "tunable", "optimizer"]
+
+plugin = typer.Typer(help="Write your own plug-ins, and check them.", no_args_is_help=True)
+app.add_typer(plugin, name="plugin", rich_help_panel=PLUGINS)
+
+
+@plugin.command()
+def new(
+    kind: Annotated[Kind, typer.Argument(help="kind of the plug-in")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="name in specs, and of the file")],
+    folder: Annotated[
+        Path | None,
+        typer.Option(help="folder of the file; left out: the first of GAPLAB_PLUGINS, or plugins", show_default=False),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write a plug-in that runs, to change into your own."""
+    from gaplab.services.contract.files import write_skeleton
+    from gaplab.services.core.external_plugins import named_folders
+
+    folders.find()
+    named = named_folders()
+    file = write_skeleton(kind, name, folder or (named[0] if named else Path("plugins")))
+    is_found = file.absolute().parent in named
+    start = "" if is_found else f"\nLet the service find it: export GAPLAB_PLUGINS={file.absolute().parent}"
+    print_result({"file": str(file)}, f"Wrote {file}. Check it: gaplab plugin check {file}{start}", as_json=as_json)
+
+
+@plugin.command()
+def check(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="a Python file, or the folder of a package")],
+    as_json: AsJson = False,
+) -> None:
+    """Check whether the plug-ins in a file keep the contract of their kind."""
+    from gaplab.services.contract.files import check_file
+
+    folders.find()
+    found = list(check_file(file))
+    if as_json:
+        print_json(found)
+    else:
+        console().print(*(line for each in found for line in _lines(each)), sep="\n", soft_wrap=True)
+    if not all(each.passes for each in found):
+        raise typer.Exit(Exit.FAILED)
+
+
+def _lines(found: "Checked") -> Iterator[str]:
+    yield f"[bold]{found.kind} {escape(found.name)}[/]"
+    if found.unusable:
+        yield f"  [bold red]unusable[/]: {escape(found.unusable)}"
+    for result in found.results:
+        if result.reason is None:
+            yield f"  [green]ok[/]     {escape(result.promise)}"
+        else:
+            yield f"  [bold red]FAILED[/] {escape(result.promise)}: {escape(result.reason)}"

@@ -1,0 +1,38 @@
+"""The command that writes reports."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gaplab.api.clients.reports import FORMATS
+from gaplab.api.commands.app import RESULTS, AsJson, Id, Url, app, connect
+from gaplab.api.commands.json_output import print_json
+
+
+@app.command(rich_help_panel=RESULTS)
+def report(
+    id: Id,
+    save: Annotated[
+        list[Path] | None,
+        typer.Option("--save", "-o", help=f"file; its suffix is the format: {', '.join(FORMATS)}; repeatable"),
+    ] = None,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Print the verdict on a study or an experiment, or save its report: figures, tables, tests, provenance."""
+    for file in save or []:
+        if file.suffix.removeprefix(".").lower() not in FORMATS:
+            msg = f"{file} has no suffix of a report; permitted: {', '.join(FORMATS)}"
+            raise typer.BadParameter(msg, param_hint="--save")
+    with connect(url) as client:
+        verdict = client.verdict(id)
+        files = [client.reports.save(id, file) for file in save or []]
+    if as_json:
+        print_json(verdict)
+    else:
+        typer.echo(verdict.headline)
+        for sentence in () if files else verdict.sentences:
+            typer.echo(f"- {sentence}")
+    for file in files:
+        typer.echo(f"Wrote {file}.", err=as_json)

@@ -1,0 +1,77 @@
+"""The command that computes an archive again."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from gaplab.api.clients.progress.text import console
+from gaplab.api.commands.app import KEEPING, AsJson, Url, app, connect
+from gaplab.api.commands.exit_codes import Exit
+from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.submission import submit_confirmed
+from gaplab.schemas.reruns import RepetitionRerun, RerunRead
+from gaplab.services.plugins import folders
+
+COLORS = {"same": "green", "different": "bold red", "not computed": "yellow"}
+
+
+@app.command(rich_help_panel=KEEPING)
+def rerun(
+    file: Annotated[Path, typer.Argument(metavar="ARCHIVE", help="an archive of `gaplab export`")],
+    verify: Annotated[
+        bool, typer.Option("--verify", help="compute it on this machine, without a service, and compare every bit")
+    ] = False,
+    repetitions: Annotated[
+        int | None, typer.Option(min=1, help="of each experiment to verify; left out: all", show_default=False)
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask, however long it takes")] = False,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Submit the spec of an archive again, or verify its results on this machine."""
+    folders.load()
+    if verify:
+        _verify(file, repetitions, as_json=as_json)
+        return
+    from gaplab.services.archives.rerunning import submitted_spec
+
+    with file.open("rb") as source:
+        spec = submitted_spec(source)
+    with connect(url) as client:
+        record = submit_confirmed(client, spec, yes=yes)
+    print_result(record, record.id, as_json=as_json)
+
+
+def _verify(file: Path, repetitions: int | None, *, as_json: bool) -> None:
+    from gaplab.services.archives.rerunning import verify as recompute  # pulls in the physics
+
+    screen = console(stderr=as_json)
+
+    def show(result: RepetitionRerun) -> None:
+        screen.print(_line(result), soft_wrap=True)
+
+    with file.open("rb") as source:
+        found = recompute(source, most=repetitions, computed=show)
+    if as_json:
+        print_json(found)
+    else:
+        screen.print(*_summary(found), sep="\n", soft_wrap=True, markup=False)
+    if found.different or not found.same:
+        raise typer.Exit(Exit.FAILED)
+
+
+def _line(result: RepetitionRerun) -> str:
+    outcome = f"[{COLORS[result.outcome]}]{result.outcome}[/]"
+    reason = f": {escape(result.reason)}" if result.reason else ""
+    steps = f"{result.steps} of {result.stored_steps} steps"
+    return f"{escape(result.name)} {result.repetition}: {outcome}, {steps}{reason}"
+
+
+def _summary(found: RerunRead) -> list[str]:
+    total = len(found.repetitions)
+    lines = [f"{found.same} of {total} repetitions have the same bits."]
+    lines += [f"{found.different} differ."] if found.different else []
+    lines += [f"{found.not_computed} could not be computed."] if found.not_computed else []
+    return [*lines, *(f"Other versions: {text}" for text in found.other_versions)]

@@ -1,0 +1,75 @@
+"""Reports: a study or an experiment as one document, with a verdict in words."""
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Response
+from pydantic import Field
+
+from gaplab.api.http.dependencies import Id, Parameters, StoreDep
+from gaplab.api.http.figures import in_turn
+from gaplab.api.http.problems import Responses, documented
+from gaplab.api.http.security_headers import page
+from gaplab.schemas.reports import VerdictRead
+from gaplab.services.reports.blocks import Report
+from gaplab.services.reports.content import experiment_verdict, study_verdict
+from gaplab.services.reports.document import experiment_report, study_report
+from gaplab.services.reports.html import render_html
+from gaplab.services.reports.pdf import render_pdf
+from gaplab.services.store.session import Store
+
+router = APIRouter(tags=["reports"])
+
+_FORMATS = "one HTML file without scripts, which prints well; PDF; or JSON with the verdict alone"
+_CONTENT = {
+    "text/html": {"schema": {"type": "string"}, "example": "<!doctype html><html lang='en'>…"},
+    "application/pdf": {"schema": {"type": "string", "format": "binary"}, "example": "%PDF…"},
+}
+_RESPONSES: Responses = {
+    200: {"description": _FORMATS.capitalize(), "content": _CONTENT},
+    **documented(404, 422, 429),
+}
+
+
+class ReportQuery(Parameters):
+    """The format of a report."""
+
+    format: Literal["html", "pdf", "json"] = Field(default="html", description=_FORMATS)
+
+
+@router.get("/studies/{id}/report", summary="Report on a study", response_model=VerdictRead, responses=_RESPONSES)
+def report_study(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]) -> VerdictRead | Response:
+    """Return verdict, curves, tests, simulators, sensitivity, cost, settings and provenance in one document.
+
+    The verdict follows from rules that the report states: which strategies differ, and whether each curve still rises,
+    or is flat since some iteration and not worth continuing.
+    """
+    if query.format == "json":
+        return study_verdict(store, id)
+    return _answer(store, id, study_report, query.format)
+
+
+@router.get(
+    "/experiments/{id}/report", summary="Report on an experiment", response_model=VerdictRead, responses=_RESPONSES
+)
+def report_experiment(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]) -> VerdictRead | Response:
+    """Return verdict, curve, simulators, sensitivity, cost, settings and provenance in one document."""
+    if query.format == "json":
+        return experiment_verdict(store, id)
+    return _answer(store, id, experiment_report, query.format)
+
+
+def _answer(
+    store: Store, id_: str, report_of: Callable[[Store, str], Report], format_: Literal["html", "pdf"]
+) -> Response:
+    report, at = report_of(store, id_), datetime.now(UTC)
+    made = f"Made by gaplab {version('gaplab')} on {at:%Y-%m-%d at %H:%M} UTC, from what was stored by then."
+    name = f'inline; filename="gaplab-{report.id}-report.{format_}"'
+    if format_ == "html":
+        answer: Response = page(in_turn(lambda: render_html(report, made)))
+    else:
+        answer = Response(in_turn(lambda: render_pdf(report, made, at)), media_type="application/pdf")
+    answer.headers["Content-Disposition"] = name
+    return answer

@@ -1,0 +1,45 @@
+"""Settings in which studies and experiments differ."""
+
+from typing import Any
+
+from pydantic import Field
+
+from gaplab.schemas.base import Frozen, Id, Name
+
+Values = tuple[Any, ...]
+
+
+class DiffColumn(Frozen):
+    """A study or an experiment whose settings are compared."""
+
+    id: Id
+    name: Name
+    experiments: int = Field(description="number of its experiments", examples=[3])
+
+
+class SettingRead(Frozen):
+    """A setting with different values."""
+
+    pointer: str = Field(
+        description="JSON Pointer into the resolved spec of the first column that has the setting",
+        examples=["/budget/simulator_evaluations"],
+    )
+    setting: str = Field(description="the setting in words", examples=["simulator evaluations of the budget"])
+    values: tuple[Values, ...] = Field(
+        description="by column: the distinct values of its experiments; empty if it has no such setting; "
+        "null in a parameter of reality: hidden",
+        examples=[((400,), (800,))],
+    )
+
+
+class SpecDiff(Frozen):
+    """The settings that differ. Names and the schedule change no number, so they are no settings."""
+
+    columns: tuple[DiffColumn, ...]
+    settings: tuple[SettingRead, ...] = Field(description="in the order of the spec; empty if all are equal")
+    equal: int = Field(description="number of the other settings", examples=[31])
+    hidden: tuple[str, ...] = Field(
+        default=(),
+        description="pointers of parameters of reality that are still hidden in a column, so they cannot be compared",
+        examples=[("/reality/parameters/restitution",)],
+    )

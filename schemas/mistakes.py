@@ -1,0 +1,105 @@
+"""Mistakes that pydantic finds, in plain words: the place, what is permitted there, and the value."""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+LONGEST_VALUE = 60
+"""Most characters of a value in a sentence."""
+
+PERMITTED = {
+    "int_type": "a whole number",
+    "int_parsing": "a whole number",
+    "int_parsing_size": "a whole number with fewer digits",
+    "int_from_float": "a whole number",
+    "float_type": "a finite number",
+    "float_parsing": "a finite number",
+    "finite_number": "a finite number",
+    "string_type": "text",
+    "bool_parsing": "true or false",
+    "bool_type": "true or false",
+    "dict_type": "an object",
+    "model_type": "an object",
+    "model_attributes_type": "an object",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "greater_than": "above {gt}",
+    "greater_than_equal": "at least {ge}",
+    "less_than": "below {lt}",
+    "less_than_equal": "at most {le}",
+    "too_short": "at least {min_length}",
+    "too_long": "at most {max_length}",
+    "string_too_short": "at least {min_length} characters",
+    "string_too_long": "at most {max_length} characters",
+}
+"""What is permitted, by pydantic's type of error."""
+
+LENGTHS = {
+    "too_short": ("at least", "min_length", "item"),
+    "too_long": ("at most", "max_length", "item"),
+    "string_too_short": ("at least", "min_length", "character"),
+    "string_too_long": ("at most", "max_length", "character"),
+}
+"""Bound, limit and unit of a length, by pydantic's type of error."""
+
+
+def permitted_by(error: Mapping[str, Any]) -> tuple[str, ...] | str | None:
+    """Return what is permitted in the place of an error: a description, or all permitted texts."""
+    context = error.get("ctx", {})
+    if error["type"] in {"literal_error", "enum"}:
+        return tuple(re.findall(r"'([^']*)'", context["expected"]))
+    template = PERMITTED.get(error["type"])
+    return template.format(**context) if template else None
+
+
+def sentence(error: Mapping[str, Any], place: Sequence[str | int] | None = None) -> str:
+    """Return an error of pydantic as a sentence without a full stop.
+
+    Args:
+        error: an item of `ValidationError.errors()`.
+        place: names and numbers that lead to the value; left out: `loc` of the error.
+    """
+    kind, context = error["type"], error.get("ctx", {})
+    subject = _subject(error["loc"] if place is None else place)
+    if kind == "missing":
+        return f"{subject} is missing"
+    if kind in LENGTHS:
+        bound, limit, unit = LENGTHS[kind]
+        items = f"{context[limit]} {unit}{'' if context[limit] == 1 else 's'}"
+        return f"{subject} must have {bound} {items}{_not_length(error)}"
+    if kind == "string_pattern_mismatch":
+        return f"{subject} must match {context['pattern']}{_not(error)}"
+    permitted = permitted_by(error)
+    if permitted is None:
+        return str(error["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, ")
+    return f"{subject} must be {permitted if isinstance(permitted, str) else _one_of(permitted)}{_not(error)}"
+
+
+def _subject(place: Sequence[str | int]) -> str:
+    """Return the name of a place: the field, with the number of an item; "it" for the whole."""
+    names = [part for part in place if isinstance(part, str)]
+    if not names:
+        return "it"
+    return f"item {place[-1]} of {names[-1]}" if isinstance(place[-1], int) else names[-1]
+
+
+def _one_of(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"one of {', '.join(names)}"
+
+
+def _not_length(error: Mapping[str, Any]) -> str:
+    given = error.get("input")
+    length = error.get("ctx", {}).get("actual_length", len(given) if isinstance(given, str) else None)
+    return "" if length is None else f", not {length:,}"
+
+
+def _not(error: Mapping[str, Any]) -> str:
+    """Return the refused value, shortened; nothing if the error does not have it."""
+    if "input" not in error:
+        return ""
+    try:
+        value = json.dumps(error["input"], ensure_ascii=False, default=str)
+    except (ValueError, RecursionError):
+        return ""
+    return f", not {value if len(value) <= LONGEST_VALUE else f'{value[:LONGEST_VALUE]}…'}"

@@ -1,0 +1,36 @@
+"""Differences between two steps of a log, to the last bit."""
+
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from itertools import zip_longest
+from math import isnan
+
+import numpy as np
+
+from gaplab.services.core.types import Step
+
+
+def difference(stored: Step, computed: Step) -> str | None:
+    """Return the first number that differs, with both values; None if all numbers have the same bits."""
+    if type(stored) is not type(computed):
+        return f"it is {type(computed).__name__} here, and {type(stored).__name__} in the archive"
+    for (place, before), (other, now) in zip_longest(_numbers(stored), _numbers(computed), fillvalue=("", 0.0)):
+        if place != other or not _same_bits(before, now):
+            return f"{place or other} is {now!r} here, and {before!r} in the archive"
+    return None
+
+
+def _numbers(value: object, place: str = "") -> Iterator[tuple[str, float]]:
+    """Yield every number in a step with its place, like `simulators[0].squared_error`."""
+    if is_dataclass(value):
+        for field in fields(value):
+            yield from _numbers(getattr(value, field.name), f"{place}.{field.name}" if place else field.name)
+    elif isinstance(value, tuple | np.ndarray):
+        for index, item in enumerate(value):
+            yield from _numbers(item, f"{place}[{index}]")
+    else:
+        yield place, float(value)  # type: ignore[arg-type] # steps have numbers only
+
+
+def _same_bits(one: float, other: float) -> bool:
+    return np.float64(one).tobytes() == np.float64(other).tobytes() or (isnan(one) and isnan(other))

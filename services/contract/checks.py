@@ -1,0 +1,58 @@
+"""Checks of plug-ins, by kind, and their results."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from inspect import getdoc
+from traceback import extract_tb
+from typing import Any
+
+from gaplab.services.contract import engines, optimizers, robots, strategies, tunables
+
+Check = Callable[[type[Any]], None]
+
+CHECKS: dict[str, tuple[Check, ...]] = {
+    "strategy": strategies.CHECKS,
+    "robot": robots.CHECKS,
+    "engine": engines.CHECKS,
+    "tunable": tunables.CHECKS,
+    "optimizer": optimizers.CHECKS,
+}
+"""The checks of each kind of plug-in."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """The result of one check.
+
+    Attributes:
+        promise: what a plug-in of this kind does, in words.
+        reason: why this plug-in does not; None if it does.
+    """
+
+    promise: str
+    reason: str | None
+
+
+def promise_of(check: Check) -> str:
+    """Return what a check checks, in words."""
+    return (getdoc(check) or check.__name__).partition("\n")[0].rstrip(".")
+
+
+def results(kind: str, plugin: type[Any]) -> Iterator[Result]:
+    """Yield the result of each check of a plug-in of this kind."""
+    for check in CHECKS[kind]:
+        try:
+            check(plugin)
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - a plug-in may raise anything
+            yield Result(promise_of(check), _reason(error))
+        else:
+            yield Result(promise_of(check), None)
+
+
+def _reason(error: BaseException) -> str:
+    """Return the message of a failed check; for an error of the plug-in, its kind and line too."""
+    message = str(error).strip().partition("\n")[0]
+    if isinstance(error, AssertionError) and message:
+        return message
+    (*_, last) = extract_tb(error.__traceback__)
+    return f"{type(error).__name__}: {message} ({last.filename.rpartition('/')[2]}, line {last.lineno})"

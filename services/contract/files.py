@@ -1,0 +1,99 @@
+"""Files of plug-ins: skeletons to begin with, and the results of the contract's checks of a file."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.resources import files
+from keyword import iskeyword
+from pathlib import Path
+
+from gaplab.services.contract.checks import CHECKS, Result, results
+from gaplab.services.core import external_plugins
+from gaplab.services.core.errors import GaplabError
+from gaplab.services.plugins.external import REGISTRIES
+
+KINDS = tuple(CHECKS)
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A plug-in that was checked.
+
+    Attributes:
+        kind: its kind.
+        name: its name in specs.
+        results: the result of each check; empty if it cannot be used.
+        unusable: why it cannot be used; None if it can.
+    """
+
+    kind: str
+    name: str
+    results: tuple[Result, ...] = ()
+    unusable: str | None = None
+
+    @property
+    def passes(self) -> bool:
+        """Whether the plug-in keeps the whole contract."""
+        return self.unusable is None and all(result.reason is None for result in self.results)
+
+
+def write_skeleton(kind: str, name: str, folder: Path) -> Path:
+    """Write a plug-in that runs into a new file of a folder, and return the file.
+
+    Args:
+        kind: one of `KINDS`.
+        name: name in specs, and of the file.
+        folder: is created if absent.
+
+    Raises:
+        GaplabError: the name is not permitted, or the kind has a plug-in of this name.
+        FileExistsError: the file exists.
+    """
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or iskeyword(name):
+        raise GaplabError(f"{name!r} cannot be the name of a plug-in; use small letters, digits and _, like my_{kind}")
+    file = folder / f"{name}.py"
+    if file.exists():
+        raise FileExistsError(17, "the file exists; choose another name or folder", str(file))
+    if name in REGISTRIES[kind]:
+        raise GaplabError(f"there is a {kind} called {name!r} already; choose another name")
+    template = files("gaplab.services.contract").joinpath("skeletons", f"{kind}.txt").read_text("utf-8")
+    class_name = "".join(part.capitalize() for part in name.split("_"))
+    folder.mkdir(parents=True, exist_ok=True)
+    with file.open("x", encoding="utf-8") as target:
+        target.write(template.replace("{class}", class_name).replace("{name}", name))
+    return file
+
+
+def check_file(file: Path) -> Iterator[Checked]:
+    """Import a file as if its folder were a plug-in folder, and yield each of its plug-ins, checked.
+
+    Args:
+        file: a module, or the folder of a package.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        GaplabError: it has no plug-in.
+    """
+    path = file.absolute()
+    if not path.exists():
+        raise FileNotFoundError(2, "there is no such file", str(file))
+    module = f"{path.name}/" if path.is_dir() else path.name
+    external_plugins.set_folders((path.parent, *(each for each in external_plugins.folders() if each != path.parent)))
+    found = False
+    for kind, registry in REGISTRIES.items():
+        own = [plugin for plugin in registry.values() if (external_plugins.file_of(plugin) or "").startswith(module)]
+        for plugin in own:
+            found = True
+            yield Checked(kind, plugin.name, tuple(results(kind, plugin)))
+    for name, refused_kind, why in _unusable(module):
+        found = True
+        yield Checked(refused_kind or "plug-in", name, unusable=why)
+    if not found:
+        bases = ", ".join(kind.capitalize() for kind in KINDS)
+        raise GaplabError(f"{file} has no plug-in; it needs a class of one of {bases} from gaplab.plugins")
+
+
+def _unusable(module: str) -> list[tuple[str, str | None, str]]:
+    """Return name, kind and reason of each plug-in of a file that cannot be used, once."""
+    all_ = [each for registry in REGISTRIES.values() for each in registry.refused if each.file.startswith(module)]
+    return list({(each.name, each.why): (each.name, each.kind, each.why) for each in all_}.values())

@@ -1,0 +1,135 @@
+"""The contract of an optimizer."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gaplab.services.core.arrays import FloatArray, Genomes
+from gaplab.services.core.optimizers.base import Optimizer
+from gaplab.services.core.search import Question, maximise
+from gaplab.services.core.types import Space
+
+SPACE = Space.box([0.0, -2.0, 0.0], [1.0, 2.0, 5.0], [True, False, False])
+SUMMIT = np.array([0.9, 0.5, 4.0])
+Plugin = type[Optimizer]
+
+
+class Hill:
+    """A concave fitness with its summit inside the box; it remembers how it was asked."""
+
+    def __init__(self, transform: Callable[[FloatArray], FloatArray] = lambda fitness: fitness) -> None:
+        self.transform = transform
+        self.asked: list[Genomes] = []
+
+    def __call__(self, question: Question) -> FloatArray:
+        """Return the fitness of the genomes that are asked for."""
+        self.asked.append(question.genomes.copy())
+        return self.of(question.genomes)
+
+    def of(self, genomes: Genomes) -> FloatArray:
+        """Return the fitness `(n,)` of genomes `(n, 3)`."""
+        return self.transform(-(((genomes - SUMMIT) / SPACE.extent) ** 2).sum(axis=1))
+
+
+def searched(plugin: Plugin, hill: Hill, evaluations: int = 300) -> Any:  # noqa: ANN401 - a population
+    """Return what an optimizer finds on a hill."""
+    return maximise(plugin(), SPACE, hill, evaluations, np.random.default_rng(3))
+
+
+def asks_within_the_box(plugin: Plugin) -> None:
+    """Asks only for genomes within the bounds."""
+    hill = Hill()
+    searched(plugin, hill)
+    asked = np.vstack(hill.asked)
+    assert np.all((asked >= SPACE.lower) & (asked <= SPACE.upper)), "it asks for genomes outside the bounds"
+
+
+def climbs_the_hill(plugin: Plugin) -> None:
+    """Finds the summit of a concave hill in 2,000 evaluations."""
+    found = searched(plugin, Hill(), 2000).genomes[0]
+    near = np.allclose(found, SUMMIT, atol=0.02 * SPACE.extent.max())
+    assert near, f"it finds {found.tolist()}; the summit is at {SUMMIT.tolist()}"
+
+
+def returns_members_best_first(plugin: Plugin) -> None:
+    """Returns its members best first, each with its own fitness."""
+    found = searched(plugin, Hill())
+    assert np.array_equal(found.fitness, np.sort(found.fitness)[::-1]), "its members are not sorted, best first"
+    assert np.allclose(found.fitness, Hill().of(found.genomes)), "its members have the fitness of others"
+
+
+def keeps_the_best(plugin: Plugin) -> None:
+    """Keeps the best genome that it was told."""
+    hill = Hill()
+    found, best = searched(plugin, hill).fitness[0], Hill().of(np.vstack(hill.asked)).max()
+    assert found == best, f"it was told a fitness of {best} and returns {found}"
+
+
+def repeats_itself(plugin: Plugin) -> None:
+    """Finds the same with the same random stream."""
+    first, second = (searched(plugin, Hill()).genomes for _ in range(2))
+    assert np.array_equal(first, second), "two searches with the same stream differ: use only `rng`"
+
+
+def compares_by_rank(plugin: Plugin) -> None:
+    """Compares fitness by rank alone."""
+    plain, bent = (searched(plugin, hill).genomes for hill in (Hill(), Hill(lambda fitness: np.exp(3 * fitness) - 7)))
+    assert np.array_equal(plain, bent), "an ascending transformation of fitness changes what it finds"
+
+
+def lets_nan_never_win(plugin: Plugin) -> None:
+    """Lets nan and infinities never win."""
+    for bad in (np.nan, np.inf, -np.inf):
+        found = searched(plugin, Hill(_spoilt(bad)), 500)
+        finite = np.isfinite(found.fitness[0]) and found.fitness[0] <= -0.05
+        assert finite, f"where fitness is {bad} near the summit, its best is {found.fitness[0]}"
+
+
+def _spoilt(bad: float) -> Callable[[FloatArray], FloatArray]:
+    """Return a transformation that replaces fitness near the summit."""
+
+    def spoil(fitness: FloatArray) -> FloatArray:
+        return np.where(fitness > -0.05, bad, fitness)
+
+    return spoil
+
+
+def goes_on_where_everything_fails(plugin: Plugin) -> None:
+    """Goes on where the fitness of every genome is nan."""
+    found = searched(plugin, Hill(lambda fitness: np.full_like(fitness, np.nan)))
+    assert np.all(np.isneginf(found.fitness)), "members whose fitness is nan must have -inf"
+
+
+def leaves_the_given_state(plugin: Plugin) -> None:
+    """Leaves the state that it was given unchanged."""
+    optimizer, rng = plugin(), np.random.default_rng(0)
+    state = optimizer.init(SPACE)
+    genomes = optimizer.ask(state, rng)
+    state = optimizer.tell(state, genomes, Hill().of(genomes))
+    before = state.genomes.copy(), state.fitness.copy()
+    genomes = optimizer.ask(state, rng)
+    optimizer.tell(state, genomes, np.full(len(genomes), 1e9))
+    same = np.array_equal(state.genomes, before[0]) and np.array_equal(state.fitness, before[1])
+    assert same, "`ask` or `tell` changes the given state; return another"
+
+
+def keeps_diverse_members(plugin: Plugin) -> None:
+    """Keeps as many different members as `diverse` asks for."""
+    found = maximise(plugin().diverse(9), SPACE, Hill(), 200, np.random.default_rng(0))
+    different = len(np.unique(found.genomes, axis=0))
+    assert (found.size, different) == (9, 9), f"of 9 members it keeps {found.size}, of which {different} differ"
+
+
+CHECKS = (
+    asks_within_the_box,
+    climbs_the_hill,
+    returns_members_best_first,
+    keeps_the_best,
+    repeats_itself,
+    compares_by_rank,
+    lets_nan_never_win,
+    goes_on_where_everything_fails,
+    leaves_the_given_state,
+    keeps_diverse_members,
+)

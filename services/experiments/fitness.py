@@ -1,0 +1,64 @@
+"""The fitness of experiments in one number that agrees with their curves: a point that all have reached."""
+
+from collections.abc import Mapping, Sequence
+
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.records import BestRead, ExperimentRead, FitnessRead, common_count
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.curves import curve_point
+from gaplab.services.store.queries.results import last_common, recorded_at
+
+
+def fitness_of(session: Session, experiments: Sequence[str]) -> dict[str, FitnessRead]:
+    """Return the point of each experiment's curve after the last common number of evaluations, if it has a mean."""
+    return points_at(session, last_common(session, experiments))
+
+
+def points_at(session: Session, counts: Mapping[str, int]) -> dict[str, FitnessRead]:
+    """Return a point of each experiment's curve, if it has a mean.
+
+    Args:
+        session: session of a transaction.
+        counts: number of real-world evaluations by experiment.
+    """
+    points = {
+        experiment: curve_point(counts[experiment], frozen(values))
+        for experiment, values in recorded_at(session, counts).items()
+    }
+    return {
+        experiment: FitnessRead(evaluations=point.evaluations, n=point.n, mean=point.mean, sd=point.sd)
+        for experiment, point in points.items()
+        if point.mean is not None
+    }
+
+
+def best_of(session: Session, studies: Mapping[str, Sequence[ExperimentRead]]) -> dict[str, BestRead]:
+    """Return the fittest experiment of each study, after the last number of evaluations that its experiments share.
+
+    Args:
+        session: session of a transaction.
+        studies: experiments by study.
+    """
+    shared = {study: common_count(experiments) for study, experiments in studies.items()}
+    counts = {study: count for study, count in shared.items() if count is not None}
+    rivals = {study: _rivals(studies[study]) for study in counts}
+    points = {each.id: each.fitness for found in rivals.values() for each in found if each.fitness}
+    wanted = {each.id: counts[study] for study, found in rivals.items() for each in found}
+    elsewhere = {id_: count for id_, count in wanted.items() if points[id_].evaluations != count}
+    points |= points_at(session, elsewhere)
+    return {
+        study: _fittest([(each, points[each.id]) for each in found if points[each.id].evaluations == counts[study]])
+        for study, found in rivals.items()
+    }
+
+
+def _rivals(experiments: Sequence[ExperimentRead]) -> list[ExperimentRead]:
+    """Return the experiments with a fitness; the direct baseline only if there is no other."""
+    found = [each for each in experiments if each.fitness]
+    return [each for each in found if not each.direct] or found
+
+
+def _fittest(points: Sequence[tuple[ExperimentRead, FitnessRead]]) -> BestRead:
+    experiment, point = max(points, key=lambda each: each[1].mean)
+    return BestRead(**point.model_dump(), experiment=experiment.id, name=experiment.name)

@@ -1,0 +1,189 @@
+"""The fields of queries: for each its meaning, the permitted operators, and its SQL condition."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from math import isfinite
+from typing import Any
+
+from sqlalchemy import ColumnElement, Select, and_, func, literal, not_, true
+
+from gaplab.schemas.lifecycle import State
+from gaplab.services.core.errors import InvalidSpec, Violation, unknown_name
+from gaplab.services.experiments.query.parsing import Value, refusal
+from gaplab.services.store.cursor import Column
+from gaplab.services.store.texts import storable
+
+Condition = ColumnElement[bool]
+Meets = Callable[[str, Value], Condition]
+
+TEXT, NUMBER, CHOICE = ("=", "~"), ("=", ">", ">=", "<", "<="), ("=",)
+"""Operators of kinds of fields. `!=`, `!~`, `in` and `not in` follow from them."""
+
+_SPANS = {"m": "minutes", "h": "hours", "d": "days", "w": "weeks"}
+_FLAGS = ("true", "false", "any")
+
+
+@dataclass(frozen=True)
+class Field:
+    """What a query can ask about.
+
+    Attributes:
+        meaning: what it holds, for documentation and errors.
+        operators: operators that it permits, without the ones that follow from them.
+        meets: returns the SQL condition of an operator and a value; never NULL.
+    """
+
+    meaning: str
+    operators: tuple[str, ...]
+    meets: Meets
+
+
+def text(column: Column, meaning: str) -> Field:
+    """Return the field of a text; `none` asks for one that is missing."""
+
+    def meets(operator: str, value: Value) -> Condition:
+        if is_none(value):
+            return column.is_(None)
+        wanted = storable(value.text)
+        met = column.icontains(wanted, autoescape=True) if operator == "~" else column == wanted
+        return and_(column.is_not(None), met)
+
+    return Field(meaning, TEXT, meets)
+
+
+def tags(has: Callable[[Callable[[Column], Condition]], Condition], meaning: str) -> Field:
+    """Return the field of tags; `has` makes a condition on a column of tags a condition on the record."""
+
+    def meets(operator: str, value: Value) -> Condition:
+        wanted = storable(value.text.lower())
+        if is_none(value):
+            return not_(has(lambda column: column.is_not(None)))
+        packed = wanted if operator == "~" else f" {wanted} "
+        return has(lambda column: and_(column.is_not(None), column.contains(packed, autoescape=True)))
+
+    return Field(meaning, TEXT, meets)
+
+
+def whole(column: Column, meaning: str) -> Field:
+    """Return the field of a number that is never missing."""
+    return Field(meaning, NUMBER, lambda operator, value: compared(column, operator, number_of(value)))
+
+
+def moment(column: Column, meaning: str) -> Field:
+    """Return the field of a time: a date, a date with a time, or how long ago; a date alone is a whole day for `=`."""
+
+    def meets(operator: str, value: Value) -> Condition:
+        if is_none(value):
+            return column.is_(None)
+        at, length = _moment_of(value)
+        if operator == "=":
+            return and_(column.is_not(None), column >= at, column < at + length)
+        return and_(column.is_not(None), compared(column, operator, at))
+
+    return Field(f"{meaning}: 2026-11-05, 2026-11-05T09:00 (UTC), or -7d for seven days ago", NUMBER, meets)
+
+
+def state(meets: Callable[[State], Condition], meaning: str) -> Field:
+    """Return the field of a state, in upper or lower case."""
+
+    def of(_: str, value: Value) -> Condition:
+        return meets(State(choice(value, [each.value for each in State], "state", str.upper)))
+
+    return Field(f"{meaning}: {', '.join(State)}", CHOICE, of)
+
+
+def flag(is_set: Condition, meaning: str) -> Field:
+    """Return the field of a truth value; `any` permits both."""
+
+    def meets(_: str, value: Value) -> Condition:
+        match choice(value, _FLAGS, "value", str.lower):
+            case "true":
+                return is_set
+            case "false":
+                return not_(is_set)
+        return true()
+
+    return Field(f"{meaning}: {', '.join(_FLAGS)}", CHOICE, meets)
+
+
+def fitness(experiment: Column, points: Select[Any], value: ColumnElement[Any], meaning: str) -> Field:
+    """Return the field of a fitness that is averaged over repetitions; `none` asks for experiments without one.
+
+    Args:
+        experiment: id of the experiment.
+        points: ids of experiments with a fitness, grouped by id.
+        value: fitness of a repetition in these groups.
+        meaning: which fitness it is.
+    """
+
+    def meets(operator: str, wanted: Value) -> Condition:
+        if is_none(wanted):
+            return experiment.not_in(points)
+        return experiment.in_(points.having(compared(func.avg(value), operator, number_of(wanted))))
+
+    return Field(meaning, NUMBER, meets)
+
+
+def compared(column: ColumnElement[object] | Column, operator: str, value: object) -> Condition:
+    """Return the condition of `=`, `>`, `>=`, `<` or `<=`."""
+    return column.op(operator, is_comparison=True)(literal(value))
+
+
+def is_none(value: Value) -> bool:
+    """Return whether the value asks for something that is missing."""
+    return not value.quoted and value.text.lower() == "none"
+
+
+def number_of(value: Value) -> float:
+    """Return the number that a query names.
+
+    Raises:
+        InvalidSpec: it is no number.
+    """
+    try:
+        number = float(value.text)
+    except ValueError:
+        number = float("nan")
+    if not isfinite(number):
+        raise refusal(value, f"{value.text!r} is no number, like 0.5")
+    return number
+
+
+def choice(value: Value, permitted: Sequence[str], kind: str, case: Callable[[str], str]) -> str:
+    """Return the permitted word that a query names.
+
+    Raises:
+        InvalidSpec: it is not permitted; the error has the nearest one.
+    """
+    if (word := case(value.text)) in permitted:
+        return word
+    violation = unknown_name("q", kind, word, permitted)
+    raise refusal(value, violation.message, permitted, violation.nearest)
+
+
+def field_of(fields: Mapping[str, Field], name: Value) -> Field:
+    """Return the field with this name, in upper or lower case.
+
+    Raises:
+        InvalidSpec: there is none; the error has the nearest one.
+    """
+    return fields[choice(name, list(fields), "field", str.lower)]
+
+
+def _moment_of(value: Value) -> tuple[datetime, timedelta]:
+    """Return the beginning and the length of the time that a query names."""
+    word = value.text
+    try:
+        if word[:1] == "-" and word[-1:] in _SPANS:
+            return datetime.now(UTC) - timedelta(**{_SPANS[word[-1]]: float(word[1:-1])}), timedelta(seconds=1)
+        at = datetime.fromisoformat(word)
+        at = at.replace(tzinfo=UTC) if at.tzinfo is None else at.astimezone(UTC)
+        return at, timedelta(days=1) if len(word) == len("2026-11-05") else timedelta(minutes=1)
+    except (ValueError, OverflowError) as error:
+        raise refusal(value, f"{word!r} is no time, like 2026-11-05, 2026-11-05T09:00 or -7d") from error
+
+
+def moved(error: InvalidSpec, pointer: str) -> InvalidSpec:
+    """Return an error about a query that stands at this place of a request's body."""
+    return InvalidSpec([Violation.moved(each, "q", pointer) for each in error.violations])

@@ -1,0 +1,158 @@
+"""Parallel coordinates: one axis for each setting and result, and one line for each simulator or experiment."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import log10
+
+from gaplab.services.figures.marks import (
+    Axis,
+    FigureDefinition,
+    Label,
+    Line,
+    Mark,
+    Number,
+    Panel,
+    Polylines,
+    Table,
+)
+from gaplab.services.figures.style import INK, Style
+from gaplab.services.figures.words import drawable, heading, number, number_of, power, printable
+
+MOST = 1_000
+"""Most lines; beyond them, only the first are drawn."""
+
+WIDE = 30.0
+"""Ratio of the greatest to the least value, above which the axis of an error is logarithmic."""
+
+LONGEST = 22
+"""Characters of a label of an axis."""
+
+AXIS = Style(INK, "solid", "circle")
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One axis.
+
+    Attributes:
+        label: name with the unit.
+        values: the value of each line: numbers, or words for a setting that is no number; None if it has none.
+        lower: value at the bottom; None for the least value.
+        upper: value at the top; None for the greatest value.
+        wide: logarithmic, if the values need it.
+    """
+
+    label: str
+    values: tuple[float | str | None, ...]
+    lower: Number = None
+    upper: Number = None
+    wide: bool = False
+
+
+@dataclass(frozen=True)
+class _Scaled:
+    """A coordinate between 0 and 1: the height of each line, and the labels of the axis by height."""
+
+    heights: tuple[Number, ...]
+    ticks: tuple[tuple[float, str], ...]
+    words: bool = False
+
+    def labels(self, place: float) -> list[Label]:
+        """Return the labels of the axis at a place on x: numbers at its ends, words beside their heights."""
+        return [Label(text, place, height, beside=self.words) for height, text in self.ticks]
+
+
+def coordinates_figure(
+    coordinates: Sequence[Coordinate],
+    *,
+    shades: Sequence[float],
+    shades_label: str,
+    hover: Sequence[str],
+    what: str,
+    title: str = "",
+) -> FigureDefinition:
+    """Return parallel coordinates: each line joins the values of one simulator or experiment.
+
+    Args:
+        coordinates: the axes, from left to right, with one value for each line.
+        shades: a number for each line, drawn from light to dark.
+        shades_label: the meaning of the shades.
+        hover: a text for each line.
+        what: noun for one line, like "simulator".
+        title: text above the figure.
+    """
+    coordinates, lines = list(coordinates), len(shades)
+    scaled = [_scaled(coordinate) for coordinate in coordinates]
+    shown = min(lines, MOST)
+    rows = tuple(tuple(axis.heights[line] for axis in scaled) for line in range(shown))
+    places = tuple(float(place) for place in range(len(coordinates)))
+    marks: list[Mark] = [Polylines("", places, rows, tuple(shades[:shown]), shades_label, tuple(hover[:shown]))]
+    ends = [(place, end) for place in places for end in (0.0, 1.0, None)]
+    marks.append(Line("", tuple(p for p, _ in ends), tuple(end for _, end in ends), AXIS, markers=False))
+    marks += [label for place, axis in zip(places, scaled, strict=True) for label in axis.labels(place)]
+    ticks = tuple((place, _label(axis.label)) for place, axis in zip(places, coordinates, strict=True))
+    frame = Axis("", (-0.4, max(1.0, len(coordinates) - 1) + 0.6), ticks=ticks)
+    return FigureDefinition(
+        name="coordinates",
+        title=heading(title),
+        panels=(Panel(tuple(marks) if shown else (), frame, Axis("", (-0.19, 1.16), ticks=((0.0, ""), (1.0, "")))),),
+        caption=_caption(what, lines, shown, shades_label),
+        alt=_alt(coordinates, what, lines),
+        table=_table(coordinates, shown),
+    )
+
+
+def _scaled(coordinate: Coordinate) -> _Scaled:
+    values = coordinate.values
+    if any(isinstance(value, str) for value in values):
+        return _of_words([None if value is None else str(value) for value in values])
+    numbers = [None if value is None else drawable(float(value)) for value in values]
+    there = [value for value in numbers if value is not None]
+    if not there:
+        return _Scaled((None,) * len(values), ())
+    least = min(there) if coordinate.lower is None else coordinate.lower
+    most = max(there) if coordinate.upper is None else coordinate.upper
+    if coordinate.wide and least > 0 and most >= WIDE * least:
+        heights = [None if value is None else log10(value / least) / log10(most / least) for value in numbers]
+        return _Scaled(tuple(heights), ((-0.17, power(float(f"{least:.1g}"))), (1.0, power(float(f"{most:.1g}")))))
+    span = most - least
+    heights = [None if value is None else (value - least) / span if span else 0.5 for value in numbers]
+    if not span:
+        return _Scaled(tuple(heights), ((0.5, number(least)),))
+    return _Scaled(tuple(heights), ((-0.17, number(least)), (1.0, number(most))))
+
+
+def _of_words(values: Sequence[str | None]) -> _Scaled:
+    """Place the distinct words at equal distances, in the order of their first line."""
+    words = list(dict.fromkeys(value for value in values if value is not None))
+    height = {word: 0.5 if len(words) == 1 else at / (len(words) - 1) for at, word in enumerate(words)}
+    heights = tuple(None if value is None else height[value] for value in values)
+    return _Scaled(heights, tuple((height[word], printable(word, LONGEST)) for word in words), words=True)
+
+
+def _label(text: str) -> str:
+    return printable(text, LONGEST)
+
+
+def _caption(what: str, lines: int, shown: int, shades_label: str) -> str:
+    if not lines:
+        return ""
+    of = f" of {lines}" if lines > shown else ""
+    shade = f"{shades_label[:1].lower()}{shades_label[1:]}"
+    return f"One line for each of {number_of(what, shown)}{of}. Shade: {shade}."
+
+
+def _alt(coordinates: Sequence[Coordinate], what: str, lines: int) -> str:
+    if not lines:
+        return "Parallel coordinates: no results yet."
+    axes = ", ".join(coordinate.label for coordinate in coordinates)
+    return f"Parallel coordinates of {number_of(what, lines)}, with the axes {axes}."
+
+
+def _table(coordinates: Sequence[Coordinate], shown: int) -> Table:
+    head = tuple(coordinate.label for coordinate in coordinates)
+    return Table(head, tuple(tuple(_cell(axis.values[line]) for axis in coordinates) for line in range(shown)))
+
+
+def _cell(value: float | str | None) -> str:
+    return value if isinstance(value, str) else number(value)

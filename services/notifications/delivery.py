@@ -1,0 +1,114 @@
+"""Delivery of one notification: a POST to a webhook, or a command of the service's owner."""
+
+import hmac
+import os
+import shlex
+import subprocess
+import time
+from dataclasses import dataclass
+from hashlib import sha256
+
+import httpx2
+
+from gaplab.schemas.notifications import Channel, Notification
+from gaplab.services.notifications.webhooks import refusal
+from gaplab.services.settings import Notify
+
+WEBHOOK_S = 10.0
+COMMAND_S = 60.0
+"""Longest times of a delivery."""
+
+_GONE = {400, 401, 403, 404, 405, 410, 422}
+"""Statuses of an address that refuses the message itself."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How an attempt ended.
+
+    Attributes:
+        failure: why the message was not delivered, without the address, which may hold a secret; None if it was.
+        hopeless: whether a further attempt would fail the same way.
+    """
+
+    failure: str | None = None
+    hopeless: bool = False
+
+
+def deliver(message: Notification, channel: Channel, webhook: str | None, notify: Notify) -> Outcome:
+    """Send a notification once.
+
+    Args:
+        message: what to send.
+        channel: where to.
+        webhook: address that the study or experiment has of its own.
+        notify: settings of the service's owner.
+    """
+    if channel is Channel.COMMAND:
+        return run(notify.command, message) if notify.command else _no_longer("the command")
+    if channel is Channel.WEBHOOK:
+        return post(notify.url, message, notify.secret) if notify.url else _no_longer("the webhook of the service")
+    if webhook is None:
+        return _no_longer("its webhook")
+    if why := refusal(webhook, notify.permitted_hosts):
+        return Outcome(why, hopeless=True)
+    return post(webhook, message, notify.secret)
+
+
+def post(url: str, message: Notification, secret: str | None = None) -> Outcome:
+    """POST the message as JSON. Redirects are not followed, and the body of the answer is not read."""
+    body = message.model_dump_json().encode()
+    headers = {"Content-Type": "application/json", "User-Agent": "gaplab", "Gaplab-Notification": message.id}
+    if secret:
+        headers["Gaplab-Signature"] = signature(secret, body, int(time.time()))
+    try:
+        with (
+            httpx2.Client(timeout=WEBHOOK_S, follow_redirects=False) as client,
+            client.stream("POST", url, content=body, headers=headers) as answer,
+        ):
+            status = answer.status_code
+    except httpx2.TimeoutException:
+        return Outcome(f"it did not answer within {WEBHOOK_S:g} s")
+    except (httpx2.HTTPError, httpx2.InvalidURL, UnicodeError) as error:
+        return Outcome(f"it cannot be reached ({type(error).__name__})")
+    if 200 <= status < 300:
+        return Outcome()
+    return Outcome(f"it answered {status}", hopeless=status in _GONE or 300 <= status < 400)
+
+
+def signature(secret: str, body: bytes, at: int) -> str:
+    """Return the signature of a body: `t=SECONDS,v1=HEX`, an HMAC-SHA256 of `SECONDS.BODY`."""
+    digest = hmac.new(secret.encode(), f"{at}.".encode() + body, sha256).hexdigest()
+    return f"t={at},v1={digest}"
+
+
+def run(command: str, message: Notification) -> Outcome:
+    """Run the owner's command without a shell; it reads the message as JSON from its standard input.
+
+    Nothing that users write is an argument of it. Its environment has no secrets of gaplab.
+    """
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("GAPLAB_")}
+    environment |= {
+        "GAPLAB_NOTIFICATION": message.id,
+        "GAPLAB_STATE": message.state.value,
+        "GAPLAB_ID": message.subject,
+    }
+    try:
+        ended = subprocess.run(  # noqa: S603 - the owner of the service has set it
+            shlex.split(command),
+            input=message.model_dump_json().encode(),
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            timeout=COMMAND_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return Outcome(f"the command did not end within {COMMAND_S:g} s")
+    except (OSError, ValueError) as error:
+        return Outcome(f"the command cannot be run: {getattr(error, 'strerror', None) or 'it is not a command line'}")
+    return Outcome(f"the command ended with code {ended.returncode}" if ended.returncode else None)
+
+
+def _no_longer(what: str) -> Outcome:
+    return Outcome(f"{what} was removed before it was told", hopeless=True)

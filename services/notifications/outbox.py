@@ -1,0 +1,168 @@
+"""The outbox: notifications that are left to send, found in the events, which are stored in the order of commits.
+
+So no change of an experiment does more work than before, and nothing is forgotten when the service is down. Each
+function is one transaction, and raises StoreUnavailable while the database cannot be used.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from sqlalchemy import func, select
+
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.notifications import Channel, Notification
+from gaplab.services.notifications import messages
+from gaplab.services.store.clock import moment
+from gaplab.services.store.models import (
+    EventCounterRow,
+    EventRow,
+    ExperimentRow,
+    NotificationRow,
+    NotifierRow,
+    StudyRow,
+)
+from gaplab.services.store.queries.events import note
+from gaplab.services.store.queries.experiments import experiments_of
+from gaplab.services.store.session import Session, snapshot, transaction
+
+ENDS = (EventKind.COMPLETED, EventKind.FAILED, EventKind.CANCELLED)
+
+PAUSES_S = (10, 60, 300, 1_800, 7_200, 21_600)
+"""Pauses before each further attempt; after the last one a notification is given up."""
+
+TOO_LATE = timedelta(days=1)
+"""Age of an end of which nobody is told any more, as after notifications were off for a week."""
+
+TURN = timedelta(minutes=2)
+"""Time for which one process at a time sends; longer than any delivery takes."""
+
+_AT_ONCE = 10_000
+
+
+@dataclass(frozen=True)
+class Letter:
+    """A notification to send now.
+
+    Attributes:
+        key: event, subject and channel, which identify it.
+        message: what it says.
+        webhook: address, if the study or experiment has its own; None if that was removed.
+        attempt: number of this attempt, from 1.
+    """
+
+    key: tuple[int, str, str]
+    message: Notification
+    webhook: str | None
+    attempt: int
+
+    @property
+    def channel(self) -> Channel:
+        """Return the channel."""
+        return Channel(self.key[2])
+
+
+@transaction
+def collect(session: Session, owner: str, channels: Sequence[Channel]) -> bool:
+    """Add a notification for each new end, and return whether it is this process's turn to send.
+
+    Args:
+        session: session of a transaction that writes.
+        owner: name of the process.
+        channels: channels of the service, which tell of everything; others are told by their own webhooks.
+    """
+    notifier, present = session.get(NotifierRow, 1, with_for_update=True), moment(session)
+    assert notifier is not None
+    if notifier.owner not in (None, owner) and notifier.until and present < notifier.until <= present + TURN:
+        return False
+    if notifier.owner != owner or notifier.until is None or notifier.until < present + TURN / 2:
+        notifier.owner, notifier.until = owner, present + TURN
+    latest = session.execute(select(EventCounterRow.latest)).scalar_one()
+    after = latest if notifier.after is None or notifier.after > latest else notifier.after
+    notifier.after = min(latest, after + _AT_ONCE)
+    row = EventRow
+    ends = select(row).where(row.number > after, row.number <= notifier.after, row.kind.in_(ENDS)).order_by(row.number)
+    for event in session.scalars(ends).all():
+        if present - event.at < TOO_LATE:
+            session.add_all(_of_end(session, event, channels, present))
+    return True
+
+
+@snapshot
+def next_letter(session: Session) -> Letter | None:
+    """Return the notification whose turn it is; None if nothing is due."""
+    row = NotificationRow
+    due = select(row).where(row.next_at <= moment(session)).order_by(row.next_at, row.event).limit(1)
+    if (found := session.scalars(due).first()) is None:
+        return None
+    owner = session.get(StudyRow, found.subject_id) or session.get(ExperimentRow, found.subject_id)
+    key = (found.event, found.subject_id, found.channel)
+    webhook = owner.webhook if owner else None
+    return Letter(key, Notification.model_validate(found.message), webhook, found.attempts + 1)
+
+
+@transaction
+def settle(session: Session, letter: Letter, failure: str | None, *, hopeless: bool = False) -> None:
+    """Store the outcome of an attempt as an event, and when to try again.
+
+    Args:
+        session: session of a transaction that writes.
+        letter: what was sent.
+        failure: why it was not delivered; None if it was.
+        hopeless: whether a further attempt would fail the same way.
+    """
+    row = session.get(NotificationRow, letter.key, with_for_update=True)
+    if row is None or row.attempts >= letter.attempt:
+        return
+    row.attempts, row.error = letter.attempt, failure
+    pauses = () if hopeless or failure is None else PAUSES_S[letter.attempt - 1 : letter.attempt]
+    row.next_at = moment(session) + timedelta(seconds=pauses[0]) if pauses else None
+    about = {"channel": letter.channel.value, "of": letter.message.kind, "attempt": letter.attempt}
+    if failure is None:
+        row.delivered_at = moment(session)
+        note(session, EventKind.NOTIFIED, row.experiment_id, **about)
+    else:
+        again = pauses[0] if pauses else None
+        note(session, EventKind.NOTIFICATION_FAILED, row.experiment_id, **about, reason=failure, again_in_s=again)
+
+
+def _of_end(
+    session: Session, event: EventRow, channels: Sequence[Channel], present: datetime
+) -> Iterator[NotificationRow]:
+    """Yield the notifications of an end, unless it was undone since."""
+    experiment = session.get(ExperimentRow, event.experiment_id)
+    if experiment is None or not experiment.state.ended:
+        return
+    if experiment.study_id is None:
+        told = [*channels, *([Channel.OWN] if experiment.webhook else [])]
+        message = messages.of_experiment(event, experiment)
+        yield from (_row(event, message, channel, present) for channel in told)
+        return
+    if experiment.webhook:
+        yield _row(event, messages.of_experiment(event, experiment), Channel.OWN, present)
+    study = session.get(StudyRow, experiment.study_id)
+    if study is not None and _ended_with(session, event, study):
+        told = [*channels, *([Channel.OWN] if study.webhook else [])]
+        message = messages.of_study(session, event, study)
+        yield from (_row(event, message, channel, present) for channel in told)
+
+
+def _ended_with(session: Session, event: EventRow, study: StudyRow) -> bool:
+    """Return whether all experiments of the study have ended, the last of them at this event."""
+    experiments, row = experiments_of(session, [study.id]), EventRow
+    if not all(experiment.state.ended for experiment in experiments):
+        return False
+    ids = [experiment.id for experiment in experiments]
+    ends = select(func.max(row.number)).where(row.experiment_id.in_(ids), row.kind.in_(ENDS))
+    return session.scalar(ends) == event.number
+
+
+def _row(event: EventRow, message: Notification, channel: Channel, present: datetime) -> NotificationRow:
+    return NotificationRow(
+        event=event.number,
+        subject_id=message.subject,
+        channel=channel.value,
+        experiment_id=event.experiment_id,
+        message=message.model_dump(mode="json"),
+        next_at=present,
+    )

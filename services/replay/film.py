@@ -1,0 +1,127 @@
+"""Pictures of a replay: both worlds side by side, seen by one camera that follows the robot, as on the page."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from gaplab.schemas.replays import Replay, ReplayWorld, Shape
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.kinematics import product, rotated
+from gaplab.services.replay.painting import Camera, Solid, paint
+
+TURN_RAD, RISE_RAD, DISTANCE_M = -1.0, 0.35, 1.25
+"""Where the page's camera begins."""
+
+APART = 2.2
+"""Metres of distance for each metre between a base and the point between both."""
+
+TARGET_HEIGHT_M = 0.12
+SMOOTHING = 12
+"""Frames to each side over which the path of the camera is averaged."""
+
+BAR = 0.12
+"""Height of the titles, as a share of the height of a world."""
+
+INK, PAPER = (34, 34, 34), (255, 255, 255)
+COLOURS = {
+    "trunk": (0, 114, 178),
+    "limb": (123, 135, 148),
+    "foot": (240, 196, 138),
+    "foot on the ground": (213, 94, 0),
+}
+"""The light colours of the page."""
+
+
+@dataclass(frozen=True)
+class _Moving:
+    """A world with its motion as arrays: `(frames, bodies, 3)` and `(frames, bodies, 4)`."""
+
+    world: ReplayWorld
+    title: str
+    positions: FloatArray
+    orientations: FloatArray
+
+    @property
+    def path(self) -> FloatArray:
+        """The path of the base over the ground without its sway, `(frames, 2)`."""
+        base = np.pad(self.positions[:, 0, :2], ((SMOOTHING, SMOOTHING), (0, 0)), mode="edge")
+        kernel = np.ones(2 * SMOOTHING + 1) / (2 * SMOOTHING + 1)
+        return np.stack([np.convolve(base[:, axis], kernel, mode="valid") for axis in (0, 1)], axis=1)
+
+
+def pictures(replay: Replay, *, every: int, width_px: int) -> Iterator[Image.Image]:
+    """Yield every n-th frame of the replay, from the start.
+
+    Args:
+        replay: the motion in one or two worlds; a world whose physics failed, or that is hardware, is left out.
+        every: take each n-th frame.
+        width_px: width of a picture, an even number; worlds share it.
+    """
+    worlds = _worlds(replay)
+    size = (width_px // max(1, len(worlds)), round(width_px / 3 / 2) * 2)
+    paths = [world.path for world in worlds]
+    for frame in range(0, len(replay.times_s) if worlds else 0, every):
+        camera = _camera([path[frame] for path in paths], size)
+        whole = Image.new("RGB", (size[0] * len(worlds), size[1] + _bar(size)), PAPER)
+        for place, world in enumerate(worlds):
+            solids = _solids(world, frame, replay.times_s[frame])
+            whole.paste(paint(solids, camera), (place * size[0], _bar(size)))
+            _write(whole, world.title, (place * size[0] + 8, 0), size)
+        _write(whole, f"{replay.times_s[frame]:.2f} s", (8, size[1] - _bar(size) // 2), size)
+        yield whole
+
+
+def _worlds(replay: Replay) -> list[_Moving]:
+    simulated = "In its simulator" if replay.simulator is None else f"In the simulator of iteration {replay.simulator}"
+    named = ((replay.simulation, simulated), (replay.reality, "In reality"))
+    return [
+        _Moving(
+            world,
+            f"{title}: {world.fitness:.3f} {replay.unit}, {world.engine}",
+            np.array(world.positions_m).reshape(len(world.positions_m), -1, 3),
+            np.array(world.orientations).reshape(len(world.orientations), -1, 4),
+        )
+        for world, title in named
+        if world is not None and world.positions_m
+    ]
+
+
+def _camera(bases: list[FloatArray], size: tuple[int, int]) -> Camera:
+    middle = np.mean(bases, axis=0)
+    distance = DISTANCE_M + APART * max(float(np.linalg.norm(base - middle)) for base in bases)
+    target = np.array([*middle, TARGET_HEIGHT_M])
+    level = distance * np.cos(RISE_RAD)
+    away = np.array([level * np.cos(TURN_RAD), level * np.sin(TURN_RAD), distance * np.sin(RISE_RAD)])
+    return Camera(target + away, target, size)
+
+
+def _solids(world: _Moving, frame: int, time_s: float) -> list[Solid]:
+    feet = list(dict.fromkeys(shape.body for shape in world.world.shapes if shape.role == "foot"))
+    down = {
+        foot
+        for foot, intervals in zip(feet, world.world.contacts, strict=False)
+        if any(begin <= time_s < end for begin, end in intervals)
+    }
+    return [_solid(world, shape, frame, down) for shape in world.world.shapes if shape.kind != "plane"]
+
+
+def _solid(world: _Moving, shape: Shape, frame: int, down: set[int | None]) -> Solid:
+    position, turn = np.array(shape.position_m), np.array(shape.orientation)
+    if shape.body is not None:
+        body = world.orientations[frame, shape.body]
+        position = world.positions[frame, shape.body] + rotated(body, position)
+        turn = product(body, turn)
+    role = "foot on the ground" if shape.role == "foot" and shape.body in down else shape.role
+    axes = np.stack([rotated(turn, axis) for axis in np.eye(3)])
+    return Solid(shape.kind, shape.size_m, position, axes, COLOURS[role])
+
+
+def _bar(size: tuple[int, int]) -> int:
+    return round(BAR * size[1] / 2) * 2
+
+
+def _write(picture: Image.Image, words: str, at: tuple[int, int], size: tuple[int, int]) -> None:
+    font = ImageFont.load_default(_bar(size) * 0.55)
+    ImageDraw.Draw(picture).text((at[0], at[1] + _bar(size) * 0.15), words, fill=INK, font=font)

@@ -1,0 +1,163 @@
+"""The facts of a report, collected from the store."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from gaplab.schemas.curves import Comparison, Curve
+from gaplab.schemas.differences import SpecDiff
+from gaplab.schemas.misfit import MisfitRead
+from gaplab.schemas.provenance import ProvenanceRead
+from gaplab.schemas.records import ExperimentRead, common_count
+from gaplab.schemas.reports import VerdictRead
+from gaplab.schemas.sensitivity import SensitivityRead
+from gaplab.services.core.errors import NotFound
+from gaplab.services.experiments import checks, reading
+from gaplab.services.reports.judged import Judged, judged_curves
+from gaplab.services.reports.verdict import judge
+from gaplab.services.results import curves as results
+from gaplab.services.results.misfit import misfit
+from gaplab.services.results.tuned_simulators import TunedSimulators, tuned_simulators
+from gaplab.services.running import provenance
+from gaplab.services.specs.differences import SpecColumn, differences
+from gaplab.services.store.queries.costs import Work, work_of
+from gaplab.services.store.session import Store
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Everything that a report shows, as of about one moment.
+
+    Attributes:
+        id: id of the study or the experiment.
+        name: its name.
+        notes: its notes; None without any.
+        study: whether it is a study.
+        experiments: its experiments; of hidden realities without parameters.
+        curves: their curves.
+        judged: the curves with their distinct names.
+        verdict: the verdict on the curves.
+        at_last: comparisons of all pairs at the common count; empty for one experiment.
+        pooled: the same, pooled over all counts as in the paper.
+        differing: settings that differ between the experiments; None for one experiment.
+        checks: sensitivity checks, each once.
+        misfits: misfit by experiment, without the direct baseline.
+        work: work by experiment.
+        provenance: provenance by experiment.
+        leading: simulators of the experiment with the highest mean; None if there are none.
+    """
+
+    id: str
+    name: str
+    notes: str | None
+    study: bool
+    experiments: tuple[ExperimentRead, ...]
+    curves: tuple[Curve, ...]
+    judged: tuple[Judged, ...]
+    verdict: VerdictRead
+    at_last: tuple[Comparison, ...]
+    pooled: tuple[Comparison, ...]
+    differing: SpecDiff | None
+    checks: tuple[SensitivityRead, ...]
+    misfits: Mapping[str, MisfitRead]
+    work: Mapping[str, Work]
+    provenance: Mapping[str, ProvenanceRead]
+    leading: tuple[Judged, TunedSimulators] | None
+
+
+def study_verdict(store: Store, study_id: str) -> VerdictRead:
+    """Return the verdict on a study.
+
+    Raises:
+        NotFound: no such study.
+    """
+    study = reading.read_study(store, study_id)
+    return _verdict(store, results.study_curves(store, study_id), study.experiments)[0]
+
+
+def experiment_verdict(store: Store, experiment_id: str) -> VerdictRead:
+    """Return the verdict on an experiment.
+
+    Raises:
+        NotFound: no such experiment.
+    """
+    experiment = reading.read_experiment(store, experiment_id)
+    return _verdict(store, results.curves(store, [experiment_id]), [experiment])[0]
+
+
+def study_facts(store: Store, study_id: str) -> Facts:
+    """Return the facts of a study.
+
+    Raises:
+        NotFound: no such study.
+    """
+    study = reading.read_study(store, study_id)
+    return _facts(store, study.id, study.name, study.notes, study.experiments, study=True)
+
+
+def experiment_facts(store: Store, experiment_id: str) -> Facts:
+    """Return the facts of an experiment.
+
+    Raises:
+        NotFound: no such experiment.
+    """
+    experiment = reading.read_experiment(store, experiment_id)
+    return _facts(store, experiment.id, experiment.name, experiment.notes, (experiment,), study=False)
+
+
+def _facts(
+    store: Store, id_: str, name: str, notes: str | None, experiments: tuple[ExperimentRead, ...], *, study: bool
+) -> Facts:
+    ids = [experiment.id for experiment in experiments]
+    curves = results.curves(store, ids)
+    verdict, at_last = _verdict(store, curves, experiments)
+    judged = judged_curves(curves, experiments, verdict.evaluations)
+    columns = [SpecColumn(each.id, each.name, (each.spec,)) for each in experiments]
+    with store.reading() as session:
+        work = work_of(session, ids)
+    return Facts(
+        id=id_,
+        name=name,
+        notes=notes,
+        study=study,
+        experiments=experiments,
+        curves=curves,
+        judged=judged,
+        verdict=verdict,
+        at_last=at_last,
+        pooled=results.compare(store, ids) if len(ids) > 1 else (),
+        differing=differences(columns) if len(ids) > 1 else None,
+        checks=_checks(store, experiments),
+        misfits={each.id: misfit(store, each.id) for each in experiments if not each.direct},
+        work=work,
+        provenance={id_: provenance.read(store, id_) for id_ in ids},
+        leading=_leading(store, judged),
+    )
+
+
+def _verdict(
+    store: Store, curves: Sequence[Curve], experiments: Sequence[ExperimentRead]
+) -> tuple[VerdictRead, tuple[Comparison, ...]]:
+    """Return the verdict, and the comparisons at the common count that it uses."""
+    count, ids = common_count(experiments), [curve.experiment for curve in curves]
+    pairs: tuple[Comparison, ...] = ()
+    if count is not None and len(ids) > 1:
+        pairs = results.compare(store, ids, from_evaluations=count, to_evaluations=count)
+    return judge(curves, experiments, pairs), pairs
+
+
+def _checks(store: Store, experiments: Sequence[ExperimentRead]) -> tuple[SensitivityRead, ...]:
+    found = []
+    for id_ in dict.fromkeys(experiment.sensitivity for experiment in experiments if experiment.sensitivity):
+        try:
+            found.append(checks.read(store, id_))
+        except NotFound:  # an imported experiment names a check that its archive does not contain
+            continue
+    return tuple(check for check in found if check.tunables)
+
+
+def _leading(store: Store, judged: Sequence[Judged]) -> tuple[Judged, TunedSimulators] | None:
+    learned = [one for one in judged if not one.curve.direct and one.point]
+    if not learned:
+        return None
+    best = max(learned, key=lambda one: one.mean)
+    return best, tuned_simulators(store, best.curve.experiment)

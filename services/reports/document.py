@@ -1,0 +1,109 @@
+"""The arrangement of a report: which facts stand in which section."""
+
+from gaplab.schemas.reports import VerdictRead
+from gaplab.services.core.statistics import POOLED
+from gaplab.services.figures.kinds.curves import curves_figure
+from gaplab.services.figures.kinds.squared_error import squared_error_figure
+from gaplab.services.figures.words import number_of, spoken
+from gaplab.services.reports import tables
+from gaplab.services.reports.blocks import Block, Bullets, Code, Drawing, Paragraph, Report, Section
+from gaplab.services.reports.content import Facts, experiment_facts, study_facts
+from gaplab.services.reports.reproduction import instructions, spec_text
+from gaplab.services.results.coordinates import simulator_coordinates
+from gaplab.services.store.session import Store
+
+
+def study_report(store: Store, study_id: str) -> Report:
+    """Return the report on a study.
+
+    Raises:
+        NotFound: no such study.
+    """
+    return _report(store, study_facts(store, study_id))
+
+
+def experiment_report(store: Store, experiment_id: str) -> Report:
+    """Return the report on an experiment.
+
+    Raises:
+        NotFound: no such experiment.
+    """
+    return _report(store, experiment_facts(store, experiment_id))
+
+
+def _report(store: Store, facts: Facts) -> Report:
+    several = len(facts.experiments) > 1
+    sections = [
+        Section("Verdict", _verdict(facts.verdict)),
+        Section("Curves", (Drawing(curves_figure(facts.curves)), tables.at_last(facts))),
+        *([Section("Which differ", _differences(facts))] if several else []),
+        *([Section("Simulators", _simulators(store, facts))] if facts.leading else []),
+        *([Section("Sensitivity of fitness to the tunables", _sensitivity(facts))] if facts.checks else []),
+        Section("Cost", (tables.cost(facts),)),
+        Section("Settings", _settings(facts)),
+        Section("Provenance", _provenance(facts)),
+        Section("How to reproduce it", (*_instructions(facts), Code(spec_text(facts.experiments, facts.name)))),
+    ]
+    kind = number_of("experiment", len(facts.experiments)) if facts.study else "1 experiment"
+    repetitions = sum(experiment.progress.completed for experiment in facts.experiments)
+    return Report(
+        id=facts.id,
+        title=facts.name if facts.study else spoken(facts.name, 200),
+        subtitle=f"{'Study' if facts.study else 'Experiment'} {facts.id}: {kind}, "
+        f"{number_of('completed repetition', repetitions)}",
+        headline=facts.verdict.headline,
+        sections=tuple(sections),
+    )
+
+
+def _verdict(verdict: VerdictRead) -> tuple[Block, ...]:
+    rules = [Paragraph(f"Rule {number}. {rule}", note=True) for number, rule in enumerate(verdict.rules, 1)]
+    return (Bullets(verdict.sentences), *rules)
+
+
+def _differences(facts: Facts) -> tuple[Block, ...]:
+    count = facts.verdict.evaluations
+    if not facts.at_last:
+        return (Paragraph("There is nothing to compare yet."),)
+    return (
+        tables.pairs(facts, facts.at_last, f"All pairs after {number_of('real-world evaluation', count or 0)}"),
+        tables.pairs(facts, facts.pooled, "The paper's test: the same pairs, pooled over all numbers of evaluations"),
+        Paragraph(f"The second table is {POOLED}. The verdict does not use it.", note=True),
+    )
+
+
+def _simulators(store: Store, facts: Facts) -> tuple[Block, ...]:
+    assert facts.leading is not None
+    leading, tuned = facts.leading
+    remarks = tuple(
+        f"{one.name}: {remark}."
+        for one in facts.judged
+        if one.curve.experiment in facts.misfits
+        for remark in facts.misfits[one.curve.experiment].remarks
+    )
+    error = squared_error_figure(tuned.errors, samples=tuned.samples, unit=tuned.unit, title=leading.name)
+    return (
+        *tables.misfit(facts),
+        *([Bullets(remarks)] if remarks else []),
+        Drawing(error),
+        Drawing(simulator_coordinates(store, leading.curve.experiment, title=leading.name)),
+    )
+
+
+def _sensitivity(facts: Facts) -> tuple[Block, ...]:
+    warnings = tuple(dict.fromkeys(warning for check in facts.checks for warning in check.warnings))
+    return (*map(tables.sensitivity, facts.checks), *([Bullets(warnings)] if warnings else []))
+
+
+def _settings(facts: Facts) -> tuple[Block, ...]:
+    notes = [Paragraph(f"Notes: {facts.notes}")] if facts.notes else []
+    return (*notes, *tables.differing(facts), tables.settings(facts))
+
+
+def _provenance(facts: Facts) -> tuple[Block, ...]:
+    found = tables.provenance(facts)
+    return found or (Paragraph("The versions of what computed it are not stored."),)
+
+
+def _instructions(facts: Facts) -> tuple[Block, ...]:
+    return tuple(Paragraph(sentence) for sentence in instructions(facts.id))

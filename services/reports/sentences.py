@@ -1,0 +1,152 @@
+"""The sentences of a verdict."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from gaplab.schemas.curves import Comparison
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.records import ExperimentRead
+from gaplab.schemas.reports import Trend, TrendRead
+from gaplab.services.core.trends import FEWEST_REPETITIONS, CurveEnd
+from gaplab.services.figures.words import number_of
+from gaplab.services.reports.judged import SIGNIFICANT, Judged, differs, p_of
+
+
+def standing(learned: Sequence[Judged], pairs: Sequence[Comparison], count: int | None) -> Iterator[str]:
+    """Yield who is ahead, in one sentence."""
+    ids = {one.curve.experiment for one in learned}
+    compared = [pair for pair in pairs if {pair.first, pair.second} <= ids and p_of(pair) is not None]
+    if len(learned) < 2:
+        return
+    if any(one.point is not None and one.point.n < FEWEST_REPETITIONS for one in learned):
+        yield f"Fewer than {FEWEST_REPETITIONS} repetitions are too few to compare strategies."
+        return
+    differing = sum(map(differs, compared))
+    where = f"at {number_of('real-world evaluation', count or 0)}"
+    if not differing:
+        yield f"No strategy differs significantly from another {where}; {learned[0].name} has the highest mean."
+    else:
+        pairs_differ = f"{differing} of {number_of('pair', len(compared))} of strategies differ"
+        yield f"{pairs_differ} {where}; {learned[0].name} has the highest mean."
+
+
+def ranking(
+    learned: Sequence[Judged], pairs: Sequence[Comparison], names: Mapping[str, str], count: int | None
+) -> Iterator[str]:
+    """Yield what the highest mean is, and from which strategies it differs."""
+    if not learned:
+        return
+    best = learned[0]
+    where = f"After {number_of('real-world evaluation', count or 0)}"
+    highest = " has the highest mean" if len(learned) > 1 else " has a mean"
+    yield f"{where}, {best.name}{highest}, {_with_interval(best)}."
+    ids = {one.curve.experiment for one in learned}
+    own = [
+        pair for pair in pairs if best.curve.experiment in {pair.first, pair.second} <= ids and p_of(pair) is not None
+    ]
+    others: dict[bool, list[str]] = {False: [], True: []}
+    for pair in own:
+        other = pair.second if pair.first == best.curve.experiment else pair.first
+        others[differs(pair)].append(names[other])
+    if others[True]:
+        yield f"It differs significantly from {_listed(others[True])}."
+    if others[False]:
+        yield f"It does not differ significantly from {_listed(others[False])}, which may be as good."
+    yield from _disagreements(pairs, names)
+
+
+def _disagreements(pairs: Sequence[Comparison], names: Mapping[str, str]) -> Iterator[str]:
+    """Yield the pairs on which the other tests disagree with Student's."""
+    for pair in pairs:
+        tests = {"Welch's t": pair.welch.p_holm, "Mann-Whitney": pair.mann_whitney.p_holm}
+        other = [name for name, p in tests.items() if p is not None and (p < SIGNIFICANT) != differs(pair)]
+        if other and p_of(pair) is not None:
+            result = "does not find" if differs(pair) else "finds"
+            yield f"{' and '.join(other)} {result} a difference between {names[pair.first]} and {names[pair.second]}."
+
+
+def share_of_direct(learned: Sequence[Judged], judged: Sequence[Judged], pairs: Sequence[Comparison]) -> Iterator[str]:
+    """Yield the share of the direct baseline's fitness that each strategy reaches."""
+    for baseline in judged:
+        if not baseline.curve.direct or baseline.mean <= 0 or not learned:
+            continue
+        shares = [f"{one.name} {one.mean / baseline.mean:.0%}" for one in learned]
+        yield f"Share of the fitness of {baseline.name}, {_with_interval(baseline)}: {', '.join(shares)}."
+        key = baseline.curve.experiment
+        same = [one.name for one in learned if _is_alike(pairs, key, one)]
+        if same:
+            yield f"No significant difference from {baseline.name}: {_listed(same)}."
+
+
+def spread(learned: Sequence[Judged]) -> Iterator[str]:
+    """Yield how far repetitions vary, for the strategy with the largest standard deviation."""
+    spreads = [(one.name, one.point.sd, one.mean) for one in learned if one.point and one.point.sd is not None]
+    if spreads:
+        name, sd, mean = max(spreads, key=lambda each: each[1])
+        share = f", {sd / abs(mean):.0%} of its mean" if mean else ""
+        unit = learned[0].curve.unit
+        yield f"Repetitions vary most with {name}: their standard deviation is {sd:.3f} {unit}{share}."
+
+
+def end_of_curve(one: Judged, end: CurveEnd) -> str:
+    """Return what the end of a curve says, with its numbers."""
+    if end.trend is Trend.TOO_FEW or end.gain is None:
+        counts = f"{number_of('repetition', end.n)} at {number_of('real-world evaluation', end.last)}"
+        return f"{one.name}: {counts} are too few to say whether it still rises."
+    gain = f"{end.gain:+.3f} {one.curve.unit}, 95 % interval {end.lower:+.3f} to {end.upper:+.3f}"
+    words = {
+        Trend.RISING: "still rises; continuing is worthwhile",
+        Trend.FALLING: "falls: later controllers are worse in reality",
+        Trend.FLAT: f"is flat since iteration {end.since}; not worth continuing",
+        Trend.UNCLEAR: "may still rise or not; more repetitions would tell",
+    }[end.trend]
+    return f"{one.name} {words} (gain from {end.since} to {end.last} evaluations: {gain})."
+
+
+def continuing(trends: Sequence[TrendRead]) -> Iterator[str]:
+    """Yield what the curves say of continuing."""
+    of = {kind: [trend for trend in trends if trend.trend is kind] for kind in Trend}
+    if trends and len(of[Trend.TOO_FEW]) == len(trends):
+        yield "Too few repetitions or evaluations to say whether continuing is worthwhile."
+        return
+    if of[Trend.RISING]:
+        yield f"Still rising: {_named(of[Trend.RISING])}."
+    if flat := of[Trend.FLAT]:
+        since = max(trend.since or 0 for trend in flat)
+        subject = "Flat" if len(trends) == 1 else "All flat" if len(flat) == len(trends) else f"Flat: {_named(flat)},"
+        yield f"{subject} since iteration {since}; not worth continuing."
+    if of[Trend.UNCLEAR] and not of[Trend.RISING]:
+        subject = "It" if len(trends) == 1 else _named(of[Trend.UNCLEAR])
+        yield f"{subject} may still rise; more repetitions would tell."
+
+
+def incomplete(experiments: Sequence[ExperimentRead], names: Mapping[str, str]) -> Iterator[str]:
+    """Yield what is missing: experiments that still run, were stopped or cancelled, or have failed repetitions."""
+    for experiment in experiments:
+        progress, state = experiment.progress, experiment.state
+        done = f"{progress.completed} of {number_of('repetition', progress.repetitions)} completed"
+        if experiment.caveat or state is not State.COMPLETED:
+            why = f" ({experiment.caveat})" if experiment.caveat else ""
+            yield f"{names[experiment.id]} is incomplete: {state.value.lower()}{why}, {done}."
+
+
+def _is_alike(pairs: Sequence[Comparison], baseline: str, one: Judged) -> bool:
+    """Return whether the test between a strategy and the baseline is defined, and finds no difference."""
+    both = {baseline, one.curve.experiment}
+    return any({pair.first, pair.second} == both and p_of(pair) is not None and not differs(pair) for pair in pairs)
+
+
+def _with_interval(one: Judged) -> str:
+    assert one.point is not None
+    interval = (
+        f" (95 % interval {one.point.lower:.3f} to {one.point.upper:.3f}" if one.point.lower is not None else " ("
+    )
+    n = f", n = {one.point.n})" if one.point.lower is not None else f"n = {one.point.n})"
+    return f"{one.mean:.3f} {one.curve.unit}{interval}{n}"
+
+
+def _named(trends: Sequence[TrendRead]) -> str:
+    return _listed([trend.name for trend in trends])
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,234 @@
+"""The tables of a report."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import datetime
+from typing import Any
+
+from gaplab.schemas.curves import Comparison
+from gaplab.schemas.misfit import TunableDistribution
+from gaplab.schemas.provenance import Provenance
+from gaplab.schemas.sensitivity import SensitivityRead
+from gaplab.services.figures.words import number, spoken
+from gaplab.services.reports.blocks import Grid
+from gaplab.services.reports.content import Facts
+from gaplab.services.reports.judged import SIGNIFICANT, Judged
+from gaplab.services.specs.differences import SpecColumn, all_settings
+from gaplab.services.store.queries.costs import Work
+
+MISSING = "\N{EN DASH}"
+
+
+def at_last(facts: Facts) -> Grid:
+    """Return the fitness of each experiment at the common count."""
+    unit = next((one.curve.unit for one in facts.judged), "")
+    baseline = next((one.mean for one in facts.judged if one.curve.direct and one.mean > 0), None)
+    head = ("Experiment", "n", f"Mean ({unit})", "SD", "95 % interval", "Share of direct", "End of the curve")
+    caption = "Recorded fitness at the last number of real-world evaluations that the experiments share"
+    return Grid(caption, head, tuple(_at_last(one, baseline) for one in facts.judged))
+
+
+def _at_last(one: Judged, baseline: float | None) -> tuple[str, ...]:
+    if one.point is None:
+        return (one.name, "0", *[MISSING] * 5)
+    share = f"{one.mean / baseline:.0%}" if baseline else MISSING
+    end = one.end.trend.value.replace("_", " ") if one.end else MISSING
+    since = f" since {one.end.since}" if one.end and end == "flat" else ""
+    numbers = (str(one.point.n), _fixed(one.mean), _fixed(one.point.sd), _interval(one.point.lower, one.point.upper))
+    return (one.name, *numbers, share, end + since)
+
+
+def pairs(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
+    """Return all pairs with the difference of their means, the effect size, and p of each test."""
+    names = {one.curve.experiment: one.name for one in facts.judged}
+    head = ("Pair", "n", "Difference", "Cohen's d", "Student", "Welch", "Mann-Whitney", "Differs")
+    rows = tuple(
+        (
+            f"{names[pair.first]} \N{MINUS SIGN} {names[pair.second]}",
+            f"{pair.n_first}, {pair.n_second}",
+            _signed(pair.difference),
+            _signed(pair.effect_size),
+            *(_probability(test.p_holm) for test in (pair.student, pair.welch, pair.mann_whitney)),
+            MISSING if pair.student.p_holm is None else "yes" if pair.student.p_holm < SIGNIFICANT else "no",
+        )
+        for pair in compared
+    )
+    return Grid(f"{caption}; p after Holm's correction over all pairs", head, rows)
+
+
+def misfit(facts: Facts) -> Iterator[Grid]:
+    """Yield the misfit of the latest simulators, and their tunables."""
+    names = {one.curve.experiment: one.name for one in facts.judged}
+    found = [(names[id_], read) for id_, read in facts.misfits.items() if read.points]
+    if not found:
+        return
+    last = [(name, read.points[-1], read.unit) for name, read in found]
+    unit = last[0][2]
+    head = ("Experiment", "Iteration", "n", f"Error per sample ({unit})", f"Gap in reality ({unit})")
+    rows = tuple(
+        (name, str(point.iteration), str(point.error.n), _spread(point.error), _spread(point.gap))
+        for name, point, _ in last
+    )
+    yield Grid("Misfit of the best simulators after the last iteration: mean ± SD over repetitions", head, rows)
+    head = ("Experiment", "Tunable", "Tuned", "Bounds", "At a bound")
+    tuned = tuple((name, *_tuned(tunable)) for name, point, _ in last for tunable in point.tunables)
+    yield Grid("Tuned values after the last iteration: mean ± SD over repetitions", head, tuned)
+
+
+def _tuned(found: TunableDistribution) -> tuple[str, ...]:
+    at_bound = (found.at_lower or 0.0) + (found.at_upper or 0.0)
+    bounds = f"{found.lower:g} to {found.upper:g}"
+    return spoken(found.name), _spread(found), bounds, f"{at_bound:.0%}"
+
+
+def sensitivity(check: SensitivityRead) -> Grid:
+    """Return the effect of each tunable on fitness, before tuning."""
+    head = ("Tunable", "Between", f"Effect ({check.unit})", "Share of the spread", "Roughness", "Verdict")
+    rows = tuple(
+        (
+            spoken(found.name),
+            f"{found.values[0]:g} to {found.values[-1]:g}",
+            number(found.effect) or MISSING,
+            MISSING if found.relative_effect is None else f"{found.relative_effect:.0%}",
+            number(found.roughness, 2) or MISSING,
+            found.verdict.value,
+        )
+        for found in check.tunables
+    )
+    return Grid(f"Check of {check.spec.robot.name} in {check.spec.engine.name}", head, rows)
+
+
+def cost(facts: Facts) -> Grid:
+    """Return what each experiment has cost so far."""
+    head = (
+        "Experiment",
+        "State",
+        "Completed",
+        "Samples",
+        "Probes",
+        "Rollouts",
+        "Not needed",
+        "Failed",
+        "Time of work",
+        "Duration",
+    )
+    names = {one.curve.experiment: one.name for one in facts.judged}
+    rows = []
+    for experiment in facts.experiments:
+        progress, work = experiment.progress, facts.work.get(experiment.id, Work())
+        counts = (work.samples, work.probes, progress.rollouts_done, progress.rollouts_saved, progress.rollouts_failed)
+        rows.append(
+            (
+                names[experiment.id],
+                experiment.state.value.lower(),
+                f"{progress.completed} of {progress.repetitions}",
+                *(f"{count:,}" for count in counts),
+                _duration(work.seconds),
+                _elapsed(experiment.started_at, experiment.ended_at),
+            )
+        )
+    caption = (
+        "Real-world evaluations (samples are learned from, probes only recorded), rollouts in simulation, and time"
+    )
+    return Grid(caption, head, tuple(rows))
+
+
+def differing(facts: Facts) -> Iterator[Grid]:
+    """Yield the settings that differ between the experiments."""
+    if facts.differing and facts.differing.settings:
+        names = {one.curve.experiment: one.name for one in facts.judged}
+        head = ("Setting", *(names[column.id] for column in facts.differing.columns))
+        rows = tuple((each.setting, *(_values(cell) for cell in each.values)) for each in facts.differing.settings)
+        yield Grid("Settings that differ", head, rows, words=True)
+
+
+def settings(facts: Facts) -> Grid:
+    """Return the settings that all experiments share; hidden parameters of reality are called so."""
+    differs = {each.pointer for each in facts.differing.settings} if facts.differing else set()
+    columns = SpecColumn(facts.id, facts.name, tuple(experiment.spec for experiment in facts.experiments))
+    rows = tuple(
+        (words, pointer, _values(values)) for pointer, words, values in all_settings(columns) if pointer not in differs
+    )
+    shared = "Settings of all experiments" if len(facts.experiments) > 1 else "Settings"
+    return Grid(shared, ("Setting", "Pointer", "Value"), rows, words=True)
+
+
+def provenance(facts: Facts) -> tuple[Grid, ...]:
+    """Return the versions of everything that computed the experiments, each once."""
+    found: dict[str, Provenance] = {}
+    repetitions: dict[str, int] = {}
+    for read in facts.provenance.values():
+        for use in read.uses:
+            found[use.id] = use.provenance
+            repetitions[use.id] = repetitions.get(use.id, 0) + use.repetitions
+    return tuple(
+        Grid(
+            f"Software and machine of {repetitions[id_]} repetitions", ("Part", "Version"), _versions(each), words=True
+        )
+        for id_, each in found.items()
+    )
+
+
+def _versions(found: Provenance) -> tuple[tuple[str, str], ...]:
+    commit = f"{found.commit}{' with changes' if found.dirty else ''}" if found.commit else MISSING
+    rows = [
+        ("gaplab", found.gaplab),
+        ("commit", commit),
+        ("code (hash)", found.code),
+        ("Python", found.python),
+        ("processor", f"{found.processor} ({found.architecture})"),
+        ("system", found.system),
+        ("spec version", str(found.spec_version)),
+        *_pairs("engine", found.engines),
+        *_pairs("library", found.libraries),
+        *_pairs("external plug-in", found.outside),
+    ]
+    return tuple(rows)
+
+
+def _pairs(what: str, versions: Mapping[str, str]) -> Iterable[tuple[str, str]]:
+    return ((f"{what} {name}", version) for name, version in versions.items())
+
+
+def _values(values: Sequence[Any]) -> str:
+    return ", ".join(map(_value, values)) or MISSING
+
+
+def _value(value: Any) -> str:  # noqa: ANN401 - JSON
+    if isinstance(value, list):
+        return ", ".join(map(_value, value))
+    if value is None or isinstance(value, bool):
+        return {None: "none or hidden", True: "yes", False: "no"}[value]
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _spread(found: Any) -> str:  # noqa: ANN401 - a Distribution or one of a tunable
+    if found.mean is None:
+        return MISSING
+    return f"{number(found.mean)} ± {number(found.sd)}" if found.sd is not None else number(found.mean)
+
+
+def _fixed(value: float | None) -> str:
+    return MISSING if value is None else f"{value:.3f}"
+
+
+def _signed(value: float | None) -> str:
+    return MISSING if value is None else f"{value:+.3f}".replace("-", "\N{MINUS SIGN}")
+
+
+def _interval(lower: float | None, upper: float | None) -> str:
+    return MISSING if lower is None or upper is None else f"{lower:.3f} to {upper:.3f}"
+
+
+def _probability(p: float | None) -> str:
+    return MISSING if p is None else "< 0.001" if p < 0.001 else f"{p:.3f}"
+
+
+def _elapsed(start: datetime | None, end: datetime | None) -> str:
+    return MISSING if start is None or end is None else _duration((end - start).total_seconds())
+
+
+def _duration(seconds: float) -> str:
+    for unit, size in (("d", 86_400), ("h", 3_600), ("min", 60)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.1f} {unit}"
+    return f"{seconds:.1f} s"

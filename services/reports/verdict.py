@@ -1,0 +1,74 @@
+"""The verdict: what curves and tests say, in words, by stated rules."""
+
+from collections.abc import Sequence
+
+from gaplab.schemas.curves import Comparison, Curve
+from gaplab.schemas.records import ExperimentRead, common_count
+from gaplab.schemas.reports import Trend, TrendRead, VerdictRead
+from gaplab.services.core.trends import FEWEST_EVALUATIONS, FEWEST_REPETITIONS, SMALL, CurveEnd
+from gaplab.services.reports import sentences
+from gaplab.services.reports.judged import SIGNIFICANT, Judged, judged_curves
+
+NOTHING = "There are no results yet."
+
+RULES = (
+    f"A pair differs if its p is below {SIGNIFICANT}: Student's t on the recorded fitness at the last number of "
+    "real-world evaluations that the experiments share, corrected by Holm's method over all pairs. A p above that does "
+    "not show that two strategies are equal. Experiments that failed or were cancelled do not lower the number.",
+    "The gain of a curve is the mean, over repetitions, of the later minus the earlier recorded fitness of the same "
+    "repetition, with its 95 % interval by Student's t.",
+    "A curve is flat since k, and not worth continuing, if the interval of the gain from k, and from every later "
+    "number of evaluations, to the last one contains 0, and the interval of the gain from k ends below "
+    f"{SMALL:.0%} of the mean fitness; k is at least {FEWEST_EVALUATIONS} evaluations before the last. A curve is "
+    f"rising or falling if the interval of the gain over the last {FEWEST_EVALUATIONS} evaluations is above or below "
+    "0. Otherwise more repetitions would tell.",
+    f"Nothing is said of a curve with fewer than {FEWEST_REPETITIONS} repetitions or {FEWEST_EVALUATIONS} evaluations.",
+)
+
+
+def judge(curves: Sequence[Curve], experiments: Sequence[ExperimentRead], pairs: Sequence[Comparison]) -> VerdictRead:
+    """Return the verdict on experiments.
+
+    Args:
+        curves: the curves of the experiments, in their order.
+        experiments: one or more experiments.
+        pairs: comparisons of all pairs at the common count.
+    """
+    count = common_count(experiments)
+    judged = judged_curves(curves, experiments, count)
+    learned = [one for one in judged if not one.curve.direct and one.point]
+    learned.sort(key=lambda one: one.mean, reverse=True)
+    names = {one.curve.experiment: one.name for one in judged}
+    trends = tuple(_trend(one, one.end) for one in judged if one.end is not None)
+    told = [
+        *sentences.ranking(learned, pairs, names, count),
+        *sentences.share_of_direct(learned, judged, pairs),
+        *(trend.sentence for trend in trends),
+        *sentences.spread(learned),
+        *sentences.incomplete(experiments, names),
+    ]
+    headline = [*sentences.standing(learned, pairs, count), *sentences.continuing(trends)]
+    return VerdictRead(
+        headline=" ".join(headline) or NOTHING,
+        sentences=tuple(told),
+        trends=trends,
+        evaluations=count,
+        rules=RULES,
+    )
+
+
+def _trend(one: Judged, end: CurveEnd) -> TrendRead:
+    continuing = {Trend.RISING: True, Trend.FLAT: False}.get(end.trend)
+    return TrendRead(
+        experiment=one.curve.experiment,
+        name=one.name,
+        trend=end.trend,
+        n=end.n,
+        since=end.since,
+        last=end.last,
+        gain=end.gain,
+        lower=end.lower,
+        upper=end.upper,
+        continuing=continuing,
+        sentence=sentences.end_of_curve(one, end),
+    )

@@ -1,0 +1,29 @@
+"""The engine of a spec that names none."""
+
+from gaplab.services.core.external_plugins import file_of
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.world import World
+from gaplab.services.engines import engines
+from gaplab.services.engines.base import Engine
+
+
+def default_engine(robot: Robot | type[Robot]) -> str:
+    """Return the engine that the robot names, or another of gaplab's own if its library is not installed here.
+
+    PyBullet has no wheels for Python 3.12 and later. There, the quadruped's engine is MuJoCo. The resolved spec records
+    the choice, so a stored experiment does not depend on it.
+    """
+    named = engines.get(robot.engine)
+    if named is None or named.available():
+        return robot.engine
+    world = (robot() if isinstance(robot, type) else robot).world
+    others = (name for name, engine in engines.items() if file_of(engine) is None and engine.available())
+    return next((name for name in others if runs(engines[name], world)), robot.engine)
+
+
+def runs(engine: type[Engine], world: World) -> bool:
+    """Return whether the engine can run a robot's world; one that raises cannot."""
+    try:
+        return engine.runs(world)
+    except Exception:  # noqa: BLE001 - an external engine concerns only the specs that name it
+        return False

@@ -1,0 +1,156 @@
+"""Tags, notes, queries, saved views, archived records and deletion on the page."""
+
+from typing import Any
+
+from gaplab.schemas.editing import Edit
+from gaplab.services.experiments import editing, lifecycle, submission
+from gaplab.services.experiments.lifecycle import Verb
+from tests.e2e.browser import axe, fits, screenshot
+from tests.experiments import toy
+
+NOTES = """# Floor
+
+*slippery* and **wet**, see [the lab](https://lab.example/log) and <img src=x onerror="document.title='hacked'">
+
+- `code`
+- [bad](javascript:alert(1)) <script>document.title = 'hacked'</script>
+
+![tracker](http://elsewhere.example/x.png)
+"""
+
+
+def ended(store: Any, name: str, **edit: Any) -> str:
+    made = submission.submit_experiment(store, toy(name=name)).id
+    lifecycle.ask_experiment(store, made, Verb.CANCEL)
+    if edit:
+        editing.edit_experiment(store, made, Edit(**edit), starting_from=None)
+    return made
+
+
+def only_one(page: Any) -> None:
+    """Wait until the list has one row."""
+    page.locator("tbody tr").first.wait_for()
+    page.locator("tbody tr").nth(1).wait_for(state="detached")
+
+
+def test_notes_are_rendered_and_run_and_load_nothing(visit: Any, api: Any, written: Any) -> None:
+    made = ended(written, "noted", notes=NOTES, tags=("gait", "paper"))
+
+    modes: dict[str, Any] = {"light": {}, "dark": {"dark": True}, "phone": {"width": 375, "height": 760}}
+    for mode, how in modes.items():
+        page = visit(f"{api.url}/#/experiments/{made}", **how)
+        page.locator(".notes em").wait_for()
+        axe(page)
+        fits(page)
+        screenshot(page, f"notes-{mode}")
+
+    notes = page.locator(".notes")
+    assert notes.locator("em").inner_text() == "slippery"
+    assert notes.locator("h3").inner_text() == "Floor"
+    assert notes.locator("img, script, iframe, [onerror]").count() == 0
+    link = notes.get_by_role("link", name="the lab")
+    assert (link.get_attribute("href"), link.get_attribute("rel")) == (
+        "https://lab.example/log",
+        "noopener noreferrer nofollow",
+    )
+    assert notes.locator("a[href^=javascript]").count() == 0
+    assert "hacked" not in page.title()
+    page.get_by_role("link", name="gait").click()
+    page.locator("tr.experiment").first.wait_for()
+    assert page.get_by_role("searchbox").input_value() == "tag = gait"
+
+
+def test_a_page_builds_only_what_it_knows_of_rendered_notes(visit: Any, api: Any, written: Any) -> None:
+    visit.forgive("Executing inline event handler")  # the policy of the page refuses it as well
+    page = visit(f"{api.url}/#/new")
+    page.locator(".panel .big").wait_for()
+
+    html = page.evaluate("""async () => {
+        const { markdownNodes } = await import("./assets/dashboard/lib/markdown.js");
+        const { h } = await import("./assets/dashboard/lib/dom.js");
+        return h("div", {}, ...markdownNodes(`<p onclick="x()" style="color:red">a<b>b</b><script>x()</script>
+          <style>p{}</style><svg onload=x()><a href="//e">c</a></svg><a href="javascript:x()">d</a>
+          <a href=" https://e">e</a><a href="https://e" target="_self">f</a><iframe src="https://e"></iframe>
+          <form action="https://e"><input></form></p>`)).innerHTML;
+    }""")
+
+    for word in (
+        "onclick",
+        "style",
+        "script",
+        "svg",
+        "onload",
+        "javascript",
+        "iframe",
+        "form",
+        "input",
+        "_self",
+        "<b>",
+    ):
+        assert word not in html
+    assert '<a href="https://e" rel="noopener noreferrer nofollow" target="_blank">f</a>' in html
+
+
+def test_a_query_finds_is_explained_and_is_saved_as_a_view(visit: Any, api: Any, written: Any) -> None:
+    visit.forgive("422")
+    ended(written, "walks", tags=("findable",), notes="slippery")
+    page = visit(api.url)
+    page.locator("tbody tr").first.wait_for()
+    search = page.get_by_role("searchbox")
+
+    search.fill("tag = findable and strateg = simulated_fit")
+    page.get_by_text("did you mean 'strategy'?").wait_for()
+    assert page.locator("tbody tr").count() > 0
+    search.fill("tag = findable and strategy = simulated_fit")
+    only_one(page)
+    assert page.locator(".mistake").inner_text() == ""
+    page.get_by_role("button", name="Save as a view…").click()
+    page.get_by_label("Name", exact=True).fill("found ones")
+    page.get_by_role("button", name="Save", exact=True).click()
+    page.get_by_role("link", name="found ones").wait_for()
+    page.get_by_text("How to search").click()
+    axe(page)
+    screenshot(page, "views-light")
+
+    modes: dict[str, Any] = {"dark": {"dark": True}, "phone": {"width": 375, "height": 760}}
+    for mode, how in modes.items():
+        other = visit(api.url, **how)
+        other.get_by_role("link", name="found ones").click()
+        only_one(other)
+        axe(other)
+        fits(other)
+        screenshot(other, f"views-{mode}")
+    page.get_by_role("button", name="Delete the view found ones").click()
+    page.get_by_role("button", name="Delete it").click()
+    page.get_by_role("link", name="found ones").wait_for(state="detached")
+
+
+def test_what_has_ended_is_archived_and_deleted_by_its_name(visit: Any, api: Any, written: Any) -> None:
+    visit.forgive("404")
+    made = ended(written, "obsolete")
+    page = visit(f"{api.url}/#/experiments/{made}")
+    watching = visit(f"{api.url}/#/experiments/{made}")
+    page.get_by_role("button", name="Archive", exact=True).click()
+    page.get_by_role("button", name="Unarchive").wait_for()
+    page.get_by_role("button", name="Notify…").click()
+    page.get_by_role("button", name="Back").click()
+
+    page.get_by_role("button", name="Delete…").click()
+    page.get_by_label("Type its name to confirm").fill("obsolet")
+    page.get_by_role("button", name="Delete it").click()
+    page.get_by_text("That is not its name").wait_for()
+    screenshot(page, "delete-light")
+    page.get_by_label("Type its name to confirm").fill("obsolete")
+    page.get_by_role("button", name="Delete it").click()
+
+    page.get_by_role("searchbox").wait_for()
+    watching.get_by_text("was deleted at").first.wait_for()
+
+
+def test_what_runs_is_not_deleted_and_says_why(visit: Any, api: Any, written: Any) -> None:
+    made = submission.submit_experiment(written, toy(name="waiting")).id
+    page = visit(f"{api.url}/#/experiments/{made}")
+
+    page.get_by_role("button", name="Delete…").click(force=True)
+
+    page.get_by_text("Only what has ended can be deleted").wait_for()

@@ -1,0 +1,352 @@
+"""Tags, archived records, deletion, saved views and notes: what people do with results once they have them."""
+
+from collections.abc import Iterator
+from io import BytesIO
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import func, select, update
+
+from gaplab.api.app import create_app
+from gaplab.schemas.access import Role
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.lifecycle import State, Verb
+from gaplab.schemas.schedule import ExtensionSpec
+from gaplab.schemas.spec import StudySpec
+from gaplab.services import access, events
+from gaplab.services.archives import export_experiment, export_study, import_archive
+from gaplab.services.archives.writing import Archive
+from gaplab.services.core.errors import Conflict, Forbidden, NotFound
+from gaplab.services.events import WantedEvents
+from gaplab.services.experiments import archiving, deletion, lifecycle, reading, submission
+from gaplab.services.experiments.deletion import Deleter
+from gaplab.services.experiments.extension import extend_experiment
+from gaplab.services.experiments.notes import render
+from gaplab.services.running import execution
+from gaplab.services.running.execution import Failure
+from gaplab.services.store.models import Base, RepetitionRow
+from gaplab.services.store.session import Store
+from tests.experiments import cancel, run, some_log, toy
+
+ME = Deleter(None)
+STUDY = {
+    "strategies": ["random", "known_fit"],
+    "robot": "toy_function",
+    "tunables": ["static_friction", "dynamic_friction"],
+    "budget": "smoke",
+    "iterations": 1,
+    "repetitions": 1,
+}
+
+
+@pytest.fixture
+def api(sqlite_store: Store) -> Iterator[TestClient]:
+    with TestClient(create_app(sqlite_store)) as client:
+        yield client
+
+
+def study(store: Store, **changes: Any) -> Any:
+    return submission.submit_study(store, StudySpec.model_validate(STUDY | changes))
+
+
+def finish(store: Store, **log: Any) -> None:
+    """Complete everything that is queued."""
+    while claims := execution.claim(store, "me", 10):
+        for claim in claims:
+            run(store, claim, some_log(claim.spec.iterations, **log))
+
+
+def rows(store: Store) -> dict[str, int]:
+    with store.reading() as session:
+        return {
+            name: session.execute(select(func.count()).select_from(table)).scalar_one()
+            for name, table in Base.metadata.tables.items()
+        }
+
+
+def content(archive: Archive) -> bytes:
+    with archive.file:
+        return archive.file.read()
+
+
+def kinds(store: Store, **which: Any) -> list[EventKind]:
+    return [event.kind for event in events.page(store, 0, WantedEvents(**which), limit=1000).items]
+
+
+def test_tags_are_added_removed_and_replaced_without_others(api: TestClient) -> None:
+    made = api.post("/experiments", json=toy().model_dump(mode="json", exclude_unset=True)).json()
+    path, any_ = f"/experiments/{made['id']}", {"If-Match": "*"}
+
+    def tags(**change: Any) -> Any:
+        return api.patch(path, json=change, headers=any_).json().get("tags")
+
+    assert made["tags"] == []
+    assert tags(tags=["Gait", "b", "gait"]) == ["b", "gait"]
+    assert tags(add_tags=["paper", "ÄRGER"], remove_tags=["b", "never"]) == ["gait", "paper", "ärger"]
+    assert tags(name="other") == ["gait", "paper", "ärger"]
+    assert tags(tags=[]) == []
+    refused = api.patch(path, json={"tags": ["two words"]}, headers=any_)
+    assert (refused.status_code, refused.json()["errors"][0]["pointer"]) == (422, "/tags/0")
+    for change in ({"tags": None}, {"tags": [], "add_tags": ["a"]}, {"tags": [f"t{n}" for n in range(21)]}):
+        assert api.patch(path, json=change, headers=any_).status_code == 422
+    tags(tags=[f"t{number}" for number in range(20)])
+    full = api.patch(path, json={"add_tags": ["one-more"]}, headers=any_)
+    assert (full.status_code, full.json()["errors"][0]["pointer"]) == (422, "/add_tags")
+    assert kinds(api.app.state.store).count(EventKind.EDITED) == 5  # type: ignore[attr-defined]
+
+
+def test_archiving_and_back_changes_nothing_else_and_each_is_one_event(store: Store) -> None:
+    made = study(store)
+    finish(store)
+    before = reading.read_study(store, made.id)
+
+    for _ in range(2):
+        archived = archiving.archive_study(store, made.id)
+    for _ in range(2):
+        shown = archiving.archive_study(store, made.id, archived=False)
+
+    assert archived.archived_at is not None
+    assert all(each.archived_at for each in archived.experiments)
+    assert shown == before
+    assert kinds(store)[-4:] == [EventKind.ARCHIVED] * 2 + [EventKind.UNARCHIVED] * 2
+
+
+def test_only_what_has_ended_is_archived_and_what_goes_on_is_shown_again(store: Store) -> None:
+    made = study(store)
+    first, second = (each.id for each in made.experiments)
+    with pytest.raises(Conflict, match="is QUEUED and cannot be archived: wait for its end"):
+        archiving.archive_study(store, made.id)
+    finish(store)
+    archiving.archive_study(store, made.id)
+
+    extend_experiment(store, first, ExtensionSpec(repetitions=2))
+
+    assert reading.read_study(store, made.id).archived_at is None
+    assert reading.read_experiment(store, first).archived_at is None
+    assert reading.read_experiment(store, second).archived_at is not None
+
+
+def test_a_deleted_study_leaves_nothing_but_its_events_and_what_others_share(store: Store) -> None:
+    kept = submission.submit_experiment(store, toy(name="kept", repetitions=1))
+    finish(store)
+    with_one = rows(store)
+    made = study(store)
+    finish(store)
+    lasting = {"event", "event_counter", "deletion", "sensitivity", "provenance"}
+
+    deleted = deletion.delete_study(store, made.id, ME)
+
+    after = rows(store)
+    assert {name: count for name, count in after.items() if name not in lasting} == {
+        name: count for name, count in with_one.items() if name not in lasting
+    }
+    assert (after["deletion"], after["provenance"]) == (3, with_one["provenance"])
+    assert deletion.delete_study(store, made.id, ME) == deleted
+    assert rows(store) == after
+    assert reading.read_experiment(store, kept.id).state is State.COMPLETED
+    with pytest.raises(NotFound, match=f"study '{made.id}', 'study', was deleted at"):
+        reading.read_study(store, made.id)
+
+
+def test_events_of_the_deleted_stay_in_order_and_can_be_asked_for(store: Store) -> None:
+    made = study(store)
+    finish(store)
+    number = events.latest(store)
+    deletion.delete_study(store, made.id, ME)
+    page = events.page(store, 0, WantedEvents(study=made.id), limit=1000)
+    of_one = events.page(store, number, WantedEvents(experiment=made.experiments[0].id), limit=10)
+
+    assert [event.number for event in page.items] == list(range(1, number + 3))
+    assert [event.kind for event in page.items[-2:]] == [EventKind.DELETED] * 2
+    assert {event.study for event in page.items} == {made.id}
+    assert [event.body for event in of_one.items] == [{"name": "random"}]
+    events.check(store, WantedEvents(study=made.id), number)
+    events.check(store, WantedEvents(experiment=made.experiments[0].id))
+
+
+def test_nothing_is_deleted_that_is_under_way_or_holds_hardware(store: Store) -> None:
+    made = submission.submit_experiment(store, toy(repetitions=1))
+    (claim,) = execution.claim(store, "me", 1)
+
+    with pytest.raises(Conflict, match="is RUNNING and cannot be deleted: cancel it first"):
+        deletion.delete_experiment(store, made.id, ME)
+    cancel(store, made.id)
+    with store.transaction() as session:
+        session.execute(update(RepetitionRow).values(hardware="arm"))
+    with pytest.raises(Conflict, match="still holds hardware"):
+        deletion.delete_experiment(store, made.id, ME)
+    execution.free_hardware(store, [claim])
+    deletion.delete_experiment(store, made.id, ME)
+
+    with pytest.raises(NotFound):
+        lifecycle.ask_experiment(store, made.id, Verb.RETRY)
+
+
+def test_a_worker_that_has_not_heard_of_the_deletion_writes_into_no_other_experiment(store: Store) -> None:
+    made = submission.submit_experiment(store, toy(repetitions=1))
+    (claim,) = execution.claim(store, "me", 1)
+    cancel(store, made.id)
+    deletion.delete_experiment(store, made.id, ME)
+    other = submission.submit_experiment(store, toy(repetitions=1))
+    (theirs,) = execution.claim(store, "you", 1)
+
+    assert theirs.id != claim.id
+    assert not execution.record(store, claim, next(some_log()))
+    assert execution.heartbeat(store, [claim]) == ()
+    assert execution.complete(store, claim) == ()
+    assert execution.hand_back(store, claim) == ()
+    assert not execution.fail(store, claim, Failure("late"))
+    assert reading.list_repetitions(store, other.id)[0].state is State.RUNNING
+
+
+def test_an_experiment_leaves_its_study_unless_it_is_the_only_one(store: Store) -> None:
+    made = study(store)
+    finish(store)
+    first, second = (each.id for each in made.experiments)
+
+    deletion.delete_experiment(store, first, ME)
+
+    assert [each.id for each in reading.read_study(store, made.id).experiments] == [second]
+    with pytest.raises(Conflict, match="is the only one of study"):
+        deletion.delete_experiment(store, second, ME)
+
+
+def test_an_archive_of_the_deleted_brings_it_back_under_its_id(store: Store) -> None:
+    made = study(store)
+    finish(store)
+    archive = content(export_study(store, made.id))
+    deletion.delete_study(store, made.id, ME)
+
+    imported = import_archive(store, BytesIO(archive))
+
+    assert (imported.study, imported.renamed) == (made.id, {})
+    assert content(export_study(store, made.id)) == archive
+    assert reading.read_study(store, made.id).state is State.COMPLETED
+    deletion.delete_study(store, made.id, ME)
+
+
+def test_tags_travel_in_archives_and_hiding_does_not(store: Store, api: TestClient) -> None:
+    made = submission.submit_experiment(store, toy(repetitions=1))
+    finish(store)
+    client = TestClient(create_app(store))
+    client.patch(f"/experiments/{made.id}", json={"tags": ["gait", "b"]}, headers={"If-Match": "*"})
+    archiving.archive_experiment(store, made.id)
+
+    imported = import_archive(store, BytesIO(content(export_experiment(store, made.id))))
+
+    arrived = reading.read_experiment(store, imported.experiments[0])
+    assert (arrived.tags, arrived.archived_at) == (("b", "gait"), None)
+
+
+def test_a_token_deletes_what_it_submitted_and_an_admin_everything(sqlite_store: Store) -> None:
+    tokens = {
+        name: access.create_token(sqlite_store, role)
+        for name, role in {"ann": Role.RUNNER, "bob": Role.RUNNER, "reader": Role.READER, "admin": Role.ADMIN}.items()
+    }
+    app = create_app(sqlite_store)
+
+    def as_(name: str) -> TestClient:
+        return TestClient(app, headers={"Authorization": f"Bearer {tokens[name].secret}"})
+
+    made = as_("ann").post("/studies", json=STUDY).json()["id"]
+    path = f"/studies/{made}"
+    as_("ann").post(f"{path}/cancel")
+
+    assert as_("reader").delete(path).status_code == 403
+    refused = as_("bob").delete(path)
+    assert (refused.status_code, "submitted with another token" in refused.json()["detail"]) == (403, True)
+    assert as_("bob").post(f"{path}/archive").status_code == 200
+    assert as_("bob").get(path).status_code == 200
+    assert as_("ann").delete(path).json()["id"] == made
+    assert as_("ann").delete(path).status_code == 200
+    assert as_("ann").delete("/studies/nobody").status_code == 404
+
+    other = as_("ann").post("/studies", json=STUDY).json()["id"]
+    as_("ann").post(f"/studies/{other}/cancel")
+    assert as_("admin").delete(f"/studies/{other}").status_code == 200
+
+
+def test_what_an_open_service_stored_only_an_admin_deletes_once_there_are_tokens(sqlite_store: Store) -> None:
+    made = submission.submit_experiment(sqlite_store, toy())
+    cancel(sqlite_store, made.id)
+
+    with pytest.raises(Forbidden):
+        deletion.delete_experiment(sqlite_store, made.id, Deleter("a token"))
+    deletion.delete_experiment(sqlite_store, made.id, Deleter("an admin's", may_delete_all=True))
+
+
+def test_saved_views_are_shared_replaced_and_deleted(api: TestClient) -> None:
+    best = {"shows": "experiments", "query": "strategy = informative and fitness > 0.5", "sort": "name"}
+
+    saved = api.put("/views/slippery gaits", json=best)
+    api.put("/views/all", json={})
+
+    assert saved.status_code == 200
+    assert [view["name"] for view in api.get("/views").json()] == ["all", "slippery gaits"]
+    assert api.get("/views/slippery gaits").json() == saved.json()
+    assert api.put("/views/all", json={"query": "archived = true"}).json()["query"] == "archived = true"
+    assert api.delete("/views/all").status_code == 200
+    assert api.delete("/views/all").status_code == 404
+    assert api.get("/views/all").status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("name", "body", "pointer"),
+    [
+        ("a", {"query": "strategi = x"}, "/query"),
+        ("a", {"query": "study = none"}, "/query"),
+        ("a", {"shows": "tables"}, "/shows"),
+        ("a", {"sort": "state"}, ""),
+        ("a<b", {}, "name"),
+        ("x" * 61, {}, "name"),
+    ],
+)
+def test_a_view_is_checked_when_it_is_saved(api: TestClient, name: str, body: Any, pointer: str) -> None:
+    refused = api.put(f"/views/{name}", json=body)
+
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["pointer"] == pointer
+
+
+def test_lists_are_queried_over_http_and_a_mistake_is_a_problem(api: TestClient) -> None:
+    api.post("/studies", json=STUDY | {"name": "slippery"})
+
+    assert [each["name"] for each in api.get("/experiments", params={"q": "strategy = random"}).json()["items"]] == [
+        "random"
+    ]
+    assert len(api.get("/studies", params={"q": "slip"}).json()["items"]) == 1
+    problem = api.get("/studies", params={"q": "strategi = random"}).json()
+    assert problem["status"] == 422
+    assert problem["errors"][0]["nearest"] == "strategy"
+
+
+HARMLESS = {
+    "*soft* and `code`": "<p><em>soft</em> and <code>code</code></p>\n",
+    "<script>alert(1)</script>": "<p>&lt;script&gt;alert(1)&lt;/script&gt;</p>\n",
+    "<img src=x onerror=alert(1)>": "<p>&lt;img src=x onerror=alert(1)&gt;</p>\n",
+    "[a](javascript:alert(1))": "<p>[a](javascript:alert(1))</p>\n",
+    "[a](JaVaScRiPt:alert(1))": "<p>[a](JaVaScRiPt:alert(1))</p>\n",
+    "[a](&#106;avascript:alert(1))": "<p>[a](javascript:alert(1))</p>\n",
+    "[a](data:text/html;base64,x)": "<p>[a](data:text/html;base64,x)</p>\n",
+    "[a](//elsewhere.example)": "<p>[a](//elsewhere.example)</p>\n",
+    "<javascript:alert(1)>": "<p>&lt;javascript:alert(1)&gt;</p>\n",
+    "![track](http://elsewhere.example/x.png)": "<p>!"
+    '<a href="http://elsewhere.example/x.png" rel="noopener noreferrer nofollow" target="_blank">track</a></p>\n',
+    '[a](http://b.example "t\\" onclick=\\"x")': '<p><a href="http://b.example" title="t&quot; onclick=&quot;x" '
+    'rel="noopener noreferrer nofollow" target="_blank">a</a></p>\n',
+    "[here](#/experiments/abc)": '<p><a href="#/experiments/abc">here</a></p>\n',
+}
+
+
+@pytest.mark.parametrize("notes", HARMLESS, ids=lambda notes: notes[:25])
+def test_notes_are_rendered_without_anything_that_runs_or_loads(notes: str) -> None:
+    assert render(notes) == HARMLESS[notes]
+
+
+def test_notes_are_served_as_html(api: TestClient) -> None:
+    made = api.post("/studies", json=STUDY).json()
+    api.patch(f"/studies/{made['id']}", json={"notes": "# Wet\n\n- *slippery*"}, headers={"If-Match": "*"})
+
+    assert api.get(f"/studies/{made['id']}/notes").json()["html"].startswith("<h1>Wet</h1>\n<ul>")
+    assert api.get(f"/experiments/{made['experiments'][0]['id']}/notes").json() == {"html": ""}

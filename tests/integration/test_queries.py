@@ -1,0 +1,236 @@
+"""The query language of lists: the same on both databases, with errors that point at the place."""
+
+from typing import Any
+
+import pytest
+
+from gaplab.schemas.editing import Edit
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.experiments import archiving, editing, lifecycle, listing, submission
+from gaplab.services.experiments.listing import ListFilter
+from gaplab.services.experiments.query.conditions import EXPERIMENT_FIELDS, STUDY_FIELDS
+from gaplab.services.experiments.query.parsing import LONGEST, quote
+from gaplab.services.running import execution
+from gaplab.services.store.session import Store
+from tests.experiments import run, some_log, toy
+
+
+def edit(store: Store, id_: str, **changes: Any) -> None:
+    editing.edit_experiment(store, id_, Edit(**changes), starting_from=None)
+
+
+@pytest.fixture
+def ids(store: Store) -> dict[str, str]:
+    """An experiment that is complete, one that is tagged and noted, one with another strategy, and a study of two."""
+    made = {}
+    for name, strategy in (("done", "informative"), ("Tagged", "random"), ("other", "simulated_fit")):
+        made[name] = submission.submit_experiment(
+            store, toy(strategy=strategy, name=name, iterations=1, repetitions=2)
+        ).id
+        if name == "done":
+            for number, claim in enumerate(execution.claim(store, "me", 2)):
+                run(store, claim, some_log(1, recorded=0.5 + number / 2))
+    edit(store, made["Tagged"], tags=("gait", "50-percent"), notes="the floor was *Slippery*, 50% wet")
+    spec = StudySpec.model_validate(
+        {"name": "both", "strategies": ["known_fit", "direct"], "robot": "toy_function", "budget": "smoke"}
+    )
+    study = submission.submit_study(store, spec)
+    editing.edit_study(store, study.id, Edit(tags=("paper",), notes="a bent leg"), starting_from=None)
+    made |= {"study": study.id, "known_fit": study.experiments[0].id, "direct": study.experiments[1].id}
+    return made
+
+
+def found(store: Store, q: str) -> set[str]:
+    return {each.name for each in listing.list_experiments(store, ListFilter(q=q)).items}
+
+
+def studies(store: Store, q: str) -> set[str]:
+    return {each.name for each in listing.list_studies(store, ListFilter(q=q)).items}
+
+
+ALL = {"done", "Tagged", "other", "known_fit", "direct"}
+
+QUERIES = {
+    "": ALL,
+    "strategy = informative": {"done"},
+    "STRATEGY = informative and STATE = completed": {"done"},
+    "strategy != informative": ALL - {"done"},
+    "strategy in (informative, random)": {"done", "Tagged"},
+    "strategy not in (informative, random)": {"other", "known_fit", "direct"},
+    "not strategy = informative or done": ALL,
+    "state = QUEUED and not tag = gait": {"other", "known_fit", "direct"},
+    "tag = GAIT": {"Tagged"},
+    "tag = gai": set(),
+    "tag ~ gai": {"Tagged"},
+    "tag = paper": {"known_fit", "direct"},
+    "tag = none": {"done", "other"},
+    "tag != gait": ALL - {"Tagged"},
+    'note ~ "slippery"': {"Tagged"},
+    "note ~ 50%": {"Tagged"},
+    "note ~ '%'": {"Tagged"},
+    "note ~ _": set(),
+    "note = none": ALL - {"Tagged"},
+    "note !~ slippery": ALL - {"Tagged"},
+    "fitness > 1.7": {"done"},
+    "fitness = 1.75": {"done"},
+    "fitness != 1.75": ALL - {"done"},
+    "fitness > 1.75": set(),
+    "fitness >= 1.75 and fitness <= 1.75": {"done"},
+    "fitness = none": ALL - {"done"},
+    "study = none": {"done", "Tagged", "other"},
+    "robot = toy_function": ALL,
+    "engine = analytic and optimizer = steady_state": ALL,
+    "reality = analytic": ALL,
+    "repetitions = 2 and study = none": {"done", "Tagged", "other"},
+    "iterations < 2 and priority = 0": {"done", "Tagged", "other"},
+    "created > -1h": ALL,
+    "created < 2012-11-05 or ended > 2012-11-05T09:00": {"done"},
+    "ended = none": ALL - {"done"},
+    "started = 2012-11-05": set(),
+    "slippery": {"Tagged"},
+    "gait": {"Tagged"},
+    "SLIPPERY floor": {"Tagged"},
+    "slippery or don": {"done", "Tagged"},
+    "(slippery or done) and strategy = random": {"Tagged"},
+    "archived = true": set(),
+    "archived = any": ALL,
+    "name = 'Tagged'": {"Tagged"},
+    "name = tagged": set(),
+    "name ~ TAGGED": {"Tagged"},
+    quote('no "such" text'): set(),
+}
+
+
+def test_queries_find_what_they_say(store: Store, ids: dict[str, str]) -> None:
+    wrong = {q: names for q, expected in QUERIES.items() if (names := found(store, q)) != expected}
+
+    assert wrong == {}
+    assert found(store, f"id = {ids['done']}") == {"done"}
+    assert found(store, f"study = {ids['study']}") == {"known_fit", "direct"}
+
+
+def test_the_queried_fitness_is_the_one_that_is_shown(store: Store, ids: dict[str, str]) -> None:
+    (shown,) = listing.list_experiments(store, ListFilter(q="strategy = informative")).items
+
+    assert shown.fitness is not None
+    assert shown.best_fitness is not None
+    assert found(store, f"fitness = {shown.fitness.mean!r}") == {"done"}
+    assert found(store, f"best_fitness = {shown.best_fitness!r}") == {"done"}
+
+
+STUDY_QUERIES = {
+    "strategy = known_fit": True,
+    "strategy in (known_fit, random)": True,
+    "strategy != random": True,
+    "tag = paper": True,
+    "note ~ bent": True,
+    "bent": True,
+    "state = QUEUED": True,
+    "state != COMPLETED": True,
+    "fitness = none": True,
+    "created > -1d and robot = toy_function": True,
+    "archived = false": True,
+    "both": True,
+    "strategy = random": False,
+    "strategy != known_fit": False,
+    "tag = gait": False,
+    "fitness > 0": False,
+    "slippery": False,
+}
+
+
+def test_a_query_finds_a_study_by_itself_and_by_its_experiments(store: Store, ids: dict[str, str]) -> None:
+    assert {q: bool(studies(store, q)) for q in STUDY_QUERIES} == STUDY_QUERIES
+
+
+def test_a_study_is_found_by_a_tag_of_an_experiment(store: Store, ids: dict[str, str]) -> None:
+    edit(store, ids["direct"], add_tags=("odd",), notes="a limp")
+
+    assert studies(store, "tag = odd and note ~ limp") == {"both"}
+
+
+ERRORS = {
+    "strategi = x": ("character 1: unknown field 'strategi' (did you mean 'strategy'?)", "strategy"),
+    "state = COMPLETD": ("character 9: unknown state 'COMPLETD' (did you mean 'COMPLETED'?)", "COMPLETED"),
+    "fitness ~ 3": ("character 1: 'fitness' has no operator ~; permitted: =, !=, >, >=, <, <=, in, not in", None),
+    "tag > 3": ("'tag' has no operator >; permitted: =, !=, ~, !~, in, not in", None),
+    "fitness > much": ("character 11: 'much' is no number", None),
+    "fitness > inf": ("character 11: 'inf' is no number", None),
+    "created > soon": ("character 11: 'soon' is no time, like 2026-11-05", None),
+    "created > -99999999999d": ("is no time", None),
+    "archived = maybe": (
+        "character 12: unknown value 'maybe' (did you mean 'any'?); permitted: true, false, any",
+        "any",
+    ),
+    "fitness >": ("character 10: the query ends; expected a word or a text in quotes", None),
+    "strategy == x": ("character 11: '=' is unexpected", None),
+    "(a": ("character 3: the query ends; expected )", None),
+    "a)": ("character 2: ')' is unexpected; expected the end", None),
+    'note ~ "slippery': ('character 8: the quote " is not closed', None),
+    "strategy in ()": ("character 14: ')' is unexpected", None),
+    "not": ("the query ends", None),
+    "x" * (LONGEST + 1): ("at most 1,000 characters", None),
+    "not " * 40 + "a": ("the query is too large", None),
+    "(a or " * 120 + "a" + ")" * 120: ("too large", None),
+    f"strategy in ({', '.join('x' * 1 for _ in range(200))})": ("too large", None),
+}
+
+
+@pytest.mark.parametrize("q", ERRORS, ids=lambda q: q[:20])
+@pytest.mark.parametrize("read", [listing.list_experiments, listing.list_studies])
+def test_a_mistake_in_a_query_is_named_with_its_place(sqlite_store: Store, q: str, read: Any) -> None:
+    message, nearest = ERRORS[q]
+
+    with pytest.raises(InvalidSpec) as refused:
+        read(sqlite_store, ListFilter(q=q))
+
+    (violation,) = refused.value.violations
+    assert violation.pointer == "q"
+    assert message in violation.message
+    assert violation.nearest == nearest
+
+
+def test_a_query_of_many_parentheses_costs_no_stack(sqlite_store: Store) -> None:
+    assert found(sqlite_store, "(" * 400 + "a" + ")" * 400) == set()
+
+
+def test_every_field_can_be_asked_on_both_databases(store: Store, ids: dict[str, str]) -> None:
+    values = {"state": "QUEUED", "archived": "any"}
+
+    for fields, ask in ((EXPERIMENT_FIELDS, found), (STUDY_FIELDS, studies)):
+        for name, field in fields.items():
+            number = "created" not in name and name in {"fitness", "iterations", "repetitions", "priority"}
+            time = name in {"created", "started", "ended"}
+            value = values.get(name, "1.5" if number else "2012-11-05" if time else "none")
+            for operator in field.operators:
+                ask(store, f"{name} {operator} {value}")
+                ask(store, f"not ({name} {operator} {value}) and {name} not in ({value}, {value})")
+
+
+def test_archived_ones_are_listed_only_if_the_query_or_the_study_asks(store: Store, ids: dict[str, str]) -> None:
+    archiving.archive_experiment(store, ids["done"])
+    lifecycle.ask_study(store, ids["study"], lifecycle.Verb.CANCEL)
+    archiving.archive_study(store, ids["study"])
+
+    assert found(store, "") == {"Tagged", "other"}
+    assert found(store, "archived = true") == {"done", "known_fit", "direct"}
+    assert found(store, "done or archived = any") == ALL
+    assert studies(store, "") == set()
+    assert studies(store, "archived = true") == {"both"}
+    of_study = listing.list_experiments(store, ListFilter(study=ids["study"])).items
+    assert {each.name for each in of_study} == {"known_fit", "direct"}
+
+
+def test_a_query_is_paged_and_its_cursor_belongs_to_it(store: Store, ids: dict[str, str]) -> None:
+    names, cursor = [], None
+    while True:
+        page = listing.list_experiments(store, ListFilter(q="not done", sort="name"), limit=2, cursor=cursor)
+        names += [each.name for each in page.items]
+        if (cursor := page.next) is None:
+            break
+        last = cursor
+
+    assert sorted(names) == sorted(ALL - {"done"})
+    with pytest.raises(InvalidSpec, match="other filters"):
+        listing.list_experiments(store, ListFilter(q="done", sort="name"), limit=2, cursor=last)

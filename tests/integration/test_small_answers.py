@@ -1,0 +1,158 @@
+"""Answers of the command in small things: what is wrong, and what to do."""
+
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+import gaplab as package
+from gaplab.api.app import create_app
+from gaplab.api.commands.cli import app
+from gaplab.api.commands.exit_codes import Exit
+from gaplab.schemas.spec import StudySpec
+from gaplab.services import logs
+from gaplab.services.core import external_plugins
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.engines import engines
+from gaplab.services.experiments import submission
+from gaplab.services.plugins.ignored import ignored_files
+from gaplab.services.specs.default_engines import default_engine
+from gaplab.services.store.session import Store
+from tests.commands import Gaplab
+
+SMALL = {"strategies": ["random", "direct"], "robot": "toy_function", "budget": "smoke"}
+
+
+def test_a_study_is_told_apart_from_an_unknown_experiment(gaplab: Gaplab, sqlite_store: Store, tmp_path: Path) -> None:
+    study = submission.submit_study(sqlite_store, StudySpec.model_validate(SMALL))
+    first = study.experiments[0].id
+
+    extended = gaplab("extend", study.id, "--repetitions", "9")
+    drawn = gaplab("figure", "simulators", study.id, "--out", str(tmp_path / "a.svg"))
+
+    assert extended.code == Exit.NOT_FOUND
+    assert f"'{study.id}' is a study, and this needs an experiment: {first} (random), " in extended.err
+    assert f"a figure of simulators has one experiment, not a study; choose one of {first} (random), " in drawn.err
+
+
+@pytest.mark.parametrize("address", ["localhost:8137", "gaplab.example.org", "ftp://127.0.0.1"])
+def test_an_address_without_its_scheme_is_told_how_it_begins(gaplab: Gaplab, address: str) -> None:
+    said = gaplab("list", "--url", address)
+
+    assert said.code == Exit.UNREACHABLE
+    assert f"like http://{address.removeprefix('ftp://')}" in said.err
+
+
+def test_after_the_last_token_the_command_names_the_one_that_makes_another(
+    gaplab: Gaplab, sqlite_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GAPLAB_DATABASE_URL", sqlite_url)
+    ids = []
+    for _ in range(2):
+        gaplab("token", "create", "--role", "admin")
+    for line in gaplab("token", "list").out.splitlines():
+        ids += [line.split()[0]] if "admin" in line else []
+
+    first, last = (gaplab("token", "revoke", id) for id in ids)
+
+    assert first.err == ""
+    assert "`gaplab token create --role admin`" in last.err
+
+
+def test_the_version_is_printed_and_has_a_name(gaplab: Gaplab) -> None:
+    assert gaplab("--version").out == f"gaplab {package.__version__}\n"
+
+
+def test_every_command_is_in_a_group_of_the_help() -> None:
+    groups: list[Any] = [*app.registered_commands, *app.registered_groups]
+
+    assert [each.name or each.callback for each in groups if not isinstance(each.rich_help_panel, str)] == []
+
+
+def test_a_figure_logs_no_fonts() -> None:
+    root = logging.getLogger()
+    before = root.handlers[:], root.level
+    try:
+        logs.configure()
+        assert not logging.getLogger("fontTools.subset").isEnabledFor(logging.INFO)
+        assert not logging.getLogger("matplotlib").isEnabledFor(logging.INFO)
+    finally:
+        root.handlers[:], _ = before
+        root.setLevel(before[1])
+
+
+def test_where_the_robots_engine_is_not_installed_another_of_gaplabs_own_runs_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert default_engine(Quadruped()) == "pybullet"
+
+    monkeypatch.setattr(engines["pybullet"], "available", classmethod(lambda _: False))
+
+    assert default_engine(Quadruped()) == "mujoco"
+
+
+@pytest.fixture
+def plugin_folder(tmp_path: Path) -> Iterator[Path]:
+    before = external_plugins.named_folders()
+    external_plugins.set_folders((tmp_path,))
+    yield tmp_path
+    external_plugins.set_folders(before)
+
+
+PLUGIN = '''
+from gaplab.plugins import Strategy
+
+
+class {cls}(Strategy):
+    """Select the known genome."""
+
+    name = "{name}"
+    searches = False
+
+    def select(self, belief, search, rng):
+        return belief.known
+'''
+
+
+def test_a_plug_in_that_is_added_or_repaired_needs_no_restart(
+    plugin_folder: Path, sqlite_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gaplab.services.plugins.watching.LOOK_S", 0.0)
+    with TestClient(create_app(sqlite_store), base_url="http://localhost") as api:
+
+        def names() -> dict[str, bool]:
+            return {each["name"]: each["available"] for each in api.get("/catalogue").json()["strategies"]}
+
+        before = names()
+        (plugin_folder / "mine.py").write_text(PLUGIN.format(cls="Mine", name="mine"))
+        added = names()
+        (plugin_folder / "mine.py").write_text("import nowhere\n" + PLUGIN.format(cls="Mine", name="mine"))
+        broken = names()
+        (plugin_folder / "mine.py").write_text(PLUGIN.format(cls="Mine", name="yours"))
+        repaired = names()
+        accepted = api.post("/experiments", json={"strategy": "yours", "robot": "toy_function"})
+
+    assert "mine" not in before
+    assert (added["mine"], broken["mine"], repaired["yours"]) == (True, False, True)
+    assert "mine" not in repaired
+    assert accepted.status_code == 202
+
+
+def test_a_file_that_is_no_plug_in_is_named(plugin_folder: Path, gaplab: Gaplab) -> None:
+    (plugin_folder / "robot.urdf").write_text("<robot/>")
+    (plugin_folder / "data").mkdir()
+    (plugin_folder / "extra.py").write_text("X = 1\n")
+    (plugin_folder / "_shared.py").write_text("X = 1\n")
+    (plugin_folder / "used.py").write_text("X = 1\n")
+    (plugin_folder / "mine.py").write_text(
+        "from gaplab_plugins.used import X\n" + PLUGIN.format(cls="Mine", name="mine")
+    )
+
+    found = {each.file: each.why for each in ignored_files()}
+
+    assert set(found) == {"data/", "extra.py", "robot.urdf"}
+    assert "describe the robot as a class" in found["robot.urdf"]
+    assert "robot.urdf is not used: it is no Python module" in gaplab("catalogue").out

@@ -1,0 +1,172 @@
+"""What was submitted can be submitted again: from the service, from an archive, and with the same bits."""
+
+import json
+import zipfile
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from gaplab.api.app import create_app
+from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.archives import export_study
+from gaplab.services.archives.rerunning import Recorded, rerun, submitted_spec
+from gaplab.services.archives.step_differences import difference
+from gaplab.services.core.errors import Conflict
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.types import Measured, Probed
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment, resolve_study
+from gaplab.services.specs.shortening import experiment_spec, study_spec
+from gaplab.services.store.session import Store
+from tests.commands import Gaplab
+from tests.experiments import run, toy
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SMALL = {"strategies": ["simulated_fit", "direct"], "robot": "toy_function", "budget": "smoke", "seed": 2**63}
+
+
+def stored(spec: dict[str, object]) -> list[dict[str, object]]:
+    return [each.model_dump(mode="json") for each in resolve_study(StudySpec.model_validate(spec))]
+
+
+def exported(store: Store, study: str) -> bytes:
+    with export_study(store, study).file as archive:
+        return archive.read()
+
+
+def compute(store: Store) -> None:
+    """Compute whatever is queued."""
+    while claims := execution.claim(store, "test", limit=10):
+        for claim in claims:
+            run(store, claim, repetition(setting(claim.spec, claim.number)))
+
+
+@pytest.mark.parametrize("name", ["figure_4", "quadruped", "toy", "weights"])
+def test_a_short_spec_of_a_study_gives_the_same_experiments(name: str) -> None:
+    given = json.loads((EXAMPLES / f"{name}.json").read_text())
+
+    found = study_spec(given["name"], stored(given))
+
+    assert found.spec is not None
+    assert found.remarks == ()
+    assert stored(found.spec) == stored(given)
+    assert found.spec["name"] == given["name"]
+    assert len(json.dumps(found.spec)) < len(json.dumps(found.resolved)) / 5
+
+
+@pytest.mark.parametrize("name", ["smoke", "tunables"])
+def test_a_short_spec_of_an_experiment_gives_the_same(name: str) -> None:
+    given = ExperimentSpec.model_validate_json((EXAMPLES / f"{name}.json").read_text())
+    resolved = resolve_experiment(given)
+
+    found = experiment_spec(resolved.model_dump(mode="json"))
+
+    assert resolve_experiment(ExperimentSpec.model_validate(found.spec)) == resolved
+    assert found.spec is not None
+    assert found.spec["budget"] == given.budget.preset
+
+
+def test_a_study_whose_experiments_were_extended_has_the_size_that_all_have() -> None:
+    experiments = stored(SMALL | {"repetitions": 3})
+    grown = [experiments[0] | {"repetitions": 9}, experiments[1]]
+
+    found = study_spec("study", grown)
+
+    assert found.spec is not None
+    assert [each["repetitions"] for each in stored(found.spec)] == [9, 3]
+
+
+def test_experiments_that_differ_in_more_than_strategy_have_no_single_spec() -> None:
+    one, other = stored(SMALL)
+
+    found = study_spec("mixed", [one, other | {"seed": 5}])
+
+    assert found.spec is None
+    assert "differ in more than their strategies" in found.remarks[0]
+
+
+def test_hidden_parameters_are_in_no_spec_until_the_experiment_has_ended(sqlite_store: Store) -> None:
+    spec = {**SMALL, "reality": {"parameters": {"static_friction": 0.77}}, "tunables": ["static_friction"]}
+    study = submission.submit_study(sqlite_store, StudySpec.model_validate(spec))
+
+    with TestClient(create_app(sqlite_store), base_url="http://localhost") as api:
+        before = api.get(f"/studies/{study.id}/spec")
+        archive = BytesIO(exported(sqlite_store, study.id))
+        compute(sqlite_store)
+        after = api.get(f"/studies/{study.id}/spec").json()
+        one = api.get(f"/experiments/{study.experiments[0].id}/spec").json()
+
+    assert "0.77" not in before.text
+    assert "static_friction are hidden until" in before.json()["remarks"][0]
+    assert after["spec"]["reality"] == {"parameters": {"static_friction": 0.77}}
+    assert after["remarks"] == []
+    assert one["spec"]["strategy"] == "simulated_fit"
+    with pytest.raises(Conflict, match="hides parameters of reality"):
+        submitted_spec(archive)
+
+
+def test_an_archive_has_the_spec_and_is_verified_to_the_last_bit(
+    gaplab: Gaplab, sqlite_store: Store, tmp_path: Path
+) -> None:
+    study = submission.submit_study(sqlite_store, StudySpec.model_validate(SMALL | {"repetitions": 1}))
+    compute(sqlite_store)
+    file = tmp_path / "a.zip"
+    file.write_bytes(exported(sqlite_store, study.id))
+
+    with zipfile.ZipFile(file) as archive:
+        spec = json.loads(archive.read("spec.json"))["spec"]
+    said, document = gaplab("rerun", str(file), "--verify"), gaplab("rerun", str(file), "--verify", "--json")
+    again = gaplab("rerun", str(file))
+
+    assert stored(spec) == stored(SMALL | {"repetitions": 1})
+    assert said.code == document.code == again.code == 0
+    assert "2 of 2 repetitions have the same bits." in said.out
+    assert json.loads(document.out)["same"] == 2
+    assert gaplab("spec", again.out.strip()).out == gaplab("spec", study.id).out
+
+
+def test_the_first_step_that_differs_is_named() -> None:
+    spec = resolve_experiment(toy())
+    log = tuple(repetition(setting(spec, 0)))
+    place = next(index for index, step in enumerate(log) if isinstance(step, Measured))
+    measured = log[place]
+    assert isinstance(measured, Measured)
+    sample = measured.sample
+    changed = Measured(1, replace(sample, fitness=sample.fitness * (1 + 2**-52)))
+    recorded = Recorded("x", "x", 0, spec.model_dump(mode="json"), (*log[:place], changed, *log[place + 1 :]))
+
+    same, different = rerun(replace(recorded, log=log)), rerun(recorded)
+    longer = rerun(replace(recorded, log=(*log, log[-1])))
+
+    assert (same.outcome, same.steps) == ("same", len(log))
+    assert (different.outcome, different.steps) == ("different", place)
+    assert different.reason is not None
+    assert different.reason.startswith(f"step {place + 1} (measured, iteration 1): sample.fitness is ")
+    assert (longer.outcome, longer.reason) == ("different", f"it ends here after {len(log)} steps")
+
+
+def test_what_cannot_be_computed_says_why() -> None:
+    spec = resolve_experiment(toy()).model_dump(mode="json")
+    hidden = spec | {"reality": {**spec["reality"], "parameters": {"static_friction": None}}}
+    gone = spec | {"engine": {"name": "fluid", "options": {}}}
+
+    reasons = [rerun(Recorded("x", "x", 0, each, ())).reason for each in (hidden, gone)]
+
+    assert reasons == ["the archive hides parameters of reality", "the engine 'fluid' is not installed here"]
+
+
+def test_zeros_of_both_signs_differ_and_nan_is_nan() -> None:
+    assert difference(Probed(1, 0.0, 1.0), Probed(1, -0.0, 1.0)) == "fitness is -0.0 here, and 0.0 in the archive"
+    assert difference(Probed(1, float("nan"), 1.0), Probed(1, float("nan"), 1.0)) is None
+
+
+def test_an_archive_of_before_gives_its_spec_too() -> None:
+    with (Path(__file__).parents[2] / "docs" / "studies" / "mujoco-in-mujoco.zip").open("rb") as source:
+        spec = submitted_spec(source)
+
+    assert len(stored(spec)) == len(spec["strategies"])

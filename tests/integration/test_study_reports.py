@@ -1,0 +1,202 @@
+"""Reports: verdicts that follow from their rules, and the same content as HTML and as PDF."""
+
+import re
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from gaplab.api.app import create_app
+from gaplab.schemas.lifecycle import Verb
+from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.archives import import_archive
+from gaplab.services.core.types import Probed
+from gaplab.services.experiments import lifecycle, reading, submission
+from gaplab.services.reports.content import study_verdict
+from gaplab.services.reports.document import study_report
+from gaplab.services.reports.pdf import render_pdf
+from gaplab.services.reports.reproduction import spec_text
+from gaplab.services.running import execution
+from gaplab.services.specs.resolution import resolve_study
+from gaplab.services.store.session import Store
+from tests.experiments import run, some_log, toy
+
+ARCHIVE = Path(__file__).parents[2] / "docs" / "studies" / "pybullet-in-pybullet.zip"
+EVIL = "<script>alert(1)</script>"
+
+
+@pytest.fixture
+def api(sqlite_store: Store) -> Iterator[TestClient]:
+    app = create_app(sqlite_store)
+    yield TestClient(app)
+    app.state.rollout_process.close()
+
+
+@pytest.fixture
+def study(sqlite_store: Store) -> str:
+    """A published study, with eight repetitions of each strategy and five evaluations."""
+    with ARCHIVE.open("rb") as file:
+        made = import_archive(sqlite_store, file)
+    assert made.study is not None
+    return made.study
+
+
+class Page(HTMLParser):
+    """What stands in a page: tags, addresses and text."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.addresses: list[str] = []
+        self.words = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: Any) -> None:
+        self.tags.append(tag)
+        self.addresses += [value for name, value in attrs if name in {"src", "href"}]
+
+    def handle_data(self, data: str) -> None:
+        self.words += data
+
+
+def recorded(store: Store, means: list[float], spread: float, repetitions: int = 8) -> str:
+    """An experiment with these recorded values, a constant apart in each repetition."""
+    spec = toy(iterations=len(means) - 1, repetitions=repetitions)
+    made = submission.submit_experiment(store, ExperimentSpec.model_validate(spec)).id
+    for claim in execution.claim(store, "test", limit=repetitions):
+        log = list(some_log(len(means) - 1))
+        for step in log:
+            if isinstance(step, Probed):
+                offset = spread * (claim.number - repetitions / 2)
+                step = Probed(step.iteration, 0.5, means[step.iteration] + offset)
+            assert execution.record(store, claim, step, seconds=0.5)
+        assert execution.complete(store, claim)
+    return made
+
+
+def test_the_verdict_on_a_flat_curve_says_since_when_and_advises(sqlite_store: Store, api: TestClient) -> None:
+    made = recorded(sqlite_store, [0.2, 0.5, 0.8, 1.0, 1.0, 1.0, 1.0], spread=0.05)
+
+    verdict = api.get(f"/experiments/{made}/report", params={"format": "json"}).json()
+
+    assert verdict["headline"] == "Flat since iteration 3; not worth continuing."
+    (trend,) = verdict["trends"]
+    assert (trend["trend"], trend["since"], trend["last"], trend["continuing"]) == ("flat", 3, 6, False)
+
+
+def test_the_verdict_on_a_rising_curve_advises_to_continue(sqlite_store: Store, api: TestClient) -> None:
+    made = recorded(sqlite_store, [0.2, 0.4, 0.6, 0.8, 1.0], spread=0.05)
+
+    verdict = api.get(f"/experiments/{made}/report", params={"format": "json"}).json()
+
+    assert verdict["headline"] == "Still rising: Simulated fit."
+    assert verdict["trends"][0]["continuing"] is True
+
+
+def test_four_repetitions_are_too_few_for_a_verdict(sqlite_store: Store, api: TestClient) -> None:
+    made = recorded(sqlite_store, [0.2, 0.5, 1.0, 1.0, 1.0, 1.0], spread=0.05, repetitions=4)
+
+    verdict = api.get(f"/experiments/{made}/report", params={"format": "json"}).json()
+
+    assert verdict["headline"] == "Too few repetitions or evaluations to say whether continuing is worthwhile."
+    assert verdict["trends"][0]["continuing"] is None
+
+
+def test_the_verdict_on_a_study_agrees_with_the_comparison_at_the_last_count(
+    sqlite_store: Store, api: TestClient, study: str
+) -> None:
+    experiments = reading.read_study(sqlite_store, study).experiments
+    asked: Any = {"experiment": [each.id for each in experiments], "from": 5, "to": 5}
+    pairs = api.get("/comparisons", params=asked).json()
+    learned = {each.id for each in experiments if not each.direct}
+    compared = [pair for pair in pairs if {pair["first"], pair["second"]} <= learned]
+    differing = [pair for pair in compared if pair["student"]["p_holm"] < 0.05]
+
+    verdict = study_verdict(sqlite_store, study)
+
+    assert verdict.evaluations == 5
+    assert not differing
+    assert verdict.headline.startswith("No strategy differs significantly from another at 5")
+    assert any("Share of the fitness of Direct" in sentence and "%" in sentence for sentence in verdict.sentences)
+    assert "does not show that two strategies are equal" in verdict.rules[0]
+
+
+def test_a_study_without_results_has_no_verdict(sqlite_store: Store) -> None:
+    made = submission.submit_study(sqlite_store, StudySpec.model_validate({"robot": "toy_function", "budget": "smoke"}))
+
+    assert study_verdict(sqlite_store, made.id).headline == "There are no results yet."
+
+
+def test_the_page_needs_no_other_file_and_no_script(api: TestClient, study: str) -> None:
+    answer = api.get(f"/studies/{study}/report")
+
+    page = Page(answer.text)
+    assert answer.headers["content-type"].startswith("text/html")
+    assert f'filename="gaplab-{study}-report.html"' in answer.headers["content-disposition"]
+    assert "script" not in page.tags
+    assert all(address.startswith("data:image/svg+xml;base64,") for address in page.addresses)
+    assert page.tags.count("img") == 3
+    for heading in ("Verdict", "Which differ", "Simulators", "Cost", "Settings", "Provenance", "How to reproduce it"):
+        assert heading in page.words
+    assert "pooled as in the paper" in page.words
+    assert "not independent" in page.words
+
+
+def test_a_name_cannot_become_markup(sqlite_store: Store, api: TestClient) -> None:
+    made = submission.submit_experiment(sqlite_store, toy(name=EVIL)).id
+
+    text = api.get(f"/experiments/{made}/report").text
+
+    assert EVIL not in text
+    assert EVIL in Page(text).words
+
+
+def test_the_same_report_is_the_same_pdf(sqlite_store: Store, study: str) -> None:
+    report, at = study_report(sqlite_store, study), datetime(2026, 1, 1, tzinfo=UTC)
+
+    first, second = (render_pdf(report, "made", at) for _ in range(2))
+
+    assert first.startswith(b"%PDF")
+    assert first == second
+    assert len(re.findall(rb"/Type /Page\b", first)) > 3
+
+
+def test_the_pdf_is_served(api: TestClient, study: str) -> None:
+    answer = api.get(f"/studies/{study}/report", params={"format": "pdf"})
+
+    assert answer.headers["content-type"] == "application/pdf"
+    assert answer.content.startswith(b"%PDF")
+
+
+def test_hidden_parameters_of_reality_are_in_no_report(sqlite_store: Store, api: TestClient) -> None:
+    secret = 0.7319462853
+    reality = {"parameters": {"static_friction": secret, "dynamic_friction": 0.3}}
+    made = submission.submit_experiment(sqlite_store, toy(reality=reality)).id
+    (claim, *_) = execution.claim(sqlite_store, "test", limit=1)
+    run(sqlite_store, claim)
+
+    hidden = api.get(f"/experiments/{made}/report").text
+    lifecycle.ask_experiment(sqlite_store, made, Verb.CANCEL)
+
+    assert str(secret) not in hidden
+    assert str(secret) in api.get(f"/experiments/{made}/report").text
+
+
+def test_the_spec_in_a_report_gives_the_same_experiments(sqlite_store: Store, study: str) -> None:
+    experiments = reading.read_study(sqlite_store, study).experiments
+
+    resolved = resolve_study(StudySpec.model_validate_json(spec_text(experiments, "again")))
+
+    stored = [{**each.spec, "name": None} for each in experiments]
+    known = set(stored[0])  # without the schedule, which changes no number
+    assert [{**each.model_dump(mode="json", include=known), "name": None} for each in resolved] == stored
+
+
+@pytest.mark.parametrize("address", ["/studies/nope/report", "/experiments/nope/report"])
+def test_there_is_no_report_of_nothing(api: TestClient, address: str) -> None:
+    for format_ in ("html", "pdf", "json"):
+        assert api.get(address, params={"format": format_}).status_code == 404

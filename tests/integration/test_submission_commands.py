@@ -1,0 +1,125 @@
+"""Submission from a terminal: the cost is shown first, and a person is asked before hours of computation."""
+
+import json
+import shlex
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import pexpect
+import pytest
+
+from gaplab.api.clients import confirmation
+from gaplab.api.clients.client import Client
+from gaplab.api.clients.confirmation import NotSubmitted, confirm, duration, sentence
+from gaplab.api.commands.exit_codes import Exit
+from gaplab.schemas.estimates import EstimateRead
+from gaplab.services.experiments import listing
+from gaplab.services.store.session import Store
+from tests.commands import Gaplab
+
+SMALL = {"strategy": "random", "robot": "toy_function", "budget": "smoke"}
+
+STUDY = {"strategies": ["random"], "robot": "toy_function", "budget": "smoke"}
+
+
+@pytest.fixture
+def at_a_terminal(url: str) -> Callable[[str, str], pexpect.spawn]:
+    """Runs a line of a shell at a terminal, where `gaplab` is the command."""
+
+    def start(line: str, answer: str) -> pexpect.spawn:
+        command = f"{shlex.quote(sys.executable)} -m gaplab"
+        child = pexpect.spawn(
+            "sh", ["-c", line.replace("gaplab", command)], env={"GAPLAB_URL": url, "PATH": "/usr/bin:/bin"}, timeout=120
+        )
+        child.expect_exact("Submit it? [y/N] ")
+        child.sendline(answer)
+        child.expect(pexpect.EOF)
+        child.close()
+        return child
+
+    return start
+
+
+def test_the_cost_is_shown_before_the_id_is_printed(gaplab: Gaplab) -> None:
+    said = gaplab("submit", "-", stdin=json.dumps(SMALL))
+
+    assert said.code == 0
+    assert len(said.out.split()) == 1
+    assert said.err.startswith("1 experiment, 2 repetitions: at most 720 rollouts, less than a second on ")
+
+
+def test_a_dry_run_prints_the_complete_spec_and_submits_nothing(gaplab: Gaplab, sqlite_store: Store) -> None:
+    text, document = (
+        gaplab("submit", "-", "--dry-run", *options, stdin=json.dumps(SMALL)) for options in ([], ["--json"])
+    )
+
+    assert listing.list_experiments(sqlite_store).items == ()
+    assert json.loads(text.out)["iterations"] == 2
+    assert json.loads(text.out)["engine"]["name"] == "analytic"
+    assert "Nothing was submitted" in text.err
+    assert json.loads(document.out)["specs"] == [json.loads(text.out)]
+
+
+def test_a_program_without_a_terminal_is_not_asked(gaplab: Gaplab, sqlite_store: Store) -> None:
+    said = gaplab("submit", "-", stdin="{}")
+
+    assert said.code == 0
+    assert "7 experiments, 280 repetitions" in said.err
+    assert len(listing.list_studies(sqlite_store).items) == 1
+
+
+@pytest.mark.parametrize(("answer", "studies"), [("n", 0), ("y", 1)])
+def test_a_person_is_asked_before_hours_even_if_the_spec_comes_through_a_pipe(
+    at_a_terminal: Callable[[str, str], Any], sqlite_store: Store, answer: str, studies: int
+) -> None:
+    child = at_a_terminal("echo '{}' | gaplab submit -", answer)
+
+    assert child.exitstatus == (0 if studies else Exit.INTERRUPTED)
+    assert len(listing.list_studies(sqlite_store).items) == studies
+
+
+def test_the_client_asks_a_person_too(url: str, monkeypatch: pytest.MonkeyPatch, sqlite_store: Store) -> None:
+    monkeypatch.setattr("gaplab.api.clients.submission.can_ask", lambda: True)
+    monkeypatch.setattr("builtins.input", lambda _: "no")
+    with Client(url) as client:
+        with pytest.raises(NotSubmitted, match="nothing was submitted"):
+            client.submit({})
+        client.submit(SMALL)
+        client.submit({}, yes=True)
+
+    assert len(listing.list_experiments(sqlite_store).items) == 1 + 7
+
+
+def test_an_estimate_of_an_experiment_is_that_of_a_study_with_its_strategy(url: str) -> None:
+    with Client(url) as client:
+        alone, study = (client.estimate(spec) for spec in (SMALL, STUDY))
+
+    assert alone.rollouts == study.rollouts
+
+
+def test_only_yes_is_yes(url: str) -> None:
+    with Client(url) as client:
+        estimate: EstimateRead = client.estimate({})
+
+    assert estimate.seconds > confirmation.LONG_S
+    confirm(estimate, None)
+    confirm(estimate, lambda _: " Yes\n")
+    for answer in ("", "n", "yesterday"):
+        with pytest.raises(NotSubmitted):
+            confirm(estimate, lambda _: answer)  # noqa: B023 - asked at once
+    assert "no supervisor runs" in sentence(estimate)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [
+        (0.2, "less than a second"),
+        (42.4, "about 42 s"),
+        (3_600, "about 1 h"),
+        (7_505, "about 2 h 5 min"),
+        (200_000, "about 2 d 7 h"),
+    ],
+)
+def test_durations_have_two_units(seconds: float, words: str) -> None:
+    assert duration(seconds) == words

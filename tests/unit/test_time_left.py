@@ -1,0 +1,63 @@
+"""The interval of the time left, from the pace of the whole work so far."""
+
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import pytest
+
+from gaplab.api.clients.progress.text import span
+from gaplab.schemas.records import TimeLeft
+from gaplab.services.experiments.time_left import busy_s, interval
+
+START = datetime(2026, 1, 1, tzinfo=UTC)
+
+
+def attempt(begin: float, end: float) -> tuple[datetime, datetime]:
+    return START + timedelta(seconds=begin), START + timedelta(seconds=end)
+
+
+def test_the_time_left_is_not_known_before_a_pace_is_measured() -> None:
+    assert interval(0, 1000, 100.0) is None
+    assert interval(500, 500, 9.0) is None
+    assert interval(99, 901, 100.0) is None
+    assert interval(100, 900, 100.0) is not None
+    assert interval(1000, 0, 100.0) is None
+
+
+def test_pauses_do_not_count_as_slowness_and_attempts_at_once_count_once() -> None:
+    assert busy_s([attempt(1000, 1060), attempt(0, 30), attempt(20, 40), attempt(5, 10)]) == 100.0
+    assert busy_s([]) == 0.0
+
+
+@pytest.mark.parametrize("acceleration", [0.9, 1.0, 1.1])
+def test_the_interval_contains_the_true_time_although_the_pace_changes(acceleration: Any) -> None:
+    done = lambda second: second**acceleration  # noqa: E731
+    whole = done(1000)
+
+    for second in range(150, 1000, 50):
+        found = interval(int(done(second)), int(whole - done(second)), float(second))
+        assert found
+        assert found.low_s <= 1000 - second <= found.high_s
+
+
+def test_the_interval_narrows_and_contains_the_true_time_of_progress_in_bursts() -> None:
+    found = [interval(second - second % 30, 1000 - second + second % 30, float(second)) for second in range(200, 900)]
+
+    assert all(each and each.low_s <= 1000 - second <= each.high_s for second, each in enumerate(found, 200))
+    assert found[0]
+    assert found[-1]
+    assert found[-1].high_s / found[-1].low_s < found[0].high_s / found[0].low_s
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "shown"),
+    [
+        (8, 15, "less than 1 min"),
+        (40, 100, "less than 2 min"),
+        (125, 200, "2 to 4 min"),
+        (3000, 9000, "50 to 150 min"),
+        (28_800, 45_000, "8 to 13 h"),
+    ],
+)
+def test_an_interval_is_in_whole_minutes_or_hours(low: Any, high: Any, shown: Any) -> None:
+    assert span(TimeLeft(low_s=low, high_s=high)) == shown
