@@ -145,7 +145,7 @@ def test_a_deleted_study_leaves_nothing_but_its_events_and_what_others_share(sto
     assert deletion.delete_study(store, made.id, ME) == deleted
     assert rows(store) == after
     assert reading.read_experiment(store, kept.id).state is State.COMPLETED
-    with pytest.raises(NotFound, match=f"study '{made.id}', 'study', was deleted at"):
+    with pytest.raises(NotFound, match=rf"'study' \({made.id}\) was deleted at"):
         reading.read_study(store, made.id)
 
 
