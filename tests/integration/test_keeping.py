@@ -295,7 +295,7 @@ def test_saved_views_are_shared_replaced_and_deleted(api: TestClient) -> None:
     ("name", "body", "pointer"),
     [
         ("a", {"query": "strategi = x"}, "/query"),
-        ("a", {"query": "study = none"}, "/query"),
+        ("a", {"query": "study ="}, "/query"),
         ("a", {"shows": "tables"}, "/shows"),
         ("a", {"sort": "state"}, ""),
         ("a<b", {}, "name"),
