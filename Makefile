@@ -20,7 +20,6 @@ lint: .venv/installed-dev  ## check style, types, dependencies and the imports b
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	$(BIN)/mypy --config-file tests/mypy.ini
 	$(DENO) lint --quiet
 	$(DENO) check --quiet api/dashboard
 	$(BIN)/python -m pip check --disable-pip-version-check

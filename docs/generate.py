@@ -51,7 +51,7 @@ def commands() -> Iterator[str]:
         )
         yield f"## {name}\n\n```text\n{usage}\n```\n\n{_cell(command.help)}\n"
         rows = [_parameter(each) for each in command.params]
-        yield from _table(("argument or option", "meaning", "left out"), rows)  # type: ignore[arg-type]
+        yield from _table(("argument or option", "meaning", "left out"), rows)
     yield "## Exit codes\n"
     yield from _table(("code", "meaning"), [(str(code.value), code.meaning) for code in Exit])
 
@@ -67,7 +67,7 @@ def http() -> Iterator[str]:
                 (f"`{each['name']}` ({each['in']})", _type(each["schema"]), _cell(each.get("description")))
                 for each in operation.get("parameters", ())
             ]
-            yield from _table(("parameter", "type", "meaning"), rows)  # type: ignore[arg-type]
+            yield from _table(("parameter", "type", "meaning"), rows)
             yield f"Answers: {', '.join(sorted(operation['responses']))}.\n"
 
 
@@ -133,7 +133,7 @@ def _plugin(found: PluginRead) -> Iterator[str]:
         (f"`{name}`", _type(schema), _cell(schema.get("description")), _default(schema.get("default")))
         for name, schema in found.options.get("properties", {}).items()
     ]
-    yield from _table(("option", "type", "meaning", "left out"), rows)  # type: ignore[arg-type]
+    yield from _table(("option", "type", "meaning", "left out"), rows)
 
 
 def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> Iterator[str]:

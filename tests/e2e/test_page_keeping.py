@@ -3,8 +3,8 @@
 from typing import Any
 
 from gaplab.schemas.editing import Edit
+from gaplab.schemas.lifecycle import Verb
 from gaplab.services.experiments import editing, lifecycle, submission
-from gaplab.services.experiments.lifecycle import Verb
 from tests.e2e.browser import axe, fits, screenshot
 from tests.experiments import toy
 

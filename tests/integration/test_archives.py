@@ -24,6 +24,7 @@ from gaplab.schemas.spec import StudySpec
 from gaplab.services.archives import export_experiment, export_study, import_archive, opening, unpacking
 from gaplab.services.archives import reading as importing
 from gaplab.services.archives.columns import EXPORTED
+from gaplab.services.archives.logs import check_logs
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict, NotFound
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Transferred, Tuned
@@ -363,7 +364,7 @@ def test_times_keep_their_microseconds(store: Store, other: Any) -> None:
 def test_others_write_while_an_archive_is_checked(
     store: Store, other: Any, monkeypatch: pytest.MonkeyPatch, unpacked_here: None
 ) -> None:
-    submitted, check_logs = finished(store), importing.check_logs
+    submitted = finished(store)
     archive = exported(export_experiment(store, submitted))
 
     def check_slowly(*given: Any) -> None:

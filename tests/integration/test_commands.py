@@ -24,6 +24,7 @@ from gaplab.api.commands import completion
 from gaplab.api.commands.cli import app
 from gaplab.api.commands.exit_codes import BY_STATUS, Exit
 from gaplab.api.http import problems
+from gaplab.services.core import external_plugins
 from gaplab.services.running import execution
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
@@ -73,8 +74,9 @@ def said() -> dict[str, Any]:
 
 
 @pytest.fixture
-def ask(gaplab: Gaplab, said: dict[str, Any]) -> Callable[..., Any]:
-    """Gives the document that a command prints."""
+def ask(gaplab: Gaplab, said: dict[str, Any]) -> Iterator[Callable[..., Any]]:
+    """Gives the document that a command prints; the plug-in folders are as before at the end."""
+    before = external_plugins.named_folders()
 
     def document(name: str, *arguments: str, stdin: str = "") -> Any:
         answer = gaplab(*name.split(), *arguments, "--json", stdin=stdin)
@@ -82,7 +84,8 @@ def ask(gaplab: Gaplab, said: dict[str, Any]) -> Callable[..., Any]:
         said[name] = json.loads(answer.out)
         return said[name]
 
-    return document
+    yield document
+    external_plugins.set_folders(before)
 
 
 def test_every_command_prints_one_document_and_nothing_else(

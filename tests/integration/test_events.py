@@ -413,7 +413,7 @@ def test_all_streams_together_ask_the_database_once_a_look(
         next(asked)
         return page(*given, **named)
 
-    monkeypatch.setattr(feeding.events, "page", counted)
+    monkeypatch.setattr(events, "page", counted)
     with served(sqlite_store) as (url, feed), Client(url) as client:
         submission.submit_experiment(sqlite_store, toy())
         streams = [client.events() for _ in range(8)]
@@ -447,11 +447,11 @@ def test_a_stream_that_nobody_takes_from_keeps_no_failed_reader(
         stalled, resumed = feed.follow(0, WantedEvents()), feed.follow(0, WantedEvents())
         first = await anext(stalled)
         failing.append(True)
-        monkeypatch.setattr(feeding.events, "page", fail_once)
+        monkeypatch.setattr(events, "page", fail_once)
         while failing == [False, True]:
             await asyncio.sleep(0.01)
         await asyncio.sleep(0.05)
-        monkeypatch.setattr(feeding.events, "page", page)
+        monkeypatch.setattr(events, "page", page)
         second = await asyncio.wait_for(anext(resumed), DEADLINE_S)
         await stalled.aclose()  # type: ignore[attr-defined]
         await resumed.aclose()  # type: ignore[attr-defined]
@@ -473,7 +473,7 @@ def test_a_stream_whose_reader_failed_is_resumed_by_the_client(
             raise ValueError(msg)
         return latest(store)
 
-    monkeypatch.setattr(feeding.events, "latest", fail_once)
+    monkeypatch.setattr(events, "latest", fail_once)
     with served(sqlite_store) as (url, _), Client(url) as client:
         found = take(client.events(), 1)
 

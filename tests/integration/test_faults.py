@@ -1,5 +1,6 @@
 """Faults of plug-ins, of reality and of hardware: each concerns the repetitions that it hits, and nothing else."""
 
+from dataclasses import replace
 from threading import Event, Lock
 from types import SimpleNamespace
 from typing import Any, ClassVar
@@ -332,7 +333,7 @@ def test_a_repetition_that_does_nothing_gives_signs_of_life(monkeypatch: pytest.
         return 1.0
 
     whole = setting(resolve_experiment(small(repetitions=1)), 0)
-    for item in checkpoints.recorded(checkpoints.replace(whole, reality=waiting), (), ()):
+    for item in checkpoints.recorded(replace(whole, reality=waiting), (), ()):
         if isinstance(item, Pulse) and item.measuring:
             pulses.append(item)
             if len(pulses) > 3:

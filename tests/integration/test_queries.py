@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from gaplab.schemas.editing import Edit
+from gaplab.schemas.lifecycle import Verb
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.experiments import archiving, editing, lifecycle, listing, submission
@@ -210,7 +211,7 @@ def test_every_field_can_be_asked_on_both_databases(store: Store, ids: dict[str,
 
 def test_archived_ones_are_listed_only_if_the_query_or_the_study_asks(store: Store, ids: dict[str, str]) -> None:
     archiving.archive_experiment(store, ids["done"])
-    lifecycle.ask_study(store, ids["study"], lifecycle.Verb.CANCEL)
+    lifecycle.ask_study(store, ids["study"], Verb.CANCEL)
     archiving.archive_study(store, ids["study"])
 
     assert found(store, "") == {"Tagged", "other"}

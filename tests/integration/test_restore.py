@@ -13,7 +13,6 @@ import pytest
 from gaplab.api.commands.cli import main
 from gaplab.services.core.errors import StoreDamaged, StoreUnavailable, Unsupported
 from gaplab.services.experiments import listing, submission
-from gaplab.services.store import restore as restoring
 from gaplab.services.store.backup import backup
 from gaplab.services.store.restore import restore
 from gaplab.services.store.session import Store
@@ -169,7 +168,7 @@ def test_a_crash_in_the_middle_leaves_the_former_database(
     def die(*_: Any) -> None:
         raise Killed
 
-    monkeypatch.setattr(restoring.os, "link", die)
+    monkeypatch.setattr(os, "link", die)
     with pytest.raises(Killed):
         restore(url, copied)
 

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -28,7 +29,9 @@ def rollouts() -> Iterator[Any]:
 
 
 def gone(pid: Any) -> bool:
-    """Whether a process has ended, waited for or not."""
+    """Whether a process has ended, waited for or not: with all of its threads, which hold its pipes until then."""
+    with suppress(ChildProcessError):
+        return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
     except OSError:

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from sqlalchemy import make_url, text
 
-from gaplab import migrations
 from gaplab.services.core.errors import StoreUnavailable
 from gaplab.services.store import postgres as connections
+from gaplab.services.store.engine import open_engine
 from gaplab.services.store.session import Store
 from tests.conftest import Postgres
 from tests.postgres import PORT
@@ -89,7 +89,7 @@ def test_a_wait_for_a_lock_ends_too(postgres: Postgres) -> None:
 
 def test_a_migration_may_take_longer_than_any_statement_of_the_service(postgres: Postgres) -> None:
     with postgres.database() as url:
-        engine = migrations.open_engine(url)
+        engine = open_engine(url, enforce_foreign_keys=False)
         with engine.connect() as connection:
             limit = connection.execute(text("SHOW statement_timeout")).scalar_one()
             kept_alive = connection.execute(text("SHOW tcp_keepalives_idle")).scalar_one()

@@ -22,7 +22,7 @@ from gaplab.services.specs.assembly import setting
 from gaplab.services.store.lease import Pulse
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import recorded
-from tests.numbers.kept import FOLDER, HALF_WAY, MACHINE, machine
+from tests.numbers.kept_numbers import FOLDER, HALF_WAY, MACHINE, machine
 from tests.numbers.specs import HALF_WAY as HALF_WAY_SPEC
 from tests.numbers.specs import STUDIES
 

@@ -18,7 +18,16 @@ from gaplab.services.experiments import reading
 from gaplab.services.results import curves
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.session import Store
-from tests.numbers.kept import FOLDER, ITERATION, archive, exact, members, numbers, other_machine, other_versions
+from tests.numbers.kept_numbers import (
+    FOLDER,
+    ITERATION,
+    archive,
+    exact,
+    members,
+    numbers,
+    other_machine,
+    other_versions,
+)
 from tests.numbers.specs import STUDIES
 
 SAMPLE = ("repetition", "iteration", "kind", "genome", "fitness")

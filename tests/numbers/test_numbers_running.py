@@ -22,7 +22,7 @@ from gaplab.services.store.session import Store
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor
 from tests.numbers.keep import CHECKPOINTS
-from tests.numbers.kept import HALF_WAY, archive, members, numbers, other_machine
+from tests.numbers.kept_numbers import HALF_WAY, archive, members, numbers, other_machine
 from tests.processes import processes_of_ray
 
 DEADLINE_S = 400

@@ -34,7 +34,7 @@ export function editNameAndNotes(page, path, current) {
     title: "Edit name, notes and tags",
     fields: [
       { name: "name", label: "Name", value: name, required: true, maxlength: 200, autocomplete: "off" },
-      { name: "notes", label: "Notes", value: notes, multiline: true, rows: 5, maxlength: 10000, hint: "Markdown: *emphasis*, `code`, - lists, [links](https://…)" },
+      { name: "notes", label: "Notes", value: notes, multiline: true, rows: 5, maxlength: 10000, hint: "Markdown: *emphasis*, `code`, - lists, [links](address)" },
       { name: "tags", label: "Tags", value: tags.join(" "), autocomplete: "off", hint: "letters, digits and _ . : / + -, separated by spaces" },
     ],
     action: "Save",

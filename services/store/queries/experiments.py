@@ -178,7 +178,7 @@ def _get(session: Session, table: type[R], noun: str, id_: str) -> R:
     if (found := session.get(table, storable(id_))) is not None:
         return found
     if deletion := session.get(DeletionRow, storable(id_)):
-        raise NotFound(f"{noun} {id_!r}, {deletion.name!r}, was deleted at {deletion.deleted_at:%Y-%m-%d %H:%M} UTC")
+        raise NotFound(f"{deletion.name!r} ({id_}) was deleted at {deletion.deleted_at:%Y-%m-%d %H:%M} UTC")
     raise NotFound(_of_another_kind(session, id_) or f"there is no {noun} {id_!r}")
 
 
