@@ -21,9 +21,10 @@ from gaplab.services.core.loop import Setting
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.search import Evaluate, Question, maximise
+from gaplab.services.core.space import Space
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tuning import Misfit
-from gaplab.services.core.types import Sample, Space
+from gaplab.services.core.types import Sample
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 

@@ -18,6 +18,7 @@ from gaplab.services.core.scoring import simulator_weights as simulator_weights
 from gaplab.services.core.scoring import uniqueness_penalty as uniqueness_penalty
 from gaplab.services.core.scoring import weighted_deviation as weighted_deviation
 from gaplab.services.core.scoring import weighted_mean as weighted_mean
+from gaplab.services.core.space import Space as Space
 from gaplab.services.core.strategies.base import EnsembleOptions as EnsembleOptions
 from gaplab.services.core.strategies.base import Search as Search
 from gaplab.services.core.strategies.base import Strategy as Strategy
@@ -26,7 +27,6 @@ from gaplab.services.core.tunables.base import Tunable as Tunable
 from gaplab.services.core.types import Belief as Belief
 from gaplab.services.core.types import Sample as Sample
 from gaplab.services.core.types import Simulator as Simulator
-from gaplab.services.core.types import Space as Space
 from gaplab.services.core.world import Body as Body
 from gaplab.services.core.world import Box as Box
 from gaplab.services.core.world import Joint as Joint

@@ -10,8 +10,9 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
 from gaplab.services.core.registry import Plugin, Registry
+from gaplab.services.core.space import Space
 from gaplab.services.core.strategies import strategies
-from gaplab.services.core.types import Budget, Outcome, Space
+from gaplab.services.core.types import Budget, Outcome
 from gaplab.services.plugins import blame
 from gaplab.services.running import versions
 

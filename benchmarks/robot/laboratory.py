@@ -9,9 +9,9 @@ from gaplab.services.core.arrays import FloatArray, Genome
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import COUNTED_S, SETTLING_S, Quadruped, QuadrupedOptions
 from gaplab.services.core.search import maximise
+from gaplab.services.core.space import Space
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tunables import tunables
-from gaplab.services.core.types import Space
 from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.specs.assembly import Simulation
 

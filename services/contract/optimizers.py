@@ -8,7 +8,7 @@ import numpy as np
 from gaplab.services.core.arrays import FloatArray, Genomes
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.search import Question, maximise
-from gaplab.services.core.types import Space
+from gaplab.services.core.space import Space
 
 SPACE = Space.box([0.0, -2.0, 0.0], [1.0, 2.0, 5.0], [True, False, False])
 SUMMIT = np.array([0.9, 0.5, 4.0])

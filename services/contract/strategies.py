@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from gaplab.services.core.arrays import Fitnesses, Genome, Genomes, Parameters
+from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Score, Strategy
-from gaplab.services.core.types import Belief, Sample, Simulator, Space
+from gaplab.services.core.types import Belief, Sample, Simulator
 
 SPACE = Space.box([0.0, 0.0], [1.0, 1.0], [True, False])
 SAMPLES = (Sample(np.array([0.5, 0.5]), 0.8), Sample(np.array([0.1, 0.5]), float("nan")))

@@ -19,6 +19,7 @@ from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.ports import Reality, Sense, Simulate
 from gaplab.services.core.search import maximise
+from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Score, Search, Strategy
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tuners.base import Task, Tuner
@@ -33,7 +34,6 @@ from gaplab.services.core.types import (
     Sample,
     Selected,
     Simulator,
-    Space,
     Step,
     Transferred,
     Tuned,

@@ -15,7 +15,7 @@ import numpy as np
 from gaplab.schemas.misfit import Distribution, MisfitPoint, TunableDistribution
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import known
-from gaplab.services.core.types import Space
+from gaplab.services.core.space import Space
 
 AT_BOUND = 0.01
 """Largest distance from a bound, as a share of the distance between the bounds, that counts as at the bound."""

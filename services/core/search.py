@@ -12,7 +12,7 @@ from gaplab.services.core.answers import Following
 from gaplab.services.core.arrays import FloatArray, Genomes
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.optimizers.base import Optimizer, Population
-from gaplab.services.core.types import Space
+from gaplab.services.core.space import Space
 
 FARTHEST = 32
 """Most genomes to evaluate at once. About one newcomer in ten stays, so later ones are hardly ever used."""

@@ -26,8 +26,8 @@ from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.ports import Simulate
 from gaplab.services.core.search import maximise
+from gaplab.services.core.space import Space
 from gaplab.services.core.streams import stream
-from gaplab.services.core.types import Space
 
 RANDOM, EVOLVED = 3, 4
 """Numbers of random and of evolved controllers, beside the known one."""

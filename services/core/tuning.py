@@ -10,7 +10,8 @@ from gaplab.services.core.arrays import NO_READINGS, Fitnesses, FloatArray, Geno
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.search import Question
-from gaplab.services.core.types import Sample, Simulator, Space
+from gaplab.services.core.space import Space
+from gaplab.services.core.types import Sample, Simulator
 
 ROUNDING = 1e-9
 """Relative excess of a partial sum over a limit: from it on, the whole sum exceeds the limit in spite of rounding."""

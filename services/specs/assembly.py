@@ -19,11 +19,12 @@ from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.sensitivity import Subject
+from gaplab.services.core.space import Space
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.core.tuners import tuners
-from gaplab.services.core.types import Budget, Outcome, Space
+from gaplab.services.core.types import Budget, Outcome
 from gaplab.services.core.world import Recording, Trajectory, World
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine

@@ -9,8 +9,10 @@ from gaplab.schemas.resolved import ResolvedBudget, ResolvedReality, ResolvedSpe
 from gaplab.schemas.sensitivity import Checked, SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, SharedSettings, StudySpec
 from gaplab.services.core.discrepancies import discrepancies
+from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import InvalidSpec, Violation, gather
 from gaplab.services.core.optimizers import optimizers
+from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.registry import Registry
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
@@ -18,6 +20,7 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuners import tuners
+from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.default_engines import default_engine, runs
@@ -37,20 +40,14 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     Raises:
         InvalidSpec: with every violation, each with its pointer into the spec.
     """
-    robot, strategy, optimizer, discrepancy, tuner = gather(
-        lambda: robots.create(spec.robot, "/robot"),
-        lambda: strategies.create(spec.strategy, "/strategy"),
-        lambda: optimizers.create(spec.optimizer, "/optimizer"),
-        lambda: discrepancies.create(spec.discrepancy, "/discrepancy"),
-        lambda: tuners.create(spec.tuner, "/tuner"),
-    )
+    robot, strategy, optimizer, discrepancy, tuner = _created(spec)
     simulated = spec.engine or PluginRef(name=default_engine(robot))
     real = spec.reality.engine or simulated
     engine, reality_engine = gather(
         lambda: _engine(simulated, robot, "/engine"),
         lambda: _engine(real, robot, "/reality/engine" if spec.reality.engine else "/engine"),
     )
-    budget = _budget(spec)
+    budget, preset = _budget(spec), PRESETS[spec.budget.preset]
     violations = [
         *tunable_violations(spec, engine),
         *tuning_violations(robot, discrepancy, tuner),
@@ -59,7 +56,6 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     ]
     if violations:
         raise InvalidSpec(violations)
-    preset = PRESETS[budget.preset]
     return ResolvedSpec(
         priority=spec.priority,
         max_parallel=spec.max_parallel,
@@ -76,6 +72,17 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         reality=ResolvedReality(engine=_completed(engines, real), parameters=_truth(spec, robot, reality_engine)),
         budget=budget,
         seed=spec.seed,
+    )
+
+
+def _created(spec: ExperimentSpec) -> tuple[Robot, Strategy, Optimizer, Discrepancy, Tuner]:
+    """Return the plug-ins of a spec that need no others to be created."""
+    return gather(
+        lambda: robots.create(spec.robot, "/robot"),
+        lambda: strategies.create(spec.strategy, "/strategy"),
+        lambda: optimizers.create(spec.optimizer, "/optimizer"),
+        lambda: discrepancies.create(spec.discrepancy, "/discrepancy"),
+        lambda: tuners.create(spec.tuner, "/tuner"),
     )
 
 

@@ -9,7 +9,7 @@ from gaplab.services.contract.optimizers import SPACE, Hill
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
 from gaplab.services.core.search import maximise
-from gaplab.services.core.types import Space
+from gaplab.services.core.space import Space
 
 
 class Watched:

@@ -15,6 +15,7 @@ from gaplab.services.core.errors import Conflict, InvalidSpec, TryAgain
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import Strategy
+from gaplab.services.core.types import Outcome
 from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.experiments import checks, lifecycle, reading, submission
@@ -328,9 +329,9 @@ def test_a_repetition_that_does_nothing_gives_signs_of_life(monkeypatch: pytest.
     monkeypatch.setattr(checkpoints, "PULSE_S", 0.01)
     pulses, going = [], Event()
 
-    def waiting(genome: Any) -> float:
+    def waiting(genome: Any) -> Outcome:
         assert going.wait(60)
-        return 1.0
+        return Outcome(1.0)
 
     whole = setting(resolve_experiment(small(repetitions=1)), 0)
     for item in checkpoints.recorded(replace(whole, reality=waiting), (), ()):
@@ -350,11 +351,11 @@ def test_hardware_stops_when_its_permit_runs_out(monkeypatch: pytest.MonkeyPatch
     left, done, asked = [0.0, 0.0], Event(), Event()
     events: list[str] = []
 
-    def moving(genome: Any) -> float:
+    def moving(genome: Any) -> Outcome:
         events.append("moves")
         asked.set()
         assert done.wait(60)
-        return 1.0
+        return Outcome(1.0)
 
     def end() -> None:
         events.append("ends")
@@ -375,9 +376,9 @@ def test_a_permit_runs_out_although_nobody_answers(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(permits, "POLL_S", 0.001)
     answers, done = [0.05], Event()
 
-    def moving(genome: Any) -> float:
+    def moving(genome: Any) -> Outcome:
         assert done.wait(60)
-        return 1.0
+        return Outcome(1.0)
 
     def silent() -> float:
         if answers:

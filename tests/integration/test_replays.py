@@ -66,14 +66,14 @@ def walked(store: Store, **changes: Any) -> Any:
     log = [
         Tuned(0, (Simulator(frozen(UNTUNED)), Simulator(frozen(BEST)))),
         Transferred(0, known, simulated(known, UNTUNED)),
-        Probed(0, setting_.reality(known), 0.1),
+        Probed(0, setting_.reality(known).fitness, 0.1),
         Selected(1, moved),
-        Measured(1, Sample(moved, setting_.reality(moved))),
+        Measured(1, Sample(moved, setting_.reality(moved).fitness)),
         Tuned(1, (Simulator(frozen(BEST)),)),
         Transferred(1, moved, simulated(moved, BEST)),
-        Probed(1, setting_.reality(moved), 0.2),
+        Probed(1, setting_.reality(moved).fitness, 0.2),
         Selected(2, known),
-        Measured(2, Sample(known, setting_.reality(known))),
+        Measured(2, Sample(known, setting_.reality(known).fitness)),
     ]
     for step in log:
         assert execution.record(store, claim, step)  # type: ignore[arg-type]
@@ -189,7 +189,7 @@ def test_the_direct_baseline_is_seen_in_reality_alone(sqlite_store: Store, api: 
     experiment = submission.submit_experiment(sqlite_store, quadruped(strategy="direct")).id
     (claim,) = execution.claim(sqlite_store, "me", 1)
     known = Quadruped().known
-    real = setting(claim.spec, 0).reality(known)
+    real = setting(claim.spec, 0).reality(known).fitness
     for step in (Tuned(0, (Simulator(frozen(BEST)),)), Transferred(0, known, real), Probed(0, real, real)):
         execution.record(sqlite_store, claim, step)
 

@@ -20,6 +20,7 @@ from gaplab.services.core.errors import ClusterUnusable, StoreUnavailable
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.sensitivity import Effort, check
+from gaplab.services.core.types import Outcome
 from gaplab.services.engines import engines
 from gaplab.services.engines.analytic import Analytic
 from gaplab.services.experiments import checks, reading, submission
@@ -173,10 +174,10 @@ def moving(told: Path) -> Any:
         with told.open("a") as file:
             file.write(f"{word}\n")
 
-    def measure(genome: Any) -> float:
+    def measure(genome: Any) -> Outcome:
         say("moves")
         time.sleep(3600)
-        return 0.0
+        return Outcome(0.0)
 
     @ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")
     def task_(claim: Any, expected: Any, checkpoint_s: Any, permits: Any) -> Iterator[Any]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.misfit import Tuning, misfit_point, remarks
-from gaplab.services.core.types import Space
+from gaplab.services.core.space import Space
 
 SPACE = Space.box([0.0, 1.0], [1.0, 3.0])
 NAMES = ("grip", "bounce")

@@ -12,7 +12,7 @@ from pymoo.core.problem import Problem
 
 from gaplab.services.core.optimizers.base import Population
 from gaplab.services.core.optimizers.replacement import least_fit, less_fit_of_most_similar
-from gaplab.services.core.types import Space
+from gaplab.services.core.space import Space
 
 SPACE = Space.box([0.0, 0.0], [1.0, 10.0])
 PHASE = Space.box([-1.0, 0.0], [3.0, 10.0], [True, False])

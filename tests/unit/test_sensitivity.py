@@ -18,7 +18,7 @@ from gaplab.services.core.sensitivity import (
     verdict,
     warning,
 )
-from gaplab.services.core.types import Space
+from gaplab.services.core.space import Space
 from tests.fakes import Recorder, paraboloid
 
 EFFORT = Effort(points=17, evaluations=40)

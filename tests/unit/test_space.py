@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gaplab.services.core.types import Space
+from gaplab.services.core.space import Space
 
 SPACE = Space.box([0.0, -1.0], [1.0, 3.0], [True, False])
 

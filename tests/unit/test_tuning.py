@@ -7,10 +7,11 @@ import pytest
 
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
+from gaplab.services.core.space import Space
 from gaplab.services.core.tuners.base import Task
 from gaplab.services.core.tuners.search import Search
 from gaplab.services.core.tuning import Misfit, draw_simulators, simulator_fitness, squared_errors
-from gaplab.services.core.types import Sample, Space
+from gaplab.services.core.types import Sample
 from tests.fakes import TRUTH, Recorder, paraboloid
 
 SPACE = Space.box([0.0, 0.0], [1.0, 1.0])

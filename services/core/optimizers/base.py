@@ -8,7 +8,7 @@ from numpy.random import Generator
 
 from gaplab.services.core.arrays import FloatArray, Genomes
 from gaplab.services.core.registry import Plugin
-from gaplab.services.core.types import Space
+from gaplab.services.core.space import Space
 
 
 @dataclass(frozen=True, eq=False)

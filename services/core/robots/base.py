@@ -8,7 +8,7 @@ import numpy as np
 
 from gaplab.services.core.arrays import FloatArray, Genome, no_readings
 from gaplab.services.core.registry import Plugin
-from gaplab.services.core.types import Space
+from gaplab.services.core.space import Space
 from gaplab.services.core.world import Motion, Trajectory, World
 
 

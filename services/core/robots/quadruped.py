@@ -8,7 +8,7 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, Genome, frozen
 from gaplab.services.core.robots.base import Robot, Sensors
-from gaplab.services.core.types import Space
+from gaplab.services.core.space import Space
 from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, Trajectory, Vector, World
 
 BODY_M: Vector = (0.30, 0.20, 0.06)

@@ -4,7 +4,7 @@ import numpy as np
 
 from gaplab.services.core.arrays import FloatArray, Genome, frozen
 from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.types import Space
+from gaplab.services.core.space import Space
 from gaplab.services.core.world import Material, Motion, Trajectory, World
 
 

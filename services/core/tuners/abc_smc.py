@@ -8,8 +8,9 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Parameters
+from gaplab.services.core.space import Space
 from gaplab.services.core.tuners.base import Task, Tuner
-from gaplab.services.core.types import Simulator, Space
+from gaplab.services.core.types import Simulator
 
 WIDER = 2.0
 """Factor of the covariance of particles by which each is moved. Source: Beaumont, Cornuet, Marin and Robert 2009."""

@@ -8,8 +8,9 @@ from numpy.random import Generator
 
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.registry import Plugin
+from gaplab.services.core.space import Space
 from gaplab.services.core.tuning import Misfit
-from gaplab.services.core.types import Simulator, Space
+from gaplab.services.core.types import Simulator
 
 
 @dataclass(frozen=True, eq=False)

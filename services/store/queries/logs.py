@@ -5,7 +5,6 @@ from collections.abc import Iterable, Sequence
 from math import inf, nan
 from typing import Any, TypeVar
 
-import numpy as np
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
@@ -85,7 +84,7 @@ def _tuned(row: IterationRow, simulators: Sequence[SimulatorRow]) -> Tuned | Non
 
 
 def _simulator(row: SimulatorRow) -> Simulator:
-    interval = None if row.lower is None or row.upper is None else frozen(np.transpose([row.lower, row.upper]))
+    interval = None if row.lower is None or row.upper is None else frozen(list(zip(row.lower, row.upper, strict=True)))
     return Simulator(frozen(row.parameters), _or(inf, row.squared_error), interval, row.weight)
 
 
