@@ -41,6 +41,8 @@ declare namespace Api {
     engines: Array<PluginRead>;
     tunables: Array<PluginRead>;
     optimizers: Array<PluginRead>;
+    discrepancies: Array<PluginRead>;
+    tuners: Array<PluginRead>;
     budgets: Array<BudgetRead>;
     ignored: Array<IgnoredFile>;
     defaults: Record<string, any>;
@@ -190,6 +192,8 @@ declare namespace Api {
     engine: PluginRef | null;
     optimizer: PluginRef;
     tunables: Array<TunableRef>;
+    discrepancy: PluginRef;
+    tuner: PluginRef;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
@@ -380,6 +384,7 @@ declare namespace Api {
     kind: MeasurementKind;
     genome: Array<number>;
     fitness: number | null;
+    readings: Array<number | null> | null;
     measured_by: string;
     measured_at: string;
   }
@@ -417,6 +422,8 @@ declare namespace Api {
     engine: PluginRef | null;
     optimizer: PluginRef;
     tunables: Array<TunableRef>;
+    discrepancy: PluginRef;
+    tuner: PluginRef;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
@@ -443,6 +450,8 @@ declare namespace Api {
     parameters: Record<string, number>;
     squared_error: number | null;
     error: number | null;
+    intervals: Record<string, [number, number]> | null;
+    weight: number | null;
   }
   interface SpecDiff {
     columns: Array<DiffColumn>;
@@ -486,6 +495,8 @@ declare namespace Api {
     engine: PluginRef | null;
     optimizer: PluginRef;
     tunables: Array<TunableRef>;
+    discrepancy: PluginRef;
+    tuner: PluginRef;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
