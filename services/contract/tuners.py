@@ -82,14 +82,13 @@ def returns_as_many_as_wanted(plugin: Plugin) -> None:
         assert inside.all(), "it returns simulators outside the bounds"
 
 
-def begins_with_the_best(plugin: Plugin) -> None:
-    """Returns its simulators best first, each with its own discrepancy."""
+def states_the_discrepancy_of_each(plugin: Plugin) -> None:
+    """Returns each simulator with its own discrepancy."""
     found = tuned(plugin, Physics(), 7)
     misfit = Misfit(Answers(Physics().fitness, sense=Physics().sense), samples(), Readings(), TIMES_S)
     own = misfit.of(np.array([each.parameters for each in found]))
     stated = np.array([each.squared_error for each in found])
     assert np.allclose(own, stated), "its simulators have the discrepancy of others"
-    assert stated[0] == stated.min(), "its first simulator is not the best"
 
 
 def keeps_to_its_budget(plugin: Plugin) -> None:
@@ -137,7 +136,7 @@ def is_described(plugin: Plugin) -> None:
 CHECKS = (
     finds_the_simulator,
     returns_as_many_as_wanted,
-    begins_with_the_best,
+    states_the_discrepancy_of_each,
     keeps_to_its_budget,
     repeats_itself,
     copes_with_failed_physics,

@@ -18,8 +18,8 @@ CONFIDENCE = 0.95
 """Probability that an interval contains the truth."""
 
 PRIOR_VARIANCE = 0.25
-"""Variance of a tunable before any sample, in units of its bounds; three times that of a uniform one, so that a truth on
-a bound is hardly drawn to the middle."""
+"""Variance of a tunable before any sample, in units of its bounds. It is three times that of a uniform one, so that a
+truth on a bound is hardly drawn to the middle."""
 
 OWN = 0.3
 """Share of the scatter of a difference that is taken as its own, independent of the others."""
@@ -107,7 +107,7 @@ class Estimate:
         """Return `(p, 2)`: ends of the interval of each tunable, by Student's t."""
         freedom = max(1, len(self.errors) - self.place.size - 1)
         half = stats.t.ppf((1 + CONFIDENCE) / 2, freedom) * np.sqrt(np.diag(self.covariance))
-        return np.clip(np.transpose([self.place - half, self.place + half]), 0.0, 1.0)
+        return np.asarray(np.clip(np.transpose([self.place - half, self.place + half]), 0.0, 1.0))
 
     def box(self, within: FloatArray) -> FloatArray:
         """Return the next box `(2, p)`, a part of this one."""
@@ -152,7 +152,7 @@ def _place(places: FloatArray, answers: FloatArray, asked: FloatArray, noise: fl
     middle = np.full(size, 0.5)
     away = asked - level - slopes @ (middle - centre)
     found = middle + np.linalg.solve(slopes.T @ weighted + np.eye(size) / PRIOR_VARIANCE, weighted.T @ away)
-    return np.clip(found, 0.0, 1.0)
+    return np.asarray(np.clip(found, 0.0, 1.0))
 
 
 def _simulators(task: Task, estimate: Estimate, rng: Generator) -> tuple[Simulator, ...]:
@@ -162,10 +162,8 @@ def _simulators(task: Task, estimate: Estimate, rng: Generator) -> tuple[Simulat
     errors, weight = task.misfit.of(found), 1.0 / task.ensemble
     interval = _parameters(task, estimate.interval().T).T
     first = Simulator(found[0], float(errors[0]), interval, weight)
-    return (
-        first,
-        *(Simulator(each, float(error), None, weight) for each, error in zip(found[1:], errors[1:], strict=True)),
-    )
+    others = zip(found[1:], errors[1:], strict=True)
+    return (first, *(Simulator(parameters, float(error), None, weight) for parameters, error in others))
 
 
 def _parameters(task: Task, places: FloatArray) -> FloatArray:
