@@ -7,6 +7,7 @@ import typer
 
 from gaplab.api.clients.reports import FORMATS
 from gaplab.api.commands.app import RESULTS, AsJson, Id, Url, app, connect
+from gaplab.api.commands.comparisons import MarginOption, margins
 from gaplab.api.commands.json_output import print_json
 
 
@@ -17,6 +18,7 @@ def report(
         list[Path] | None,
         typer.Option("--save", "-o", help=f"file; its suffix is the format: {', '.join(FORMATS)}; repeatable"),
     ] = None,
+    margin: MarginOption = None,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
@@ -26,8 +28,8 @@ def report(
             msg = f"{file} has no suffix of a report; permitted: {', '.join(FORMATS)}"
             raise typer.BadParameter(msg, param_hint="--save")
     with connect(url) as client:
-        verdict = client.verdict(id)
-        files = [client.reports.save(id, file) for file in save or []]
+        verdict = client.verdict(id, **margins(margin))
+        files = [client.reports.save(id, file, **margins(margin)) for file in save or []]
     if as_json:
         print_json(verdict)
     else:
