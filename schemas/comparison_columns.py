@@ -1,7 +1,5 @@
 """The columns of a comparison as a table: one row for each pair, for CSV and frames."""
 
-from functools import reduce
-
 from gaplab.schemas.comparisons import Comparison
 
 UNPAIRED = ("student", "welch", "mann_whitney")
@@ -38,8 +36,11 @@ NUMBERS = tuple(name for name in COLUMNS if name not in TEXTS | {"shared_streams
 
 def row(pair: Comparison) -> tuple[object, ...]:
     """Return the values of a pair in the order of `COLUMNS`; a missing part has None in each of its columns."""
-    return tuple(reduce(_part, path.split("."), pair) for path in _PATHS)
+    return tuple(_value(pair, path) for path in _PATHS)
 
 
-def _part(whole: object, name: str) -> object:
-    return None if whole is None else getattr(whole, name)
+def _value(pair: Comparison, path: str) -> object:
+    value: object = pair
+    for name in path.split("."):
+        value = None if value is None else getattr(value, name)
+    return value

@@ -55,8 +55,9 @@ def compare(
     Each p is shown before and after Holm's correction over all pairs.
     """
     first, last = _range(at)
+    width, share = margins(margin)
     with connect(url) as client:
-        pairs = client.compare(ids, first, last, **margins(margin))
+        pairs = client.compare(ids, first, last, margin=width, margin_of_direct=share)
         _PRINTERS[Format.JSON if as_json else format](pairs)
 
 
@@ -72,10 +73,10 @@ def _range(text: str | None) -> tuple[int | None, int | None]:
         raise typer.BadParameter(msg, param_hint="--at") from None
 
 
-def margins(text: str | None) -> dict[str, float]:
-    """Return a margin like "0.03" or "3%" as the argument of the client that it is."""
+def margins(text: str | None) -> tuple[float | None, float | None]:
+    """Return a margin like "0.03" in the unit of fitness, or one like "3%" as a share of the direct baseline."""
     if text is None:
-        return {}
+        return None, None
     try:
         number = float(text.removesuffix("%"))
     except ValueError:
@@ -83,7 +84,7 @@ def margins(text: str | None) -> dict[str, float]:
     if not 0 < number < inf:
         msg = f"{text!r} is no margin above 0, like 0.03 in the unit of fitness or 3% of the direct baseline"
         raise typer.BadParameter(msg, param_hint="--margin")
-    return {"margin_of_direct": number / 100} if text.endswith("%") else {"margin": number}
+    return (None, number / 100) if text.endswith("%") else (number, None)
 
 
 def _print_table(pairs: Comparisons) -> None:

@@ -27,9 +27,10 @@ def report(
         if file.suffix.removeprefix(".").lower() not in FORMATS:
             msg = f"{file} has no suffix of a report; permitted: {', '.join(FORMATS)}"
             raise typer.BadParameter(msg, param_hint="--save")
+    width, share = margins(margin)
     with connect(url) as client:
-        verdict = client.verdict(id, **margins(margin))
-        files = [client.reports.save(id, file, **margins(margin)) for file in save or []]
+        verdict = client.verdict(id, margin=width, margin_of_direct=share)
+        files = [client.reports.save(id, file, margin=width, margin_of_direct=share) for file in save or []]
     if as_json:
         print_json(verdict)
     else:
