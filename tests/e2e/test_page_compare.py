@@ -140,8 +140,9 @@ def test_a_pair_that_shares_random_streams_is_marked_and_a_margin_is_judged(
     api: Any, written: Store, visit: Any
 ) -> None:
     ids = [submission.submit_experiment(written, toy(name=name, repetitions=6)).id for name in ("one", "two")]
-    for number, claim in enumerate(execution.claim(written, "tests", 12)):
-        run(written, claim, some_log(recorded=1.0 + 0.01 * (number % 5) + 0.5 * (number // 6)))
+    for claim in execution.claim(written, "tests", 12):
+        better = 0.5 + 0.01 * (claim.number % 3) if claim.experiment_id == ids[0] else 0.0
+        run(written, claim, some_log(recorded=1.0 + 0.02 * claim.number + better))
     page = visit(address(api, *ids))
     cell = page.locator("table.matrix td.better, table.matrix td.worse").first
     expect(cell).to_contain_text("paired")

@@ -20,8 +20,15 @@ export function probability(p) {
  *
  * @param {{ p: number | null, p_holm: number | null }} test
  */
-export const bothProbabilities = ({ p, p_holm: corrected }) =>
-  (p === null ? "undefined" : `${probability(corrected)}, raw ${p < 0.001 ? "< 0.001" : p.toFixed(3)}`);
+export const bothProbabilities = (test) => probabilities(test).join(", ");
+
+/**
+ * Return p after Holm's correction and the raw p, each in words.
+ *
+ * @param {{ p: number | null, p_holm: number | null }} test
+ */
+export const probabilities = ({ p, p_holm: corrected }) =>
+  (p === null ? ["undefined"] : [probability(corrected), `raw ${p < 0.001 ? "< 0.001" : p.toFixed(3)}`]);
 
 /**
  * Write a difference or an effect size with its sign.
