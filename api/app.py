@@ -16,6 +16,7 @@ from gaplab.api.http.security_headers import SecurityHeaders
 from gaplab.api.routes import (
     archives,
     catalogue,
+    comparisons,
     curves,
     dashboard,
     differences,
@@ -78,6 +79,7 @@ MODULES = (
     provenance,
     events,
     curves,
+    comparisons,
     differences,
     figures,
     replay_figures,

@@ -1,4 +1,4 @@
-"""Fitness against the number of real-world evaluations, and the tests that compare two such curves."""
+"""Fitness against the number of real-world evaluations."""
 
 from pydantic import Field
 
@@ -34,40 +34,3 @@ class Curve(Frozen):
     unit: Unit
     direct: bool = False
     points: tuple[CurvePoint, ...]
-
-
-class Test(Frozen):
-    """One statistical test between two groups."""
-
-    __test__ = False
-
-    statistic: Statistic
-    p: Statistic = Field(description="two-sided p-value; null if undefined")
-    p_holm: Statistic = Field(default=None, description="p-value with Holm's correction over all pairs")
-    degrees_of_freedom: Statistic = None
-
-
-class Comparison(Frozen):
-    """Two experiments, compared by recorded fitness pooled over a range of numbers of real-world evaluations.
-
-    Differences are `first` minus `second`.
-    """
-
-    first: Id
-    second: Id
-    first_name: Name = ""
-    second_name: Name = ""
-    from_evaluations: int
-    to_evaluations: int
-    caution: str | None = Field(
-        default=None,
-        description="why not to trust the tests of a pooled range; null at a single number",
-        examples=["pooled as in the paper: …"],
-    )
-    n_first: int
-    n_second: int
-    difference: Statistic = Field(description="difference of the means")
-    effect_size: Statistic = Field(description="Cohen's d: the difference divided by the pooled standard deviation")
-    student: Test = Field(description="Student's t-test, which the paper uses")
-    welch: Test
-    mann_whitney: Test

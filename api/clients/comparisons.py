@@ -1,18 +1,14 @@
 """Comparisons of experiments, which turn into a frame, or into a table for a paper."""
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 from gaplab.api.clients.frames import frame
-from gaplab.schemas.curves import Comparison
+from gaplab.schemas.comparison_columns import COLUMNS, NUMBERS, row
+from gaplab.schemas.comparisons import Comparison
 
 if TYPE_CHECKING:
     import pandas
-
-TESTS = ("student", "welch", "mann_whitney")
-OF_A_TEST = ("statistic", "degrees_of_freedom", "p", "p_holm")
-TEXTS = ("first", "first_name", "second", "second_name")
-NUMBERS = ("from_evaluations", "to_evaluations", "n_first", "n_second", "difference", "effect_size")
 
 
 class Comparisons(tuple[Comparison, ...]):
@@ -32,23 +28,17 @@ class Comparisons(tuple[Comparison, ...]):
         return made
 
     def frame(self) -> "pandas.DataFrame":
-        """Return a row for each pair, with a column for each number of each test; an undefined number is nan.
+        """Return a row for each pair, with a column for each number, named as in CSV; an undefined number is nan.
 
         Raises:
             ExtraMissing: pandas is not installed.
         """
-        numeric = (*NUMBERS, *(f"{test}_{value}" for test in TESTS for value in OF_A_TEST))
-        return frame([_row(pair) for pair in self], (*TEXTS, *numeric), numeric)
+        return frame([row(pair) for pair in self], COLUMNS, NUMBERS)
 
     def csv(self) -> str:
         """Return the same rows as CSV."""
         return self._formatted("csv")
 
     def latex(self) -> str:
-        """Return a table for a paper, with Holm's corrected p-values; LaTeX needs the package booktabs."""
+        """Return tables for a paper, with p before and after Holm's correction; LaTeX needs the package booktabs."""
         return self._formatted("latex")
-
-
-def _row(pair: Comparison) -> list[Any]:
-    tests = [getattr(getattr(pair, test), value) for test in TESTS for value in OF_A_TEST]
-    return [*(getattr(pair, name) for name in (*TEXTS, *NUMBERS)), *tests]

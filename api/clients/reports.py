@@ -16,16 +16,33 @@ class Reports:
         self._connection = connection
         self._records = records
 
-    def verdict(self, id: str) -> VerdictRead:
-        """Return the verdict on a study or an experiment: what its curves and tests say, in words."""
-        return self._connection.get(VerdictRead, f"{path_of(self._records.find(id))}/report", format="json")
+    def verdict(self, id: str, *, margin: float | None = None, margin_of_direct: float | None = None) -> VerdictRead:
+        """Return the verdict on a study or an experiment: what its curves and tests say, in words.
 
-    def save(self, id: str, file: str | Path) -> Path:
-        """Write the report on a study or an experiment into a file with the suffix .html or .pdf."""
+        Args:
+            id: id of the study or the experiment.
+            margin: difference in the unit of fitness within which strategies are equivalent; left out: not tested.
+            margin_of_direct: the same margin as a share of the direct baseline's mean fitness, like 0.03.
+        """
+        query = {"margin": margin, "margin_of_direct": margin_of_direct}
+        return self._connection.get(VerdictRead, f"{path_of(self._records.find(id))}/report", format="json", **query)
+
+    def save(
+        self, id: str, file: str | Path, *, margin: float | None = None, margin_of_direct: float | None = None
+    ) -> Path:
+        """Write the report on a study or an experiment into a file with the suffix .html or .pdf.
+
+        Args:
+            id: id of the study or the experiment.
+            file: file to write.
+            margin: difference in the unit of fitness within which strategies are equivalent; left out: not tested.
+            margin_of_direct: the same margin as a share of the direct baseline's mean fitness, like 0.03.
+        """
         path = Path(file)
         if (format_ := path.suffix.removeprefix(".").lower()) not in FORMATS:
             raise ValueError(f"{path} has no suffix of a report; permitted: {', '.join(FORMATS)}")
-        content = self._connection.get_bytes(f"{path_of(self._records.find(id))}/report", format=format_)
+        query = {"margin": margin, "margin_of_direct": margin_of_direct}
+        content = self._connection.get_bytes(f"{path_of(self._records.find(id))}/report", format=format_, **query)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
         return path

@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 from gaplab.api.clients.comparisons import Comparisons
 from gaplab.api.clients.connection import Connection, Parameter, segment
 from gaplab.api.clients.records import Records, experiments_of, split
-from gaplab.schemas.curves import Comparison, Curve
+from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.curves import Curve
 from gaplab.schemas.differences import SpecDiff
 from gaplab.schemas.misfit import MisfitRead
 from gaplab.schemas.records import common_count
@@ -36,21 +37,35 @@ class Results:
         first, *others = (self._connection.get_bytes("/curves", **request).decode() for request in requests)
         return first + "".join(other.partition("\n")[2] for other in others)  # the header stands once
 
-    def compare(self, experiments: Sequence[str], first: int | None = None, last: int | None = None) -> Comparisons:
-        """Compare every pair of experiments by three tests, with Holm's correction over all pairs.
+    def compare(
+        self,
+        experiments: Sequence[str],
+        first: int | None = None,
+        last: int | None = None,
+        *,
+        margin: float | None = None,
+        margin_of_direct: float | None = None,
+        intervals: bool | None = None,
+    ) -> Comparisons:
+        """Compare every pair of experiments, one value for each repetition: over a range, its mean.
 
-        A pooled range is the paper's test, whose p are too small: see `caution` of the result.
+        Each p is given before and after Holm's correction over all pairs. `trusted` of a pair is the test by which to
+        judge it: paired if both experiments draw the same random numbers. Over a range, `pooled` has the paper's tests,
+        whose p are too small.
 
         Args:
             experiments: ids of experiments, or of studies for all of their experiments.
-            first: first number of real-world evaluations to pool; left out: `last`.
-            last: last number to pool; left out: the last that all experiments have.
+            first: first number of real-world evaluations; left out: `last`.
+            last: last number; left out: the last that all experiments have.
+            margin: difference in the unit of fitness; `equivalence` of a pair says whether it differs by less.
+            margin_of_direct: the same margin as a share of the direct baseline's mean fitness, like 0.03.
+            intervals: with bootstrap intervals; left out: for up to 20 experiments.
         """
         records = [each for id in experiments for each in experiments_of(self._records.find(id))]
-        last = (common_count(records) or 0) if last is None else last
-        query: dict[str, Parameter] = {"experiment": [each.id for each in records], "to": last}
-        query["from"] = last if first is None else first
+        query: dict[str, Parameter] = {"experiment": [each.id for each in records], "from": first, "to": last}
+        query |= {"margin": margin, "margin_of_direct": margin_of_direct, "intervals": intervals}
         pairs = self._connection.get(tuple[Comparison, ...], "/comparisons", **query)
+        query |= {"from": pairs[0].from_evaluations, "to": pairs[0].to_evaluations}  # also if an experiment goes on
 
         def formatted(format: str) -> str:  # noqa: A002 - as the API says
             return self._connection.get_bytes("/comparisons", format=format, **query).decode()

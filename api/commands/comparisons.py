@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 from enum import StrEnum
+from math import inf, nan
 from typing import Annotated
 
 import typer
 
 from gaplab.api.clients.comparisons import Comparisons
 from gaplab.api.clients.progress.text import console
-from gaplab.api.commands import tables
+from gaplab.api.commands import comparison_tables
 from gaplab.api.commands.app import RESULTS, AsJson, Ids, Url, app, connect
 from gaplab.api.commands.json_output import print_json
 
@@ -22,6 +23,16 @@ class Format(StrEnum):
     LATEX = "latex"
 
 
+MarginOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NUMBER|SHARE%",
+        help="test whether pairs differ by less than this: in the unit of fitness, or in % of the direct baseline",
+        show_default=False,
+    ),
+]
+
+
 @app.command(rich_help_panel=RESULTS)
 def compare(
     ids: Ids,
@@ -29,18 +40,24 @@ def compare(
         str | None,
         typer.Option(
             metavar="N|FROM-TO",
-            help="number of real-world evaluations, or a range to pool; left out: the last number of all",
+            help="number of real-world evaluations, or a range, over which each repetition is its mean; left out: the "
+            "last number of all",
             show_default=False,
         ),
     ] = None,
+    margin: MarginOption = None,
     format: Annotated[Format, typer.Option(help="of the output")] = Format.TABLE,  # noqa: A002 - as the API says
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
-    """Compare every pair of experiments by Student's, Welch's and Mann-Whitney's tests, with Holm's correction."""
+    """Compare every pair of experiments: tests of means, ranks and spreads, intervals, and equivalence.
+
+    Each p is shown before and after Holm's correction over all pairs.
+    """
     first, last = _range(at)
+    width, share = margins(margin)
     with connect(url) as client:
-        pairs = client.compare(ids, first, last)
+        pairs = client.compare(ids, first, last, margin=width, margin_of_direct=share)
         _PRINTERS[Format.JSON if as_json else format](pairs)
 
 
@@ -56,8 +73,22 @@ def _range(text: str | None) -> tuple[int | None, int | None]:
         raise typer.BadParameter(msg, param_hint="--at") from None
 
 
+def margins(text: str | None) -> tuple[float | None, float | None]:
+    """Return a margin like "0.03" in the unit of fitness, or one like "3%" as a share of the direct baseline."""
+    if text is None:
+        return None, None
+    try:
+        number = float(text.removesuffix("%"))
+    except ValueError:
+        number = nan
+    if not 0 < number < inf:
+        msg = f"{text!r} is no margin above 0, like 0.03 in the unit of fitness or 3% of the direct baseline"
+        raise typer.BadParameter(msg, param_hint="--margin")
+    return (None, number / 100) if text.endswith("%") else (number, None)
+
+
 def _print_table(pairs: Comparisons) -> None:
-    console().print(*tables.comparisons(pairs))
+    console().print(*comparison_tables.comparisons(pairs))
 
 
 _PRINTERS: dict[Format, Callable[[Comparisons], None]] = {

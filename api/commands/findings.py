@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from gaplab.api.clients.client import Client
-from gaplab.schemas.curves import Comparison, Curve
+from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.curves import Curve
 
 SIGNIFICANT = 0.05
 MOST = 4
@@ -13,17 +14,17 @@ MOST = 4
 def findings(client: Client, curves: Sequence[Curve]) -> Iterator[str]:
     """Yield a sentence for the last number of evaluations that the strategies share, the first, and the paper's ranges.
 
-    Pairs of strategies are compared by Student's t, as in the paper, with Holm's correction over all pairs. The ranges
-    pool values of one repetition, which are not independent; their sentences say so.
+    Pairs of strategies are compared by their trusted tests, with Holm's correction over all pairs. Over a range, each
+    repetition is one value, its mean.
     """
     learned = [curve for curve in curves if not curve.direct]
     names = {curve.experiment: curve.name.replace("_", " ") for curve in learned}
     last = max((point.evaluations for curve in curves for point in curve.points), default=0)
     shared = min((max(_reached(curve), default=0) for curve in learned), default=0)
-    ranges = [(shared, shared), (1, 1), (3, last), (6, last)]  # Source: the caption of the paper's Fig. 4
+    ranges = [(shared, shared), (1, 1), (3, shared), (6, shared)]  # Source: the caption of the paper's Fig. 4
     for first, final in dict.fromkeys(ranges):
-        if len(names) > 1 and first <= final <= last:
-            yield _sentence(client.compare(list(names), first, final), names, first, final)
+        if len(names) > 1 and first <= final <= shared:
+            yield _sentence(client.compare(list(names), first, final, intervals=False), names, first, final)
     level = next((point.mean for curve in curves if curve.direct for point in curve.points), None)
     ratios = [
         f"{names[curve.experiment]} {mean / level:.2f}"
@@ -42,8 +43,9 @@ def _reached(curve: Curve) -> list[int]:
 def _sentence(pairs: Sequence[Comparison], names: Mapping[str, str], first: int, final: int) -> str:
     differing = sorted((pair for pair in pairs if _p(pair) < SIGNIFICANT), key=_p)
     where = f"At {first if first == final else f'{first}-{final}'} real-world evaluation{'' if final == 1 else 's'}"
-    pooled = "" if first == final else "; pooled as in the paper, so p is too small"
-    start = f"{where}, {len(differing)} of {len(pairs)} pairs differ (p < {SIGNIFICANT}, Student's t, Holm{pooled})"
+    mean = "" if first == final else "; the mean of each repetition"
+    tests = "paired and Student's t" if any(pair.shared_streams for pair in pairs) else "Student's t"
+    start = f"{where}, {len(differing)} of {len(pairs)} pairs differ (p < {SIGNIFICANT}, {tests}, Holm{mean})"
     shown = [_words(pair, names) for pair in differing[:MOST]]
     more = [f"and {len(differing) - MOST} more"] if len(differing) > MOST else []
     return f"{start}: {', '.join(shown + more)}" if differing else start
@@ -57,5 +59,4 @@ def _words(pair: Comparison, names: Mapping[str, str]) -> str:
 
 
 def _p(pair: Comparison) -> float:
-    p = pair.student.p_holm if pair.student.p_holm is not None else pair.student.p
-    return 1.0 if p is None else p
+    return 1.0 if pair.trusted.p_holm is None else pair.trusted.p_holm

@@ -7,6 +7,7 @@ import typer
 
 from gaplab.api.clients.reports import FORMATS
 from gaplab.api.commands.app import RESULTS, AsJson, Id, Url, app, connect
+from gaplab.api.commands.comparisons import MarginOption, margins
 from gaplab.api.commands.json_output import print_json
 
 
@@ -17,6 +18,7 @@ def report(
         list[Path] | None,
         typer.Option("--save", "-o", help=f"file; its suffix is the format: {', '.join(FORMATS)}; repeatable"),
     ] = None,
+    margin: MarginOption = None,
     as_json: AsJson = False,
     url: Url = None,
 ) -> None:
@@ -25,9 +27,10 @@ def report(
         if file.suffix.removeprefix(".").lower() not in FORMATS:
             msg = f"{file} has no suffix of a report; permitted: {', '.join(FORMATS)}"
             raise typer.BadParameter(msg, param_hint="--save")
+    width, share = margins(margin)
     with connect(url) as client:
-        verdict = client.verdict(id)
-        files = [client.reports.save(id, file) for file in save or []]
+        verdict = client.verdict(id, margin=width, margin_of_direct=share)
+        files = [client.reports.save(id, file, margin=width, margin_of_direct=share) for file in save or []]
     if as_json:
         print_json(verdict)
     else:

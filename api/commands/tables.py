@@ -9,7 +9,7 @@ from rich.table import Table
 from gaplab.api.clients.progress.text import colored, fitness, percent, standing, time_left
 from gaplab.api.clients.records import Record
 from gaplab.api.commands.completion import KINDS
-from gaplab.schemas.curves import Comparison, Curve, CurvePoint
+from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.misfit import MisfitRead, TunableDistribution
 from gaplab.schemas.plugin import Catalogue, PluginRead
@@ -53,14 +53,6 @@ def baselines(found: Sequence[Curve]) -> list[str]:
         if curve.direct
         for point in curve.points[:1]
     ]
-
-
-def comparisons(pairs: Sequence[Comparison]) -> list[Table | str]:
-    """Return a table of pairs with Holm's corrected p of each test, and a line that says what was compared."""
-    first, last = pairs[0].from_evaluations, pairs[0].to_evaluations
-    where = f"after {first} real-world evaluations" if first == last else f"pooled over {first} to {last}"
-    columns = ("first", "second", "n", "difference", "d", "p Student", "p Welch", "p Mann-Whitney")
-    return [f"Fitness in reality {where}; p with Holm's correction over all pairs", table(columns, map(_pair, pairs))]
 
 
 def catalogue(plugins: Catalogue) -> list[Table]:
@@ -140,17 +132,6 @@ def _tuned(found: TunableDistribution) -> tuple[str, ...]:
     bounds = ", ".join(f"{100 * share:.0f} % at {bound:g}" for bound, share in sides if share) or "-"
     mean_sd = f"{_number(found.mean)}±{_number(found.sd)}"
     return found.name, mean_sd, _number(found.least), _number(found.greatest), bounds
-
-
-def _pair(found: Comparison) -> tuple[str, ...]:
-    names = (escape(found.first_name), escape(found.second_name))
-    sizes = (_signed(found.difference), _signed(found.effect_size))
-    tests = (found.student, found.welch, found.mann_whitney)
-    return *names, f"{found.n_first}, {found.n_second}", *sizes, *(_number(test.p_holm) for test in tests)
-
-
-def _signed(value: float | None) -> str:
-    return "-" if value is None else f"{value:+.3g}"
 
 
 def _number(value: float | None) -> str:

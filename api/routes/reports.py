@@ -1,6 +1,5 @@
 """Reports: a study or an experiment as one document, with a verdict in words."""
 
-from collections.abc import Callable
 from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Annotated, Literal
@@ -8,17 +7,17 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
-from gaplab.api.http.dependencies import Id, Parameters, StoreDep
+from gaplab.api.http.dependencies import Id, StoreDep
 from gaplab.api.http.figures import in_turn
 from gaplab.api.http.problems import Responses, documented
 from gaplab.api.http.security_headers import page
+from gaplab.api.routes.comparisons import MarginQuery
 from gaplab.schemas.reports import VerdictRead
 from gaplab.services.reports.blocks import Report
 from gaplab.services.reports.content import experiment_verdict, study_verdict
 from gaplab.services.reports.document import experiment_report, study_report
 from gaplab.services.reports.html import render_html
 from gaplab.services.reports.pdf import render_pdf
-from gaplab.services.store.session import Store
 
 router = APIRouter(tags=["reports"])
 
@@ -33,8 +32,8 @@ _RESPONSES: Responses = {
 }
 
 
-class ReportQuery(Parameters):
-    """The format of a report."""
+class ReportQuery(MarginQuery):
+    """The format of a report, and the margin of its verdict."""
 
     format: Literal["html", "pdf", "json"] = Field(default="html", description=_FORMATS)
 
@@ -47,8 +46,8 @@ def report_study(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]
     or is flat since some iteration and not worth continuing.
     """
     if query.format == "json":
-        return study_verdict(store, id)
-    return _answer(store, id, study_report, query.format)
+        return study_verdict(store, id, query.chosen())
+    return _answer(study_report(store, id, query.chosen()), query.format)
 
 
 @router.get(
@@ -57,14 +56,12 @@ def report_study(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]
 def report_experiment(id: Id, store: StoreDep, query: Annotated[ReportQuery, Query()]) -> VerdictRead | Response:
     """Return verdict, curve, simulators, sensitivity, cost, settings and provenance in one document."""
     if query.format == "json":
-        return experiment_verdict(store, id)
-    return _answer(store, id, experiment_report, query.format)
+        return experiment_verdict(store, id, query.chosen())
+    return _answer(experiment_report(store, id, query.chosen()), query.format)
 
 
-def _answer(
-    store: Store, id_: str, report_of: Callable[[Store, str], Report], format_: Literal["html", "pdf"]
-) -> Response:
-    report, at = report_of(store, id_), datetime.now(UTC)
+def _answer(report: Report, format_: Literal["html", "pdf"]) -> Response:
+    at = datetime.now(UTC)
     made = f"Made by gaplab {version('gaplab')} on {at:%Y-%m-%d at %H:%M} UTC, from what was stored by then."
     name = f'inline; filename="gaplab-{report.id}-report.{format_}"'
     if format_ == "html":

@@ -1,48 +1,78 @@
-"""The paper's t-tests between experiments, with Welch's and Mann-Whitney's tests and Holm's correction.
+"""Tests between two groups, unpaired and paired, of means, ranks and spreads; Holm's correction over many pairs.
 
-The paper pools the recorded fitnesses of several counts of real-world evaluations into one sample ("combining the data
-for more than two real-world evaluations"). Values of one repetition at several counts are not independent, so a pooled
-p is too small. It is reported because the paper reports it, and is reliable only at a single count.
+A test is undefined, with None as its numbers, if there are fewer than two values, if nothing varies, or if squares of
+values overflow.
 """
 
 from collections.abc import Sequence
-from itertools import combinations
 from math import inf, isfinite
 
 import numpy as np
 from scipy import stats
 
-from gaplab.schemas.curves import Comparison, Test
+from gaplab.schemas.comparisons import Test
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.curves import equal, known
+from gaplab.services.core.curves import known
 
-POOLED = (
-    "pooled as in the paper: the values of one repetition at several numbers of evaluations are not independent, so "
-    "each p is too small; trust a single number"
-)
+ROUNDING = 1e-12
+"""Variation, relative to the largest value, that counts as rounding."""
+
+UNDEFINED = Test()
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def compare(first: FloatArray, second: FloatArray) -> tuple[Test, Test, Test]:
     """Return Student's t (the paper's), Welch's t and Mann-Whitney between two groups, two-sided.
 
-    A test is undefined, with None as its numbers, if a group has fewer than two values, if neither group varies, or if
-    squares of values overflow.
-
     Args:
         first: `(n,)`; nan is ignored.
         second: `(m,)`; nan is ignored.
     """
     first, second = finite(first), finite(second)
-    if min(len(first), len(second)) < 2 or equal(np.concatenate([first, second])):
-        undefined = Test(statistic=None, p=None)
-        return undefined, undefined, undefined
-    if equal(first) and equal(second):
-        undefined = Test(statistic=None, p=None)
-        return undefined, undefined, _test(stats.mannwhitneyu(first, second))
+    if min(len(first), len(second)) < 2 or constant(np.concatenate([first, second])):
+        return UNDEFINED, UNDEFINED, UNDEFINED
+    ranks = _test(stats.mannwhitneyu(first, second))
+    if constant(first) and constant(second):
+        return UNDEFINED, UNDEFINED, ranks
+    first, second = moved(first, second)
     student = stats.ttest_ind(first, second)
     welch = stats.ttest_ind(first, second, equal_var=False)
-    return _test(student, student.df), _test(welch, welch.df), _test(stats.mannwhitneyu(first, second))
+    return _test(student, student.df), _test(welch, welch.df), ranks
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def compare_paired(first: FloatArray, second: FloatArray) -> tuple[Test, Test]:
+    """Return the paired t-test and Wilcoxon's signed-rank test, two-sided.
+
+    Args:
+        first: `(r,)` by repetition; nan is missing.
+        second: `(s,)` by repetition; nan is missing.
+    """
+    first, second = both(first, second)
+    difference = first - second
+    if len(difference) < 2 or not difference.any():
+        return UNDEFINED, UNDEFINED
+    ranks = _test(stats.wilcoxon(difference))
+    if constant_difference(first, second):
+        return UNDEFINED, ranks
+    paired = stats.ttest_1samp(difference, 0.0)
+    return _test(paired, paired.df), ranks
+
+
+@np.errstate(all="ignore")
+def brown_forsythe(first: FloatArray, second: FloatArray) -> Test:
+    """Return Brown and Forsythe's test of equal spread, which is Levene's with the median, between two groups.
+
+    It is also undefined if the distances from the median do not vary within a group, as those of two values.
+
+    Args:
+        first: `(n,)`; nan is ignored.
+        second: `(m,)`; nan is ignored.
+    """
+    groups = [finite(first), finite(second)]
+    if min(map(len, groups)) < 2 or all(constant(np.abs(each - np.median(each)), each) for each in groups):
+        return UNDEFINED
+    return _test(stats.levene(*groups, center="median"))
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -50,7 +80,7 @@ def effect_size(first: FloatArray, second: FloatArray) -> float | None:
     """Return Cohen's d: difference of the means over the pooled standard deviation; None if that is 0 or unknown."""
     first, second = finite(first), finite(second)
     freedom = len(first) + len(second) - 2
-    if min(len(first), len(second)) < 2 or (equal(first) and equal(second)):
+    if min(len(first), len(second)) < 2 or (constant(first) and constant(second)):
         return None  # the computed variance of equal numbers may differ from 0
     pooled = ((len(first) - 1) * first.var(ddof=1) + (len(second) - 1) * second.var(ddof=1)) / freedom
     return known((first.mean() - second.mean()) / pooled**0.5) if 0 < pooled < inf else None
@@ -70,42 +100,6 @@ def holm(p_values: Sequence[float | None]) -> tuple[float | None, ...]:
     return tuple(corrected)
 
 
-def compare_all(
-    recorded: dict[str, FloatArray], direct: frozenset[str], from_evaluations: int, to_evaluations: int
-) -> tuple[Comparison, ...]:
-    """Compare every pair of experiments, pooled over a range of counts; Holm's correction is over all pairs, by test.
-
-    Args:
-        recorded: recorded fitness `(r, k)` by experiment, in the order of the result.
-        direct: experiments whose only column, at 0, counts at every number of real-world evaluations.
-        from_evaluations: first pooled count.
-        to_evaluations: last pooled count.
-    """
-    pooled = {
-        name: finite(values[:, :1] if name in direct else values[:, from_evaluations : to_evaluations + 1])
-        for name, values in recorded.items()
-    }
-    pairs = list(combinations(pooled, 2))
-    families = [corrected(family) for family in zip(*(compare(pooled[a], pooled[b]) for a, b in pairs), strict=True)]
-    return tuple(
-        Comparison(
-            first=first,
-            second=second,
-            from_evaluations=from_evaluations,
-            to_evaluations=to_evaluations,
-            caution=POOLED if from_evaluations < to_evaluations else None,
-            n_first=len(pooled[first]),
-            n_second=len(pooled[second]),
-            difference=_difference(pooled[first], pooled[second]),
-            effect_size=effect_size(pooled[first], pooled[second]),
-            student=student,
-            welch=welch,
-            mann_whitney=mann_whitney,
-        )
-        for (first, second), student, welch, mann_whitney in zip(pairs, *families, strict=True)
-    )
-
-
 def corrected(family: Sequence[Test]) -> tuple[Test, ...]:
     """Return the tests of a family with Holm's corrected p."""
     p_values = holm([test.p for test in family])
@@ -118,12 +112,40 @@ def finite(values: FloatArray) -> FloatArray:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _difference(first: FloatArray, second: FloatArray) -> float | None:
-    return known(first.mean() - second.mean()) if len(first) and len(second) else None
+def both(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the values `(n,)` of two experiments at the repetition numbers that have a finite value in both."""
+    common = min(len(first), len(second))
+    first, second = first[:common], second[:common]
+    there = np.isfinite(first - second)
+    return first[there], second[there]
+
+
+@np.errstate(over="ignore")
+def constant(values: FloatArray, scale: FloatArray | None = None) -> bool:
+    """Return whether values `(n,)`, one or more, are equal up to the rounding of the numbers `scale`."""
+    largest = np.max(np.abs(values if scale is None else scale))
+    return bool(values.max() - values.min() <= ROUNDING * largest)
+
+
+def constant_difference(first: FloatArray, second: FloatArray) -> bool:
+    """Return whether paired values `(n,)` differ by one number, up to rounding."""
+    return constant(first - second, np.concatenate([first, second]))
+
+
+def moved(first: FloatArray, second: FloatArray, shift: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    """Return groups whose means differ by `shift` more; a constant group becomes 0.
+
+    The variance of equal numbers may differ from 0 by rounding. That of zeros is 0.
+    """
+    if constant(second):
+        return first - second[0] + shift, np.zeros_like(second)
+    if constant(first):
+        return np.zeros_like(first), second - first[0] - shift
+    return first + shift, second
 
 
 def _test(result: object, freedom: float | None = None) -> Test:
     statistic, p = known(result.statistic), known(result.pvalue)  # type: ignore[attr-defined] # scipy has no stubs
     if statistic is None or p is None or not (freedom is None or isfinite(freedom)):
-        return Test(statistic=None, p=None)
+        return UNDEFINED
     return Test(statistic=statistic, p=p, degrees_of_freedom=None if freedom is None else float(freedom))

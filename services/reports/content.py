@@ -3,11 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from gaplab.schemas.curves import Comparison, Curve
+from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.curves import Curve
 from gaplab.schemas.differences import SpecDiff
 from gaplab.schemas.misfit import MisfitRead
 from gaplab.schemas.provenance import ProvenanceRead
-from gaplab.schemas.records import ExperimentRead, common_count
+from gaplab.schemas.records import ExperimentRead, StudyRead, common_count
 from gaplab.schemas.reports import VerdictRead
 from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.core.errors import NotFound
@@ -15,6 +16,7 @@ from gaplab.services.experiments import checks, reading
 from gaplab.services.reports.judged import Judged, judged_curves
 from gaplab.services.reports.verdict import judge
 from gaplab.services.results import curves as results
+from gaplab.services.results.comparisons import Margin, compare
 from gaplab.services.results.misfit import misfit
 from gaplab.services.results.tuned_simulators import TunedSimulators, tuned_simulators
 from gaplab.services.running import provenance
@@ -37,7 +39,8 @@ class Facts:
         judged: the curves with their distinct names.
         verdict: the verdict on the curves.
         at_last: comparisons of all pairs at the common count; empty for one experiment.
-        pooled: the same, pooled over all counts as in the paper.
+        over_all: the same over all counts up to it, one value for each repetition, with the paper's pooled tests; empty
+            if there is a single count.
         differing: settings that differ between the experiments; None for one experiment.
         checks: sensitivity checks, each once.
         misfits: misfit by experiment, without the direct baseline.
@@ -55,7 +58,7 @@ class Facts:
     judged: tuple[Judged, ...]
     verdict: VerdictRead
     at_last: tuple[Comparison, ...]
-    pooled: tuple[Comparison, ...]
+    over_all: tuple[Comparison, ...]
     differing: SpecDiff | None
     checks: tuple[SensitivityRead, ...]
     misfits: Mapping[str, MisfitRead]
@@ -64,67 +67,70 @@ class Facts:
     leading: tuple[Judged, TunedSimulators] | None
 
 
-def study_verdict(store: Store, study_id: str) -> VerdictRead:
+def study_verdict(store: Store, study_id: str, margin: Margin | None = None) -> VerdictRead:
     """Return the verdict on a study.
 
     Raises:
         NotFound: no such study.
     """
     study = reading.read_study(store, study_id)
-    return _verdict(store, results.study_curves(store, study_id), study.experiments)[0]
+    return _verdict(store, results.study_curves(store, study_id), study.experiments, margin)[0]
 
 
-def experiment_verdict(store: Store, experiment_id: str) -> VerdictRead:
+def experiment_verdict(store: Store, experiment_id: str, margin: Margin | None = None) -> VerdictRead:
     """Return the verdict on an experiment.
 
     Raises:
         NotFound: no such experiment.
     """
     experiment = reading.read_experiment(store, experiment_id)
-    return _verdict(store, results.curves(store, [experiment_id]), [experiment])[0]
+    return _verdict(store, results.curves(store, [experiment_id]), [experiment], margin)[0]
 
 
-def study_facts(store: Store, study_id: str) -> Facts:
+def study_facts(store: Store, study_id: str, margin: Margin | None = None) -> Facts:
     """Return the facts of a study.
 
     Raises:
         NotFound: no such study.
     """
     study = reading.read_study(store, study_id)
-    return _facts(store, study.id, study.name, study.notes, study.experiments, study=True)
+    return _facts(store, study, study.experiments, margin)
 
 
-def experiment_facts(store: Store, experiment_id: str) -> Facts:
+def experiment_facts(store: Store, experiment_id: str, margin: Margin | None = None) -> Facts:
     """Return the facts of an experiment.
 
     Raises:
         NotFound: no such experiment.
     """
     experiment = reading.read_experiment(store, experiment_id)
-    return _facts(store, experiment.id, experiment.name, experiment.notes, (experiment,), study=False)
+    return _facts(store, experiment, (experiment,), margin)
 
 
 def _facts(
-    store: Store, id_: str, name: str, notes: str | None, experiments: tuple[ExperimentRead, ...], *, study: bool
+    store: Store,
+    subject: StudyRead | ExperimentRead,
+    experiments: tuple[ExperimentRead, ...],
+    margin: Margin | None,
 ) -> Facts:
     ids = [experiment.id for experiment in experiments]
     curves = results.curves(store, ids)
-    verdict, at_last = _verdict(store, curves, experiments)
+    verdict, at_last = _verdict(store, curves, experiments, margin)
     judged = judged_curves(curves, experiments, verdict.evaluations)
     columns = [SpecColumn(each.id, each.name, (each.spec,)) for each in experiments]
     with store.reading() as session:
         work = work_of(session, ids)
     return Facts(
-        id=id_,
-        name=name,
-        notes=notes,
-        study=study,
+        id=subject.id,
+        name=subject.name,
+        notes=subject.notes,
+        study=isinstance(subject, StudyRead),
         experiments=experiments,
         curves=curves,
         judged=judged,
         verdict=verdict,
         at_last=at_last,
-        pooled=results.compare(store, ids) if len(ids) > 1 else (),
+        over_all=_over_all(store, ids, verdict.evaluations),
         differing=differences(columns) if len(ids) > 1 else None,
         checks=_checks(store, experiments),
         misfits={each.id: misfit(store, each.id) for each in experiments if not each.direct},
@@ -135,14 +141,21 @@ def _facts(
 
 
 def _verdict(
-    store: Store, curves: Sequence[Curve], experiments: Sequence[ExperimentRead]
+    store: Store, curves: Sequence[Curve], experiments: Sequence[ExperimentRead], margin: Margin | None
 ) -> tuple[VerdictRead, tuple[Comparison, ...]]:
     """Return the verdict, and the comparisons at the common count that it uses."""
     count, ids = common_count(experiments), [curve.experiment for curve in curves]
     pairs: tuple[Comparison, ...] = ()
     if count is not None and len(ids) > 1:
-        pairs = results.compare(store, ids, from_evaluations=count, to_evaluations=count)
+        pairs = compare(store, ids, from_evaluations=count, to_evaluations=count, margin=margin)
     return judge(curves, experiments, pairs), pairs
+
+
+def _over_all(store: Store, ids: Sequence[str], count: int | None) -> tuple[Comparison, ...]:
+    """Return the comparisons over all numbers of real-world evaluations up to a count."""
+    if count is None or count < 2 or len(ids) < 2:
+        return ()
+    return compare(store, ids, from_evaluations=1, to_evaluations=count)
 
 
 def _checks(store: Store, experiments: Sequence[ExperimentRead]) -> tuple[SensitivityRead, ...]:

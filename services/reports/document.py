@@ -1,34 +1,35 @@
 """The arrangement of a report: which facts stand in which section."""
 
 from gaplab.schemas.reports import VerdictRead
-from gaplab.services.core.statistics import POOLED
+from gaplab.services.core.comparisons import POOLED
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.words import number_of, spoken
-from gaplab.services.reports import tables
+from gaplab.services.reports import compared, tables
 from gaplab.services.reports.blocks import Block, Bullets, Code, Drawing, Paragraph, Report, Section
 from gaplab.services.reports.content import Facts, experiment_facts, study_facts
 from gaplab.services.reports.reproduction import instructions, spec_text
+from gaplab.services.results.comparisons import Margin
 from gaplab.services.results.coordinates import simulator_coordinates
 from gaplab.services.store.session import Store
 
 
-def study_report(store: Store, study_id: str) -> Report:
+def study_report(store: Store, study_id: str, margin: Margin | None = None) -> Report:
     """Return the report on a study.
 
     Raises:
         NotFound: no such study.
     """
-    return _report(store, study_facts(store, study_id))
+    return _report(store, study_facts(store, study_id, margin))
 
 
-def experiment_report(store: Store, experiment_id: str) -> Report:
+def experiment_report(store: Store, experiment_id: str, margin: Margin | None = None) -> Report:
     """Return the report on an experiment.
 
     Raises:
         NotFound: no such experiment.
     """
-    return _report(store, experiment_facts(store, experiment_id))
+    return _report(store, experiment_facts(store, experiment_id, margin))
 
 
 def _report(store: Store, facts: Facts) -> Report:
@@ -62,13 +63,25 @@ def _verdict(verdict: VerdictRead) -> tuple[Block, ...]:
 
 
 def _differences(facts: Facts) -> tuple[Block, ...]:
-    count = facts.verdict.evaluations
     if not facts.at_last:
         return (Paragraph("There is nothing to compare yet."),)
+    last = f"after {number_of('real-world evaluation', facts.verdict.evaluations or 0)}"
+    cautions = tuple(dict.fromkeys(pair.caution for pair in facts.at_last if pair.caution))
     return (
-        tables.pairs(facts, facts.at_last, f"All pairs after {number_of('real-world evaluation', count or 0)}"),
-        tables.pairs(facts, facts.pooled, "The paper's test: the same pairs, pooled over all numbers of evaluations"),
-        Paragraph(f"The second table is {POOLED}. The verdict does not use it.", note=True),
+        compared.summaries(facts, facts.at_last, f"Fitness {last}"),
+        compared.pairs(facts, facts.at_last, f"All pairs {last}, by the tests that the verdict uses"),
+        compared.tests(facts, facts.at_last, f"All pairs {last}, by each test"),
+        *(Paragraph(f"Shared random streams: {caution}.", note=True) for caution in cautions),
+        *(_over_all(facts) if facts.over_all else ()),
+    )
+
+
+def _over_all(facts: Facts) -> tuple[Block, ...]:
+    numbers = "1 to " + number_of("real-world evaluation", facts.verdict.evaluations or 0)
+    return (
+        compared.tests(facts, facts.over_all, f"The mean of each repetition over {numbers}"),
+        compared.pooled(facts, facts.over_all, f"The paper's test: the same pairs, pooled over {numbers}"),
+        Paragraph(f"The last table is {POOLED}. The verdict does not use it.", note=True),
     )
 
 

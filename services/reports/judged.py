@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gaplab.schemas.curves import Comparison, Curve, CurvePoint
+from gaplab.schemas.comparisons import Comparison, EquivalenceVerdict
+from gaplab.schemas.curves import Curve, CurvePoint
 from gaplab.schemas.records import ExperimentRead
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.trends import CurveEnd, curve_end
@@ -52,13 +53,18 @@ def judged_curves(
 
 
 def differs(pair: Comparison) -> bool:
-    """Return whether a pair differs significantly, by Student's t after Holm's correction."""
+    """Return whether a pair differs significantly, by its trusted test after Holm's correction."""
     return (p := p_of(pair)) is not None and p < SIGNIFICANT
 
 
+def is_equivalent(pair: Comparison) -> bool:
+    """Return whether a pair is shown to be equivalent within the margin that was asked for."""
+    return pair.equivalence is not None and pair.equivalence.verdict is EquivalenceVerdict.EQUIVALENT
+
+
 def p_of(pair: Comparison) -> float | None:
-    """Return p of Student's t, corrected by Holm's method; None if undefined."""
-    return pair.student.p_holm if pair.student.p_holm is not None else pair.student.p
+    """Return p of the trusted test, corrected by Holm's method; None if undefined."""
+    return pair.trusted.p_holm
 
 
 def _judged(name: str, curve: Curve, experiment: ExperimentRead, count: int | None) -> Judged:

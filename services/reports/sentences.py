@@ -2,13 +2,13 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from gaplab.schemas.curves import Comparison
+from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.reports import Trend, TrendRead
 from gaplab.services.core.trends import FEWEST_REPETITIONS, CurveEnd
 from gaplab.services.figures.words import number_of
-from gaplab.services.reports.judged import SIGNIFICANT, Judged, differs, p_of
+from gaplab.services.reports.judged import SIGNIFICANT, Judged, differs, is_equivalent, p_of
 
 
 def standing(learned: Sequence[Judged], pairs: Sequence[Comparison], count: int | None) -> Iterator[str]:
@@ -22,8 +22,10 @@ def standing(learned: Sequence[Judged], pairs: Sequence[Comparison], count: int 
         return
     differing = sum(map(differs, compared))
     where = f"at {number_of('real-world evaluation', count or 0)}"
-    if not differing:
-        yield f"No strategy differs significantly from another {where}; {learned[0].name} has the highest mean."
+    if compared and all(map(is_equivalent, compared)):
+        yield f"No difference between strategies {_within(compared)} {where}; {learned[0].name} has the highest mean."
+    elif not differing:
+        yield f"No strategy is shown to differ from another {where}; {learned[0].name} has the highest mean."
     else:
         pairs_differ = f"{differing} of {number_of('pair', len(compared))} of strategies differ"
         yield f"{pairs_differ} {where}; {learned[0].name} has the highest mean."
@@ -43,21 +45,31 @@ def ranking(
     own = [
         pair for pair in pairs if best.curve.experiment in {pair.first, pair.second} <= ids and p_of(pair) is not None
     ]
-    others: dict[bool, list[str]] = {False: [], True: []}
-    for pair in own:
-        other = pair.second if pair.first == best.curve.experiment else pair.first
-        others[differs(pair)].append(names[other])
-    if others[True]:
-        yield f"It differs significantly from {_listed(others[True])}."
-    if others[False]:
-        yield f"It does not differ significantly from {_listed(others[False])}, which may be as good."
+    yield from _of_best(own, names, best.curve.experiment)
     yield from _disagreements(pairs, names)
 
 
+def _of_best(pairs: Sequence[Comparison], names: Mapping[str, str], best: str) -> Iterator[str]:
+    """Yield from which strategies the one with the highest mean differs, and to which it is equivalent."""
+    others = [(pair, names[pair.second if pair.first == best else pair.first]) for pair in pairs]
+    if different := [other for pair, other in others if differs(pair)]:
+        yield f"It differs significantly from {_listed(different)}."
+    if alike := [other for pair, other in others if is_equivalent(pair)]:
+        yield f"Its difference from {_listed(alike)} is {_within(pairs)}."
+    if open_ := [other for pair, other in others if not differs(pair) and not is_equivalent(pair)]:
+        yield f"It is not shown to differ from {_listed(open_)}, which may be as good."
+
+
+def _within(pairs: Sequence[Comparison]) -> str:
+    margin = next(pair.equivalence.margin for pair in pairs if pair.equivalence)
+    return f"within ±{margin:.3g}"
+
+
 def _disagreements(pairs: Sequence[Comparison], names: Mapping[str, str]) -> Iterator[str]:
-    """Yield the pairs on which the other tests disagree with Student's."""
+    """Yield the pairs on which other tests of the same kind, unpaired or paired, disagree with the trusted one."""
     for pair in pairs:
-        tests = {"Welch's t": pair.welch.p_holm, "Mann-Whitney": pair.mann_whitney.p_holm}
+        unpaired = {"Welch's t": pair.welch.p_holm, "Mann-Whitney": pair.mann_whitney.p_holm}
+        tests = {"Wilcoxon": pair.wilcoxon.p_holm} if pair.shared_streams else unpaired
         other = [name for name, p in tests.items() if p is not None and (p < SIGNIFICANT) != differs(pair)]
         if other and p_of(pair) is not None:
             result = "does not find" if differs(pair) else "finds"
@@ -72,9 +84,16 @@ def share_of_direct(learned: Sequence[Judged], judged: Sequence[Judged], pairs: 
         shares = [f"{one.name} {one.mean / baseline.mean:.0%}" for one in learned]
         yield f"Share of the fitness of {baseline.name}, {_with_interval(baseline)}: {', '.join(shares)}."
         key = baseline.curve.experiment
-        same = [one.name for one in learned if _is_alike(pairs, key, one)]
-        if same:
-            yield f"No significant difference from {baseline.name}: {_listed(same)}."
+        known = {
+            one.name: pair
+            for one in learned
+            for pair in pairs
+            if {pair.first, pair.second} == {key, one.curve.experiment} and p_of(pair) is not None
+        }
+        if same := [name for name, pair in known.items() if is_equivalent(pair)]:
+            yield f"No difference from {baseline.name} {_within(pairs)}: {_listed(same)}."
+        if open_ := [name for name, pair in known.items() if not differs(pair) and not is_equivalent(pair)]:
+            yield f"Not shown to differ from {baseline.name}: {_listed(open_)}."
 
 
 def spread(learned: Sequence[Judged]) -> Iterator[str]:
@@ -127,12 +146,6 @@ def incomplete(experiments: Sequence[ExperimentRead], names: Mapping[str, str]) 
         if experiment.caveat or state is not State.COMPLETED:
             why = f" ({experiment.caveat})" if experiment.caveat else ""
             yield f"{names[experiment.id]} is incomplete: {state.value.lower()}{why}, {done}."
-
-
-def _is_alike(pairs: Sequence[Comparison], baseline: str, one: Judged) -> bool:
-    """Return whether the test between a strategy and the baseline is defined, and finds no difference."""
-    both = {baseline, one.curve.experiment}
-    return any({pair.first, pair.second} == both and p_of(pair) is not None and not differs(pair) for pair in pairs)
 
 
 def _with_interval(one: Judged) -> str:

@@ -4,18 +4,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
-from gaplab.schemas.curves import Comparison
 from gaplab.schemas.misfit import TunableDistribution
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.figures.words import number, spoken
 from gaplab.services.reports.blocks import Grid
 from gaplab.services.reports.content import Facts
-from gaplab.services.reports.judged import SIGNIFICANT, Judged
+from gaplab.services.reports.judged import Judged
+from gaplab.services.reports.numbers import MISSING, fixed, interval
 from gaplab.services.specs.differences import SpecColumn, all_settings
 from gaplab.services.store.queries.costs import Work
-
-MISSING = "\N{EN DASH}"
 
 
 def at_last(facts: Facts) -> Grid:
@@ -33,26 +31,8 @@ def _at_last(one: Judged, baseline: float | None) -> tuple[str, ...]:
     share = f"{one.mean / baseline:.0%}" if baseline else MISSING
     end = one.end.trend.value.replace("_", " ") if one.end else MISSING
     since = f" since {one.end.since}" if one.end and end == "flat" else ""
-    numbers = (str(one.point.n), _fixed(one.mean), _fixed(one.point.sd), _interval(one.point.lower, one.point.upper))
+    numbers = (str(one.point.n), fixed(one.mean), fixed(one.point.sd), interval(one.point.lower, one.point.upper))
     return (one.name, *numbers, share, end + since)
-
-
-def pairs(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
-    """Return all pairs with the difference of their means, the effect size, and p of each test."""
-    names = {one.curve.experiment: one.name for one in facts.judged}
-    head = ("Pair", "n", "Difference", "Cohen's d", "Student", "Welch", "Mann-Whitney", "Differs")
-    rows = tuple(
-        (
-            f"{names[pair.first]} \N{MINUS SIGN} {names[pair.second]}",
-            f"{pair.n_first}, {pair.n_second}",
-            _signed(pair.difference),
-            _signed(pair.effect_size),
-            *(_probability(test.p_holm) for test in (pair.student, pair.welch, pair.mann_whitney)),
-            MISSING if pair.student.p_holm is None else "yes" if pair.student.p_holm < SIGNIFICANT else "no",
-        )
-        for pair in compared
-    )
-    return Grid(f"{caption}; p after Holm's correction over all pairs", head, rows)
 
 
 def misfit(facts: Facts) -> Iterator[Grid]:
@@ -205,22 +185,6 @@ def _spread(found: Any) -> str:  # noqa: ANN401 - a Distribution or one of a tun
     if found.mean is None:
         return MISSING
     return f"{number(found.mean)} ± {number(found.sd)}" if found.sd is not None else number(found.mean)
-
-
-def _fixed(value: float | None) -> str:
-    return MISSING if value is None else f"{value:.3f}"
-
-
-def _signed(value: float | None) -> str:
-    return MISSING if value is None else f"{value:+.3f}".replace("-", "\N{MINUS SIGN}")
-
-
-def _interval(lower: float | None, upper: float | None) -> str:
-    return MISSING if lower is None or upper is None else f"{lower:.3f} to {upper:.3f}"
-
-
-def _probability(p: float | None) -> str:
-    return MISSING if p is None else "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
 def _elapsed(start: datetime | None, end: datetime | None) -> str:

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from gaplab.schemas.curves import Comparison, Curve
+from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.curves import Curve
 from gaplab.schemas.records import ExperimentRead, common_count
 from gaplab.schemas.reports import Trend, TrendRead, VerdictRead
 from gaplab.services.core.trends import FEWEST_EVALUATIONS, FEWEST_REPETITIONS, SMALL, CurveEnd
@@ -13,8 +14,12 @@ NOTHING = "There are no results yet."
 
 RULES = (
     f"A pair differs if its p is below {SIGNIFICANT}: Student's t on the recorded fitness at the last number of "
-    "real-world evaluations that the experiments share, corrected by Holm's method over all pairs. A p above that does "
-    "not show that two strategies are equal. Experiments that failed or were cancelled do not lower the number.",
+    "real-world evaluations that the experiments share, corrected by Holm's method over all pairs. Experiments of one "
+    "seed and one strategy draw the same random numbers; their test is the paired t, by repetition. A p above that "
+    "does not show that two strategies are equal. Experiments that failed or were cancelled do not lower the number.",
+    "There is no difference within a margin if two one-sided tests (Welch's, or paired) say so at that number, with p "
+    f"below {SIGNIFICANT} after Holm's correction over all pairs. Without a margin in the request, the verdict only "
+    "says which pairs are not shown to differ.",
     "The gain of a curve is the mean, over repetitions, of the later minus the earlier recorded fitness of the same "
     "repetition, with its 95 % interval by Student's t.",
     "A curve is flat since k, and not worth continuing, if the interval of the gain from k, and from every later "

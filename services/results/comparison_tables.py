@@ -3,18 +3,18 @@
 import csv
 import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
-from gaplab.schemas.curves import Comparison, Test
+from gaplab.schemas.comparison_columns import COLUMNS, row
+from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
 from gaplab.services.results.texts import cell
 
-TESTS = {"student": "Student", "welch": "Welch", "mann_whitney": "Mann--Whitney"}
-"""The tests of a comparison, with the name of each in LaTeX."""
+UNPAIRED = {"student": "Student", "welch": "Welch", "mann_whitney": "Mann--Whitney"}
+PAIRED = {"paired_t": "Paired $t$", "wilcoxon": "Wilcoxon"}
+SPREAD = {"brown_forsythe": "Brown--Forsythe"}
 
-ABOUT = ("first", "first_name", "second", "second_name", "from_evaluations", "to_evaluations", "n_first", "n_second")
-SIZES = ("difference", "effect_size")
-OF_A_TEST = ("statistic", "degrees_of_freedom", "p", "p_holm")
-COLUMNS = (*ABOUT, *SIZES, *(f"{test}_{value}" for test in TESTS for value in OF_A_TEST))
+WORDS = {"First", "Second", "Experiment", "Verdict"}
+"""Columns of words, which are set to the left."""
 
 SMALLEST_P = 0.001
 """Smallest p-value that is written as a number."""
@@ -34,32 +34,73 @@ def comparisons_csv(comparisons: Sequence[Comparison]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
-    writer.writerows(_values(pair) for pair in comparisons)
+    writer.writerows(map(_cell, row(pair)) for pair in comparisons)
     return text.getvalue()
 
 
 def comparisons_latex(comparisons: Sequence[Comparison], unit: str) -> str:
-    """Return a table for the package booktabs: a row for each pair, p-values with Holm's correction.
+    """Return tables for the package booktabs: the pairs, the experiments, and over a range the paper's pooled tests.
 
     Args:
         comparisons: pairs over one range of real-world evaluations.
         unit: unit of fitness; "" if it has none.
     """
-    first, last = comparisons[0].from_evaluations, comparisons[0].to_evaluations
-    counts = f"{first} real-world evaluation{'' if first == 1 else 's'}"
-    where = f"after {counts}" if first == last else f"pooled over {first} to {last} real-world evaluations"
-    units = f" in {escaped(unit)}" if unit else ""
+    return "\n".join([_pairs(comparisons, unit), _experiments(comparisons, unit), *_pooled(comparisons)])
+
+
+def _pairs(comparisons: Sequence[Comparison], unit: str) -> str:
+    shared = any(pair.shared_streams for pair in comparisons)
+    tests = UNPAIRED | (PAIRED if shared else {}) | SPREAD
+    margins = {pair.equivalence.margin for pair in comparisons if pair.equivalence}
+    head = ["First", "Second", "$n$", "Difference", "$d$", "$P(>)$", *tests.values(), *(["Verdict"] if margins else [])]
+    rows = [
+        [*_names(pair), *_sizes(pair, pair), _estimate(pair.improvement), *_tests(pair, tests), *_verdict(pair)]
+        for pair in comparisons
+    ]
+    caption = [
+        f"Differences of mean fitness in reality{_units(unit)}, {_where(comparisons[0])}, with 90\\,\\% intervals",
+        "Cohen's $d$",
+        "$P(>)$, the probability that a repetition of the first is fitter, with its 95\\,\\% interval",
+        "two-sided $p$-values, in brackets with Holm's correction over all pairs",
+        *(["paired tests by repetition where two experiments share random streams"] if shared else []),
+        *[f"equivalence within $\\pm{margin:.3g}$ by two one-sided tests" for margin in margins],
+    ]
+    return _table("; ".join(caption), head, rows)
+
+
+def _experiments(comparisons: Sequence[Comparison], unit: str) -> str:
+    found: dict[str, tuple[str, Summary]] = {}
+    for pair in comparisons:
+        found[pair.first] = pair.first_name, pair.summary_first
+        found[pair.second] = pair.second_name, pair.summary_second
+    rows = [
+        [_name(name), str(one.n), _estimate(one.mean), _estimate(one.interquartile_mean), _plain(one.sd)]
+        for name, one in found.values()
+    ]
+    caption = f"Fitness in reality{_units(unit)}, {_where(comparisons[0])}, with 95\\,\\% bootstrap intervals"
+    return _table(caption, ["Experiment", "$n$", "Mean", "Interquartile mean", "SD"], rows)
+
+
+def _pooled(comparisons: Sequence[Comparison]) -> Iterator[str]:
+    pooled = [(pair, pair.pooled) for pair in comparisons if pair.pooled]
+    if not pooled:
+        return
+    rows = [[*_names(pair), *_sizes(tests, None), *_tests(tests, UNPAIRED)] for pair, tests in pooled]
+    caption = f"The same pairs, {escaped(pooled[0][1].caution)}; $p$-values as above"
+    yield _table(caption, ["First", "Second", "$n$", "Difference", "$d$", *UNPAIRED.values()], rows)
+
+
+def _table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join(
         [
             r"\begin{table}",
             r"  \centering",
-            f"  \\caption{{Differences of mean fitness in reality{units}, {where}; Cohen's $d$; two-sided $p$-values "
-            r"with Holm's correction over all pairs.}",
-            r"  \begin{tabular}{llrrrrrr}",
+            f"  \\caption{{{caption}.}}",
+            f"  \\begin{{tabular}}{{{''.join('l' if each in WORDS else 'r' for each in head)}}}",
             r"    \toprule",
-            f"    First & Second & $n$ & Difference & $d$ & {' & '.join(TESTS.values())} \\\\",
+            f"    {' & '.join(head)} \\\\",
             r"    \midrule",
-            *(f"    {' & '.join(_row(pair))} \\\\" for pair in comparisons),
+            *(f"    {' & '.join(cells)} \\\\" for cells in rows),
             r"    \bottomrule",
             r"  \end{tabular}",
             r"\end{table}",
@@ -73,16 +114,58 @@ def escaped(text: str) -> str:
     return "".join(_SPECIAL.get(sign, sign) for sign in re.sub(r"\s+", " ", text))
 
 
-def _values(pair: Comparison) -> Iterator[object]:
-    yield from (cell(value) if isinstance(value := getattr(pair, name), str) else value for name in (*ABOUT, *SIZES))
-    yield from (getattr(getattr(pair, test), value) for test in TESTS for value in OF_A_TEST)
+def _cell(value: object) -> object:
+    return cell(value) if isinstance(value, str) else value
 
 
-def _row(pair: Comparison) -> list[str]:
-    names = [escaped(name.replace("_", " ")) for name in (pair.first_name, pair.second_name)]
-    sizes = [_signed(pair.difference), _signed(pair.effect_size)]
-    tests: list[Test] = [getattr(pair, test) for test in TESTS]
-    return [*names, f"{pair.n_first}, {pair.n_second}", *sizes, *(_probability(test.p_holm) for test in tests)]
+def _where(pair: Comparison) -> str:
+    first, last = pair.from_evaluations, pair.to_evaluations
+    if first == last:
+        return f"after {first} real-world evaluation{'' if first == 1 else 's'}"
+    return f"mean of each repetition over {first} to {last} real-world evaluations"
+
+
+def _units(unit: str) -> str:
+    return f" in {escaped(unit)}" if unit else ""
+
+
+def _name(name: str) -> str:
+    return escaped(name.replace("_", " "))
+
+
+def _names(pair: Comparison) -> list[str]:
+    return [_name(pair.first_name), _name(pair.second_name)]
+
+
+def _sizes(groups: Groups, pair: Comparison | None) -> list[str]:
+    interval = _interval(pair.lower, pair.upper) if pair else ""
+    return [f"{groups.n_first}, {groups.n_second}", _signed(groups.difference) + interval, _signed(groups.effect_size)]
+
+
+def _tests(groups: Groups, names: Iterable[str]) -> list[str]:
+    tests: list[Test] = [getattr(groups, name) for name in names]
+    return [_both(test.p, test.p_holm) for test in tests]
+
+
+def _both(p: float | None, p_holm: float | None) -> str:
+    return "--" if p is None else f"{_probability(p)} ({_probability(p_holm)})"
+
+
+def _verdict(pair: Comparison) -> list[str]:
+    found = pair.equivalence
+    return [f"{found.verdict.value}, {_both(found.p, found.p_holm)}"] if found else []
+
+
+def _estimate(found: Estimate) -> str:
+    return _plain(found.value) + _interval(found.lower, found.upper)
+
+
+def _interval(lower: float | None, upper: float | None) -> str:
+    return "" if lower is None or upper is None else f" $[{lower:.2f}, {upper:.2f}]$"
+
+
+def _plain(value: float | None) -> str:
+    return "--" if value is None else f"${value:.2f}$"
 
 
 def _signed(value: float | None) -> str:

@@ -1,4 +1,4 @@
-"""Curves and comparisons of stored experiments, computed by the core."""
+"""Curves of stored experiments, computed by the core."""
 
 import csv
 import io
@@ -6,11 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gaplab.schemas.curves import Comparison, Curve
+from gaplab.schemas.curves import Curve
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import curve_points
-from gaplab.services.core.errors import InvalidSpec, Violation
-from gaplab.services.core.statistics import compare_all
 from gaplab.services.results.texts import cell
 from gaplab.services.specs.resolution import is_direct, spec_of, unit
 from gaplab.services.store.models import ExperimentRow
@@ -45,7 +43,7 @@ def curves_of(session: Session, experiment_ids: Sequence[str]) -> tuple[Curve, .
     Raises:
         NotFound: an experiment does not exist.
     """
-    rows, values = _recorded(session, experiment_ids)
+    rows, values = recorded_of(session, experiment_ids)
     return tuple(_curve(row, values[row.id]) for row in rows)
 
 
@@ -58,46 +56,6 @@ def study_curves(store: Store, study_id: str) -> tuple[Curve, ...]:
     with store.reading() as session:
         experiments.get_study(session, study_id)
         return curves_of(session, [row.id for row in experiments.experiments_of(session, [study_id])])
-
-
-def compare(
-    store: Store,
-    experiment_ids: Sequence[str],
-    *,
-    from_evaluations: int | None = None,
-    to_evaluations: int | None = None,
-) -> tuple[Comparison, ...]:
-    """Compare every pair of experiments on their recorded fitness, pooled over a range of real-world evaluations.
-
-    The only value of the direct baseline is in every range.
-
-    Args:
-        store: database with the experiments.
-        experiment_ids: two or more, each once.
-        from_evaluations: the first number of evaluations; by default 1.
-        to_evaluations: the last number of evaluations; by default the last that an experiment has.
-
-    Raises:
-        NotFound: an experiment does not exist.
-        InvalidSpec: fewer than two experiments, an experiment twice, or a range that is empty or negative.
-    """
-    if len(set(experiment_ids)) < max(2, len(experiment_ids)):
-        message = f"a comparison needs two or more experiments, each once, not {len(experiment_ids)}"
-        raise InvalidSpec([Violation("experiment", list(experiment_ids), message)])
-    with store.reading() as session:
-        rows, values = _recorded(session, experiment_ids)
-    last = max(1, *(row.iterations - 1 for row in rows))
-    first = 1 if from_evaluations is None else from_evaluations
-    final = last if to_evaluations is None else to_evaluations
-    if not 0 <= first <= final:
-        message = f"the range of real-world evaluations must ascend from 0 or more, not from {first} to {final}"
-        raise InvalidSpec([Violation("from_evaluations", first, message, f"0 to {final}")])
-    direct = frozenset(row.id for row in rows if is_direct(spec_of(row.spec)))
-    names = {row.id: row.name for row in rows}
-    return tuple(
-        pair.model_copy(update={"first_name": names[pair.first], "second_name": names[pair.second]})
-        for pair in compare_all(values, direct, first, final)
-    )
 
 
 def unit_of(store: Store, experiment_id: str) -> str:
@@ -128,8 +86,12 @@ def curves_csv(curves: Sequence[Curve]) -> str:
     return text.getvalue()
 
 
-def _recorded(session: Session, ids: Sequence[str]) -> tuple[tuple[ExperimentRow, ...], dict[str, FloatArray]]:
-    """Return the experiments, and the recorded fitness of each: `(repetitions, iterations + 1)`, nan if missing."""
+def recorded_of(session: Session, ids: Sequence[str]) -> tuple[tuple[ExperimentRow, ...], dict[str, FloatArray]]:
+    """Return experiments, and the recorded fitness of each: `(repetitions, iterations + 1)`, nan if missing.
+
+    Raises:
+        NotFound: an experiment does not exist.
+    """
     rows = experiments.get_experiments(session, ids)
     found = results.recorded(session, ids)
     values = {row.id: np.full((row.spec["repetitions"], row.iterations), np.nan) for row in rows}

@@ -11,7 +11,7 @@ from gaplab.services.experiments import submission
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.e2e.browser import axe, fits, screenshot
-from tests.experiments import some_log, toy
+from tests.experiments import run, some_log, toy
 
 SLOW_MS = 120_000
 expect.set_options(timeout=SLOW_MS)
@@ -81,9 +81,12 @@ def test_the_address_holds_everything(archive: Any, ids: Any, visit: Any) -> Non
     page.get_by_label("from", exact=True).fill("2")
     page.get_by_label("to", exact=True).fill("4")
     page.get_by_label("to", exact=True).press("Tab")
-    wanted = f"#/compare?experiments={','.join(ids[:3])}&x=time&cost_s=90&band=sd&each=true&test=welch&from=2&to=4"
+    choices = "x=time&cost_s=90&band=sd&each=true&test=welch&from=2&to=4&margin=0.03"
+    wanted = f"#/compare?experiments={','.join(ids[:3])}&{choices}"
+    page.get_by_label("equivalent within").fill("0.03")
+    page.get_by_label("equivalent within").press("Tab")
     expect(page.get_by_text("over 2 to 4 real-world evaluations")).to_be_attached()
-    assert fragment(page) == wanted
+    page.wait_for_function(f"() => location.hash === {wanted!r}")
     page.get_by_role("button", name="Copy the link").click()
     expect(page.get_by_role("button", name="Copied")).to_be_visible()
 
@@ -94,6 +97,7 @@ def test_the_address_holds_everything(archive: Any, ids: Any, visit: Any) -> Non
     expect(other.get_by_label("Each repetition")).to_be_checked()
     expect(other.get_by_label("Test")).to_have_value("welch")
     expect(other.get_by_label("from", exact=True)).to_have_value("2")
+    expect(other.get_by_label("equivalent within")).to_have_value("0.03")
     expect(other.get_by_text("over 2 to 4 real-world evaluations")).to_be_attached()
     expect(other.locator(".large .xtitle")).to_contain_text("ime")
     assert fragment(other) == wanted
@@ -108,26 +112,48 @@ def test_what_differs_is_what_the_service_found(archive: Any, ids: Any, visit: A
         row, column = ids.index(pair["first"]), ids.index(pair["second"])
         here = matrix.locator("tbody tr").nth(row).locator("td").nth(column)
         there = matrix.locator("tbody tr").nth(column).locator("td").nth(row)
-        p = pair["student"]["p_holm"]
+        p, raw = pair["trusted"]["p_holm"], pair["trusted"]["p"]
         words = ("higher", "lower") if pair["difference"] > 0 else ("lower", "higher")
         expect(here).to_contain_text(words[0] if p < 0.05 else "n. s.")
         expect(there).to_contain_text(words[1] if p < 0.05 else "n. s.")
         expect(here).to_contain_text("p < 0.001" if p < 0.001 else f"p = {p:.3f}")
-    assert any(pair["student"]["p_holm"] < 0.05 for pair in found)
+        expect(here).to_contain_text("raw < 0.001" if raw < 0.001 else f"raw {raw:.3f}")
+    assert any(pair["trusted"]["p_holm"] < 0.05 for pair in found)
 
     page.get_by_text("Every pair, at every range").click()
     rows = page.get_by_role("region", name="Pairs").locator("tbody tr")
     expect(rows).to_have_count(len(found))
     heads = page.get_by_role("region", name="Pairs").locator("thead th").all_inner_texts()
-    pooled = ["Pooled 1–5, p too small", "Pooled 3–5, p too small"]
-    assert heads[1:5] == ["At 1", pooled[0], pooled[1], "At 5"]
+    assert heads[1:5] == ["At 1", "Mean of 1–5", "Mean of 3–5", "At 5"]
     caution = page.get_by_text("are not independent")
-    expect(caution).to_be_hidden()
-    button = page.get_by_role("button", name="3–5, pooled as in the paper", exact=True)
+    expect(caution).to_have_count(0)
+    button = page.get_by_role("button", name="mean of 3–5", exact=True)
     button.click()
-    expect(page.get_by_text("The row against the column")).to_contain_text("pooled over 3 to 5")
+    expect(page.get_by_text("The row against the column")).to_contain_text("over 3 to 5")
     expect(button).to_have_attribute("aria-pressed", "true")
+    expect(caution).to_be_hidden()
+    page.get_by_text("The paper’s tests, pooled over the range").click()
     expect(caution).to_be_visible()
+
+
+def test_a_pair_that_shares_random_streams_is_marked_and_a_margin_is_judged(
+    api: Any, written: Store, visit: Any
+) -> None:
+    ids = [submission.submit_experiment(written, toy(name=name, repetitions=6)).id for name in ("one", "two")]
+    for claim in execution.claim(written, "tests", 12):
+        better = 0.5 + 0.01 * (claim.number % 3) if claim.experiment_id == ids[0] else 0.0
+        run(written, claim, some_log(recorded=1.0 + 0.02 * claim.number + better))
+    page = visit(address(api, *ids))
+    cell = page.locator("table.matrix td.better, table.matrix td.worse").first
+    expect(cell).to_contain_text("paired")
+    page.get_by_label("equivalent within").fill("9")
+    page.get_by_label("equivalent within").press("Tab")
+    expect(page.locator("table.matrix .within").first).to_contain_text("within ±9")
+    page.get_by_label("Test").select_option("student")
+    expect(page.get_by_text("trust the paired tests")).to_be_visible()
+    page.get_by_text("Each experiment, with intervals").click()
+    expect(page.get_by_role("region", name="Each experiment").locator("tbody tr")).to_have_count(2)
+    axe(page)
 
 
 def test_a_comparison_begins_at_the_last_number_that_all_share(archive: Any, ids: Any, visit: Any) -> None:
@@ -213,5 +239,5 @@ def test_the_tests_of_all_pairs_are_copied_as_a_table(archive: Any, ids: Any, vi
     expect(page.get_by_role("button", name="Copied").first).to_be_visible()
 
     page.wait_for_function("async () => (await navigator.clipboard.readText()).startsWith('first,')")
-    assert latex.count(r" \\") == 1 + 3
+    assert latex.count(r" \\") == 2 * (1 + 3)  # pairs, and experiments
     assert r"\toprule" in latex

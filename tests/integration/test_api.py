@@ -182,7 +182,8 @@ def test_experiments_are_compared_pair_by_pair(store: Store, api: TestClient) ->
         (ids[1], ids[2]),
     ]
     assert {(each["from_evaluations"], each["to_evaluations"]) for each in pairs} == {(1, 2)}
-    assert pairs[0]["n_first"] == 4
+    assert pairs[0]["n_first"] == 2
+    assert pairs[0]["pooled"]["n_first"] == 4
 
 
 def test_a_figure_is_a_page_without_links_to_elsewhere_or_a_file(store: Store, api: TestClient) -> None:

@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 from gaplab.api.app import create_app
 from gaplab.api.clients.client import Client
 from gaplab.api.commands.exit_codes import Exit
-from gaplab.schemas.curves import Comparison, Test
+from gaplab.schemas.comparisons import Comparison, Equivalence, Estimate, Summary, Test, Trusted
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.experiments import submission
 from gaplab.services.results.comparison_tables import comparisons_csv, comparisons_latex, escaped
@@ -40,7 +40,7 @@ def test_csv_has_every_number_of_the_json(ids: list[str], sqlite_store: Store) -
     assert len(rows) == len(plain) == 3
     for row, pair in zip(rows, plain, strict=True):
         assert (row["first"], row["second"]) == (pair["first"], pair["second"])
-        for test in ("student", "welch", "mann_whitney"):
+        for test in ("student", "welch", "mann_whitney", "paired_t", "wilcoxon", "brown_forsythe"):
             for value in ("statistic", "p", "p_holm"):
                 expected = pair[test][value]
                 assert row[f"{test}_{value}"] == ("" if expected is None else repr(expected))
@@ -49,20 +49,30 @@ def test_csv_has_every_number_of_the_json(ids: list[str], sqlite_store: Store) -
 
 def test_latex_prints_names_as_they_are_and_rounds_p_as_papers_do() -> None:
     test = Test(statistic=3.0, p=0.0001, p_holm=0.0003)
+    estimate, nothing = Estimate(value=0.125, lower=0.05, upper=0.2), Estimate()
+    equivalence = Equivalence(margin=0.03, test="welch", p=0.2, p_holm=0.4, verdict="undecided", words="")
+    summary = Summary(n=9, sd=0.5, mean=estimate, interquartile_mean=nothing)
     pair = Comparison(
         first="a", second="b", first_name="half & half_100%", second_name=r"a\b{c}^~", from_evaluations=3,
         to_evaluations=5, n_first=9, n_second=9, difference=-0.25, effect_size=None, student=test,
-        welch=test.model_copy(update={"p_holm": 0.0412}), mann_whitney=Test(statistic=None, p=None),
+        welch=test.model_copy(update={"p_holm": 0.0412}), mann_whitney=Test(),
+        lower=-0.5, upper=0.0, improvement=estimate, shared_streams=False, streams="", n_paired=0,
+        trusted=Trusted(test="student"), paired_t=Test(),
+        wilcoxon=Test(), brown_forsythe=test, summary_first=summary, summary_second=summary,
+        equivalence=equivalence,
     )  # fmt: skip
 
     table = comparisons_latex([pair], "m/s")
 
+    assert r"half \& half 100\% & a\textbackslash{}b\{c\}\textasciicircum{}\textasciitilde{} & 9, 9 & " in table
+    assert r" & 9, 9 & $-0.25$ $[-0.50, 0.00]$ & -- & $0.12$" in table
     assert (
-        r"half \& half 100\% & a\textbackslash{}b\{c\}\textasciicircum{}\textasciitilde{} & 9, 9 & $-0.25$ & -- & "
-        in table
+        r"& $0.12$ $[0.05, 0.20]$ & $<0.001$ ($<0.001$) & $<0.001$ ($0.041$) & -- & $<0.001$ ($<0.001$) & und" in table
     )
-    assert r"& $-0.25$ & -- & $<0.001$ & $0.041$ & -- \\" in table
-    assert "pooled over 3 to 5 real-world evaluations" in table
+    assert r"undecided, $0.200$ ($0.400$) \\" in table
+    assert "mean of each repetition over 3 to 5 real-world evaluations" in table
+    assert r"equivalence within $\pm0.03$" in table
+    assert table.count(r"\begin{table}") == 2
     assert "in m/s" in table
     assert table.count("{") == table.count("}") - table.count(r"\}") + table.count(r"\{")
     assert comparisons_csv([pair]).count("\n") == 2
@@ -73,11 +83,17 @@ def test_the_client_gives_a_tuple_with_a_frame_and_a_table(ids: list[str], url: 
     with Client(url) as client:
         pairs = client.compare(ids)
         frame, latex, text = pairs.frame(), pairs.latex(), pairs.csv()
-        pooled = client.compare(ids, 1, 2)
+        over, close = client.compare(ids, 1, 2), client.compare(ids, margin=0.5)
+        over_latex, close_text = over.latex(), close.csv()
 
     assert [pair.first for pair in pairs] == list(frame["first"])
     assert (pairs[0].from_evaluations, pairs[0].to_evaluations) == (2, 2)  # the last that all have
-    assert (pooled[0].from_evaluations, pooled[0].to_evaluations) == (1, 2)
+    assert (over[0].from_evaluations, over[0].to_evaluations) == (1, 2)
+    assert over[0].pooled is not None
+    assert "pooled as in the paper" in over_latex
+    assert {pair.equivalence.margin for pair in close if pair.equivalence} == {0.5}
+    assert "undecided" in close_text or "equivalent," in close_text
+    assert {"wilcoxon_p", "improvement_lower", "trusted_test", "pooled_student_p"} <= set(frame.columns)
     assert frame["student_p_holm"].dtype == float
     assert r"\begin{tabular}" in latex
     assert text.startswith("first,first_name,")
@@ -93,7 +109,39 @@ def test_the_command_prints_each_format(ids: list[str], gaplab: Gaplab) -> None:
     assert len(text.out.splitlines()) == 1 + 3
     assert json.loads(document.out)[0]["to_evaluations"] == 2
     assert r"\toprule" in latex.out
-    assert "pooled over 1 to 2" in gaplab("compare", *ids, "--at", "1-2").out
+    over = gaplab("compare", *ids, "--at", "1-2", "--margin", "0.5").out
+    assert "mean of each repetition over 1 to 2" in over
+    assert "pooled as in the paper" in over
+    assert "within ±0.5" in over
+    assert "seed 0 and the strategy simulated_fit" in over.replace("\n", " ")
+
+
+def test_all_ways_to_ask_begin_at_the_same_count(ids: list[str], gaplab: Gaplab, url: str, sqlite_store: Store) -> None:
+    with TestClient(create_app(sqlite_store), base_url="http://localhost") as api, Client(url) as client:
+        http = api.get("/comparisons", params={"experiment": ids}).json()
+        alone = api.get("/comparisons", params={"experiment": ids, "to": 1}).json()
+        asked = client.compare(ids)
+    command = json.loads(gaplab("compare", *ids, "--json").out)
+
+    assert http == command == [pair.model_dump(mode="json") for pair in asked]
+    assert {(pair["from_evaluations"], pair["to_evaluations"]) for pair in http} == {(2, 2)}
+    assert {(pair["from_evaluations"], pair["to_evaluations"]) for pair in alone} == {(1, 1)}
+
+
+def test_a_margin_is_given_once_and_is_above_0(ids: list[str], gaplab: Gaplab, sqlite_store: Store) -> None:
+    with TestClient(create_app(sqlite_store), base_url="http://localhost") as api:
+        twice, zero, no_direct = (
+            api.get("/comparisons", params={"experiment": ids, **margin})
+            for margin in ({"margin": 1, "margin_of_direct": 1}, {"margin": 0}, {"margin_of_direct": 0.03})
+        )
+
+    assert [answer.status_code for answer in (twice, zero, no_direct)] == [422, 422, 422]
+    assert "one margin" in twice.text
+    assert "one direct baseline" in no_direct.text
+    for margin in ("0", "nan", "inf", "much", "-3%"):
+        wrong = gaplab("compare", *ids, f"--margin={margin}")
+        assert wrong.code == Exit.USAGE
+        assert "is no margin above 0" in wrong.err.replace("\n│ ", "")
 
 
 def test_a_range_that_is_none_is_refused_in_words(ids: list[str], gaplab: Gaplab) -> None:

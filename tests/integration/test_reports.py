@@ -11,6 +11,7 @@ from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.errors import InvalidSpec, NotFound
 from gaplab.services.experiments import submission
 from gaplab.services.results import curves
+from gaplab.services.results.comparisons import Margin, compare
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.experiments import run, some_log, toy
@@ -92,26 +93,49 @@ def test_the_curves_of_what_is_not_there_are_not_found(store: Store) -> None:
         curves.study_curves(store, "no-such")
 
 
-def test_a_comparison_pools_the_whole_range_and_direct_counts_at_any(sqlite_store: Store) -> None:
+def test_a_comparison_begins_at_the_last_shared_count_and_direct_counts_at_any(sqlite_store: Store) -> None:
     study = study_with_results(sqlite_store)
     ids = [each.id for each in study.experiments]
 
-    (whole,) = curves.compare(sqlite_store, ids)
-    (one,) = curves.compare(sqlite_store, ids, from_evaluations=1, to_evaluations=1)
+    (last,) = compare(sqlite_store, ids)
+    (one,) = compare(sqlite_store, ids, to_evaluations=1)
+    (whole,) = compare(sqlite_store, ids, from_evaluations=1, to_evaluations=2)
 
-    assert (whole.from_evaluations, whole.to_evaluations) == (1, 2)
-    assert (whole.n_first, whole.n_second) == (3, 2)
-    assert whole.difference == pytest.approx((2 + 3 + 3) / 3 - 1.5)
-    assert (one.n_first, one.n_second, one.difference) == (2, 2, 1.0)
+    assert (last.from_evaluations, last.to_evaluations) == (2, 2)
+    assert (one.from_evaluations, one.n_first, one.n_second, one.difference) == (1, 2, 2, 1.0)
+    assert (whole.n_first, whole.n_second) == (1, 2)  # a repetition that is half done lacks count 2
+    assert whole.difference == pytest.approx((2 + 3) / 2 - 1.5)
+    assert whole.pooled is not None
+    assert (whole.pooled.n_first, whole.pooled.n_second) == (3, 2)
+    assert whole.pooled.difference == pytest.approx((2 + 3 + 3) / 3 - 1.5)
 
 
 def test_a_comparison_is_of_every_pair(sqlite_store: Store) -> None:
     ids = [submission.submit_experiment(sqlite_store, toy()).id for _ in range(3)]
 
-    found = curves.compare(sqlite_store, ids)
+    found = compare(sqlite_store, ids)
 
     assert [(each.first, each.second) for each in found] == [(ids[0], ids[1]), (ids[0], ids[2]), (ids[1], ids[2])]
     assert {each.student.p for each in found} == {None}
+    assert all(each.shared_streams for each in found)  # one seed and one strategy
+
+
+def test_a_margin_as_a_share_of_direct_is_in_the_unit_of_fitness(sqlite_store: Store) -> None:
+    study = study_with_results(sqlite_store)
+    ids = [each.id for each in study.experiments]
+    seeds = [submission.submit_experiment(sqlite_store, toy(seed=seed)).id for seed in (1, 2)]
+
+    (pair,) = compare(sqlite_store, ids, margin=Margin(0.1, of_direct=True))
+
+    assert pair.equivalence is not None
+    assert pair.equivalence.margin == pytest.approx(0.1 * 1.5)
+    for without in ([seeds[0], ids[0]], seeds):
+        margin = Margin(0.1, of_direct=True)
+        if ids[0] in without:  # the baseline of its study is taken
+            assert compare(sqlite_store, without, margin=margin)[0].equivalence is not None
+        else:
+            with pytest.raises(InvalidSpec, match="one direct baseline"):
+                compare(sqlite_store, without, margin=margin)
 
 
 @pytest.mark.parametrize("bounds", [(2, 1), (-1, 2), (3, None)])
@@ -119,7 +143,7 @@ def test_a_range_that_is_none_is_refused(sqlite_store: Store, bounds: Any) -> No
     ids = [submission.submit_experiment(sqlite_store, toy()).id for _ in range(2)]
 
     with pytest.raises(InvalidSpec, match="range"):
-        curves.compare(sqlite_store, ids, from_evaluations=bounds[0], to_evaluations=bounds[1])
+        compare(sqlite_store, ids, from_evaluations=bounds[0], to_evaluations=bounds[1])
 
 
 def test_a_comparison_needs_two_experiments(sqlite_store: Store) -> None:
@@ -127,7 +151,7 @@ def test_a_comparison_needs_two_experiments(sqlite_store: Store) -> None:
 
     for ids in ([], [one], [one, one]):
         with pytest.raises(InvalidSpec, match="two or more"):
-            curves.compare(sqlite_store, ids)
+            compare(sqlite_store, ids)
 
 
 @pytest.mark.parametrize("name", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "=cmd|' /C calc'!A0"])

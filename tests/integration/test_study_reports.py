@@ -120,9 +120,25 @@ def test_the_verdict_on_a_study_agrees_with_the_comparison_at_the_last_count(
 
     assert verdict.evaluations == 5
     assert not differing
-    assert verdict.headline.startswith("No strategy differs significantly from another at 5")
+    assert verdict.headline.startswith("No strategy is shown to differ from another at 5")
     assert any("Share of the fitness of Direct" in sentence and "%" in sentence for sentence in verdict.sentences)
     assert "does not show that two strategies are equal" in verdict.rules[0]
+
+
+def test_only_a_margin_turns_no_significance_into_no_difference(api: TestClient, study: str) -> None:
+    def told(**query: Any) -> str:
+        verdict = api.get(f"/studies/{study}/report", params={"format": "json", **query}).json()
+        return " ".join([verdict["headline"], *verdict["sentences"]])
+
+    plain, wide, narrow, share = told(), told(margin=100), told(margin=1e-6), told(margin_of_direct=50)
+
+    assert "not shown to differ" in plain
+    assert "No difference" not in plain
+    assert "No difference between strategies within ±100 at 5" in wide
+    assert "No difference from Direct within ±100" in wide
+    assert "not shown to differ from" not in wide
+    assert narrow == plain
+    assert "No difference from Direct within ±" in share
 
 
 def test_a_study_without_results_has_no_verdict(sqlite_store: Store) -> None:

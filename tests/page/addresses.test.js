@@ -6,17 +6,17 @@ import { addressOf as listAddress, filtersOf, isFiltered } from "../../api/dashb
 const parametersOf = (address) => new URLSearchParams(address.split("?")[1] ?? "");
 
 test("an address of a comparison says everything, and comes back as it was", () => {
-  const address = "#/compare?experiments=b,a&x=time&cost_s=90&band=sd&each=true&test=welch&from=2&to=4";
+  const address = "#/compare?experiments=b,a&x=time&cost_s=90&band=sd&each=true&test=welch&from=2&to=4&margin=0.03&margin_of_direct=0.1";
   assert.equal(comparisonAddress(comparisonOf(parametersOf(address))), address);
   assert.equal(comparisonAddress(comparisonOf(new URLSearchParams())), "#/compare");
   assert.equal(comparisonAddress(comparisonOf(new URLSearchParams("from=0&to=0"))), "#/compare?from=0&to=0");
 });
 
 test("what is wrong in an address of a comparison is as if it were left out", () => {
-  const wrong = "experiments=a,a,../b,&studies=s&x=toString&cost_s=-1&band=constructor&each=yes&test=guess&from=x&to=99999";
+  const wrong = "experiments=a,a,../b,&studies=s&x=toString&cost_s=-1&band=constructor&each=yes&test=guess&from=x&to=99999&margin=0&margin_of_direct=wide";
   const { experiments, studies, ...others } = comparisonOf(new URLSearchParams(wrong));
   assert.deepEqual([experiments, studies], [["a"], ["s"]]);
-  assert.deepEqual(others, { x: "evaluations", cost_s: 60, band: "", each: false, test: "student", from: null, to: null });
+  assert.deepEqual(others, { x: "evaluations", cost_s: 60, band: "", each: false, test: "trusted", from: null, to: null, margin: null, margin_of_direct: null });
 });
 
 test("the figure is asked only for what differs from its defaults", () => {

@@ -1,12 +1,15 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { commonCount, isPooled, letter, rangesOf, rangeText } from "../../api/dashboard/views/compare/ranges.js";
+import { commonCount, isSeveral, letter, rangesOf, rangeText } from "../../api/dashboard/views/compare/ranges.js";
 import { differentSettings, warnings } from "../../api/dashboard/views/compare/remarks.js";
-import { probability, signed, swapped, verdict } from "../../api/dashboard/views/compare/verdict.js";
+import { bothProbabilities, estimated, probability, signed, swapped, verdict } from "../../api/dashboard/views/compare/verdict.js";
 
 const PAIR = {
   first: "a", second: "b", n_first: 3, n_second: 4, difference: 0.5, effect_size: -1.25,
-  student: { p_holm: 0.01 }, welch: { p_holm: 0.05 }, mann_whitney: { p_holm: null },
+  lower: 0.25, upper: 0.75, improvement: { value: 0.75, lower: 0.5, upper: null }, shared_streams: false,
+  summary_first: { sd: 1 }, summary_second: { sd: 2 },
+  trusted: { p_holm: 0.01 }, student: { p_holm: 0.01 }, welch: { p_holm: 0.05 }, mann_whitney: { p_holm: null },
+  paired_t: { p_holm: null }, brown_forsythe: { p_holm: 0.01 },
 };
 
 /** Experiments that differ in their specs alone, with their letters. */
@@ -17,13 +20,13 @@ test("letters go on after Z", () => {
   assert.deepEqual([0, 25, 26, 51, 52, 701, 702].map(letter), ["A", "Z", "AA", "AZ", "BA", "ZZ", "AAA"]);
 });
 
-test("a comparison begins at the last shared number, and the paper's pooled ranges end where the experiments do", () => {
-  assert.deepEqual(rangesOf(10, 10), [[10, 10], [1, 1], [3, 10], [6, 10], [1, 10]]);
-  assert.deepEqual(rangesOf(3, 5), [[3, 3], [1, 1], [3, 5], [1, 5]]);
-  assert.deepEqual(rangesOf(1, 1), [[1, 1]]);
-  assert.deepEqual(rangesOf(0, 1), [[0, 0], [1, 1]]);
+test("a comparison begins at the last shared number, where the paper's ranges end", () => {
+  assert.deepEqual(rangesOf(10), [[10, 10], [1, 1], [3, 10], [6, 10], [1, 10]]);
+  assert.deepEqual(rangesOf(5), [[5, 5], [1, 1], [3, 5], [1, 5]]);
+  assert.deepEqual(rangesOf(1), [[1, 1]]);
+  assert.deepEqual(rangesOf(0), [[0, 0]]);
   assert.deepEqual([rangeText([3, 3]), rangeText([3, 10])], ["3", "3–10"]);
-  assert.deepEqual([isPooled([3, 3]), isPooled([3, 10])], [false, true]);
+  assert.deepEqual([isSeveral([3, 3]), isSeveral([3, 10])], [false, true]);
 });
 
 test("the last shared number is that of experiments which go on or have completed, without the direct baseline", () => {
@@ -39,11 +42,26 @@ test("a pair differs below 0.05, and its sign says which is higher", () => {
   assert.equal(verdict(swapped(PAIR), "student").kind, "worse");
   assert.equal(verdict(PAIR, "welch").kind, "alike");
   assert.equal(verdict(PAIR, "mann_whitney").kind, "unknown");
+  assert.equal(verdict(PAIR, "trusted").words, "higher");
+});
+
+test("paired tests are of pairs that share random streams, and spreads are wider or narrower", () => {
+  assert.equal(verdict(PAIR, "paired_t").words, "not paired");
+  assert.equal(verdict({ ...PAIR, shared_streams: true }, "paired_t").words, "too few values to tell");
+  assert.deepEqual([verdict(PAIR, "brown_forsythe").words, verdict(swapped(PAIR), "brown_forsythe").words], ["narrower", "wider"]);
 });
 
 test("a pair that is swapped twice is itself", () => {
   assert.deepEqual(swapped(swapped(PAIR)), PAIR);
   assert.deepEqual(swapped({ ...PAIR, difference: null }).difference, null);
+});
+
+test("numbers have their intervals, and p-values both", () => {
+  assert.deepEqual([estimated(PAIR.improvement), estimated({ value: 0.5, lower: 0.25, upper: 1 })], ["0.75", "0.50 [0.25, 1.00]"]);
+  assert.equal(estimated({ value: null, lower: null, upper: null }), "–");
+  assert.deepEqual([bothProbabilities({ p: 0.01, p_holm: 0.03 }), bothProbabilities({ p: 0.0001, p_holm: 0.0003 })],
+    ["p = 0.030, raw 0.010", "p < 0.001, raw < 0.001"]);
+  assert.equal(bothProbabilities({ p: null, p_holm: null }), "undefined");
 });
 
 test("p-values and effect sizes are written as in papers", () => {

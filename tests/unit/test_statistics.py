@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from gaplab.services.core.statistics import compare, compare_all, effect_size, holm
+from gaplab.services.core.statistics import brown_forsythe, compare, compare_paired, effect_size, holm
 
 FIRST = np.array([1.2, 1.4, 1.1, 1.3, 1.5])
 SECOND = np.array([1.0, 0.9, 1.2, 1.1])
@@ -54,11 +54,14 @@ def test_equal_values_have_no_effect_size_though_their_variance_is_rounded() -> 
 
 @pytest.mark.parametrize("values", [[1e200, -1e200, 1e200], [1e308, 1e308, -1e308], [0.0, 1e-200, 0.0]])
 def test_what_cannot_be_squared_has_no_test_and_is_no_error(values: Any) -> None:
-    (found,) = compare_all({"large": np.array(values)[:, None], "constant": np.zeros((3, 1))}, frozenset(), 0, 0)
+    large, constant = np.array(values), np.zeros(3)
+    student, _, mann_whitney = compare(large, constant)
 
-    assert found.student.p is None or 0 <= found.student.p <= 1
-    assert found.mann_whitney.p is not None
-    assert found.effect_size is None
+    assert student.p is None or 0 <= student.p <= 1
+    assert mann_whitney.p is not None
+    assert effect_size(large, constant) is None
+    assert all(test.p is None or 0 <= test.p <= 1 for test in compare_paired(large, constant))
+    assert (spread := brown_forsythe(large, constant).p) is None or 0 <= spread <= 1
 
 
 @pytest.mark.parametrize(
@@ -107,21 +110,48 @@ def test_a_corrected_p_is_never_smaller_and_keeps_the_order(p_values: Any) -> No
     assert list(np.array(corrected)[order]) == sorted(corrected)
 
 
-def test_counts_are_pooled_over_the_range_and_the_baseline_has_but_one() -> None:
-    recorded = {
-        "fit": np.array([[0.9, 1.2, 1.3, 1.4], [0.8, 1.1, 1.3, 1.5]]),
-        "random": np.array([[0.7, 0.8, np.nan, 1.0], [0.9, 0.9, 1.0, 1.1]]),
-        "direct": np.array([[1.3], [1.4], [1.35]]),
-    }
+def test_one_constant_group_is_tested_without_a_warning_about_lost_precision() -> None:
+    student, welch, _ = compare(np.full(5, 1.1), SECOND)
 
-    fit_random, fit_direct, random_direct = compare_all(recorded, frozenset({"direct"}), 2, 3)
-
-    assert (fit_random.n_first, fit_random.n_second) == (4, 3)
-    assert (fit_direct.n_second, random_direct.n_second) == (3, 3)
-    assert fit_random.difference == pytest.approx(np.mean([1.3, 1.4, 1.3, 1.5]) - np.mean([1.0, 1.0, 1.1]))
-    p_values = [each.student.p for each in (fit_random, fit_direct, random_direct)]
-    assert [each.student.p_holm for each in (fit_random, fit_direct, random_direct)] == list(holm(p_values))
+    assert student.statistic == pytest.approx(0.05 / (0.05 / 7 * (1 / 5 + 1 / 4)) ** 0.5)
+    assert welch.degrees_of_freedom == pytest.approx(3)
 
 
-def test_one_experiment_alone_has_nothing_to_be_compared_with() -> None:
-    assert compare_all({"fit": np.ones((3, 2))}, frozenset(), 0, 1) == ()
+def test_paired_tests_compare_repetitions_of_one_number() -> None:
+    first, second = np.array([1.0, 1.4, np.nan, 1.3, 1.2]), np.array([0.9, 1.1, 1.0, 1.1])
+
+    paired_t, wilcoxon = compare_paired(first, second)
+
+    assert paired_t.p == pytest.approx(stats.ttest_rel([1.0, 1.4, 1.3], [0.9, 1.1, 1.1]).pvalue)
+    assert paired_t.degrees_of_freedom == 2
+    assert wilcoxon.p == stats.wilcoxon([1.0, 1.4, 1.3], [0.9, 1.1, 1.1]).pvalue
+
+
+def test_a_difference_that_is_always_the_same_has_only_the_rank_test_and_none_has_neither() -> None:
+    shifted, same = compare_paired(FIRST, FIRST - 0.1), compare_paired(FIRST, FIRST)
+
+    assert shifted[0].p is None  # though the rounded differences vary
+    assert shifted[1].p == pytest.approx(2 / 2**5)
+    assert [test.p for test in same] == [None, None]
+    assert [test.p for test in compare_paired(FIRST[:1], SECOND[:1])] == [None, None]
+
+
+def test_brown_forsythe_is_levenes_test_with_the_median() -> None:
+    wide = 5 * FIRST
+
+    assert brown_forsythe(np.append(wide, np.nan), SECOND).p == stats.levene(wide, SECOND, center="median").pvalue
+    assert brown_forsythe(np.ones(5), np.zeros(5)).p is None
+    assert brown_forsythe(FIRST[:2], SECOND[:2]).p is None  # the distances of two values from their median are equal
+
+
+numbers = st.lists(st.floats(-1e9, 1e9) | st.just(np.nan) | st.just(0.5), max_size=12).map(np.array)
+
+
+@given(numbers, numbers)
+@settings(deadline=None)
+def test_every_test_of_any_values_is_a_probability_or_undefined(first: Any, second: Any) -> None:
+    first, second = first.astype(float), second.astype(float)
+
+    for test in (*compare(first, second), *compare_paired(first, second), brown_forsythe(first, second)):
+        assert (test.p is None) == (test.statistic is None)
+        assert test.p is None or 0 <= test.p <= 1

@@ -60,12 +60,11 @@ declare namespace Api {
   }
   interface Comparison {
     first: string;
-    second: string;
     first_name: string;
+    second: string;
     second_name: string;
     from_evaluations: number;
     to_evaluations: number;
-    caution: string | null;
     n_first: number;
     n_second: number;
     difference: number | null;
@@ -73,6 +72,21 @@ declare namespace Api {
     student: Test;
     welch: Test;
     mann_whitney: Test;
+    caution: string | null;
+    lower: number | null;
+    upper: number | null;
+    improvement: Estimate;
+    shared_streams: boolean;
+    streams: string;
+    trusted: Trusted;
+    n_paired: number;
+    paired_t: Test;
+    wilcoxon: Test;
+    brown_forsythe: Test;
+    summary_first: Summary;
+    summary_second: Summary;
+    equivalence: Equivalence | null;
+    pooled: Pooled | null;
   }
   type ControllerKind = "sample" | "transfer";
   interface Curve {
@@ -123,6 +137,20 @@ declare namespace Api {
     engine: string;
     seconds_per_rollout: number;
     measured: boolean;
+  }
+  interface Equivalence {
+    margin: number;
+    test: "welch" | "paired_t";
+    p: number | null;
+    p_holm: number | null;
+    verdict: EquivalenceVerdict;
+    words: string;
+  }
+  type EquivalenceVerdict = "equivalent" | "different" | "undecided";
+  interface Estimate {
+    value: number | null;
+    lower: number | null;
+    upper: number | null;
   }
   interface EstimateRead {
     experiments: Array<ExperimentCost>;
@@ -274,6 +302,16 @@ declare namespace Api {
     details: Record<string, any>;
   }
   type PluginRef = string | Record<string, any>;
+  interface Pooled {
+    n_first: number;
+    n_second: number;
+    difference: number | null;
+    effect_size: number | null;
+    student: Test;
+    welch: Test;
+    mann_whitney: Test;
+    caution: string;
+  }
   interface Prediction {
     repetition: number;
     iteration: number;
@@ -513,15 +551,21 @@ declare namespace Api {
     strategies: Array<PluginRef>;
     direct_repetitions: number | null;
   }
+  interface Summary {
+    n: number;
+    sd: number | null;
+    mean: Estimate;
+    interquartile_mean: Estimate;
+  }
   interface TableRead {
     head: Array<string>;
     rows: Array<Array<string>>;
   }
   interface Test {
     statistic: number | null;
+    degrees_of_freedom: number | null;
     p: number | null;
     p_holm: number | null;
-    degrees_of_freedom: number | null;
   }
   interface TimeLeft {
     low_s: number;
@@ -540,6 +584,11 @@ declare namespace Api {
     upper: number | null;
     continuing: boolean | null;
     sentence: string;
+  }
+  interface Trusted {
+    test: "student" | "paired_t";
+    p: number | null;
+    p_holm: number | null;
   }
   interface TunableDistribution {
     n: number;

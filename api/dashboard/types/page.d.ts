@@ -72,9 +72,11 @@ declare namespace Page {
     cost_s: number;
     band: string;
     each: boolean;
-    test: "student" | "welch" | "mann_whitney";
+    test: "trusted" | "student" | "welch" | "mann_whitney" | "paired_t" | "wilcoxon" | "brown_forsythe";
     from: number | null;
     to: number | null;
+    margin: number | null;
+    margin_of_direct: number | null;
   }
 
   interface CompareView {

@@ -8,9 +8,13 @@ export const AXES = { evaluations: "Real-world evaluations", rollouts: "Rollouts
 
 /** @type {Record<Page.Comparison["test"], { label: string, short: string }>} */
 export const TESTS = {
+  trusted: { label: "Student’s t, paired where streams are shared", short: "Trusted" },
   student: { label: "Student’s t, as in the paper", short: "Student" },
   welch: { label: "Welch’s t", short: "Welch" },
   mann_whitney: { label: "Mann–Whitney", short: "Mann–Whitney" },
+  paired_t: { label: "Paired t", short: "Paired t" },
+  wilcoxon: { label: "Wilcoxon, paired", short: "Wilcoxon" },
+  brown_forsythe: { label: "Brown–Forsythe, of the spread", short: "Brown–Forsythe" },
 };
 
 const COST_S = 60;
@@ -31,9 +35,11 @@ export function comparisonOf(parameters) {
     cost_s: nonNegative(parameters.get("cost_s")) ?? COST_S,
     band: among("band", BANDS, ""),
     each: parameters.get("each") === "true",
-    test: among("test", TESTS, "student"),
+    test: among("test", TESTS, "trusted"),
     from: wholeNumber(parameters.get("from")),
     to: wholeNumber(parameters.get("to")),
+    margin: positive(parameters.get("margin")),
+    margin_of_direct: positive(parameters.get("margin_of_direct")),
   };
 }
 
@@ -42,16 +48,18 @@ export function comparisonOf(parameters) {
  *
  * @param {Page.Comparison} comparison
  */
-export function addressOf({ experiments, x, cost_s: cost, band, each, test, from, to }) {
+export function addressOf({ experiments, x, cost_s: cost, band, each, test, from, to, margin, margin_of_direct: share }) {
   const parts = Object.entries({
     experiments: experiments.join(","),
     x: x === "evaluations" ? "" : x,
     cost_s: x === "time" ? cost : "",
     band,
     each: each || "",
-    test: test === "student" ? "" : test,
+    test: test === "trusted" ? "" : test,
     from: from ?? "",
     to: to ?? "",
+    margin: margin ?? "",
+    margin_of_direct: share ?? "",
   }).filter(([, value]) => value !== "");
   return `#/compare${parts.length ? "?" : ""}${parts.map(([name, value]) => `${name}=${value}`).join("&")}`;
 }
@@ -70,6 +78,13 @@ const ids = (text) => [...new Set((text ?? "").split(",").filter((id) => /^[\w-]
 
 /** @param {string | null} text */
 const nonNegative = (text) => (text && Number.isFinite(Number(text)) && Number(text) >= 0 ? Number(text) : null);
+
+/**
+ * Return the number above 0 that a text is, or null.
+ *
+ * @param {string | null} text
+ */
+export const positive = (text) => nonNegative(text) || null;
 
 /**
  * Return the whole number from 0 to 9999 that a text is, or null.

@@ -12,11 +12,10 @@ const FORMATS = [["CSV", "csv", "gaplab-comparisons.csv"], ["LaTeX", "latex", "g
 /**
  * Return buttons that copy the tests of all pairs over a range, and links that save them.
  *
- * @param {string[]} ids of the experiments
- * @param {Page.Range} range
+ * @param {Page.Query} asked what the comparison was asked for
  */
-export function exports([...ids], [from, to]) {
-  const query = (/** @type {string} */ format) => ({ experiment: ids, from, to, format });
+export function exports(asked) {
+  const query = (/** @type {string} */ format) => ({ ...asked, format });
   const copies = FORMATS.map(([label, format]) =>
     copyButton(`Copy as ${label}`, async () => (await getFile("/comparisons", query(format))).text()));
   const links = FORMATS.map(([label, format, name]) => downloadLink(label, "/comparisons", query(format), name));

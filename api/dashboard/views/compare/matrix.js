@@ -4,7 +4,7 @@
 import { h } from "../../lib/dom.js";
 import { framed } from "../../lib/table.js";
 import { letter } from "./ranges.js";
-import { probability, signed, swapped, verdict } from "./verdict.js";
+import { probabilities, signed, swapped, verdict } from "./verdict.js";
 
 /**
  * Return the matrix over one range: the row against the column.
@@ -17,7 +17,7 @@ export function matrix({ cache, choice }, ids, { range: [from, to], pairs }) {
   const letterOf = (/** @type {string} */ id) => letter(choice.experiments.indexOf(id));
   const names = cache.namesOf(choice.experiments);
   const pairsByIds = new Map([...pairs, ...pairs.map(swapped)].map((pair) => [`${pair.first} ${pair.second}`, pair]));
-  const range = from === to ? `after ${from} real-world evaluation${from === 1 ? "" : "s"}` : `pooled over ${from} to ${to} real-world evaluations, so p is too small`;
+  const range = from === to ? `after ${from} real-world evaluation${from === 1 ? "" : "s"}` : `by the mean over ${from} to ${to} real-world evaluations`;
   const title = `The row against the column, ${range}`;
   const head = h("tr", {}, h("td", {}), ...ids.map((id) => h("th", { scope: "col", title: names.get(id) }, letterOf(id))));
   const rows = ids.map((row) => h("tr", {}, h("th", { scope: "row" }, h("b", {}, letterOf(row)), ` ${names.get(row)}`),
@@ -35,5 +35,11 @@ function cell(pair, test) {
   const { kind, sign, words } = verdict(pair, test);
   if (kind === "unknown") return h("td", { class: kind }, words);
   const result = h("span", { class: "verdict" }, h("span", { "aria-hidden": "true" }, `${sign} `), words);
-  return h("td", { class: kind }, result, h("small", {}, probability(pair[test].p_holm)), h("small", {}, `d = ${signed(pair.effect_size)}`));
+  const { equivalence } = pair;
+  const within = equivalence?.verdict === "equivalent" && h("small", { class: "within", title: equivalence.words }, `≡ within ±${rounded(equivalence.margin)}`);
+  const paired = test === "trusted" && pair.shared_streams && h("small", { title: pair.streams }, "paired");
+  return h("td", { class: kind }, result, ...probabilities(pair[test]).map((words) => h("small", {}, words)), h("small", {}, `d = ${signed(pair.effect_size)}`), paired, within);
 }
+
+/** @param {number} margin */
+const rounded = (margin) => Number(margin.toPrecision(3));

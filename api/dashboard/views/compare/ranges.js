@@ -17,21 +17,20 @@ export function commonCount(experiments) {
 }
 
 /**
- * Return the single numbers to compare at, the last shared one first, and then the paper's pooled ranges up to the longest experiment.
+ * Return the ranges to compare over, the last shared number first: single numbers, and the paper's ranges up to the last shared number.
  *
  * @param {number} shared
- * @param {number} last
  * @returns {Page.Range[]}
  */
-export function rangesOf(shared, last) {
+export function rangesOf(shared) {
   /** @type {Page.Range[]} */
-  const ranges = [[shared, shared], [1, 1], [3, last], [6, last], [1, last]];
+  const ranges = [[shared, shared], [1, 1], [3, shared], [6, shared], [1, shared]];
   const unique = new Map(ranges.map((range) => [rangeText(range), range]));
-  return [...unique.values()].filter(([from, to]) => from <= to && to <= Math.max(shared, last));
+  return [...unique.values()].filter(([from, to]) => from <= to && to <= shared);
 }
 
 /** @param {Page.Range} range */
-export const isPooled = ([from, to]) => from !== to;
+export const isSeveral = ([from, to]) => from !== to;
 
 /**
  * Return a range in words.

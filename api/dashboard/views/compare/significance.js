@@ -6,18 +6,20 @@ import { h } from "../../lib/dom.js";
 import { failed, loading } from "../../lib/placeholders.js";
 import { TESTS, wholeNumber } from "./address.js";
 import { exports } from "./exports.js";
+import { marginField } from "./margin.js";
 import { matrix } from "./matrix.js";
-import { pairsTable } from "./pairs.js";
-import { commonCount, isPooled, rangesOf, rangeText } from "./ranges.js";
+import { pairsTable, pooledTable } from "./pairs.js";
+import { commonCount, isSeveral, rangesOf, rangeText } from "./ranges.js";
+import { summaries } from "./summaries.js";
 
 const MOST = 20;  // experiments in one table: 190 pairs
-const NOTE = "p is corrected by Holm’s method over all pairs. A pair differs where p is below 0.05; elsewhere it is not significantly " +
-  "different (n. s.). d is Cohen’s effect size.";
-const POOLED = "⚠ Pooled over a range, as in the paper: the values of one repetition at several numbers of evaluations are not independent, so p is " +
-  "too small and too many pairs seem to differ. Trust a single number of evaluations.";
+const NOTE = "p is corrected by Holm’s method over all pairs; raw p is not. A pair differs where p is below 0.05; elsewhere it is not shown to " +
+  "differ (n. s.), which does not show that it is equal: for that, give a margin. d is Cohen’s effect size. Experiments of one seed and one " +
+  "strategy draw the same random numbers; such a pair is tested by repetition (paired).";
+const UNPAIRED = ["student", "welch", "mann_whitney"];
 
 /**
- * Return the tests over a chosen range as a matrix, and over the paper's ranges pair by pair.
+ * Return the tests over a chosen range as a matrix, and over other ranges pair by pair.
  *
  * @param {Page.CompareView} view
  * @returns {Page.ComparePart}
@@ -31,10 +33,10 @@ export function significance(view) {
   const changeTest = () => { view.change({ test: /** @type {Page.Comparison["test"]} */ (test.value) }); };
   const test = h("select", { onchange: changeTest }, ...tests);
   const place = h("div");
-  const pooled = h("p", { class: "caution", hidden: true }, POOLED);
+  const margin = marginField(view);
   const element = h("section", { class: "card significance", "aria-labelledby": "differ" },
     h("div", { class: "titled" }, h("h2", { id: "differ" }, "Which differ"), h("p", { class: "options" }, h("label", {}, "Test ", test))),
-    h("div", { class: "controls" }, buttons, h("label", {}, "from ", from), h("label", {}, "to ", to)), pooled, place, h("p", { class: "note" }, NOTE));
+    h("div", { class: "controls" }, buttons, h("label", {}, "from ", from), h("label", {}, "to ", to), margin.element), place, h("p", { class: "note" }, NOTE));
   let lastKey = "";
   let requests = 0;
   const update = (/** @type {unknown[]} */ events) => {
@@ -42,17 +44,18 @@ export function significance(view) {
     element.hidden = ids.length < 2;
     if (element.hidden) return;
     const experiments = ids.flatMap((id) => view.cache.get(id) ?? []);
-    const last = Math.max(1, ...experiments.map(lastEvaluation));
-    const ranges = rangesOf(commonCount(experiments), last);
-    const { from: chosenFrom, to: chosenTo } = view.choice;
+    const shared = commonCount(experiments);
+    const ranges = rangesOf(shared);
+    const last = view.choice.to ?? shared;
     /** @type {Page.Range} */
-    const range = chosenFrom === null && chosenTo === null ? ranges[0] : [chosenFrom ?? 1, chosenTo ?? last];
+    const range = [view.choice.from ?? last, last];
     test.value = view.choice.test;
     if (document.activeElement !== from) from.value = String(range[0]);
     if (document.activeElement !== to) to.value = String(range[1]);
     buttons.replaceChildren(...ranges.map((each) => rangeButton(each, range, view)));
-    pooled.hidden = !isPooled(range);
-    const key = JSON.stringify([ids, range, view.choice.test]);
+    margin.update([]);
+    const { test: byTest, margin: width, margin_of_direct: share } = view.choice;
+    const key = JSON.stringify([ids, range, byTest, width, share]);
     const isNew = key !== lastKey;
     if (!isNew && !events.length) return;
     lastKey = key;
@@ -61,9 +64,6 @@ export function significance(view) {
   };
   return { element, update };
 }
-
-/** @param {Api.ExperimentRead} experiment */
-const lastEvaluation = ({ direct, spec }) => (direct ? 0 : spec.iterations);
 
 /**
  * @param {Page.Range} range
@@ -75,7 +75,7 @@ function rangeButton(range, chosen, view) {
   const isChosen = rangeText(range) === rangeText(chosen);
   const press = () => view.change({ from, to });
   return h("button", { type: "button", class: "quiet small", "aria-pressed": String(isChosen), onclick: press },
-    isPooled(range) ? `${rangeText(range)}, pooled as in the paper` : `at ${from}`);
+    isSeveral(range) ? `mean of ${rangeText(range)}` : `at ${from}`);
 }
 
 /**
@@ -101,15 +101,32 @@ async function fill(place, view, request) {
     return;
   }
   if (isNew && !place.hasChildNodes()) place.replaceChildren(loading());
-  const ranges = [...offered.filter((each) => rangeText(each) !== rangeText(range)), range];
+  const { margin, margin_of_direct: share } = view.choice;
+  const others = offered.filter((each) => rangeText(each) !== rangeText(range));
+  const asked = { experiment: ids, from: range[0], to: range[1], margin, margin_of_direct: share };
+  const queries = [...others.map(([from, to]) => ({ experiment: ids, from, to, intervals: false })), asked];
   try {
-    const answers = await Promise.all(ranges.map(([from, to]) => get("/comparisons", { experiment: ids, from, to }, view.signal)));
+    const answers = await Promise.all(queries.map((query) => get("/comparisons", query, view.signal)));
     if (!isCurrent()) return;
-    const results = ranges.map((each, index) => ({ range: each, pairs: answers[index] }));
-    const isOpen = place.querySelector("details")?.open ?? false;
-    place.replaceChildren(...matrix(view, ids, results[results.length - 1]), exports(ids, range), pairsTable(view, results, isOpen));
+    const results = [...others, range].map((each, index) => ({ range: each, pairs: answers[index] }));
+    const pairs = answers[answers.length - 1];
+    const isOpen = (/** @type {string} */ name) => place.querySelector(`details.${name}`)?.hasAttribute("open") ?? false;
+    place.replaceChildren(...cautions(view, pairs), ...matrix(view, ids, results[results.length - 1]), exports(asked), summaries(view, pairs, isOpen("each")),
+      pairsTable(view, results, isOpen("every")), ...[pooledTable(view, pairs, isOpen("pooled"))].flatMap((found) => found ?? []));
   } catch (error) {
     const stays = !isNew && place.querySelector("table");
     if (isCurrent() && !stays) place.replaceChildren(failed(error, () => fill(place, view, request), "h3"));
   }
+}
+
+/**
+ * Return why the chosen unpaired test is not to be trusted, if a pair shares random streams.
+ *
+ * @param {Page.CompareView} view
+ * @param {Api.Comparison[]} pairs
+ */
+function cautions({ choice }, pairs) {
+  if (!UNPAIRED.includes(choice.test)) return [];
+  const found = new Set(pairs.flatMap(({ caution }) => caution ?? []));
+  return [...found].map((caution) => h("p", { class: "caution" }, `⚠ ${caution}.`));
 }

@@ -1,0 +1,111 @@
+"""Statistical comparisons of experiments, as JSON, CSV or LaTeX."""
+
+from dataclasses import replace
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Response
+from pydantic import Field
+
+from gaplab.api.http.attachments import attachment
+from gaplab.api.http.dependencies import Parameters, StoreDep
+from gaplab.api.http.problems import Responses, documented
+from gaplab.api.routes.curves import Ids
+from gaplab.schemas.comparisons import Comparison
+from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.results.comparison_tables import comparisons_csv, comparisons_latex
+from gaplab.services.results.comparisons import Margin, compare
+from gaplab.services.results.curves import unit_of
+
+router = APIRouter(tags=["curves"])
+
+Evaluations = Annotated[int | None, Field(ge=0, le=1_000)]
+Width = Annotated[float | None, Field(gt=0, le=1e6, allow_inf_nan=False)]
+
+_TABLE = {"schema": {"type": "string"}, "example": "first,first_name,second,second_name,from_evaluations,…\n"}
+_TABLES: Responses = {
+    200: {
+        "content": {
+            "text/csv": _TABLE,
+            "application/x-latex": {"schema": {"type": "string"}, "example": "\\begin{table}…"},
+        }
+    }
+}
+
+
+class MarginQuery(Parameters):
+    """The difference within which two experiments are equivalent."""
+
+    margin: Width = Field(
+        default=None,
+        description="test whether pairs are equivalent: whether they differ by less than this, in the unit of fitness",
+    )
+    margin_of_direct: Width = Field(
+        default=None, description="the same margin as a share of the direct baseline's mean fitness, like 0.03"
+    )
+
+    def chosen(self) -> Margin | None:
+        """Return the margin; None without one.
+
+        Raises:
+            InvalidSpec: there are two.
+        """
+        if self.margin is not None and self.margin_of_direct is not None:
+            message = "give one margin, either margin or margin_of_direct"
+            raise InvalidSpec([Violation("margin_of_direct", self.margin_of_direct, message)])
+        if self.margin_of_direct is not None:
+            return Margin(self.margin_of_direct, of_direct=True)
+        return None if self.margin is None else Margin(self.margin)
+
+
+class ComparisonQuery(MarginQuery):
+    """The experiments to compare, and the numbers of real-world evaluations.
+
+    Over a range, each repetition is one value: its mean over the range.
+    """
+
+    experiment: Annotated[Ids, Field(min_length=2)]
+    format: Literal["json", "csv", "latex"] = "json"
+    from_evaluations: Evaluations = Field(
+        default=None, alias="from", description="first number of real-world evaluations; left out: `to`"
+    )
+    to_evaluations: Evaluations = Field(
+        default=None, alias="to", description="last number; left out: the last that the experiments share"
+    )
+    intervals: bool | None = Field(
+        default=None, description="with bootstrap intervals; left out: for up to 20 experiments"
+    )
+
+
+@router.get(
+    "/comparisons",
+    summary="Compare experiments",
+    response_model=tuple[Comparison, ...],
+    response_description="One for each pair",
+    responses=_TABLES | documented(404, 422),
+)
+def compare_experiments(
+    store: StoreDep, query: Annotated[ComparisonQuery, Query()]
+) -> tuple[Comparison, ...] | Response:
+    """Compare every pair: tests of means, ranks and spreads, intervals, and equivalence within a margin.
+
+    Each p is given twice: uncorrected, and with Holm's correction over all pairs. `trusted` is the test by which a pair
+    is judged: the paired t-test if both experiments draw the same random numbers, else Student's, which the paper uses.
+    """
+    try:
+        pairs = compare(
+            store,
+            query.experiment,
+            from_evaluations=query.from_evaluations,
+            to_evaluations=query.to_evaluations,
+            margin=query.chosen(),
+            intervals=query.intervals,
+        )
+    except InvalidSpec as error:
+        renamed = (replace(each, pointer=each.pointer.removesuffix("_evaluations")) for each in error.violations)
+        raise InvalidSpec(renamed) from error
+    if query.format == "csv":
+        return attachment(comparisons_csv(pairs), "text/csv", "gaplab-comparisons.csv")
+    if query.format == "latex":
+        unit = unit_of(store, query.experiment[0])
+        return attachment(comparisons_latex(pairs, unit), "application/x-latex", "gaplab-comparisons.tex")
+    return pairs

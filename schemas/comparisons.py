@@ -1,0 +1,141 @@
+"""Two experiments, compared: tests, intervals, and equivalence within a margin."""
+
+from enum import StrEnum
+from typing import Literal
+
+from pydantic import Field
+
+from gaplab.schemas.base import Frozen, Id, Name, Statistic
+
+
+class Test(Frozen):
+    """One statistical test between two groups."""
+
+    __test__ = False
+
+    statistic: Statistic = None
+    degrees_of_freedom: Statistic = None
+    p: Statistic = Field(default=None, description="two-sided p-value, uncorrected; null if undefined")
+    p_holm: Statistic = Field(default=None, description="p-value with Holm's correction over all pairs")
+
+
+class Estimate(Frozen):
+    """A number with its 95 % bootstrap interval.
+
+    The ends are null if they were not asked for, if there are fewer than two values, or if all resamples agree.
+    """
+
+    value: Statistic = None
+    lower: Statistic = None
+    upper: Statistic = None
+
+
+class Summary(Frozen):
+    """The values of one experiment, one for each repetition."""
+
+    n: int
+    sd: Statistic = Field(default=None, description="sample standard deviation")
+    mean: Estimate
+    interquartile_mean: Estimate = Field(description="mean of the middle half of the values, robust to outliers")
+
+
+class Groups(Frozen):
+    """Two groups of values and the unpaired tests between them. Differences are `first` minus `second`."""
+
+    n_first: int
+    n_second: int
+    difference: Statistic = Field(description="difference of the means")
+    effect_size: Statistic = Field(description="Cohen's d: the difference divided by the pooled standard deviation")
+    student: Test = Field(description="Student's t-test, which the paper uses")
+    welch: Test
+    mann_whitney: Test
+
+
+class Pooled(Groups):
+    """The paper's test: the values at all numbers of a range as one group."""
+
+    caution: str = Field(
+        description="why not to trust these tests",
+        examples=["pooled as in the paper: the values of one repetition … are not independent"],
+    )
+
+
+class Trusted(Frozen):
+    """The test by which a pair is judged: paired if the experiments share random streams, else Student's."""
+
+    test: Literal["student", "paired_t"]
+    p: Statistic = Field(default=None, description="its two-sided p-value, uncorrected")
+    p_holm: Statistic = Field(
+        default=None, description="p-value with Holm's correction over the trusted tests of all pairs"
+    )
+
+
+class EquivalenceVerdict(StrEnum):
+    """What tests say of a pair and a margin."""
+
+    EQUIVALENT = "equivalent"
+    DIFFERENT = "different"
+    UNDECIDED = "undecided"
+
+
+class Equivalence(Frozen):
+    """Two one-sided tests of whether a difference lies within ±margin."""
+
+    margin: float = Field(description="margin in the unit of fitness", examples=[0.03])
+    test: Literal["welch", "paired_t"]
+    p: Statistic = Field(default=None, description="the larger p of the two tests, uncorrected")
+    p_holm: Statistic = Field(default=None, description="p-value with Holm's correction over all pairs")
+    verdict: EquivalenceVerdict = Field(
+        description="equivalent: this p_holm is below 0.05, even where the pair differs by less than the margin; "
+        "different: the trusted test's p_holm is; undecided: neither"
+    )
+    words: str = Field(examples=["equivalent within ±0.03 (p = 0.012)"])
+
+
+class Pair(Frozen):
+    """Two experiments, and the numbers of real-world evaluations at which they are compared."""
+
+    first: Id
+    first_name: Name = ""
+    second: Id
+    second_name: Name = ""
+    from_evaluations: int
+    to_evaluations: int
+
+
+class Comparison(Groups, Pair):
+    """Two experiments, compared by one value for each repetition.
+
+    The value is the recorded fitness at a single number of real-world evaluations. Over a range it is the mean over
+    the range; a repetition that lacks a number of the range is left out. Differences are `first` minus `second`.
+    """
+
+    caution: str | None = Field(
+        default=None,
+        description="why not to trust the unpaired tests; null if they can be trusted",
+        examples=["both draw the random numbers of seed 0 and the strategy simulated_fit …"],
+    )
+    lower: Statistic = Field(
+        default=None, description="lower end of the 90 % interval of the difference; paired if the streams are shared"
+    )
+    upper: Statistic = Field(default=None, description="upper end of that interval")
+    improvement: Estimate = Field(
+        description="probability that a repetition of the first is fitter than one of the second; a tie counts half"
+    )
+    shared_streams: bool = Field(
+        description="whether repetitions of one number draw the same random numbers in both experiments"
+    )
+    streams: str = Field(description="why they share random streams, or not", examples=["different strategies"])
+    trusted: Trusted
+    n_paired: int = Field(description="repetition numbers with a value in both; 0 if the streams are not shared")
+    paired_t: Test = Field(description="paired t-test by repetition number; only where streams are shared")
+    wilcoxon: Test = Field(
+        description="Wilcoxon's signed-rank test by repetition number; only where streams are shared"
+    )
+    brown_forsythe: Test = Field(description="test of equal spread: Levene's with the median")
+    summary_first: Summary
+    summary_second: Summary
+    equivalence: Equivalence | None = Field(default=None, description="null without a margin")
+    pooled: Pooled | None = Field(
+        default=None, description="the paper's tests over the same range; null at a single number"
+    )

@@ -1,0 +1,94 @@
+"""The tables of a report that compare experiments."""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from gaplab.schemas.comparisons import Comparison, Estimate, Groups, Summary, Test
+from gaplab.services.reports.blocks import Grid
+from gaplab.services.reports.content import Facts
+from gaplab.services.reports.judged import SIGNIFICANT, p_of
+from gaplab.services.reports.numbers import MISSING, fixed, interval, probability, signed
+
+UNPAIRED = {"student": "Student", "welch": "Welch", "mann_whitney": "Mann-Whitney"}
+PAIRED = {"paired_t": "Paired t", "wilcoxon": "Wilcoxon"}
+SPREAD = {"brown_forsythe": "Spread (Brown-Forsythe)"}
+
+
+def summaries(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
+    """Return mean and interquartile mean of each experiment, with their bootstrap intervals."""
+    found: dict[str, Summary] = {}
+    for pair in compared:
+        found |= {pair.first: pair.summary_first, pair.second: pair.summary_second}
+    names = {one.curve.experiment: one.name for one in facts.judged}
+    rows = tuple(
+        (names[key], f"{one.n}", _estimate(one.mean), _estimate(one.interquartile_mean), fixed(one.sd))
+        for key, one in found.items()
+    )
+    return Grid(
+        f"{caption}, with 95 % bootstrap intervals", ("Experiment", "n", "Mean", "Interquartile mean", "SD"), rows
+    )
+
+
+def pairs(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
+    """Return all pairs with the difference of their means, the effect size, and the verdict of the trusted test."""
+    head = (
+        "Pair",
+        "n",
+        "Difference (90 %)",
+        "Cohen's d",
+        "P(first > second)",
+        "Trusted test",
+        "p",
+        "p (Holm)",
+        "Differs",
+    )
+    rows = tuple(
+        (
+            *_pair(facts, pair),
+            f"{pair.n_first}, {pair.n_second}",
+            f"{signed(pair.difference)} ({interval(pair.lower, pair.upper)})",
+            signed(pair.effect_size),
+            _estimate(pair.improvement),
+            "paired t" if pair.shared_streams else "Student",
+            *map(probability, (pair.trusted.p, pair.trusted.p_holm)),
+            MISSING if (p := p_of(pair)) is None else "yes" if p < SIGNIFICANT else "no",
+            *([pair.equivalence.verdict.value] if pair.equivalence else []),
+        )
+        for pair in compared
+    )
+    margins = {pair.equivalence.margin for pair in compared if pair.equivalence}
+    return Grid(caption, (*head, *(f"Within ±{margin:.3g}" for margin in margins)), rows)
+
+
+def tests(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
+    """Return p of each test of all pairs, with p after Holm's correction in brackets."""
+    shared = any(pair.shared_streams for pair in compared)
+    names = UNPAIRED | (PAIRED if shared else {}) | SPREAD
+    rows = tuple((*_pair(facts, pair), *_tests(pair, names)) for pair in compared)
+    return Grid(f"{caption}: p, and in brackets p after Holm's correction", ("Pair", *names.values()), rows)
+
+
+def pooled(facts: Facts, compared: Sequence[Comparison], caption: str) -> Grid:
+    """Return the paper's tests of all pairs over a range."""
+    rows = tuple(
+        (*_pair(facts, pair), f"{found.n_first}, {found.n_second}", signed(found.difference), *_tests(found, UNPAIRED))
+        for pair in compared
+        if (found := pair.pooled)
+    )
+    return Grid(caption, ("Pair", "n", "Difference", *UNPAIRED.values()), rows)
+
+
+def _pair(facts: Facts, pair: Comparison) -> tuple[str]:
+    names = {one.curve.experiment: one.name for one in facts.judged}
+    return (f"{names[pair.first]} − {names[pair.second]}",)
+
+
+def _tests(groups: Groups, names: Iterable[str]) -> Iterator[str]:
+    for name in names:
+        test: Test = getattr(groups, name)
+        yield MISSING if test.p is None else f"{probability(test.p)} ({probability(test.p_holm)})"
+
+
+def _estimate(found: Estimate) -> str:
+    if found.lower is None:
+        return fixed(found.value)
+    return f"{fixed(found.value)} ({interval(found.lower, found.upper)})"

@@ -1,0 +1,107 @@
+"""Comparisons of stored experiments, computed by the core."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from gaplab.schemas.comparisons import Comparison
+from gaplab.schemas.records import common_count
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.comparisons import Compared, compare_all
+from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.experiments.fitness import fitness_of
+from gaplab.services.experiments.views import view_experiments
+from gaplab.services.results.curves import recorded_of
+from gaplab.services.specs.resolution import is_direct, spec_of
+from gaplab.services.store.models import ExperimentRow
+from gaplab.services.store.queries import experiments
+from gaplab.services.store.session import Session, Store
+
+MOST_WITH_INTERVALS = 20
+"""Most experiments whose comparison has bootstrap intervals unless it is asked for without them."""
+
+
+@dataclass(frozen=True)
+class Margin:
+    """A difference within which two experiments are equivalent.
+
+    Attributes:
+        value: above 0, in the unit of fitness.
+        of_direct: the value is a share of the direct baseline's mean fitness instead.
+    """
+
+    value: float
+    of_direct: bool = False
+
+
+def compare(
+    store: Store,
+    experiment_ids: Sequence[str],
+    *,
+    from_evaluations: int | None = None,
+    to_evaluations: int | None = None,
+    margin: Margin | None = None,
+    intervals: bool | None = None,
+) -> tuple[Comparison, ...]:
+    """Compare every pair of experiments on their recorded fitness, one value for each repetition.
+
+    The only value of the direct baseline is compared with every number of real-world evaluations.
+
+    Args:
+        store: database with the experiments.
+        experiment_ids: two or more, each once.
+        from_evaluations: the first number of evaluations; by default the last.
+        to_evaluations: the last number of evaluations; by default the last that the experiments share.
+        margin: difference within which two experiments are equivalent; None: not tested.
+        intervals: with bootstrap intervals; by default for up to `MOST_WITH_INTERVALS` experiments.
+
+    Raises:
+        NotFound: an experiment does not exist.
+        InvalidSpec: fewer than two experiments, an experiment twice, a range that is empty or negative, or a share
+            of direct without one direct baseline.
+    """
+    if len(set(experiment_ids)) < max(2, len(experiment_ids)):
+        message = f"a comparison needs two or more experiments, each once, not {len(experiment_ids)}"
+        raise InvalidSpec([Violation("experiment", list(experiment_ids), message)])
+    with store.reading() as session:
+        rows, values = recorded_of(session, experiment_ids)
+        final = _common_count(session, rows) if to_evaluations is None else to_evaluations
+        within = None if margin is None else _in_units(session, rows, margin)
+    first = final if from_evaluations is None else from_evaluations
+    if not 0 <= first <= final:
+        message = f"the range of real-world evaluations must ascend from 0 or more, not from {first} to {final}"
+        raise InvalidSpec([Violation("from_evaluations", first, message, f"0 to {final}")])
+    compared = [_compared(row, values[row.id]) for row in rows]
+    with_intervals = len(rows) <= MOST_WITH_INTERVALS if intervals is None else intervals
+    return compare_all(compared, first, final, margin=within, intervals=with_intervals)
+
+
+def _compared(row: ExperimentRow, recorded: FloatArray) -> Compared:
+    spec = spec_of(row.spec)
+    return Compared(row.id, row.name, recorded, is_direct(spec), spec.seed, spec.strategy.name)
+
+
+def _common_count(session: Session, rows: Sequence[ExperimentRow]) -> int:
+    return common_count(view_experiments(session, rows)) or 0
+
+
+def _in_units(session: Session, rows: Sequence[ExperimentRow], margin: Margin) -> float:
+    """Return a margin in the unit of fitness.
+
+    The direct baseline is that of the experiments, or else of their studies.
+    """
+    if not margin.of_direct:
+        return margin.value
+    studies = {row.study_id for row in rows if row.study_id is not None}
+    baselines = _direct(rows) or _direct(experiments.experiments_of(session, sorted(studies)))
+    means = [point.mean for point in fitness_of(session, [row.id for row in baselines]).values()]
+    if len(baselines) != 1 or len(means) != 1 or means[0] <= 0:
+        message = (
+            "a margin as a share of direct needs one direct baseline with a fitness above 0 among the experiments or "
+            f"in their studies, and there are {len(baselines)}; give the margin in the unit of fitness"
+        )
+        raise InvalidSpec([Violation("margin_of_direct", margin.value, message)])
+    return margin.value * means[0]
+
+
+def _direct(rows: Sequence[ExperimentRow]) -> list[ExperimentRow]:
+    return [row for row in rows if is_direct(spec_of(row.spec))]
