@@ -22,7 +22,8 @@ from gaplab.services.results import curves
 from gaplab.services.results.coordinates import experiment_coordinates, simulator_coordinates
 from gaplab.services.results.curve_costs import cost_axis
 from gaplab.services.results.tuned_simulators import tuned_simulators
-from gaplab.services.specs.resolution import is_direct, spec_of
+from gaplab.services.specs.resolution import is_direct
+from gaplab.services.specs.stored import spec_of
 from gaplab.services.store.session import Store
 
 router = APIRouter(prefix="/figures", tags=["figures"])

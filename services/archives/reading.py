@@ -27,7 +27,7 @@ from gaplab.services.core.errors import Conflict, InvalidArchive
 from gaplab.services.experiments.states import settle
 from gaplab.services.settings import Limits
 from gaplab.services.specs.hardware import hardware_of
-from gaplab.services.specs.resolution import spec_of
+from gaplab.services.specs.stored import spec_of
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import archives
 from gaplab.services.store.queries.events import note

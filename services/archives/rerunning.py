@@ -20,8 +20,8 @@ from gaplab.services.plugins import folders
 from gaplab.services.running import provenance
 from gaplab.services.running.versions import provenance as provenance_here
 from gaplab.services.specs.assembly import setting
-from gaplab.services.specs.resolution import spec_of
 from gaplab.services.specs.shortening import experiment_spec, study_spec
+from gaplab.services.specs.stored import spec_of
 from gaplab.services.store.queries import experiments, logs
 from gaplab.services.store.session import Session
 

@@ -6,7 +6,7 @@ never stopped.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.random import Generator
@@ -16,6 +16,7 @@ from gaplab.services.core.arrays import FloatArray, Genome, Parameters, no_readi
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.errors import PluginBroken
+from gaplab.services.core.history import History
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.ports import Reality, Sense, Simulate
 from gaplab.services.core.search import maximise
@@ -33,7 +34,6 @@ from gaplab.services.core.types import (
     Probed,
     Sample,
     Selected,
-    Simulator,
     Step,
     Transferred,
     Tuned,
@@ -89,34 +89,6 @@ class Setting:
         return Answers(self.simulate, self.batch_size, sense=self.sense)
 
 
-@dataclass(frozen=True, eq=False)
-class History:
-    """The result of the steps so far.
-
-    Attributes:
-        last: the latest step; None at the very start.
-        samples: samples measured so far.
-        simulators: simulators of the latest tuning, best first.
-        transferred: the latest transferred genome.
-    """
-
-    last: Step | None = None
-    samples: tuple[Sample, ...] = ()
-    simulators: tuple[Simulator, ...] = ()
-    transferred: Genome | None = None
-
-    def after(self, step: Step) -> "History":
-        """Return the history with one more step."""
-        match step:
-            case Measured(sample=sample):
-                return replace(self, last=step, samples=(*self.samples, sample))
-            case Tuned(simulators=simulators):
-                return replace(self, last=step, simulators=simulators)
-            case Transferred(genome=genome):
-                return replace(self, last=step, transferred=genome)
-        return replace(self, last=step)
-
-
 def repetition(
     setting: Setting, log: Iterable[Step] = (), answers: Callable[[], Answers] | None = None
 ) -> Iterator[Step]:
@@ -162,7 +134,10 @@ def _select(setting: Setting, history: History, iteration: int, answers: Answers
     searched = setting.budget.selection_evaluations * setting.strategy.ensemble if setting.strategy.searches else 0
     if setting.budget.reuse_transfer and setting.strategy.selects_transferred and history.transferred is not None:
         return Selected(iteration, history.transferred, Cost(saved=searched))
-    belief = Belief(setting.genomes, setting.known, history.samples, history.simulators)
+    scale = history.scale or 1.0
+    belief = Belief(
+        setting.genomes, setting.known, history.samples, history.simulators, scale, discrepancy=setting.discrepancy
+    )
     search = _search(setting, answers, belief.parameters, setting.stream(iteration, "search"))
     selected = setting.strategy.select(belief, search, setting.stream(iteration, "select"))
     genome = setting.genomes.check(selected, f"strategy {setting.strategy.name!r}")

@@ -6,6 +6,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genome, Parameters, Readings, no_readings
+from gaplab.services.core.discrepancies.base import Discrepancy
+from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.space import Space
 
 
@@ -68,12 +70,17 @@ class Belief:
         known: `(g,)`: the robot's hand-designed genome.
         samples: samples in the order of measurement.
         simulators: one simulator or a diverse ensemble; random before the first sample.
+        scale: about the fitness that evolution in reality would reach, above 0. It is the fitness in simulation of the
+            first transferred controller.
+        discrepancy: what `simulators` were tuned to minimise.
     """
 
     space: Space
     known: Genome
     samples: tuple[Sample, ...]
     simulators: tuple[Simulator, ...]
+    scale: float = 1.0
+    discrepancy: Discrepancy = field(default_factory=SquaredFitness)
 
     @property
     def parameters(self) -> Parameters:
@@ -103,7 +110,7 @@ class Budget:
     controller_evaluations: int = 10_000
     selection_evaluations: int = 10_000
     simulator_evaluations: int = 2_000
-    reuse_transfer: bool = True
+    reuse_transfer: bool = False
 
 
 @dataclass(frozen=True)

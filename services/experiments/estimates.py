@@ -10,13 +10,8 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import check_extent
 from gaplab.services.settings import Limits
-from gaplab.services.specs.resolution import (
-    expected_rollouts,
-    is_direct,
-    resolve_experiment,
-    resolve_study,
-    spec_of,
-)
+from gaplab.services.specs.resolution import expected_rollouts, is_direct, resolve_experiment, resolve_study
+from gaplab.services.specs.stored import spec_of
 from gaplab.services.store.queries import costs, supervisors
 from gaplab.services.store.session import Store
 

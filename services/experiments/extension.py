@@ -15,6 +15,7 @@ from gaplab.services.experiments.states import move, settle
 from gaplab.services.experiments.submission import extent_of
 from gaplab.services.experiments.views import view_experiments
 from gaplab.services.specs.resolution import is_direct
+from gaplab.services.specs.stored import spec_to_run
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import insert_repetitions, repetitions_of
@@ -41,7 +42,7 @@ def extend_experiment(
     if None in experiment.spec["reality"]["parameters"].values():
         msg = f"experiment {experiment_id!r} was imported while its reality was hidden, so it cannot be extended"
         raise Conflict(msg)
-    spec = _extended(ResolvedSpec.model_validate(experiment.spec), extension)
+    spec = _extended(spec_to_run(experiment.spec), extension)
     check_extent([spec], admitted.limits)
     tally = tallies(session, [experiment_id])[experiment_id]
     check_load(session, [spec], admitted, done=tally.rollouts_done + tally.rollouts_saved)

@@ -10,7 +10,8 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.robots import robots
 from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess
 from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, refuse_missing
-from gaplab.services.specs.resolution import spec_of, unit
+from gaplab.services.specs.resolution import unit
+from gaplab.services.specs.stored import spec_of
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.queries.replays import TunedSample
 from gaplab.services.store.session import Store

@@ -9,7 +9,8 @@ from gaplab.services.replay.process import Key, RolloutProcess
 from gaplab.services.replay.rollout import ReplayChoice, ReplayRequest, compute_replay
 from gaplab.services.specs.assembly import refuse_missing
 from gaplab.services.specs.hardware import hardware_of
-from gaplab.services.specs.resolution import is_direct, spec_of
+from gaplab.services.specs.resolution import is_direct
+from gaplab.services.specs.stored import spec_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.session import Session, Store

@@ -11,7 +11,8 @@ from gaplab.services.figures.kinds.coordinates import Coordinate, coordinates_fi
 from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import distinct_names, printable, spoken, with_unit
 from gaplab.services.specs.assembly import parameters_of
-from gaplab.services.specs.resolution import spec_of, unit
+from gaplab.services.specs.resolution import unit
+from gaplab.services.specs.stored import spec_of
 from gaplab.services.store.queries import experiments, results
 from gaplab.services.store.session import Store
 

@@ -7,7 +7,8 @@ from gaplab.schemas.misfit import MisfitRead
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.misfit import Tuning, misfit_point, remarks
 from gaplab.services.specs.assembly import parameters_of
-from gaplab.services.specs.resolution import is_direct, spec_of, unit
+from gaplab.services.specs.resolution import is_direct, unit
+from gaplab.services.specs.stored import spec_of
 from gaplab.services.store.queries import experiments, results
 from gaplab.services.store.queries.results import BestSimulator
 from gaplab.services.store.session import Store

@@ -9,7 +9,8 @@ from gaplab.services.core.tunables import tunables
 from gaplab.services.experiments import hiding
 from gaplab.services.figures.kinds.simulators import Dimension, SimulatorPoint
 from gaplab.services.specs.assembly import parameters_of
-from gaplab.services.specs.resolution import spec_of, unit
+from gaplab.services.specs.resolution import unit
+from gaplab.services.specs.stored import spec_of
 from gaplab.services.store.queries import experiments, results
 from gaplab.services.store.session import Store
 

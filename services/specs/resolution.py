@@ -1,7 +1,7 @@
 """Resolution: from a submitted spec to a resolved one, with every default; all violations are raised together."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef, TunableRef
@@ -24,7 +24,7 @@ from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.default_engines import default_engine, runs
-from gaplab.services.specs.presets import PRESETS
+from gaplab.services.specs.presets import PRESETS, Preset
 from gaplab.services.specs.violations import (
     bounds_of,
     budget_violations,
@@ -40,6 +40,8 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     Raises:
         InvalidSpec: with every violation, each with its pointer into the spec.
     """
+    preset = PRESETS[spec.budget.preset]
+    spec = _as_published(spec) if preset.as_published else spec
     robot, strategy, optimizer, discrepancy, tuner = _created(spec)
     simulated = spec.engine or PluginRef(name=default_engine(robot))
     real = spec.reality.engine or simulated
@@ -47,7 +49,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         lambda: _engine(simulated, robot, "/engine"),
         lambda: _engine(real, robot, "/reality/engine" if spec.reality.engine else "/engine"),
     )
-    budget, preset = _budget(spec), PRESETS[spec.budget.preset]
+    budget = _budget(spec, preset)
     violations = [
         *tunable_violations(spec, engine),
         *tuning_violations(robot, discrepancy, tuner),
@@ -73,6 +75,13 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         budget=budget,
         seed=spec.seed,
     )
+
+
+def _as_published(spec: ExperimentSpec) -> ExperimentSpec:
+    """Return the spec with the plain formula of its strategy, where the spec does not give an option."""
+    published = strategies[spec.strategy.name].published if spec.strategy.name in strategies else {}
+    options = {**published, **spec.strategy.options}
+    return spec.model_copy(update={"strategy": PluginRef(name=spec.strategy.name, options=options)})
 
 
 def _created(spec: ExperimentSpec) -> tuple[Robot, Strategy, Optimizer, Discrepancy, Tuner]:
@@ -136,13 +145,6 @@ def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
         points=spec.points,
         evaluations=spec.evaluations,
     )
-
-
-def spec_of(stored: Mapping[str, Any]) -> ResolvedSpec:
-    """Return a stored spec for reading, not for running: it may lack parameters of reality."""
-    reality = stored["reality"]
-    known = {name: value for name, value in reality["parameters"].items() if value is not None}
-    return ResolvedSpec.model_validate({**stored, "reality": {**reality, "parameters": known}})
 
 
 def is_direct(spec: ExperimentSpec) -> bool:
@@ -211,9 +213,8 @@ def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str
     return {**nominal, **spec.reality.parameters}
 
 
-def _budget(spec: ExperimentSpec) -> ResolvedBudget:
+def _budget(spec: ExperimentSpec, preset: Preset) -> ResolvedBudget:
     """Return the budget with every number."""
-    preset = PRESETS[spec.budget.preset]
     return ResolvedBudget(
         preset=spec.budget.preset,
         controller_evaluations=spec.budget.controller_evaluations or preset.controller_evaluations,

@@ -27,9 +27,10 @@ declare namespace Api {
     controller_evaluations: number;
     selection_evaluations: number;
     simulator_evaluations: number;
+    as_published: boolean;
   }
   interface BudgetSpec {
-    preset: "smoke" | "desk" | "paper";
+    preset: "smoke" | "desk" | "paper" | "as_published";
     controller_evaluations: number | null;
     selection_evaluations: number | null;
     simulator_evaluations: number | null;
@@ -41,6 +42,8 @@ declare namespace Api {
     engines: Array<PluginRead>;
     tunables: Array<PluginRead>;
     optimizers: Array<PluginRead>;
+    discrepancies: Array<PluginRead>;
+    tuners: Array<PluginRead>;
     budgets: Array<BudgetRead>;
     ignored: Array<IgnoredFile>;
     defaults: Record<string, any>;
@@ -190,6 +193,8 @@ declare namespace Api {
     engine: PluginRef | null;
     optimizer: PluginRef;
     tunables: Array<TunableRef>;
+    discrepancy: PluginRef;
+    tuner: PluginRef;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
@@ -380,6 +385,7 @@ declare namespace Api {
     kind: MeasurementKind;
     genome: Array<number>;
     fitness: number | null;
+    readings: Array<number | null> | null;
     measured_by: string;
     measured_at: string;
   }
@@ -417,6 +423,8 @@ declare namespace Api {
     engine: PluginRef | null;
     optimizer: PluginRef;
     tunables: Array<TunableRef>;
+    discrepancy: PluginRef;
+    tuner: PluginRef;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
@@ -443,6 +451,8 @@ declare namespace Api {
     parameters: Record<string, number>;
     squared_error: number | null;
     error: number | null;
+    intervals: Record<string, [number, number]> | null;
+    weight: number | null;
   }
   interface SpecDiff {
     columns: Array<DiffColumn>;
@@ -486,6 +496,8 @@ declare namespace Api {
     engine: PluginRef | null;
     optimizer: PluginRef;
     tunables: Array<TunableRef>;
+    discrepancy: PluginRef;
+    tuner: PluginRef;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;

@@ -105,7 +105,7 @@ export function specOf(draft) {
 
 /** @param {Page.Draft["budget"]} budget */
 function budgetOf({ preset, reuse_transfer: isReused, ...evaluations }) {
-  const changes = withoutEmpty({ ...typedValues(evaluations), ...(isReused ? {} : { reuse_transfer: false }) });
+  const changes = withoutEmpty({ ...typedValues(evaluations), ...(isReused ? { reuse_transfer: true } : {}) });
   return Object.keys(changes).length ? { preset, ...changes } : preset;
 }
 

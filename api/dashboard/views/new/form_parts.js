@@ -218,6 +218,6 @@ export function budgetPart(form) {
   return part("Budget",
     field({ label: "Preset", value: budget.preset, set, pointer: "/budget", places, choices }),
     h("div", { class: "fields" }, ...numbers),
-    tickField("Reuse the transferred controller as the next sample, where a strategy would only search for it again",
+    tickField("Reuse the transferred controller as the next sample, where a strategy would only search for it again. This saves rollouts, but makes comparisons unfair: other strategies select from a search of their own",
       budget.reuse_transfer, form.setter(budget, "reuse_transfer")).element);
 }
