@@ -243,3 +243,7 @@ class SimulatorRead(Frozen):
         default=None, description="95 % interval of each tunable, if the tuner gives them"
     )
     weight: float | None = Field(default=None, description="share of the posterior probability, if the tuner gives it")
+    held_out_error: Statistic = Field(
+        default=None,
+        description="discrepancy, summed over the held-out samples so far, of the best simulator; null without any",
+    )

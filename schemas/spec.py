@@ -86,6 +86,11 @@ class SharedSettings(Frozen):
         default=PluginRef(name="squared_fitness"), description="what tuning minimises, summed over the samples"
     )
     tuner: PluginRef = Field(default=PluginRef(name="search"), description="how simulators are found")
+    held_out: Annotated[float, Field(strict=True, ge=0, le=0.5)] = Field(
+        default=0.0,
+        description="share of the samples that no tuning sees; the error of tuned simulators on them is reported. 0.2: "
+        "each fifth sample",
+    )
     reality: RealitySpec = RealitySpec()
     budget: BudgetSpec = BudgetSpec()
     seed: Seed = 0

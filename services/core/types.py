@@ -1,5 +1,6 @@
 """The values of the algorithm: immutable, self-checking, compared by content."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeAlias
 
@@ -43,6 +44,11 @@ class Sample:
         return np.append(self.fitness, self.readings)
 
 
+def learnable(samples: Iterable[Sample]) -> tuple[Sample, ...]:
+    """Return the samples whose measurement succeeded."""
+    return tuple(each for each in samples if np.isfinite(each.fitness))
+
+
 @dataclass(frozen=True, eq=False)
 class Simulator:
     """One setting of the tunables, with its discrepancy from the samples that it was tuned on.
@@ -53,12 +59,15 @@ class Simulator:
             physics failed on one.
         interval: `(p, 2)`: ends of the 95 % interval of each tunable; None if the tuner gives none.
         weight: share of the posterior probability; None if the tuner gives none.
+        held_out_error: the discrepancy from the held-out samples, which only the best simulator knows; None without
+            any, or where the physics failed on one.
     """
 
     parameters: FloatArray
     squared_error: float = 0.0
     interval: FloatArray | None = None
     weight: float | None = None
+    held_out_error: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +104,7 @@ class Belief:
     @property
     def learnable(self) -> tuple[Sample, ...]:
         """Return the samples whose measurement succeeded."""
-        return tuple(each for each in self.samples if np.isfinite(each.fitness))
+        return learnable(self.samples)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from gaplab.services.figures.words import distinct_names, printable, spoken, wit
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import unit
 from gaplab.services.specs.stored import spec_of
-from gaplab.services.store.queries import experiments, results
+from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.session import Store
 
 MOST_SETTINGS = 8
@@ -29,13 +29,13 @@ def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") 
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
         found = sorted(
-            results.best_simulators(session, experiment_id), key=lambda each: (each.repetition, each.iteration)
+            tunings.best_simulators(session, experiment_id), key=lambda each: (each.repetition, each.iteration)
         )
-        measured = results.measured_iterations(session, experiment_id)
+        tuned_on = tunings.measured(session, row).tuned_on
     spec = spec_of(row.spec)
     space = parameters_of(spec.tunables)
-    samples = [results.samples_until(measured, each.repetition, each.iteration) for each in found]
-    errors = tuple(results.per_sample(each.squared_error, n) for each, n in zip(found, samples, strict=True))
+    samples = [tunings.samples_until(tuned_on, each.repetition, each.iteration) for each in found]
+    errors = tuple(tunings.per_sample(each.squared_error, n) for each, n in zip(found, samples, strict=True))
     axes = [
         Coordinate("Iteration", tuple(float(each.iteration) for each in found)),
         *(

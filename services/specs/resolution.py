@@ -11,6 +11,7 @@ from gaplab.schemas.spec import ExperimentSpec, SharedSettings, StudySpec
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import InvalidSpec, Violation, gather
+from gaplab.services.core.held_out import is_held_out
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.registry import Registry
@@ -71,6 +72,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         tunables=tuple(_with_bounds(ref) for ref in spec.tunables),
         discrepancy=_completed(discrepancies, spec.discrepancy),
         tuner=_completed(tuners, spec.tuner),
+        held_out=spec.held_out,
         reality=ResolvedReality(engine=_completed(engines, real), parameters=_truth(spec, robot, reality_engine)),
         budget=budget,
         seed=spec.seed,
@@ -167,7 +169,10 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
     if strategy.in_reality:
         return budget.controller_evaluations
     selecting = iterations * budget.selection_evaluations * strategy.ensemble if strategy.searches else 0
-    tuning = budget.simulator_evaluations * iterations * (iterations + 1) // 2
+    tuning = sum(
+        (iterations + 1 - number) * (1 if is_held_out(number, spec.held_out) else budget.simulator_evaluations)
+        for number in range(1, iterations + 1)
+    )
     return budget.controller_evaluations * (iterations + 1) + selecting + tuning
 
 

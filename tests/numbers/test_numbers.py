@@ -126,15 +126,14 @@ def test_every_kept_spec_has_the_options_of_its_study() -> None:
 
 
 def test_default_options_give_other_numbers() -> None:
-    strategies = ["simulated_fit", "simulated_fit_and_unique", "simulated_fit_and_informative"]
+    strategies = ["simulated_fit", "simulated_fit_and_informative"]
     budget = STUDIES["analytic"].budget.model_copy(update={"reuse_transfer": False})
     given = STUDIES["analytic"].model_dump(exclude={"strategies"}) | {"strategies": strategies, "budget": budget}
 
-    fit, unique, informative = computed_from(resolve_study(StudySpec.model_validate(given)))
+    fit, informative = computed_from(resolve_study(StudySpec.model_validate(given)))
 
     kept = numbers(members(archive("analytic")))
     assert fit != kept[0]
-    assert unique != kept[1]
     assert informative != kept[3]
 
 

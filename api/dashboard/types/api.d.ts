@@ -195,6 +195,7 @@ declare namespace Api {
     tunables: Array<TunableRef>;
     discrepancy: PluginRef;
     tuner: PluginRef;
+    held_out: number;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
@@ -223,6 +224,7 @@ declare namespace Api {
     status: "ok" | "degraded";
     warnings: Array<string>;
   }
+  type Identification = "identified" | "partly identified" | "not identified" | "unknown";
   interface IgnoredFile {
     file: string;
     why: string;
@@ -237,6 +239,7 @@ declare namespace Api {
   interface MisfitPoint {
     iteration: number;
     error: Distribution;
+    held_out_error: Distribution;
     gap: Distribution;
     tunables: Array<TunableDistribution>;
   }
@@ -245,6 +248,8 @@ declare namespace Api {
     unit: string;
     points: Array<MisfitPoint>;
     remarks: Array<string>;
+    held_out: number;
+    verdicts: Array<TunableVerdict>;
   }
   interface NotesRead {
     html: string;
@@ -425,6 +430,7 @@ declare namespace Api {
     tunables: Array<TunableRef>;
     discrepancy: PluginRef;
     tuner: PluginRef;
+    held_out: number;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
@@ -453,6 +459,7 @@ declare namespace Api {
     error: number | null;
     intervals: Record<string, [number, number]> | null;
     weight: number | null;
+    held_out_error: number | null;
   }
   interface SpecDiff {
     columns: Array<DiffColumn>;
@@ -498,6 +505,7 @@ declare namespace Api {
     tunables: Array<TunableRef>;
     discrepancy: PluginRef;
     tuner: PluginRef;
+    held_out: number;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
@@ -544,8 +552,18 @@ declare namespace Api {
     upper: number;
     at_lower: number | null;
     at_upper: number | null;
+    spread: number | null;
+    interval: number | null;
+    posterior: number | null;
   }
   type TunableRef = string | Record<string, any>;
+  interface TunableVerdict {
+    name: string;
+    verdict: Identification;
+    remaining: number | null;
+    sentence: string;
+    helps: Array<string>;
+  }
   type Verdict = "nothing" | "rough" | "smooth" | "unknown";
   interface VerdictRead {
     headline: string;

@@ -84,6 +84,7 @@ class GaussNewton(Tuner):
     name = "gauss_newton"
     source = "As in MuJoCo's sysid toolbox (2026); starts, differences and intervals are gaplab's"
     needs_squares = True
+    intervals = True
     Options = GaussNewtonOptions
     options: GaussNewtonOptions
 

@@ -3,7 +3,7 @@
 
 import { parseNumber } from "../../lib/json.js";
 
-const COUNTS = ["iterations", "repetitions", "direct_repetitions", "seed", "priority", "max_parallel"];
+const COUNTS = ["iterations", "repetitions", "direct_repetitions", "seed", "priority", "max_parallel", "held_out"];
 export const EVALUATIONS = ["controller_evaluations", "selection_evaluations", "simulator_evaluations"];
 
 /** @typedef {Record<string, any>} Spec */

@@ -34,7 +34,8 @@ export function studyPart(form) {
       countField("direct_repetitions", "Repetitions of the direct baseline", "", "as the strategies"),
       countField("seed", "Seed", "the same seed gives the same numbers", "0"),
       countField("priority", "Priority", "−10 to 10; the highest is computed first", "0"),
-      countField("max_parallel", "Repetitions at once", "of an experiment", "any number")));
+      countField("max_parallel", "Repetitions at once", "of an experiment", "any number"),
+      countField("held_out", "Share of samples held out", "no tuning sees them, simulators are tested on them; 0.2: each fifth", "0")));
 }
 
 /**
