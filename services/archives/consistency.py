@@ -12,10 +12,10 @@ from gaplab.services.archives.columns import EXPERIMENT, REPETITION
 from gaplab.services.archives.opening import OpenedArchive
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.core.robots import robots
+from gaplab.services.core.stored_specs import spec_as_stored
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.specs.resolution import is_direct
-from gaplab.services.specs.stored import spec_as_stored
 from gaplab.services.store.models import SPEC_VERSION
 from gaplab.services.store.queries import provenance
 from gaplab.services.store.texts import pack_tags, unpack_tags

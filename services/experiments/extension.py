@@ -8,6 +8,7 @@ from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
+from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.experiments.archiving import show_again
 from gaplab.services.experiments.lifecycle import get_permitting
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
@@ -15,7 +16,6 @@ from gaplab.services.experiments.states import move, settle
 from gaplab.services.experiments.submission import extent_of
 from gaplab.services.experiments.views import view_experiments
 from gaplab.services.specs.resolution import is_direct
-from gaplab.services.specs.stored import spec_to_run
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import insert_repetitions, repetitions_of

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from gaplab.schemas.differences import SettingRead
 from gaplab.schemas.records import ExperimentRead
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.tunables import tunables
 from gaplab.services.experiments import reading
 from gaplab.services.experiments.differences import read_differences
@@ -12,7 +13,6 @@ from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import distinct_names, printable, spoken, with_unit
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import unit
-from gaplab.services.specs.stored import spec_of
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.session import Store
 

@@ -11,9 +11,9 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import curve_points
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.statistics import compare_all
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.results.texts import cell
 from gaplab.services.specs.resolution import is_direct, unit
-from gaplab.services.specs.stored import spec_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, results
 from gaplab.services.store.session import Session, Store

@@ -14,10 +14,10 @@ from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.identification import Means, overfitting, verdicts
 from gaplab.services.core.misfit import Tuning, misfit_point, remarks
 from gaplab.services.core.robots import robots
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.tuners import tuners
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import is_direct, unit
-from gaplab.services.specs.stored import spec_of
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.queries.tunings import BestSimulator, Measured
 from gaplab.services.store.session import Store

@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.tunables import tunables
 from gaplab.services.experiments import hiding
 from gaplab.services.figures.kinds.simulators import Dimension, SimulatorPoint
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import unit
-from gaplab.services.specs.stored import spec_of
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.session import Store
 

@@ -14,6 +14,7 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import ASKED, Ending, State
 from gaplab.schemas.provenance import Provenance
+from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.core.types import Step
 from gaplab.services.experiments.states import settle
 from gaplab.services.running import provenance
@@ -22,7 +23,6 @@ from gaplab.services.running.leases import Change
 from gaplab.services.running.repetition_leases import RepetitionLeases, pause
 from gaplab.services.running.turns import FREE_HARDWARE, ahead, next_repetitions
 from gaplab.services.running.versions import provenance as present_provenance
-from gaplab.services.specs.stored import spec_to_run
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Checkpoint as Checkpoint
 from gaplab.services.store.lease import Claim as Claim

@@ -51,13 +51,12 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         lambda: _engine(real, robot, "/reality/engine" if spec.reality.engine else "/engine"),
     )
     budget = _budget(spec, preset)
-    violations = [
+    if violations := [
         *tunable_violations(spec, engine),
         *tuning_violations(robot, discrepancy, tuner),
         *reality_violations(spec, strategy, engine, reality_engine),
         *budget_violations(budget, strategy, optimizer),
-    ]
-    if violations:
+    ]:
         raise InvalidSpec(violations)
     return ResolvedSpec(
         priority=spec.priority,

@@ -14,10 +14,10 @@ import pytest
 from gaplab import migrations
 from gaplab.schemas.lifecycle import State
 from gaplab.services.archives import export_experiment
+from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.experiments import listing, reading, submission
 from gaplab.services.running import execution
 from gaplab.services.settings import Settings
-from gaplab.services.specs.stored import spec_to_run
 from gaplab.services.store.session import Store
 from gaplab.workers.cluster import cluster
 from gaplab.workers.supervisor import Supervisor

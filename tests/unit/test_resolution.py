@@ -7,12 +7,12 @@ import pytest
 from gaplab.schemas.spec import ExperimentSpec, Schedule, StudySpec
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.stored_specs import spec_as_stored, spec_of, spec_to_run
 from gaplab.services.core.strategies import strategies
 from gaplab.services.engines import engines
 from gaplab.services.specs.presets import PRESETS
 from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment, resolve_study
 from gaplab.services.specs.shortening import experiment_spec
-from gaplab.services.specs.stored import spec_as_stored, spec_of, spec_to_run
 
 EMBODIED = [name for name, engine in engines.items() if engine.runs(Quadruped().world)]
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.strategies import strategies
 
 
@@ -30,7 +31,14 @@ def spec_as_stored(stored: Mapping[str, Any]) -> ResolvedSpec:
 
 
 def _with_options_of_before(spec: ResolvedSpec) -> ResolvedSpec:
-    """Return the spec with the options that its strategy got since it was stored, so that its numbers stay the same."""
+    """Return the spec with the options that its strategy got since it was stored, so that its numbers stay the same.
+
+    The spec stays as it is if the strategy is not installed, or refuses its options.
+    """
     name, options = spec.strategy.name, spec.strategy.options
     before = strategies[name].before if name in strategies else {}
-    return spec.model_copy(update={"strategy": PluginRef(name=name, options={**before, **options})})
+    try:
+        _, complete = strategies.check(PluginRef(name=name, options={**before, **options}))
+    except InvalidSpec:
+        return spec
+    return spec.model_copy(update={"strategy": PluginRef(name=name, options=complete.model_dump(mode="json"))})
