@@ -18,11 +18,13 @@ from gaplab.services.core.optimizers.base import Optimizer as Optimizer
 from gaplab.services.core.optimizers.base import Population as Population
 from gaplab.services.core.robots.base import Robot as Robot
 from gaplab.services.core.robots.base import Sensors as Sensors
+from gaplab.services.core.scoring import scaled_uniqueness_penalty as scaled_uniqueness_penalty
 from gaplab.services.core.scoring import simulator_weights as simulator_weights
 from gaplab.services.core.scoring import uniqueness_penalty as uniqueness_penalty
 from gaplab.services.core.scoring import weighted_deviation as weighted_deviation
 from gaplab.services.core.scoring import weighted_mean as weighted_mean
 from gaplab.services.core.space import Space as Space
+from gaplab.services.core.strategies.base import DiverseOptions as DiverseOptions
 from gaplab.services.core.strategies.base import EnsembleOptions as EnsembleOptions
 from gaplab.services.core.strategies.base import Search as Search
 from gaplab.services.core.strategies.base import Strategy as Strategy

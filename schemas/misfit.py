@@ -1,5 +1,7 @@
 """Misfit: distance of tuned simulators from reality, and from each other over repetitions."""
 
+from enum import StrEnum
+
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Id, Statistic, TunableName, Unit
@@ -23,6 +25,17 @@ class TunableDistribution(Distribution):
     upper: float = Field(description="upper bound of tuning", examples=[0.6])
     at_lower: Statistic = Field(description="share of repetitions at the lower bound, within 1 % of the range")
     at_upper: Statistic = Field(description="share of repetitions at the upper bound, within 1 % of the range")
+    spread: Statistic = Field(
+        default=None, description="standard deviation over repetitions, over that of a uniform draw between the bounds"
+    )
+    interval: Statistic = Field(
+        default=None,
+        description="mean width of the 95 % intervals, over that of uniform draws; null if the tuner gives none",
+    )
+    posterior: Statistic = Field(
+        default=None,
+        description="mean standard deviation of the posterior, over that of uniform draws; null if there is none",
+    )
 
 
 class MisfitPoint(Frozen):
@@ -32,10 +45,35 @@ class MisfitPoint(Frozen):
     error: Distribution = Field(
         description="root mean square of simulated minus real fitness, over the samples tuned on"
     )
+    held_out_error: Distribution = Field(
+        description="the same over the held-out samples, which no tuning sees; it has no values without any"
+    )
     gap: Distribution = Field(
         description="absolute difference between simulated and real fitness of the transferred controller"
     )
     tunables: tuple[TunableDistribution, ...]
+
+
+class Identification(StrEnum):
+    """Verdict on a tunable; `unknown` with too few repetitions and no interval."""
+
+    IDENTIFIED = "identified"
+    PARTLY = "partly identified"
+    NOT = "not identified"
+    UNKNOWN = "unknown"
+
+
+class TunableVerdict(Frozen):
+    """Whether the samples determine a tunable."""
+
+    name: TunableName
+    verdict: Identification
+    remaining: Statistic = Field(
+        description="largest of spread, interval and posterior at the latest iteration: 1 is as uncertain as before "
+        "any sample, 0 is certain",
+    )
+    sentence: str
+    helps: tuple[str, ...] = Field(description="what would help, unless it is identified")
 
 
 class MisfitRead(Frozen):
@@ -46,4 +84,8 @@ class MisfitRead(Frozen):
     points: tuple[MisfitPoint, ...]
     remarks: tuple[str, ...] = Field(
         description="sentences about the latest iteration", examples=[("restitution is at its lower bound, 0",)]
+    )
+    held_out: float = Field(default=0.0, description="share of the samples that no tuning sees")
+    verdicts: tuple[TunableVerdict, ...] = Field(
+        default=(), description="which tunables the samples identify; none before the first sample"
     )

@@ -70,6 +70,9 @@ class BudgetRead(Frozen):
     controller_evaluations: int
     selection_evaluations: int
     simulator_evaluations: int
+    as_published: bool = Field(
+        default=False, description="whether options that a spec leaves out are those of the plain, published formulas"
+    )
 
 
 class Catalogue(Frozen):

@@ -246,3 +246,4 @@ class SimulatorRead(Frozen):
         examples=[{"dynamic_friction": (0.7, 0.9)}],
     )
     weight: Statistic = Field(default=None, description="share of the posterior probability, if the tuner gives it")
+    held_out_error: Statistic = Field(default=None, description="discrepancy from held-out samples, of rank 0")

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from gaplab.schemas.base import Count, Examples, Frozen, Label, Priority, Real, Seed
 from gaplab.schemas.plugin import PluginRef, TunableRef
 
-BudgetName = Literal["smoke", "desk", "paper"]
+BudgetName = Literal["smoke", "desk", "paper", "as_published"]
 
 
 class BudgetSpec(Frozen):
@@ -21,7 +21,11 @@ class BudgetSpec(Frozen):
     costs m rollouts; in a tuning on k samples, k rollouts.
     """
 
-    preset: BudgetName = "paper"
+    preset: BudgetName = Field(
+        default="paper",
+        description="`as_published` is `paper` with the formulas as the paper prints them: options that a strategy "
+        "leaves out are those of its plain formula",
+    )
     controller_evaluations: Count | None = Field(
         default=None, description="evaluations of the search for the transferred controller"
     )
@@ -30,10 +34,11 @@ class BudgetSpec(Frozen):
     )
     simulator_evaluations: Count | None = Field(default=None, description="evaluations of the search for a simulator")
     reuse_transfer: bool = Field(
-        default=True,
+        default=False,
         strict=True,
         description="true: `simulated_fit` tries the controller that was just transferred, without another search. It "
-        "is the best of `controller_evaluations`; other strategies select from `selection_evaluations`",
+        "is the best of `controller_evaluations`, while other strategies select from `selection_evaluations`, so it "
+        "saves rollouts but makes comparisons unfair",
     )
 
     @model_validator(mode="before")
@@ -81,6 +86,11 @@ class SharedSettings(Frozen):
         default=PluginRef(name="squared_fitness"), description="what tuning minimises, summed over the samples"
     )
     tuner: PluginRef = Field(default=PluginRef(name="search"), description="how simulators are found")
+    held_out: Annotated[float, Field(strict=True, ge=0, le=0.5)] = Field(
+        default=0.0,
+        description="share of the samples that no tuning sees; the error of tuned simulators on them is reported. 0.2: "
+        "each fifth sample",
+    )
     reality: RealitySpec = RealitySpec()
     budget: BudgetSpec = BudgetSpec()
     seed: Seed = 0

@@ -77,8 +77,8 @@ class Client:
         self.archive, self.unarchive, self.delete = keeping.archive, keeping.unarchive, keeping.delete
         self.views, self.save_view, self.delete_view = keeping.views, keeping.save_view, keeping.delete_view
         self.curves, self.curves_of, self.curves_csv = results.curves, results.curves_of, results.curves_csv
-        self.compare, self.misfit, self.diff = results.compare, results.misfit, results.diff
-        self.curve, self.samples = tables.curve, tables.samples
+        self.compare, self.diff, self.curve = results.compare, results.diff, tables.curve
+        self.misfit, self.misfit_csv, self.samples = results.misfit, results.misfit_csv, tables.samples
         self.simulators, self.predictions, self.readings = tables.simulators, tables.predictions, tables.readings
         self.figure, self.figure_kinds = figures.draw, figures.kinds
         self.verdict, self.report = reports.verdict, reports.save

@@ -84,6 +84,10 @@ class Results:
         """Return how far the tuned simulators of an experiment are from reality and from each other."""
         return self._connection.get(MisfitRead, f"/experiments/{segment(id)}/misfit")
 
+    def misfit_csv(self, id: str) -> str:
+        """Return the misfit of an experiment as CSV: a line for each iteration and each number over repetitions."""
+        return self._connection.get_bytes(f"/experiments/{segment(id)}/misfit", format="csv").decode()
+
     def _experiments(self, ids: Sequence[str]) -> list[str]:
         return [experiment.id for id in ids for experiment in experiments_of(self._records.find(id))]
 

@@ -16,6 +16,7 @@ from gaplab.api.commands.app import LIFE, RESULTS, SPECS, AsJson, Id, Url, app, 
 from gaplab.api.commands.exit_codes import CommandError, Exit
 from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.schemas.editing import Edit
+from gaplab.schemas.misfit import TunableVerdict
 from gaplab.schemas.mistakes import sentence
 from gaplab.schemas.provenance import ProvenanceUse
 from gaplab.schemas.records import ExperimentRead, StudyRead
@@ -127,10 +128,15 @@ def _show_experiment(client: Client, experiment: ExperimentRead, *, as_json: boo
     for use in provenance.uses:
         screen.print(f"computed with {_software(use)}", markup=False, soft_wrap=True)
     if misfit.remarks:
-        screen.print(tables.tuned(misfit), *misfit.remarks, sep="\n", markup=False)
+        screen.print(tables.tuned(misfit), *misfit.remarks, *map(_verdict, misfit.verdicts), sep="\n", markup=False)
     if with_spec:
         screen.print_json(data=experiment.spec)
     print_warnings(experiment)
+
+
+def _verdict(found: TunableVerdict) -> str:
+    """Return the verdict on a tunable, and what would help."""
+    return f"{found.sentence}; would help: {'; '.join(found.helps)}" if found.helps else found.sentence
 
 
 def _software(use: ProvenanceUse) -> str:

@@ -6,8 +6,8 @@ from fastapi import APIRouter, Body, Path, Query, Request, Response
 from pydantic import Field
 
 from gaplab.api.http import conditional, links
-from gaplab.api.http.dependencies import AdmissionDep, CallerDep, Id, Paging, Revealing, StoreDep, created
-from gaplab.api.http.problems import documented
+from gaplab.api.http.dependencies import AdmissionDep, CallerDep, Id, Paging, Parameters, Revealing, StoreDep, created
+from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.misfit import MisfitRead
@@ -23,7 +23,7 @@ from gaplab.schemas.records import (
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.experiments import editing, listing, reading, submission
 from gaplab.services.experiments.listing import ListFilter
-from gaplab.services.results.misfit import misfit
+from gaplab.services.results.misfit import misfit, misfit_csv
 
 router = APIRouter(prefix="/experiments", tags=["experiments"])
 
@@ -32,6 +32,17 @@ Repetition = Annotated[
 ]
 
 MANY: int = Field(default=1_000, ge=1, le=5_000, description="most items to return")
+
+
+_MISFIT_CSV: Responses = {
+    200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": "iteration,what,n,mean,sd,…\n"}}}
+}
+
+
+class MisfitQuery(Parameters):
+    """The format of the misfit."""
+
+    format: Literal["json", "csv"] = "json"
 
 
 class ExperimentFilter(Paging):
@@ -177,12 +188,20 @@ def list_simulators(id: Id, store: StoreDep, query: Annotated[SimulatorFilter, Q
 @router.get(
     "/{id}/misfit",
     summary="Read an experiment's misfit",
+    response_model=MisfitRead,
     response_description="By iteration, over repetitions",
-    responses=documented(404),
+    responses=_MISFIT_CSV | documented(404),
 )
-def read_misfit(id: Id, store: StoreDep) -> MisfitRead:
-    """Return the error that remains after tuning, how far repetitions agree, and tunables that end at a bound."""
-    return misfit(store, id)
+def read_misfit(id: Id, store: StoreDep, query: Annotated[MisfitQuery, Query()]) -> MisfitRead | Response:
+    """Return the error that remains after tuning, also on held-out samples, and which tunables are identified.
+
+    It also has the spread over repetitions, and the share of tunables that end at a bound.
+    """
+    found = misfit(store, id)
+    if query.format == "json":
+        return found
+    name = {"Content-Disposition": f'attachment; filename="gaplab-misfit-{id}.csv"'}
+    return Response(misfit_csv(found), media_type="text/csv", headers=name)
 
 
 @router.get(

@@ -10,6 +10,7 @@ from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import Drawing, answer, responses
 from gaplab.schemas.figures import FigureRead
 from gaplab.services.core.errors import NotFound
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments import reading
 from gaplab.services.figures.kinds.curves import Band, curves_figure
 from gaplab.services.figures.kinds.predictions import predictions_figure
@@ -22,7 +23,7 @@ from gaplab.services.results import curves
 from gaplab.services.results.coordinates import experiment_coordinates, simulator_coordinates
 from gaplab.services.results.curve_costs import cost_axis
 from gaplab.services.results.tuned_simulators import tuned_simulators
-from gaplab.services.specs.resolution import is_direct, spec_of
+from gaplab.services.specs.resolution import is_direct
 from gaplab.services.store.session import Store
 
 router = APIRouter(prefix="/figures", tags=["figures"])

@@ -12,9 +12,10 @@ from gaplab.services.archives.columns import EXPERIMENT, REPETITION
 from gaplab.services.archives.opening import OpenedArchive
 from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.core.robots import robots
+from gaplab.services.core.stored_specs import spec_as_stored
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
-from gaplab.services.specs.resolution import is_direct, spec_of
+from gaplab.services.specs.resolution import is_direct
 from gaplab.services.store.models import SPEC_VERSION
 from gaplab.services.store.queries import provenance
 from gaplab.services.store.texts import pack_tags, unpack_tags
@@ -93,7 +94,7 @@ def _checked_spec(row: Row) -> Row:
     if row.get("spec_version", SPEC_VERSION) > SPEC_VERSION:
         raise InvalidArchive(f"{place} has version {row['spec_version']}; this gaplab reads up to {SPEC_VERSION}")
     try:
-        spec = spec_of(given)
+        spec = spec_as_stored(given)
         truth = dict.fromkeys(given["reality"]["parameters"])
     except ValidationError as error:
         fields = sorted({"/".join(map(str, found["loc"])) for found in error.errors()})

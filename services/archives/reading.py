@@ -24,10 +24,10 @@ from gaplab.services.archives.consistency import check_row, checked_experiments
 from gaplab.services.archives.logs import check_logs
 from gaplab.services.archives.opening import OpenedArchive, open_archive
 from gaplab.services.core.errors import Conflict, InvalidArchive
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.states import settle
 from gaplab.services.settings import Limits
 from gaplab.services.specs.hardware import hardware_of
-from gaplab.services.specs.resolution import spec_of
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries import archives
 from gaplab.services.store.queries.events import note

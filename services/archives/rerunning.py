@@ -14,13 +14,13 @@ from gaplab.services.archives.reading import CheckedArchive, checked_archive
 from gaplab.services.archives.step_differences import difference
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.types import Step
 from gaplab.services.engines import engines
 from gaplab.services.plugins import folders
 from gaplab.services.running import provenance
 from gaplab.services.running.versions import provenance as provenance_here
 from gaplab.services.specs.assembly import setting
-from gaplab.services.specs.resolution import spec_of
 from gaplab.services.specs.shortening import experiment_spec, study_spec
 from gaplab.services.store.queries import experiments, logs
 from gaplab.services.store.session import Session

@@ -28,7 +28,7 @@ def _numbers(value: object, place: str = "") -> Iterator[tuple[str, float]]:
     elif isinstance(value, tuple | np.ndarray):
         for index, item in enumerate(value):
             yield from _numbers(item, f"{place}[{index}]")
-    else:
+    elif value is not None:
         yield place, float(value)  # type: ignore[arg-type] # steps have numbers only
 
 

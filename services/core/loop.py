@@ -6,7 +6,7 @@ never stopped.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.random import Generator
@@ -16,6 +16,8 @@ from gaplab.services.core.arrays import FloatArray, Genome, Parameters, no_readi
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.errors import PluginBroken
+from gaplab.services.core.held_out import split, tested
+from gaplab.services.core.history import History
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.ports import Reality, Sense, Simulate
 from gaplab.services.core.search import maximise
@@ -33,10 +35,10 @@ from gaplab.services.core.types import (
     Probed,
     Sample,
     Selected,
-    Simulator,
     Step,
     Transferred,
     Tuned,
+    learnable,
 )
 
 
@@ -61,6 +63,7 @@ class Setting:
         reading_times_s: `(q,)`: time of each reading.
         discrepancy: what tuning minimises.
         tuner: finds simulators.
+        held_out: share of the samples that no tuning sees.
     """
 
     simulate: Simulate
@@ -79,6 +82,7 @@ class Setting:
     reading_times_s: FloatArray = field(default_factory=no_readings)
     discrepancy: Discrepancy = field(default_factory=SquaredFitness)
     tuner: Tuner = field(default_factory=SearchTuner)
+    held_out: float = 0.0
 
     def stream(self, iteration: int, phase: str) -> Generator:
         """Return the random stream of one phase of one iteration."""
@@ -87,34 +91,6 @@ class Setting:
     def answers(self) -> Answers:
         """Return the answers of one step, which count and prefetch its rollouts."""
         return Answers(self.simulate, self.batch_size, sense=self.sense)
-
-
-@dataclass(frozen=True, eq=False)
-class History:
-    """The result of the steps so far.
-
-    Attributes:
-        last: the latest step; None at the very start.
-        samples: samples measured so far.
-        simulators: simulators of the latest tuning, best first.
-        transferred: the latest transferred genome.
-    """
-
-    last: Step | None = None
-    samples: tuple[Sample, ...] = ()
-    simulators: tuple[Simulator, ...] = ()
-    transferred: Genome | None = None
-
-    def after(self, step: Step) -> "History":
-        """Return the history with one more step."""
-        match step:
-            case Measured(sample=sample):
-                return replace(self, last=step, samples=(*self.samples, sample))
-            case Tuned(simulators=simulators):
-                return replace(self, last=step, simulators=simulators)
-            case Transferred(genome=genome):
-                return replace(self, last=step, transferred=genome)
-        return replace(self, last=step)
 
 
 def repetition(
@@ -162,7 +138,10 @@ def _select(setting: Setting, history: History, iteration: int, answers: Answers
     searched = setting.budget.selection_evaluations * setting.strategy.ensemble if setting.strategy.searches else 0
     if setting.budget.reuse_transfer and setting.strategy.selects_transferred and history.transferred is not None:
         return Selected(iteration, history.transferred, Cost(saved=searched))
-    belief = Belief(setting.genomes, setting.known, history.samples, history.simulators)
+    scale = history.scale or 1.0
+    belief = Belief(
+        setting.genomes, setting.known, history.samples, history.simulators, scale, discrepancy=setting.discrepancy
+    )
     search = _search(setting, answers, belief.parameters, setting.stream(iteration, "search"))
     selected = setting.strategy.select(belief, search, setting.stream(iteration, "select"))
     genome = setting.genomes.check(selected, f"strategy {setting.strategy.name!r}")
@@ -197,12 +176,14 @@ def _search(setting: Setting, answers: Answers, parameters: Parameters, rng: Gen
 def _tune(setting: Setting, history: History, iteration: int, answers: Answers) -> Tuned:
     """Return simulators tuned on all samples whose measurement succeeded; random ones if there are none.
 
-    The budget includes samples whose measurement failed; their rollouts count as saved.
+    Held-out samples are not tuned on: the best simulator is tested on them. The budget includes samples whose
+    measurement failed; their rollouts count as saved.
     """
     ensemble, evaluations = setting.strategy.ensemble, setting.budget.simulator_evaluations
-    budget = evaluations * len(history.samples)
+    seen, unseen = split(history.samples, setting.held_out)
+    budget = evaluations * len(seen) + len(unseen)
     rng = setting.stream(iteration, "tune")
-    samples = tuple(each for each in history.samples if np.isfinite(each.fitness))
+    samples, tests = learnable(seen), learnable(unseen)
     if not samples:
         return Tuned(iteration, draw_simulators(setting.parameters, ensemble, rng), Cost(saved=budget))
     optimizer = setting.optimizer.diverse(ensemble) if ensemble > 1 else setting.optimizer
@@ -214,6 +195,8 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
         raise PluginBroken(f"{source} returned {len(found)} simulators; permitted: {ensemble}")
     for simulator in found:
         setting.parameters.check(simulator.parameters, source)
+    if tests:
+        found = tested(found, Misfit(answers, tests, setting.discrepancy, setting.reading_times_s))
     return Tuned(iteration, found, answers.cost_of(budget))
 
 

@@ -20,6 +20,12 @@ from gaplab.services.core.space import Space
 AT_BOUND = 0.01
 """Largest distance from a bound, as a share of the distance between the bounds, that counts as at the bound."""
 
+PRIOR_SD = 12**-0.5
+"""Standard deviation of a uniform draw between the bounds, as a share of their distance."""
+
+PRIOR_95 = 0.95
+"""Width of the central 95 % of such draws, as a share of the distance between the bounds."""
+
 OFTEN = 0.5
 """Share of repetitions at a bound from which a remark says so."""
 
@@ -34,6 +40,10 @@ class Tuning:
         samples: number of samples that it was tuned on.
         simulated: simulated fitness of the controller that evolved in it; nan if there is none yet.
         real: fitness of that controller in reality; nan if there is none yet.
+        held_out_error: Σe² over held-out samples; nan if there are none yet, or the physics failed on one.
+        held_out: number of held-out samples.
+        interval: `(p, 2)`: ends of the 95 % intervals of its tunables; None if the tuner gives none.
+        posterior: `(p,)`: standard deviations of the posterior; None if the tuner gives none.
     """
 
     parameters: FloatArray
@@ -41,13 +51,20 @@ class Tuning:
     samples: int
     simulated: float
     real: float
+    held_out_error: float = float("nan")
+    held_out: int = 0
+    interval: FloatArray | None = None
+    posterior: FloatArray | None = None
 
     @property
     def error(self) -> float:
         """Root mean square error, √(Σe² / samples); nan without samples, or if the physics failed."""
-        if not self.samples or not np.isfinite(self.squared_error):
-            return float("nan")
-        return float(np.sqrt(self.squared_error / self.samples))
+        return _root_mean(self.squared_error, self.samples)
+
+    @property
+    def error_on_held_out(self) -> float:
+        """Root mean square error on held-out samples; nan without any, or if the physics failed."""
+        return _root_mean(self.held_out_error, self.held_out)
 
 
 def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str], space: Space) -> MisfitPoint:
@@ -60,12 +77,18 @@ def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str]
         space: bounds of the tunables.
     """
     parameters = np.array([each.parameters for each in tunings]).reshape(-1, space.size)
+    widths = [each.interval[:, 1] - each.interval[:, 0] for each in tunings if each.interval is not None]
+    deviations = [each.posterior for each in tunings if each.posterior is not None]
+    shares = _shares(widths, PRIOR_95 * space.extent), _shares(deviations, PRIOR_SD * space.extent)
     return MisfitPoint(
         iteration=iteration,
         error=Distribution.model_validate(_distribution([each.error for each in tunings])),
+        held_out_error=Distribution.model_validate(_distribution([each.error_on_held_out for each in tunings])),
         gap=Distribution.model_validate(_distribution([abs(each.simulated - each.real) for each in tunings])),
         tunables=tuple(
-            _tunable_distribution(name, parameters[:, index], float(space.lower[index]), float(space.upper[index]))
+            _tunable_distribution(
+                name, parameters[:, index], float(space.lower[index]), float(space.upper[index])
+            ).model_copy(update={"interval": shares[0][index], "posterior": shares[1][index]})
             for index, name in enumerate(names)
         ),
     )
@@ -86,7 +109,18 @@ def _tunable_distribution(name: str, values: FloatArray, lower: float, upper: fl
     at_lower = float((values <= lower + near).mean()) if len(values) else None
     at_upper = float((values >= upper - near).mean()) if len(values) else None
     bounds = {"lower": lower, "upper": upper, "at_lower": at_lower, "at_upper": at_upper}
-    return TunableDistribution.model_validate({"name": name} | bounds | _distribution(values))
+    found = _distribution(values)
+    spread = None if found["sd"] is None else found["sd"] / (PRIOR_SD * (upper - lower))
+    return TunableDistribution.model_validate({"name": name, "spread": spread} | bounds | found)
+
+
+def _shares(found: Sequence[FloatArray], prior: FloatArray) -> list[float | None]:
+    """Return the mean of each tunable's number over that of the prior; None without any."""
+    return [None] * len(prior) if not found else [known(each) for each in np.mean(found, axis=0) / prior]
+
+
+def _root_mean(total: float, count: int) -> float:
+    return float(np.sqrt(total / count)) if count and np.isfinite(total) else float("nan")
 
 
 def _distribution(values: Sequence[float] | FloatArray) -> dict[str, float | int | None]:

@@ -29,11 +29,14 @@ class Plugin:
         name: name in specs, and of the file.
         source: origin of its idea or its numbers.
         Options: frozen model whose fields all have defaults.
+        before: for options that were added later, the values that give what the plug-in did before; experiments that
+            were stored without these options keep them.
     """
 
     name: ClassVar[str]
     source: ClassVar[str] = "gaplab"
     Options: ClassVar[type[Frozen]] = NoOptions
+    before: ClassVar[Mapping[str, Any]] = {}
 
     def __init__(self, options: Frozen | None = None) -> None:
         self.options = options if options is not None else self.Options()

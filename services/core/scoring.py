@@ -10,10 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genomes
-from gaplab.services.core.types import Sample, Simulator
+from gaplab.services.core.types import Belief, Sample, Simulator
 
 NEAREST = 1e-6
 """Smallest distance between a controller and a sample: at 0 the paper's 1/d is infinite."""
+
+NO_FLOOR = 1e-300
+"""Floor under Σe² that guards against division by zero alone."""
 
 
 def weighted_mean(fitnesses: Fitnesses, weights: FloatArray) -> FloatArray:
@@ -39,7 +42,7 @@ def uniqueness_penalty(genomes: Genomes, fitness: FloatArray, samples: Sequence[
     """Return 1/(100 N) Σ 1/d(x, y) over the N samples y; 0 before the first sample.
 
     d is the Euclidean distance over genome and fitness together: the controller's fitness is the simulated one, the
-    sample's the real one.
+    sample's the real one. It adds genes and fitness, whatever their units.
 
     Source: paper, section 2, *Simulated fit and unique*.
 
@@ -52,7 +55,34 @@ def uniqueness_penalty(genomes: Genomes, fitness: FloatArray, samples: Sequence[
         return np.zeros(len(genomes))
     points = np.column_stack([genomes, fitness])
     others = np.array([np.append(each.genome, each.fitness) for each in samples])
-    distances = np.linalg.norm(points[:, None, :] - others[None, :, :], axis=2)
+    return _penalty(points[:, None, :] - others[None, :, :])
+
+
+def scaled_uniqueness_penalty(genomes: Genomes, fitness: FloatArray, belief: Belief) -> FloatArray:
+    """Return the penalty in units that cancel: it is the same share of fitness for any robot and unit.
+
+    Genes are in units of their extents, phases the shorter way around. Fitness and penalty are in units of
+    `belief.scale`.
+
+    Source: gaplab.
+
+    Args:
+        genomes: `(n, g)`.
+        fitness: `(n,)` in the simulator.
+        belief: its samples whose measurement succeeded count.
+    """
+    if not belief.learnable:
+        return np.zeros(len(genomes))
+    others = np.array([each.genome for each in belief.learnable])
+    real = np.array([each.fitness for each in belief.learnable])
+    genes = belief.space.apart(genomes[:, None, :], others[None, :, :])
+    gaps = (fitness[:, None] - real[None, :]) / belief.scale
+    return belief.scale * _penalty(np.concatenate([genes, gaps[:, :, None]], axis=2))
+
+
+def _penalty(differences: FloatArray) -> FloatArray:
+    """Return the penalty `(n,)` of differences `(n, N, g + 1)` between controllers and samples."""
+    distances = np.linalg.norm(differences, axis=2)
     penalty: FloatArray = (1.0 / np.maximum(distances, NEAREST)).mean(axis=1) / 100.0
     return penalty
 
@@ -68,7 +98,7 @@ def simulator_weights(squared_errors: FloatArray, floor: float) -> FloatArray:
 
     Args:
         squared_errors: `(m,)`, inf where the physics failed.
-        floor: floor under Σe², above 0, in the unit of fitness squared.
+        floor: floor under Σe², above 0, in the unit of Σe².
     """
     weights = 1.0 / np.maximum(squared_errors, floor)
     total = weights.sum()
@@ -81,6 +111,11 @@ def weights_of(simulators: Sequence[Simulator], floor: float) -> FloatArray:
     if len(shares) == len(simulators):
         return np.asarray(shares / np.sum(shares))
     return simulator_weights(np.array([each.squared_error for each in simulators]), floor)
+
+
+def effective_size(weights: FloatArray) -> float:
+    """Return the number of equal weights that would be as concentrated as these weights `(m,)`: (Σw)²/Σw²."""
+    return float(weights.sum() ** 2 / (weights**2).sum())
 
 
 def _weighty(fitnesses: Fitnesses, weights: FloatArray) -> Fitnesses:

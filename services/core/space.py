@@ -53,6 +53,11 @@ class Space:
         """Return `(g,)`: upper minus lower."""
         return self.upper - self.lower
 
+    def apart(self, first: FloatArray, second: FloatArray) -> FloatArray:
+        """Return first minus second in units of the extents, `(..., g)`; phases the shorter way around."""
+        shares = (first - second) / self.extent
+        return np.where(self.periodic, shares - np.round(shares), shares)
+
     def draw(self, count: int, rng: Generator) -> Genomes:
         """Return vectors `(count, g)`, drawn uniformly from the box."""
         return self.lower + self.extent * rng.random((count, self.size))

@@ -1,11 +1,14 @@
 """The values of the algorithm: immutable, self-checking, compared by content."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Genome, Parameters, Readings, no_readings
+from gaplab.services.core.discrepancies.base import Discrepancy
+from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.space import Space
 
 
@@ -41,6 +44,11 @@ class Sample:
         return np.append(self.fitness, self.readings)
 
 
+def learnable(samples: Iterable[Sample]) -> tuple[Sample, ...]:
+    """Return the samples whose measurement succeeded."""
+    return tuple(each for each in samples if np.isfinite(each.fitness))
+
+
 @dataclass(frozen=True, eq=False)
 class Simulator:
     """One setting of the tunables, with its discrepancy from the samples that it was tuned on.
@@ -51,12 +59,15 @@ class Simulator:
             physics failed on one.
         interval: `(p, 2)`: ends of the 95 % interval of each tunable; None if the tuner gives none.
         weight: share of the posterior probability; None if the tuner gives none.
+        held_out_error: the discrepancy from the held-out samples, which only the best simulator knows; None without
+            any, or where the physics failed on one.
     """
 
     parameters: FloatArray
     squared_error: float = 0.0
     interval: FloatArray | None = None
     weight: float | None = None
+    held_out_error: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +79,17 @@ class Belief:
         known: `(g,)`: the robot's hand-designed genome.
         samples: samples in the order of measurement.
         simulators: one simulator or a diverse ensemble; random before the first sample.
+        scale: about the fitness that evolution in reality would reach, above 0. It is the fitness in simulation of the
+            first transferred controller.
+        discrepancy: what `simulators` were tuned to minimise.
     """
 
     space: Space
     known: Genome
     samples: tuple[Sample, ...]
     simulators: tuple[Simulator, ...]
+    scale: float = 1.0
+    discrepancy: Discrepancy = field(default_factory=SquaredFitness)
 
     @property
     def parameters(self) -> Parameters:
@@ -88,7 +104,7 @@ class Belief:
     @property
     def learnable(self) -> tuple[Sample, ...]:
         """Return the samples whose measurement succeeded."""
-        return tuple(each for each in self.samples if np.isfinite(each.fitness))
+        return learnable(self.samples)
 
 
 @dataclass(frozen=True)
@@ -103,7 +119,7 @@ class Budget:
     controller_evaluations: int = 10_000
     selection_evaluations: int = 10_000
     simulator_evaluations: int = 2_000
-    reuse_transfer: bool = True
+    reuse_transfer: bool = False
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,11 @@ from gaplab.schemas.estimates import EngineCost, EstimateRead, ExperimentCost
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import check_extent
 from gaplab.services.settings import Limits
-from gaplab.services.specs.resolution import (
-    expected_rollouts,
-    is_direct,
-    resolve_experiment,
-    resolve_study,
-    spec_of,
-)
+from gaplab.services.specs.resolution import expected_rollouts, is_direct, resolve_experiment, resolve_study
 from gaplab.services.store.queries import costs, supervisors
 from gaplab.services.store.session import Store
 

@@ -8,6 +8,7 @@ from gaplab.schemas.records import ExperimentRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
+from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.experiments.archiving import show_again
 from gaplab.services.experiments.lifecycle import get_permitting
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
@@ -41,7 +42,7 @@ def extend_experiment(
     if None in experiment.spec["reality"]["parameters"].values():
         msg = f"experiment {experiment_id!r} was imported while its reality was hidden, so it cannot be extended"
         raise Conflict(msg)
-    spec = _extended(ResolvedSpec.model_validate(experiment.spec), extension)
+    spec = _extended(spec_to_run(experiment.spec), extension)
     check_extent([spec], admitted.limits)
     tally = tallies(session, [experiment_id])[experiment_id]
     check_load(session, [spec], admitted, done=tally.rollouts_done + tally.rollouts_saved)

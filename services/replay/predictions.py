@@ -8,9 +8,10 @@ import numpy as np
 from gaplab.schemas.predictions import Prediction, Predictions
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.robots import robots
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess
 from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, refuse_missing
-from gaplab.services.specs.resolution import spec_of, unit
+from gaplab.services.specs.resolution import unit
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.queries.replays import TunedSample
 from gaplab.services.store.session import Store

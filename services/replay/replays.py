@@ -5,11 +5,12 @@ from gaplab.schemas.replays import ControllerKind, Replay
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound, Violation
 from gaplab.services.core.robots import robots
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.replay.process import Key, RolloutProcess
 from gaplab.services.replay.rollout import ReplayChoice, ReplayRequest, compute_replay
 from gaplab.services.specs.assembly import refuse_missing
 from gaplab.services.specs.hardware import hardware_of
-from gaplab.services.specs.resolution import is_direct, spec_of
+from gaplab.services.specs.resolution import is_direct
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.session import Session, Store

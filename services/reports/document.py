@@ -5,7 +5,7 @@ from gaplab.services.core.comparisons import POOLED
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.squared_error import squared_error_figure
 from gaplab.services.figures.words import number_of, spoken
-from gaplab.services.reports import compared, tables
+from gaplab.services.reports import compared, simulator_tables, tables
 from gaplab.services.reports.blocks import Block, Bullets, Code, Drawing, Paragraph, Report, Section
 from gaplab.services.reports.content import Facts, experiment_facts, study_facts
 from gaplab.services.reports.reproduction import instructions, spec_text
@@ -96,7 +96,8 @@ def _simulators(store: Store, facts: Facts) -> tuple[Block, ...]:
     )
     error = squared_error_figure(tuned.errors, samples=tuned.samples, unit=tuned.unit, title=leading.name)
     return (
-        *tables.misfit(facts),
+        *simulator_tables.misfit(facts),
+        *simulator_tables.identified(facts),
         *([Bullets(remarks)] if remarks else []),
         Drawing(error),
         Drawing(simulator_coordinates(store, leading.curve.experiment, title=leading.name)),

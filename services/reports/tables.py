@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
-from gaplab.schemas.misfit import TunableDistribution
 from gaplab.schemas.provenance import Provenance
 from gaplab.schemas.sensitivity import SensitivityRead
 from gaplab.services.figures.words import number, spoken
@@ -33,31 +32,6 @@ def _at_last(one: Judged, baseline: float | None) -> tuple[str, ...]:
     since = f" since {one.end.since}" if one.end and end == "flat" else ""
     numbers = (str(one.point.n), fixed(one.mean), fixed(one.point.sd), interval(one.point.lower, one.point.upper))
     return (one.name, *numbers, share, end + since)
-
-
-def misfit(facts: Facts) -> Iterator[Grid]:
-    """Yield the misfit of the latest simulators, and their tunables."""
-    names = {one.curve.experiment: one.name for one in facts.judged}
-    found = [(names[id_], read) for id_, read in facts.misfits.items() if read.points]
-    if not found:
-        return
-    last = [(name, read.points[-1], read.unit) for name, read in found]
-    unit = last[0][2]
-    head = ("Experiment", "Iteration", "n", f"Error per sample ({unit})", f"Gap in reality ({unit})")
-    rows = tuple(
-        (name, str(point.iteration), str(point.error.n), _spread(point.error), _spread(point.gap))
-        for name, point, _ in last
-    )
-    yield Grid("Misfit of the best simulators after the last iteration: mean ± SD over repetitions", head, rows)
-    head = ("Experiment", "Tunable", "Tuned", "Bounds", "At a bound")
-    tuned = tuple((name, *_tuned(tunable)) for name, point, _ in last for tunable in point.tunables)
-    yield Grid("Tuned values after the last iteration: mean ± SD over repetitions", head, tuned)
-
-
-def _tuned(found: TunableDistribution) -> tuple[str, ...]:
-    at_bound = (found.at_lower or 0.0) + (found.at_upper or 0.0)
-    bounds = f"{found.lower:g} to {found.upper:g}"
-    return spoken(found.name), _spread(found), bounds, f"{at_bound:.0%}"
 
 
 def sensitivity(check: SensitivityRead) -> Grid:
@@ -181,7 +155,8 @@ def _value(value: Any) -> str:  # noqa: ANN401 - JSON
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _spread(found: Any) -> str:  # noqa: ANN401 - a Distribution or one of a tunable
+def spread(found: Any) -> str:  # noqa: ANN401 - a Distribution or one of a tunable
+    """Return mean ± SD."""
     if found.mean is None:
         return MISSING
     return f"{number(found.mean)} ± {number(found.sd)}" if found.sd is not None else number(found.mean)

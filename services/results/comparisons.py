@@ -8,10 +8,11 @@ from gaplab.schemas.records import common_count
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.comparisons import Compared, compare_all
 from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.fitness import fitness_of
 from gaplab.services.experiments.views import view_experiments
 from gaplab.services.results.curves import recorded_of
-from gaplab.services.specs.resolution import is_direct, spec_of
+from gaplab.services.specs.resolution import is_direct
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments
 from gaplab.services.store.session import Session, Store

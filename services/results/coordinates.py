@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from gaplab.schemas.differences import SettingRead
 from gaplab.schemas.records import ExperimentRead
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.tunables import tunables
 from gaplab.services.experiments import reading
 from gaplab.services.experiments.differences import read_differences
@@ -11,8 +12,8 @@ from gaplab.services.figures.kinds.coordinates import Coordinate, coordinates_fi
 from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import distinct_names, printable, spoken, with_unit
 from gaplab.services.specs.assembly import parameters_of
-from gaplab.services.specs.resolution import spec_of, unit
-from gaplab.services.store.queries import experiments, results
+from gaplab.services.specs.resolution import unit
+from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.session import Store
 
 MOST_SETTINGS = 8
@@ -28,13 +29,13 @@ def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") 
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
         found = sorted(
-            results.best_simulators(session, experiment_id), key=lambda each: (each.repetition, each.iteration)
+            tunings.best_simulators(session, experiment_id), key=lambda each: (each.repetition, each.iteration)
         )
-        measured = results.measured_iterations(session, experiment_id)
+        tuned_on = tunings.measured(session, row).tuned_on
     spec = spec_of(row.spec)
     space = parameters_of(spec.tunables)
-    samples = [results.samples_until(measured, each.repetition, each.iteration) for each in found]
-    errors = tuple(results.per_sample(each.squared_error, n) for each, n in zip(found, samples, strict=True))
+    samples = [tunings.samples_until(tuned_on, each.repetition, each.iteration) for each in found]
+    errors = tuple(tunings.per_sample(each.squared_error, n) for each, n in zip(found, samples, strict=True))
     axes = [
         Coordinate("Iteration", tuple(float(each.iteration) for each in found)),
         *(

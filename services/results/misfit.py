@@ -1,16 +1,30 @@
 """The misfit of an experiment, from its stored simulators and measurements."""
 
+import csv
+import io
 from collections import defaultdict
 from math import inf, nan
 
-from gaplab.schemas.misfit import MisfitRead
-from gaplab.services.core.arrays import frozen
+import numpy as np
+
+from gaplab.schemas.misfit import Distribution, MisfitRead
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.discrepancies import discrepancies
+from gaplab.services.core.identification import Means, overfitting, verdicts
 from gaplab.services.core.misfit import Tuning, misfit_point, remarks
+from gaplab.services.core.robots import robots
+from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.core.tuners import tuners
 from gaplab.services.specs.assembly import parameters_of
-from gaplab.services.specs.resolution import is_direct, spec_of, unit
-from gaplab.services.store.queries import experiments, results
-from gaplab.services.store.queries.results import BestSimulator
+from gaplab.services.specs.resolution import is_direct, unit
+from gaplab.services.store.queries import experiments, tunings
+from gaplab.services.store.queries.tunings import BestSimulator, Measured
 from gaplab.services.store.session import Store
+
+DISTRIBUTIONS = ("error", "held_out_error", "gap")
+STATISTICS = tuple(Distribution.model_fields)
+OF_A_TUNABLE = (*STATISTICS, "at_lower", "at_upper", "spread", "interval", "posterior")
 
 
 def misfit(store: Store, experiment_id: str) -> MisfitRead:
@@ -21,27 +35,78 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     """
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
-        simulators = results.best_simulators(session, experiment_id)
-        measured = results.measured_iterations(session, experiment_id)
+        simulators = tunings.best_simulators(session, experiment_id)
+        measured = tunings.measured(session, row)
+        members = tunings.posteriors(session, experiment_id)
     spec = spec_of(row.spec)
-    tunings: dict[int, list[Tuning]] = defaultdict(list)
+    posteriors = {place: _deviations(*found) for place, found in members.items()}
+    by_iteration: dict[int, list[Tuning]] = defaultdict(list)
     for best in simulators:
-        samples = results.samples_until(measured, best.repetition, best.iteration)
-        tunings[best.iteration].append(_tuning(best, samples))
+        posterior = posteriors.get((best.repetition, best.iteration))
+        by_iteration[best.iteration].append(_tuning(best, measured, posterior))
     names = [each.name for each in spec.tunables]
     points = tuple(
-        misfit_point(iteration, tunings[iteration], names, parameters_of(spec.tunables))
+        misfit_point(iteration, by_iteration[iteration], names, parameters_of(spec.tunables))
         for iteration in range(0 if is_direct(spec) else row.iterations)
-        if tunings[iteration]
+        if by_iteration[iteration]
     )
-    return MisfitRead(experiment=row.id, unit=unit(spec), points=points, remarks=remarks(points, unit(spec)))
+    unseen = overfitting(points[-1], unit(spec)) if points else ""
+    return MisfitRead(
+        experiment=row.id,
+        unit=unit(spec),
+        points=points,
+        remarks=(*remarks(points, unit(spec)), *([unseen] if unseen else [])),
+        held_out=spec.held_out,
+        verdicts=verdicts(points, _means(spec)),
+    )
 
 
-def _tuning(best: BestSimulator, samples: int) -> Tuning:
+def misfit_csv(found: MisfitRead) -> str:
+    """Return a line for each iteration and each number over repetitions; an undefined number is empty."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("iteration", "what", *OF_A_TUNABLE))
+    for point in found.points:
+        for name in DISTRIBUTIONS:
+            numbers = getattr(point, name)
+            blanks = [None] * (len(OF_A_TUNABLE) - len(STATISTICS))
+            writer.writerow((point.iteration, name, *(getattr(numbers, each) for each in STATISTICS), *blanks))
+        for tunable in point.tunables:
+            writer.writerow((point.iteration, tunable.name, *(getattr(tunable, each) for each in OF_A_TUNABLE)))
+    return text.getvalue()
+
+
+def _tuning(best: BestSimulator, measured: Measured, posterior: FloatArray | None) -> Tuning:
+    place = best.repetition, best.iteration
+    pairs = None if best.lower is None or best.upper is None else list(zip(best.lower, best.upper, strict=True))
     return Tuning(
         parameters=frozen(best.parameters),
         squared_error=inf if best.squared_error is None else best.squared_error,
-        samples=samples,
+        samples=tunings.samples_until(measured.tuned_on, *place),
         simulated=nan if best.simulated is None else best.simulated,
         real=nan if best.real is None else best.real,
+        held_out_error=nan if best.held_out_error is None else best.held_out_error,
+        held_out=tunings.samples_until(measured.held_out, *place),
+        interval=None if pairs is None else frozen(pairs),
+        posterior=posterior,
+    )
+
+
+def _deviations(members: list[list[float]], weights: list[float]) -> FloatArray | None:
+    """Return the standard deviations `(p,)` of weighted simulators; None of a single one."""
+    if len(members) < 2:
+        return None
+    values = np.array(members)
+    mean = np.average(values, axis=0, weights=weights)
+    return frozen(np.sqrt(np.average((values - mean) ** 2, axis=0, weights=weights)))
+
+
+def _means(spec: ResolvedSpec) -> Means:
+    """Return what the experiment has not used: readings that its robot has, and tuners with intervals."""
+    sensing = spec.discrepancy.name in discrepancies and discrepancies[spec.discrepancy.name].senses
+    has_sensors = spec.robot.name in robots and robots.create(spec.robot).sensors.size > 0
+    certain = spec.tuner.name in tuners and tuners[spec.tuner.name].intervals
+    return Means(
+        readings=() if sensing or not has_sensors else [name for name, each in discrepancies.items() if each.senses],
+        intervals=() if certain else [name for name, each in tuners.items() if each.intervals],
     )

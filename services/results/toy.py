@@ -12,9 +12,10 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments import hiding
 from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, reality_of
-from gaplab.services.specs.resolution import is_direct, spec_of
+from gaplab.services.specs.resolution import is_direct
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays, results
 from gaplab.services.store.queries.replays import MeasuredController

@@ -5,12 +5,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.tunables import tunables
 from gaplab.services.experiments import hiding
 from gaplab.services.figures.kinds.simulators import Dimension, SimulatorPoint
 from gaplab.services.specs.assembly import parameters_of
-from gaplab.services.specs.resolution import spec_of, unit
-from gaplab.services.store.queries import experiments, results
+from gaplab.services.specs.resolution import unit
+from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.session import Store
 
 
@@ -45,8 +46,8 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
     """
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
-        simulators = results.best_simulators(session, experiment_id)
-        measured = results.measured_iterations(session, experiment_id)
+        simulators = tunings.best_simulators(session, experiment_id)
+        tuned_on = tunings.measured(session, row).tuned_on
         hidden = row.id in hiding.hidden(session, [row])
     spec = spec_of(row.spec)
     errors: dict[int, dict[int, float | None]] = defaultdict(dict)
@@ -54,7 +55,7 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
     for simulator in simulators:
         if at := simulator.iteration:
             errors[at][simulator.repetition] = simulator.squared_error
-            samples[at][simulator.repetition] = results.samples_until(measured, simulator.repetition, at)
+            samples[at][simulator.repetition] = tunings.samples_until(tuned_on, simulator.repetition, at)
     elsewhere = spec.reality.engine.name != spec.engine.name
     return TunedSimulators(
         unit=unit(spec),

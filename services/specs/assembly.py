@@ -167,6 +167,7 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
         batch_size=lambda: engine.batch,
         discrepancy=discrepancies.create(spec.discrepancy),
         tuner=tuners.create(spec.tuner),
+        held_out=spec.held_out,
         reading_times_s=robot.sensors.reading_times_s,
     )
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from gaplab.schemas.differences import DiffColumn, SettingRead, SpecDiff, Values
 from gaplab.services.core.errors import InvalidSpec, Violation
-from gaplab.services.specs.resolution import spec_of
+from gaplab.services.core.stored_specs import spec_of
 
 NO_SETTINGS = {"name", "priority", "max_parallel"}
 """Fields of a spec that change no number."""

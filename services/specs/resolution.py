@@ -1,7 +1,7 @@
 """Resolution: from a submitted spec to a resolved one, with every default; all violations are raised together."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef, TunableRef
@@ -11,6 +11,7 @@ from gaplab.schemas.spec import ExperimentSpec, SharedSettings, StudySpec
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import InvalidSpec, Violation, gather
+from gaplab.services.core.held_out import is_held_out
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.registry import Registry
@@ -24,7 +25,7 @@ from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.default_engines import default_engine, runs
-from gaplab.services.specs.presets import PRESETS
+from gaplab.services.specs.presets import PRESETS, Preset
 from gaplab.services.specs.violations import (
     bounds_of,
     budget_violations,
@@ -40,6 +41,8 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     Raises:
         InvalidSpec: with every violation, each with its pointer into the spec.
     """
+    preset = PRESETS[spec.budget.preset]
+    spec = _as_published(spec) if preset.as_published else spec
     robot, strategy, optimizer, discrepancy, tuner = _created(spec)
     simulated = spec.engine or PluginRef(name=default_engine(robot))
     real = spec.reality.engine or simulated
@@ -47,14 +50,13 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         lambda: _engine(simulated, robot, "/engine"),
         lambda: _engine(real, robot, "/reality/engine" if spec.reality.engine else "/engine"),
     )
-    budget, preset = _budget(spec), PRESETS[spec.budget.preset]
-    violations = [
+    budget = _budget(spec, preset)
+    if violations := [
         *tunable_violations(spec, engine),
         *tuning_violations(robot, discrepancy, tuner),
         *reality_violations(spec, strategy, engine, reality_engine),
         *budget_violations(budget, strategy, optimizer),
-    ]
-    if violations:
+    ]:
         raise InvalidSpec(violations)
     return ResolvedSpec(
         priority=spec.priority,
@@ -69,10 +71,18 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         tunables=tuple(_with_bounds(ref) for ref in spec.tunables),
         discrepancy=_completed(discrepancies, spec.discrepancy),
         tuner=_completed(tuners, spec.tuner),
+        held_out=spec.held_out,
         reality=ResolvedReality(engine=_completed(engines, real), parameters=_truth(spec, robot, reality_engine)),
         budget=budget,
         seed=spec.seed,
     )
+
+
+def _as_published(spec: ExperimentSpec) -> ExperimentSpec:
+    """Return the spec with the plain formula of its strategy, where the spec does not give an option."""
+    published = strategies[spec.strategy.name].published if spec.strategy.name in strategies else {}
+    options = {**published, **spec.strategy.options}
+    return spec.model_copy(update={"strategy": PluginRef(name=spec.strategy.name, options=options)})
 
 
 def _created(spec: ExperimentSpec) -> tuple[Robot, Strategy, Optimizer, Discrepancy, Tuner]:
@@ -138,13 +148,6 @@ def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
     )
 
 
-def spec_of(stored: Mapping[str, Any]) -> ResolvedSpec:
-    """Return a stored spec for reading, not for running: it may lack parameters of reality."""
-    reality = stored["reality"]
-    known = {name: value for name, value in reality["parameters"].items() if value is not None}
-    return ResolvedSpec.model_validate({**stored, "reality": {**reality, "parameters": known}})
-
-
 def is_direct(spec: ExperimentSpec) -> bool:
     """Return whether the experiment is the direct baseline, evolution in reality itself."""
     return spec.strategy.name in strategies and strategies[spec.strategy.name].in_reality
@@ -165,7 +168,10 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
     if strategy.in_reality:
         return budget.controller_evaluations
     selecting = iterations * budget.selection_evaluations * strategy.ensemble if strategy.searches else 0
-    tuning = budget.simulator_evaluations * iterations * (iterations + 1) // 2
+    tuning = sum(
+        (iterations + 1 - number) * (1 if is_held_out(number, spec.held_out) else budget.simulator_evaluations)
+        for number in range(1, iterations + 1)
+    )
     return budget.controller_evaluations * (iterations + 1) + selecting + tuning
 
 
@@ -211,9 +217,8 @@ def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str
     return {**nominal, **spec.reality.parameters}
 
 
-def _budget(spec: ExperimentSpec) -> ResolvedBudget:
+def _budget(spec: ExperimentSpec, preset: Preset) -> ResolvedBudget:
     """Return the budget with every number."""
-    preset = PRESETS[spec.budget.preset]
     return ResolvedBudget(
         preset=spec.budget.preset,
         controller_evaluations=spec.budget.controller_evaluations or preset.controller_evaluations,

@@ -11,7 +11,8 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.schemas.submitted import SpecRead
 from gaplab.services.core.errors import GaplabError
-from gaplab.services.specs.resolution import is_direct, resolve_experiment, resolve_study, spec_of
+from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.specs.resolution import is_direct, resolve_experiment, resolve_study
 
 Spec = dict[str, Any]
 Stored = Mapping[str, Any]

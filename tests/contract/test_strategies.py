@@ -1,5 +1,6 @@
 """What the strategies of the paper promise; test_contract.py asks what every strategy does."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.contract.strategies import GridSearch, belief
 from gaplab.services.core.scoring import uniqueness_penalty
 from gaplab.services.core.strategies import strategies
-from gaplab.services.core.types import Sample
+from gaplab.services.core.types import Sample, Simulator
 from tests.fakes import TRUTH, paraboloid
 
 PAPER = [
@@ -57,6 +58,30 @@ def test_uniqueness_moves_the_selection_away_from_a_sample_on_the_summit() -> No
     assert uniqueness_penalty(moved[None], np.array([1.0]), [sample])[0] < 0.5
 
 
+@pytest.mark.parametrize("name", ["simulated_fit_and_unique", "simulated_fit_and_informative", "informative"])
+def test_no_default_depends_on_the_unit_of_fitness(name: str) -> None:
+    metres, millimetres = scores(name, 1.0), scores(name, 1_000.0)
+
+    np.testing.assert_allclose(millimetres / 1_000, metres, rtol=1e-9)
+
+
+def scores(name: str, unit: float) -> Any:
+    """Scores of controllers if fitness is counted in a unit that is so many times smaller."""
+    strategy = strategies[name]()
+    known = belief(strategy, [Sample(np.array([0.5, 0.5]), 0.8 * unit)])
+    errors = [0.0002 * (1 + rank) * unit**2 for rank in range(len(known.simulators))]
+    simulators = tuple(map(Simulator, known.parameters, errors))
+    known = replace(known, simulators=simulators, scale=0.9 * unit)
+    grid, found = np.random.default_rng(3).random((50, 2)), list[Any]()
+
+    def search(score: Any) -> Any:
+        found.append(score(grid, unit * paraboloid(grid, known.parameters)))
+        return grid[0]
+
+    strategy.select(known, search, np.random.default_rng(0))
+    return found[0]
+
+
 def test_informative_selects_where_the_simulators_disagree_most() -> None:
     genome = select("informative", options={"simulators": 3})
 
@@ -94,5 +119,5 @@ def test_known_fit_adds_up_to_a_quarter_to_each_gene_wraps_phases_and_clips_widt
 def test_truth_is_not_among_what_a_strategy_is_given() -> None:
     believed = belief(strategies["informative"]())
 
-    assert set(vars(believed)) == {"space", "known", "samples", "simulators"}
+    assert set(vars(believed)) == {"space", "known", "samples", "simulators", "scale", "discrepancy"}
     assert not any(np.array_equal(each.parameters, TRUTH) for each in believed.simulators)

@@ -292,3 +292,14 @@ def test_the_catalogue_lists_every_plug_in_with_the_schema_of_its_options(lite: 
 def test_the_service_says_that_it_lives_and_is_ready(api: TestClient) -> None:
     assert api.get("/livez").json() == {"status": "ok"}
     assert api.get("/readyz").json() == {"status": "ok"}
+
+
+def test_misfit_is_a_table_too(store: Store, api: TestClient) -> None:
+    made = api.post("/experiments", json={"strategy": "random", "robot": "toy_function", "budget": "smoke"}).json()
+
+    answer = api.get(f"/experiments/{made['id']}/misfit?format=csv")
+
+    assert answer.headers["content-type"].startswith("text/csv")
+    assert answer.text.startswith(
+        "iteration,what,n,mean,sd,least,greatest,at_lower,at_upper,spread,interval,posterior\n"
+    )

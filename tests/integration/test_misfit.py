@@ -1,16 +1,30 @@
 """Misfit from stored results, on both databases."""
 
+import csv
+import io
+from typing import Any
+
+import numpy as np
 import pytest
 
+from gaplab.schemas.misfit import Identification
 from gaplab.services.core.errors import NotFound
+from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Sample, Selected, Simulator, Transferred, Tuned
-from gaplab.services.experiments import submission
-from gaplab.services.results.misfit import misfit
+from gaplab.services.experiments import reading, submission
+from gaplab.services.results.misfit import misfit, misfit_csv
 from gaplab.services.running import execution
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from tests.experiments import run, some_log, toy
 
 SECRET = 0.987654321
+
+
+def stored_log(store: Store, repetition: Any) -> Any:
+    with store.reading() as session:
+        return logs(session, [repetition])[repetition]
 
 
 def test_the_misfit_is_that_of_the_best_simulator_of_each_repetition(store: Store) -> None:
@@ -86,3 +100,47 @@ def test_nothing_of_reality_is_shown(store: Store) -> None:
 def test_the_misfit_of_an_unknown_experiment_is_not_found(store: Store) -> None:
     with pytest.raises(NotFound, match="no-such"):
         misfit(store, "no-such")
+
+
+def test_held_out_samples_are_stored_and_their_error_is_shown_beside_the_other(store: Store) -> None:
+    experiment = submission.submit_experiment(store, toy(repetitions=1, held_out=0.5)).id
+    (claim,) = execution.claim(store, "me", 1)
+    for step in repetition(setting(claim.spec, 0)):
+        assert execution.record(store, claim, step)
+
+    found = misfit(store, experiment)
+
+    tuned = [step.simulators[0] for step in stored_log(store, claim.id) if isinstance(step, Tuned)]
+    assert [each.held_out_error is None for each in tuned] == [True, True, False]
+    last = found.points[-1]
+    assert found.held_out == 0.5
+    assert last.held_out_error.mean == pytest.approx(tuned[-1].held_out_error ** 0.5)  # type: ignore[operator]
+    assert last.error.mean == pytest.approx(tuned[-1].squared_error ** 0.5)  # of sample 1 alone
+    assert found.points[1].held_out_error.n == 0
+    assert found.remarks[-1].startswith("on held-out samples the best simulators err by")
+    assert [each.verdict for each in found.verdicts] == [Identification.UNKNOWN] * 2
+    shown = reading.list_simulators(store, experiment).items
+    assert [each.held_out_error for each in shown] == [each.held_out_error for each in tuned]
+    assert shown[-1].error == last.error.mean
+    table = list(csv.DictReader(io.StringIO(misfit_csv(found))))
+    (line,) = (row for row in table if row["iteration"] == "2" and row["what"] == "held_out_error")
+    assert float(line["mean"]) == last.held_out_error.mean
+
+
+def test_a_posterior_and_intervals_say_what_a_single_repetition_knows(store: Store) -> None:
+    experiment = submission.submit_experiment(store, toy(repetitions=1, iterations=1)).id
+    (claim,) = execution.claim(store, "me", 1)
+    interval = np.array([[0.9, 1.1], [0.0, 1.5]])
+    simulators = (
+        Simulator(np.array([1.0, 0.7]), 0.04, interval, 0.5),
+        Simulator(np.array([1.1, 0.9]), 0.05, None, 0.5),
+    )
+    log = [*some_log(0), Selected(1, np.array([0.5])), Measured(1, Sample(np.array([0.5]), 0.3)), Tuned(1, simulators)]
+    for step in log:
+        execution.record(store, claim, step)
+
+    static, dynamic = misfit(store, experiment).verdicts
+
+    assert (static.verdict, dynamic.verdict) == (Identification.IDENTIFIED, Identification.NOT)
+    assert static.remaining == pytest.approx(0.2 / (0.95 * 1.5))
+    assert misfit(store, experiment).points[-1].tunables[0].posterior == pytest.approx(0.05 / (1.5 / 12**0.5))

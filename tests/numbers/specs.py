@@ -1,5 +1,7 @@
 """Experiments whose numbers are kept: every strategy on every engine, both optimizers, other options than the defaults.
 
+They state the options of before comparisons were fair, because their numbers were kept then.
+
 The budgets are tiny, so that all of it together is computed in seconds. A change here takes effect with the next
 `python -m tests.numbers.keep`; the tests read what the archives hold.
 """
@@ -8,18 +10,34 @@ from typing import Any
 
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 
-_ENSEMBLE = {"simulators": 3}
+_WEIGHTS = {"least_error": 0.03}
+_ENSEMBLE = {"simulators": 3} | _WEIGHTS
+_UNIQUE = {"name": "simulated_fit_and_unique", "options": {"distances": "plain"}}
+_ALL: Any = [
+    "simulated_fit",
+    _UNIQUE,
+    {"name": "informative", "options": _WEIGHTS},
+    {"name": "simulated_fit_and_informative", "options": _WEIGHTS},
+    "random",
+    "known_fit",
+    "direct",
+]
 _QUADRUPED: dict[str, Any] = {
     "robot": "quadruped",
     "optimizer": {"name": "steady_state", "options": {"population": 4}},
     "iterations": 2,
     "repetitions": 2,
     "direct_repetitions": 3,
-    "budget": {"controller_evaluations": 8, "selection_evaluations": 6, "simulator_evaluations": 6},
+    "budget": {
+        "controller_evaluations": 8,
+        "selection_evaluations": 6,
+        "simulator_evaluations": 6,
+        "reuse_transfer": True,
+    },
     "seed": 2012,
     "strategies": [
         "simulated_fit",
-        "simulated_fit_and_unique",
+        _UNIQUE,
         {"name": "informative", "options": _ENSEMBLE},
         {"name": "simulated_fit_and_informative", "options": _ENSEMBLE},
         "random",
@@ -31,7 +49,13 @@ _TOY: dict[str, Any] = {
     "robot": "toy_function",
     "iterations": 2,
     "repetitions": 2,
-    "budget": {"controller_evaluations": 40, "selection_evaluations": 30, "simulator_evaluations": 40},
+    "budget": {
+        "controller_evaluations": 40,
+        "selection_evaluations": 30,
+        "simulator_evaluations": 40,
+        "reuse_transfer": True,
+    },
+    "strategies": _ALL,
 }
 
 STUDIES = {
@@ -46,7 +70,12 @@ STUDIES = {
             "iterations": 3,
             "optimizer": {"name": "cma_es", "options": {"population": 6, "initial_scale": 0.2, "members": 4}},
             "seed": 2**64 - 1,
-            "strategies": ["simulated_fit", "simulated_fit_and_unique", "simulated_fit_and_informative", "direct"],
+            "strategies": [
+                "simulated_fit",
+                _UNIQUE,
+                {"name": "simulated_fit_and_informative", "options": _WEIGHTS},
+                "direct",
+            ],
         },
         "options": {
             **_TOY,
@@ -63,7 +92,7 @@ STUDIES = {
                 {"name": "informative", "options": {"simulators": 4, "least_error": 0.2}},
                 {
                     "name": "simulated_fit_and_informative",
-                    "options": {"simulators": 5, "fit_weight": 0.5, "informative_weight": 4.0},
+                    "options": _WEIGHTS | {"simulators": 5, "fit_weight": 0.5, "informative_weight": 4.0},
                 },
                 {"name": "known_fit", "options": {"spread": 0.6}},
             ],
@@ -82,9 +111,14 @@ STUDIES = {
             **_TOY,
             "iterations": 1,
             "repetitions": 2,
-            "budget": {"controller_evaluations": 1_000, "selection_evaluations": 300, "simulator_evaluations": 300},
+            "budget": {
+                "controller_evaluations": 1_000,
+                "selection_evaluations": 300,
+                "simulator_evaluations": 300,
+                "reuse_transfer": True,
+            },
             "seed": 3,
-            "strategies": ["simulated_fit_and_informative"],
+            "strategies": [{"name": "simulated_fit_and_informative", "options": _WEIGHTS}],
         },
     }.items()
 }
@@ -92,6 +126,6 @@ STUDIES = {
 
 HALF_WAY = ExperimentSpec.model_validate(
     STUDIES["long"].model_dump(exclude={"strategies", "direct_repetitions"})
-    | {"strategy": "simulated_fit_and_informative"}
+    | {"strategy": {"name": "simulated_fit_and_informative", "options": _WEIGHTS}}
 )
 """The experiment of `long`, which the kept database has half computed."""

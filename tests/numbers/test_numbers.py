@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.archives import export_study, import_archive
 from gaplab.services.core.loop import repetition
+from gaplab.services.core.stored_specs import spec_to_run
 from gaplab.services.core.types import Measured, Probed, Selected, Transferred, Tuned
 from gaplab.services.experiments import reading
 from gaplab.services.results import curves
 from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_study
 from gaplab.services.store.session import Store
 from gaplab.services.store.stored_specs import complete
 from tests.numbers.kept_numbers import (
@@ -93,13 +94,45 @@ def cost(phase: Any, step: Any) -> Any:
 @pytest.mark.parametrize("name", KEPT)
 def test_the_pure_loop_computes_the_kept_numbers(name: Any) -> None:
     found = members(archive(name))
-    specs = [ExperimentSpec.model_validate(each["spec"]) for each in found["experiment"]]
 
-    computed = [[rows(list(repetition(setting(spec, each)))) for each in range(spec.repetitions)] for spec in specs]  # type: ignore[arg-type]
+    computed = computed_from(spec_to_run(each["spec"]) for each in found["experiment"])
 
     if computed != numbers(found) and (other := other_machine()):
         pytest.skip(f"the numbers differ, and so does the machine: {other}")
     assert computed == numbers(found), other_versions(found)
+
+
+def computed_from(specs: Any) -> Any:
+    return [[rows(list(repetition(setting(spec, each)))) for each in range(spec.repetitions)] for spec in specs]
+
+
+@pytest.mark.parametrize("name", ["analytic", "cma_es", "options"])
+def test_explicit_old_options_give_the_kept_numbers(name: Any) -> None:
+    kept = numbers(members(archive(name)))
+
+    computed = computed_from(resolve_study(STUDIES[name]))
+
+    if computed != kept and (other := other_machine()):
+        pytest.skip(f"the numbers differ, and so does the machine: {other}")
+    assert computed == kept
+
+
+def test_every_kept_spec_has_the_options_of_its_study() -> None:
+    for name, study in STUDIES.items():
+        stored = [spec_to_run(each["spec"]) for each in members(archive(name))["experiment"]]
+        for old, new in zip(stored, resolve_study(study), strict=True):
+            assert old.budget == new.budget
+            assert old.strategy == new.strategy
+
+
+def test_a_search_of_its_own_gives_simulated_fit_other_numbers() -> None:
+    (fit, *_) = resolve_study(STUDIES["analytic"])
+    (kept, *_) = numbers(members(archive("analytic")))
+    budget = fit.budget.model_copy(update={"reuse_transfer": False})
+
+    (computed,) = computed_from([fit.model_copy(update={"budget": budget})])
+
+    assert computed != kept
 
 
 @pytest.fixture(scope="module", params=KEPT)

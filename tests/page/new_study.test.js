@@ -10,7 +10,7 @@ const CATALOGUE = {
   tunables: [{ name: "grip" }, { name: "mass" }],
   defaults: {
     strategies: [{ name: "two", options: {} }, { name: "one", options: {} }], robot: { name: "legs", options: {} },
-    optimizer: { name: "climber", options: {} }, discrepancy: { name: "squares", options: {} }, tuner: { name: "hill", options: {} }, tunables: [{ name: "grip" }], budget: { preset: "paper", reuse_transfer: true },
+    optimizer: { name: "climber", options: {} }, discrepancy: { name: "squares", options: {} }, tuner: { name: "hill", options: {} }, tunables: [{ name: "grip" }], budget: { preset: "paper", reuse_transfer: false },
   },
 };
 
@@ -19,7 +19,7 @@ test("a spec goes through the form unchanged", () => {
     name: "all", strategies: ["two", { name: "two", options: { weight: 0.5 } }], robot: { name: "wheels", options: { radius: 2 } }, engine: "fast",
     optimizer: "climber", discrepancy: { name: "squares", options: { to: 1 } }, tuner: "hill", tunables: ["grip", { name: "mass", lower: 0, upper: 2.5 }],
     reality: { engine: "slow", parameters: { grip: 0 } },
-    budget: { preset: "smoke", controller_evaluations: 100, reuse_transfer: false },
+    budget: { preset: "smoke", controller_evaluations: 100, reuse_transfer: true },
     iterations: 3, repetitions: 4, direct_repetitions: 8, seed: 18446744073709551615n, priority: -10, max_parallel: 2,
   };
   assert.deepEqual(specOf(draftOf(spec, CATALOGUE)), spec);

@@ -8,13 +8,14 @@ import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.answers import BLOCK, Answers, pack, unpack
-from gaplab.services.core.loop import History, next_step, repetition
+from gaplab.services.core.history import History
+from gaplab.services.core.loop import next_step, repetition
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.types import Budget
 from tests.fakes import Recorder, flat, paraboloid, small_setting
 
-BUDGET = Budget(controller_evaluations=24, selection_evaluations=20, simulator_evaluations=24, reuse_transfer=False)
+BUDGET = Budget(controller_evaluations=24, selection_evaluations=20, simulator_evaluations=24)
 
 
 class Interrupted(Exception):

@@ -6,14 +6,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gaplab.services.core.discrepancies.absolute_fitness import AbsoluteFitness
 from gaplab.services.core.errors import PluginBroken
+from gaplab.services.core.history import History
 from gaplab.services.core.loop import recorded_fitness, repetition
 from gaplab.services.core.strategies import strategies
-from gaplab.services.core.strategies.base import EnsembleOptions, Strategy
+from gaplab.services.core.strategies.base import DiverseOptions, Strategy
 from gaplab.services.core.strategies.informative import Informative
-from gaplab.services.core.types import Budget, Measured, Probed, Sample, Selected, Transferred, Tuned
+from gaplab.services.core.strategies.random import Random
+from gaplab.services.core.types import Belief, Budget, Measured, Probed, Sample, Selected, Transferred, Tuned
 from tests.fakes import CountedReality, Recorder, flat, paraboloid, small_setting
 
+REUSING = Budget(40, 30, 50, reuse_transfer=True)
 PHASES = (Selected, Measured, Tuned, Transferred, Probed)
 
 
@@ -114,9 +118,9 @@ def test_a_strategy_that_transfers_the_best_of_many_simulators_saves_the_budget_
     class Fittest(Informative):
         selects_transferred = True
 
-    strategy = Fittest(EnsembleOptions(simulators=4))
+    strategy = Fittest(DiverseOptions(simulators=4))
 
-    steps = list(repetition(replace(small_setting(), strategy=strategy)))
+    steps = list(repetition(replace(small_setting(budget=REUSING), strategy=strategy)))
 
     assert {step.cost.saved for step in steps if isinstance(step, Selected)} == {30 * 4}
 
@@ -143,7 +147,7 @@ def test_a_search_for_which_there_is_no_budget_is_refused(said: Any, wrong: Any)
 
 def test_a_budget_that_the_population_does_not_divide_is_honoured_too() -> None:
     simulate = Recorder()
-    budget = Budget(controller_evaluations=7, selection_evaluations=6, simulator_evaluations=9, reuse_transfer=False)
+    budget = Budget(controller_evaluations=7, selection_evaluations=6, simulator_evaluations=9)
 
     steps = list(repetition(small_setting(simulate=simulate, budget=budget, iterations=1)))
 
@@ -151,8 +155,8 @@ def test_a_budget_that_the_population_does_not_divide_is_honoured_too() -> None:
     assert sum(cost.rollouts + cost.saved for cost in costs) == 7 + 6 + 9 + 7
 
 
-def test_simulated_fit_tries_the_controller_that_was_just_transferred() -> None:
-    steps = list(repetition(small_setting()))
+def test_with_reuse_simulated_fit_tries_the_controller_that_was_just_transferred() -> None:
+    steps = list(repetition(small_setting(budget=REUSING)))
 
     transferred = [step.genome for step in steps if isinstance(step, Transferred)]
     selected = [step for step in steps if isinstance(step, Selected)]
@@ -160,8 +164,8 @@ def test_simulated_fit_tries_the_controller_that_was_just_transferred() -> None:
     assert {(step.cost.rollouts, step.cost.saved) for step in selected} == {(0, 30)}
 
 
-def test_without_reuse_simulated_fit_searches_anew() -> None:
-    steps = list(repetition(small_setting(budget=Budget(40, 30, 50, reuse_transfer=False))))
+def test_simulated_fit_searches_with_the_budget_of_every_selection() -> None:
+    steps = list(repetition(small_setting()))
 
     assert {step.cost.rollouts for step in steps if isinstance(step, Selected)} == {30}
     transferred = [step.genome for step in steps if isinstance(step, Transferred)]
@@ -244,3 +248,32 @@ def test_the_transfer_evolves_in_the_best_simulator() -> None:
     transferred = next(repetition(setting, [step]))
 
     np.testing.assert_allclose(transferred.genome, best, atol=0.01)  # type: ignore[union-attr]
+
+
+def test_the_scale_is_the_size_of_the_first_transferred_fitness_that_has_one() -> None:
+    def scale(*fitnesses: float) -> float | None:
+        history = History()
+        for number, fitness in enumerate(fitnesses):
+            history = history.after(Transferred(number, np.zeros(2), fitness))
+        return history.scale
+
+    assert scale() is None
+    assert scale(0.4, 0.9) == 0.4
+    assert scale(-2.0) == 2.0
+    assert scale(float("nan"), 0.0, 0.7) == 0.7
+
+
+def test_a_strategy_is_told_the_scale_and_the_discrepancy() -> None:
+    told: list[Belief] = []
+
+    class Listener(Random):
+        def select(self, belief: Any, search: Any, rng: Any) -> Any:
+            told.append(belief)
+            return super().select(belief, search, rng)
+
+    setting = small_setting(strategy="random", discrepancy=AbsoluteFitness())
+
+    steps = list(repetition(replace(setting, strategy=Listener())))
+
+    first = next(step.fitness for step in steps if isinstance(step, Transferred))
+    assert [(each.scale, each.discrepancy.name) for each in told] == [(first, "absolute_fitness")] * 3

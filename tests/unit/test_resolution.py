@@ -7,9 +7,12 @@ import pytest
 from gaplab.schemas.spec import ExperimentSpec, Schedule, StudySpec
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.stored_specs import spec_as_stored, spec_of, spec_to_run
+from gaplab.services.core.strategies import strategies
 from gaplab.services.engines import engines
 from gaplab.services.specs.presets import PRESETS
 from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment, resolve_study
+from gaplab.services.specs.shortening import experiment_spec
 
 EMBODIED = [name for name, engine in engines.items() if engine.runs(Quadruped().world)]
 
@@ -44,6 +47,57 @@ def test_a_resolved_spec_has_nothing_left_out_and_resolves_to_itself() -> None:
     settled = resolved.model_dump(exclude=set(Schedule.model_fields))
     assert None not in [*settled.values(), *dict(resolved.budget).values(), *dict(resolved.tunables[0]).values()]
     assert resolve_experiment(resolved) == resolved
+
+
+def test_every_strategy_has_equal_searches_unless_asked_otherwise() -> None:
+    for preset in PRESETS:
+        assert not resolve_experiment(experiment(budget=preset)).budget.reuse_transfer
+    assert resolve_experiment(experiment(budget={"preset": "desk", "reuse_transfer": True})).budget.reuse_transfer
+
+
+def test_as_published_has_the_papers_numbers_and_its_plain_formulas() -> None:
+    published = {
+        each.strategy.name: each for each in resolve_study(StudySpec.model_validate({"budget": "as_published"}))
+    }
+
+    paper = resolve_experiment(experiment())
+    assert {each.budget.selection_evaluations for each in published.values()} == {10_000}
+    assert published["simulated_fit"] == paper.model_copy(
+        update={"budget": paper.budget.model_copy(update={"preset": "as_published"})}
+    )
+    assert published["informative"].strategy.options["least_error"] == 0.0
+    assert published["simulated_fit_and_informative"].strategy.options["least_error"] == 0.0
+    assert published["simulated_fit_and_unique"].strategy.options == {"distances": "plain"}
+    assert published["informative"].name == "informative (least_error 0.0)"
+
+
+def test_an_option_given_beats_the_published_one() -> None:
+    strategy = {"name": "informative", "options": {"least_error": 0.1, "simulators": 5}}
+
+    resolved = resolve_experiment(experiment(strategy=strategy, budget={"preset": "as_published"}))
+
+    assert resolved.strategy.options == {"simulators": 5, "least_share": 0.03, "least_error": 0.1}
+
+
+@pytest.mark.parametrize("attribute", ["published", "before"])
+@pytest.mark.parametrize("name", sorted(strategies))
+def test_published_and_former_options_are_options(name: str, attribute: str) -> None:
+    strategies[name].Options.model_validate(getattr(strategies[name], attribute))
+
+
+def test_a_stored_spec_without_a_later_option_has_its_value_of_before() -> None:
+    stored = resolve_experiment(experiment(strategy="simulated_fit_and_unique")).model_dump(mode="json")
+    assert stored["strategy"]["options"] == {"distances": "scaled"}
+
+    older = stored | {"strategy": {"name": "simulated_fit_and_unique", "options": {}}}
+
+    for read in (spec_of, spec_to_run):
+        assert read(older).strategy.options == {"distances": "plain"}
+        assert read(stored).strategy.options == {"distances": "scaled"}
+    assert spec_as_stored(older).strategy.options == {}
+    again = experiment_spec(older).spec
+    assert again is not None
+    assert resolve_experiment(ExperimentSpec.model_validate(again)).strategy.options == {"distances": "plain"}
 
 
 @pytest.mark.parametrize("preset", sorted(PRESETS))

@@ -3,8 +3,19 @@
 import numpy as np
 import pytest
 
-from gaplab.services.core.scoring import simulator_weights, uniqueness_penalty, weighted_deviation, weighted_mean
-from gaplab.services.core.types import Sample
+from gaplab.services.core.discrepancies import discrepancies
+from gaplab.services.core.scoring import (
+    NO_FLOOR,
+    effective_size,
+    scaled_uniqueness_penalty,
+    simulator_weights,
+    uniqueness_penalty,
+    weighted_deviation,
+    weighted_mean,
+)
+from gaplab.services.core.space import Space
+from gaplab.services.core.strategies.base import DiverseOptions
+from gaplab.services.core.types import Belief, Sample
 
 FITNESSES = np.array([[1.0, 3.0], [2.0, 2.0]])
 WEIGHTS = np.array([0.75, 0.25])
@@ -46,6 +57,56 @@ def test_a_controller_on_top_of_a_sample_has_a_large_but_finite_penalty() -> Non
 
     assert np.isfinite(penalty).all()
     assert penalty[0] > 1_000
+
+
+def believed(*samples: Sample, scale: float = 1.0, discrepancy: str = "squared_fitness") -> Belief:
+    space = Space.box([0.0, 0.0], [2.0, 10.0], [True, False])
+    return Belief(space, np.zeros(2), samples, (), scale, discrepancies[discrepancy]())
+
+
+def test_scaled_distances_count_extents_turns_and_shares_of_the_scale() -> None:
+    sample = Sample(np.array([0.1, 3.0]), 0.5)
+
+    # the phase is 0.2 of 2 away around the turn, the width 2 of 10, the fitness 0.1 of 0.5
+    penalty = scaled_uniqueness_penalty(np.array([[1.9, 5.0]]), np.array([0.6]), believed(sample, scale=0.5))
+
+    assert penalty == pytest.approx(0.5 / (0.1**2 + 0.2**2 + 0.2**2) ** 0.5 / 100)
+
+
+def test_samples_that_failed_have_no_scaled_distance() -> None:
+    failed = believed(Sample(np.zeros(2), float("nan")))
+
+    np.testing.assert_array_equal(scaled_uniqueness_penalty(np.zeros((3, 2)), np.zeros(3), failed), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("options", "discrepancy", "floor"),
+    [
+        ({}, "squared_fitness", (0.03 * 0.5) ** 2),
+        ({"least_share": 0.1}, "squared_fitness", 0.05**2),
+        ({"least_error": 0.03}, "squared_fitness", 0.03**2),
+        ({"least_error": 0.0}, "squared_fitness", NO_FLOOR),
+        ({}, "absolute_fitness", 0.03 * 0.5),
+        ({"least_error": 0.2}, "absolute_fitness", 0.2),
+        ({}, "readings", 1.0),
+        ({"least_error": 0.5}, "readings", 0.25),
+        ({"least_error": 0.0}, "readings", NO_FLOOR),
+    ],
+)
+def test_the_floor_is_a_share_of_the_scale_or_the_noise_of_readings(
+    options: dict[str, float], discrepancy: str, floor: float
+) -> None:
+    assert DiverseOptions(**options).floor(believed(scale=0.5, discrepancy=discrepancy)) == pytest.approx(floor)  # type: ignore[arg-type]
+
+
+def test_without_a_floor_a_perfect_simulator_takes_all_the_weight() -> None:
+    np.testing.assert_allclose(simulator_weights(np.array([0.0, 1e-6, np.inf]), NO_FLOOR), [1.0, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(simulator_weights(np.zeros(4), NO_FLOOR), np.full(4, 0.25))
+
+
+def test_the_effective_size_is_that_of_equal_weights() -> None:
+    assert effective_size(np.full(20, 0.05)) == pytest.approx(20)
+    assert effective_size(np.array([2.0, 2.0, 0.0, 0.0])) == pytest.approx(2)
 
 
 def test_weights_are_the_simulators_fitnesses_normalised() -> None:

@@ -27,9 +27,10 @@ declare namespace Api {
     controller_evaluations: number;
     selection_evaluations: number;
     simulator_evaluations: number;
+    as_published: boolean;
   }
   interface BudgetSpec {
-    preset: "smoke" | "desk" | "paper";
+    preset: "smoke" | "desk" | "paper" | "as_published";
     controller_evaluations: number | null;
     selection_evaluations: number | null;
     simulator_evaluations: number | null;
@@ -222,6 +223,7 @@ declare namespace Api {
     tunables: Array<TunableRef>;
     discrepancy: PluginRef;
     tuner: PluginRef;
+    held_out: number;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
@@ -250,6 +252,7 @@ declare namespace Api {
     status: "ok" | "degraded";
     warnings: Array<string>;
   }
+  type Identification = "identified" | "partly identified" | "not identified" | "unknown";
   interface IgnoredFile {
     file: string;
     why: string;
@@ -264,6 +267,7 @@ declare namespace Api {
   interface MisfitPoint {
     iteration: number;
     error: Distribution;
+    held_out_error: Distribution;
     gap: Distribution;
     tunables: Array<TunableDistribution>;
   }
@@ -272,6 +276,8 @@ declare namespace Api {
     unit: string;
     points: Array<MisfitPoint>;
     remarks: Array<string>;
+    held_out: number;
+    verdicts: Array<TunableVerdict>;
   }
   interface NotesRead {
     html: string;
@@ -471,6 +477,7 @@ declare namespace Api {
     tunables: Array<TunableRef>;
     discrepancy: PluginRef;
     tuner: PluginRef;
+    held_out: number;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
@@ -499,6 +506,7 @@ declare namespace Api {
     error: number | null;
     intervals: Record<string, [number, number]> | null;
     weight: number | null;
+    held_out_error: number | null;
   }
   interface SpecDiff {
     columns: Array<DiffColumn>;
@@ -544,6 +552,7 @@ declare namespace Api {
     tunables: Array<TunableRef>;
     discrepancy: PluginRef;
     tuner: PluginRef;
+    held_out: number;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
@@ -601,8 +610,18 @@ declare namespace Api {
     upper: number;
     at_lower: number | null;
     at_upper: number | null;
+    spread: number | null;
+    interval: number | null;
+    posterior: number | null;
   }
   type TunableRef = string | Record<string, any>;
+  interface TunableVerdict {
+    name: string;
+    verdict: Identification;
+    remaining: number | null;
+    sentence: string;
+    helps: Array<string>;
+  }
   type Verdict = "nothing" | "rough" | "smooth" | "unknown";
   interface VerdictRead {
     headline: string;

@@ -15,3 +15,7 @@ class AbsoluteFitness(Discrepancy):
     def terms(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:  # noqa: ARG002 - the contract's
         """Return the absolute differences, in the unit of fitness."""
         return np.abs(simulated[..., 0] - measured[:, None, 0])
+
+    def floor(self, error: float) -> float:
+        """Return the error itself."""
+        return error

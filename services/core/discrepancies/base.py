@@ -36,6 +36,14 @@ class Discrepancy(Plugin):
         """Return the variance of a residual if the simulator is right; 0 if it is unknown."""
         return 0.0
 
+    def floor(self, error: float) -> float:
+        """Return the discrepancy of a simulator that errs by `error`, at least 0, on one sample alone."""
+        return error**2
+
+    def least_error(self, fitness_error: float) -> float:
+        """Return the error below which simulators are equally good, given one in the unit of fitness."""
+        return fitness_error
+
     @classmethod
     def details(cls) -> dict[str, Any]:
         """Return whether it compares readings, and whether it is a sum of squares, for the catalogue."""

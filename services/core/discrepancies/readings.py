@@ -49,5 +49,9 @@ class Readings(Discrepancy):
         """Return that of a reading, which is in units of its noise, divided by the number of readings that count."""
         return 1.0 / len(self._early(times_s))
 
+    def least_error(self, fitness_error: float) -> float:  # noqa: ARG002 - readings are in units of their noise
+        """Return 1, the noise of the sensors: a smaller error says nothing about a simulator."""
+        return 1.0
+
     def _early(self, times_s: FloatArray) -> NDArray[np.intp]:
         return np.flatnonzero(times_s <= times_s.min() + self.options.seconds + 1e-9)

@@ -1,10 +1,13 @@
 """Try a controller on which the simulators disagree."""
 
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
 from numpy.random import Generator
 
 from gaplab.services.core.arrays import Genome
 from gaplab.services.core.scoring import weighted_deviation, weights_of
-from gaplab.services.core.strategies.base import EnsembleOptions, Search, Strategy
+from gaplab.services.core.strategies.base import DiverseOptions, Search, Strategy
 from gaplab.services.core.types import Belief
 
 
@@ -16,8 +19,9 @@ class Informative(Strategy):
 
     name = "informative"
     source = "Paper, section 2, Informative; Estimation-Exploration"
-    Options = EnsembleOptions
-    options: EnsembleOptions
+    published: ClassVar[Mapping[str, Any]] = {"least_error": 0.0}
+    Options = DiverseOptions
+    options: DiverseOptions
 
     @property
     def ensemble(self) -> int:
@@ -26,5 +30,5 @@ class Informative(Strategy):
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
         """Return the controller with the highest weighted deviation of simulated fitness found."""
-        weights = weights_of(belief.simulators, self.options.least_error**2)
+        weights = weights_of(belief.simulators, self.options.floor(belief))
         return search(lambda _, fitnesses: weighted_deviation(fitnesses, weights))

@@ -1,19 +1,20 @@
 """Try a controller that is expected to be fit and on which simulators disagree."""
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
 
 from numpy.random import Generator
 from pydantic import Field
 
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
 from gaplab.services.core.scoring import weighted_deviation, weighted_mean, weights_of
-from gaplab.services.core.strategies.base import EnsembleOptions, Search, Strategy
+from gaplab.services.core.strategies.base import DiverseOptions, Search, Strategy
 from gaplab.services.core.types import Belief
 
 Weight = Annotated[float, Field(strict=True, ge=0, le=1e6)]
 
 
-class SimulatedFitAndInformativeOptions(EnsembleOptions):
+class SimulatedFitAndInformativeOptions(DiverseOptions):
     """Weights of fitness and disagreement; the paper uses a plain sum, and proposes a weighted one."""
 
     fit_weight: Weight = Field(default=1.0, description="weight of the mean simulated fitness")
@@ -28,6 +29,7 @@ class SimulatedFitAndInformative(Strategy):
 
     name = "simulated_fit_and_informative"
     source = "Paper, section 2, Simulated Fit and Informative; the weights: section 4"
+    published: ClassVar[Mapping[str, Any]] = {"least_error": 0.0}
     Options = SimulatedFitAndInformativeOptions
     options: SimulatedFitAndInformativeOptions
 
@@ -38,7 +40,7 @@ class SimulatedFitAndInformative(Strategy):
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
         """Return the controller with the highest sum of weighted mean and weighted deviation found."""
-        weights = weights_of(belief.simulators, self.options.least_error**2)
+        weights = weights_of(belief.simulators, self.options.floor(belief))
 
         def score(_: Genomes, fitnesses: Fitnesses) -> FloatArray:
             fit = self.options.fit_weight * weighted_mean(fitnesses, weights)

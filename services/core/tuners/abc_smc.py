@@ -37,6 +37,7 @@ class AbcSmc(Tuner):
 
     name = "abc_smc"
     source = "Toni et al. 2009, Beaumont et al. 2009; numbers of rounds and particles are gaplab's"
+    intervals = True
     Options = AbcSmcOptions
     options: AbcSmcOptions
 

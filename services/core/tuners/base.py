@@ -39,9 +39,11 @@ class Tuner(Plugin):
 
     Attributes:
         needs_squares: true if it needs a discrepancy that is a sum of squares.
+        intervals: true if it gives 95 % intervals of the tunables.
     """
 
     needs_squares: ClassVar[bool] = False
+    intervals: ClassVar[bool] = False
 
     @abstractmethod
     def tune(self, task: Task, rng: Generator) -> tuple[Simulator, ...]:
@@ -49,5 +51,5 @@ class Tuner(Plugin):
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return whether it needs a sum of squares, for the catalogue."""
-        return {"needs_squares": cls.needs_squares}
+        """Return whether it needs a sum of squares, and whether it gives intervals, for the catalogue."""
+        return {"needs_squares": cls.needs_squares, "intervals": cls.intervals}

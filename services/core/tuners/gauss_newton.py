@@ -60,6 +60,7 @@ class GaussNewton(Tuner):
     name = "gauss_newton"
     source = "Gauss-Newton with statistical linearisation, as in iterated Kalman filters; all numbers are gaplab's"
     needs_squares = True
+    intervals = True
     Options = GaussNewtonOptions
     options: GaussNewtonOptions
 

@@ -64,6 +64,7 @@ class SimulatorRow(Base):
     """One tuned simulator; rank 0 is the best of its iteration.
 
     Its 95 % intervals, from `lower` to `upper`, and its share of the posterior are NULL unless the tuner gives them.
+    Its discrepancy from held-out samples is NULL unless it is the best, and there are some.
     """
 
     __tablename__ = "simulator"
@@ -79,3 +80,4 @@ class SimulatorRow(Base):
     lower: Mapped[list[float] | None]
     upper: Mapped[list[float] | None]
     weight: Mapped[float | None]
+    held_out_error: Mapped[float | None]

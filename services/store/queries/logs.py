@@ -85,7 +85,7 @@ def _tuned(row: IterationRow, simulators: Sequence[SimulatorRow]) -> Tuned | Non
 
 def _simulator(row: SimulatorRow) -> Simulator:
     interval = None if row.lower is None or row.upper is None else frozen(list(zip(row.lower, row.upper, strict=True)))
-    return Simulator(frozen(row.parameters), _or(inf, row.squared_error), interval, row.weight)
+    return Simulator(frozen(row.parameters), _or(inf, row.squared_error), interval, row.weight, row.held_out_error)
 
 
 def _transferred(row: IterationRow) -> Transferred | None:

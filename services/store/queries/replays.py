@@ -6,7 +6,7 @@ from sqlalchemy.orm import Session, aliased
 
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.store.models import IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
-from gaplab.services.store.queries.results import of_experiments
+from gaplab.services.store.queries.repetition_rows import of_experiments
 
 
 @dataclass(frozen=True)

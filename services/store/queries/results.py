@@ -1,8 +1,6 @@
 """Results: samples, simulators, recorded fitnesses and costs of iterations."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from math import sqrt
 from typing import Any
 
 from sqlalchemy import ColumnElement, Select, case, func, select, tuple_
@@ -12,17 +10,11 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
 from gaplab.services.store.cursor import decode, encode
 from gaplab.services.store.models import ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
-
-ResultRow = IterationRow | MeasurementRow | SimulatorRow
+from gaplab.services.store.queries.repetition_rows import of_experiments
+from gaplab.services.store.queries.tunings import measured, per_sample, samples_until
 
 _TURN = case((MeasurementRow.kind == MeasurementKind.SAMPLE, 0), else_=1)
 """Within an iteration the sample comes before the probe."""
-
-
-def of_experiments(row: type[ResultRow], experiments: Sequence[str], *columns: Any) -> Select[Any]:  # noqa: ANN401
-    """Return a query for columns of a table of results, joined with the repetitions of these experiments."""
-    joined = select(*columns).join(RepetitionRow, RepetitionRow.id == row.repetition_id)
-    return joined.where(RepetitionRow.experiment_id.in_(experiments))
 
 
 def _page(
@@ -83,9 +75,9 @@ def page_of_simulators(
     query = of_experiments(row, [experiment.id], *key, row)
     wanted = {RepetitionRow.number: repetition, row.iteration: iteration}
     names = [each["name"] for each in experiment.spec["tunables"]]
-    measured = measured_iterations(session, experiment.id)
+    tuned_on = measured(session, experiment).tuned_on
     return tuple(
-        _simulator(number, found, names, samples_until(measured, number, found.iteration))
+        _simulator(number, found, names, samples_until(tuned_on, number, found.iteration))
         for number, *_, found in _page(session, query, key, wanted, limit, cursor)
     )
 
@@ -101,6 +93,7 @@ def _simulator(repetition: int, row: SimulatorRow, names: Sequence[str], samples
         error=per_sample(row.squared_error, samples),
         intervals=None if pairs is None else dict(zip(names, pairs, strict=True)),
         weight=row.weight,
+        held_out_error=row.held_out_error,
     )
 
 
@@ -166,63 +159,6 @@ def recorded_at(session: Session, counts: Mapping[str, int]) -> dict[str, list[f
     for experiment, fitness in session.execute(query):
         found.setdefault(experiment, []).append(fitness)
     return found
-
-
-@dataclass(frozen=True)
-class BestSimulator:
-    """The best simulator of one iteration, and the fitness of the controller that was evolved in it.
-
-    Attributes:
-        squared_error: None if the physics failed on a sample.
-        simulated: fitness in the simulator; None if there is none.
-        real: fitness in reality; None if there is none.
-    """
-
-    repetition: int
-    iteration: int
-    parameters: list[float]
-    squared_error: float | None
-    simulated: float | None
-    real: float | None
-
-
-def best_simulators(session: Session, experiment: str) -> tuple[BestSimulator, ...]:
-    """Return the best simulator of every iteration of every repetition."""
-    row, found, probe = IterationRow, SimulatorRow, MeasurementRow
-    columns = found.parameters, found.squared_error, row.simulated_fitness, probe.fitness
-    best = (found.repetition_id == row.repetition_id) & (found.iteration == row.number) & (found.rank == 0)
-    probed = (probe.repetition_id == row.repetition_id) & (probe.iteration == row.number)
-    query = of_experiments(row, [experiment], RepetitionRow.number, row.number, *columns)
-    query = query.join(found, best).outerjoin(probe, probed & (probe.kind == MeasurementKind.PROBE))
-    return tuple(BestSimulator(*each) for each in session.execute(query.order_by(RepetitionRow.number, row.number)))
-
-
-def measured_iterations(session: Session, experiment: str) -> dict[int, list[int]]:
-    """Return the iterations whose sample has a fitness, by repetition: simulators are tuned on these samples."""
-    row = MeasurementRow
-    query = of_experiments(row, [experiment], RepetitionRow.number, row.iteration)
-    gathered: dict[int, list[int]] = {}
-    for repetition, iteration in session.execute(
-        query.where(row.kind == MeasurementKind.SAMPLE, row.fitness.is_not(None))
-    ):
-        gathered.setdefault(repetition, []).append(iteration)
-    return gathered
-
-
-def samples_until(measured: Mapping[int, Sequence[int]], repetition: int, iteration: int) -> int:
-    """Return the number of samples that the simulators of an iteration were tuned on.
-
-    Args:
-        measured: the result of `measured_iterations`.
-        repetition: number of the repetition.
-        iteration: number of the iteration.
-    """
-    return sum(each <= iteration for each in measured.get(repetition, ()))
-
-
-def per_sample(squared_error: float | None, samples: int) -> float | None:
-    """Return the root mean square error; None without samples, or if the physics failed on one."""
-    return sqrt(squared_error / samples) if squared_error is not None and samples else None
 
 
 def iteration_costs(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str, int, int, int, float, bool]]:

@@ -132,6 +132,7 @@ def simulator_columns(step: Tuned) -> list[dict[str, Any]]:
             "lower": None if each.interval is None else vector(each.interval[:, 0]),
             "upper": None if each.interval is None else vector(each.interval[:, 1]),
             "weight": each.weight,
+            "held_out_error": each.held_out_error,
         }
         for rank, each in enumerate(step.simulators)
     ]

@@ -1,5 +1,5 @@
 // @ts-check
-/** How far tuned simulators are from reality, and from each other when tuning is repeated. */
+/** How far tuned simulators are from reality and from each other, and which tunables that identifies. */
 
 import { get } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
@@ -10,8 +10,10 @@ import { table } from "../../lib/table.js";
 const KINDS = ["tuned", "probed"];
 const NOTE = "The error per sample is the root mean square over the samples. Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound. Iteration 0 is not tuned.";
 
+const VERDICT_NOTE = "100 % is as uncertain as before any sample. The largest counts of the spread over repetitions, the tuner’s 95 % intervals, and its posterior. Agreement is not truth: simulators that lack an effect agree on a value that makes up for it.";
+
 /**
- * Return the service's remarks, and a table with a row for each iteration.
+ * Return the verdicts on tunables, the service's remarks, and a table with a row for each iteration.
  *
  * @param {Page.ExperimentPage} page
  */
@@ -19,23 +21,43 @@ export function misfit(page) {
   const place = h("div");
   page.sections.add(place, KINDS, async () => {
     /** @type {Api.MisfitRead} */
-    const { points, remarks, unit } = await get(`/experiments/${page.id}/misfit`, {}, page.signal);
+    const { points, remarks, unit, verdicts, held_out: share } = await get(`/experiments/${page.id}/misfit`, {}, page.signal);
     if (!points.length) {
       place.replaceChildren(empty("Nothing is tuned yet."));
       return;
     }
     const tunables = points[0].tunables.map(({ name }) => readableName(name));
-    const columns = ["Iteration", `Error per sample (${unit})`, `Gap of what it evolved (${unit})`, ...tunables, "n"];
-    place.replaceChildren(h("ul", { class: "misfit-remarks" }, ...remarks.map((remark) => h("li", {}, remark))),
-      table("Misfit by iteration", columns, points.map(row)), h("p", { class: "note" }, NOTE));
+    const unseen = share ? [`On held-out samples (${unit})`] : [];
+    const columns = ["Iteration", `Error per sample (${unit})`, ...unseen, `Gap of what it evolved (${unit})`, ...tunables, "n"];
+    place.replaceChildren(...identified(verdicts), h("h3", {}, "Misfit"),
+      h("ul", { class: "misfit-remarks" }, ...remarks.map((remark) => h("li", {}, remark))),
+      table("Misfit by iteration", columns, points.map((point) => row(point, Boolean(share)))), h("p", { class: "note" }, NOTE,
+        " ", h("a", { href: `/experiments/${page.id}/misfit?format=csv`, download: "" }, "CSV")));
   });
   return [place];
 }
 
-/** @param {Api.MisfitPoint} point */
-function row({ iteration, error, gap, tunables }) {
+/**
+ * Return the verdict on each tunable, and what would help; nothing before the first sample.
+ *
+ * @param {Api.TunableVerdict[]} verdicts
+ */
+function identified(verdicts) {
+  if (!verdicts.length) return [];
+  const rows = verdicts.map(({ name, verdict, remaining, helps }) => [
+    readableName(name), h("span", { class: `verdict ${verdict.replaceAll(" ", "-")}` }, verdict),
+    remaining === null ? "–" : `${Math.round(100 * remaining)} %`,
+    helps.length ? h("ul", { class: "helps" }, ...helps.map((help) => h("li", {}, help))) : "–",
+  ]);
+  return [h("h3", {}, "Which tunables are identified"),
+    table("Which tunables are identified", ["Tunable", "Verdict", "Uncertainty left", "What would help"], rows),
+    h("p", { class: "note" }, VERDICT_NOTE)];
+}
+
+/** @type {(point: Api.MisfitPoint, hasUnseen: boolean) => Page.Child[]} */
+function row({ iteration, error, held_out_error: unseen, gap, tunables }, hasUnseen) {
   const tuned = tunables.map((tunable) => `${meanAndSd(tunable)}${boundShare(tunable.at_lower, "⊣")}${boundShare(tunable.at_upper, "⊢")}`);
-  return [iteration, meanAndSd(error), meanAndSd(gap), ...tuned, gap.n];
+  return [iteration, meanAndSd(error), ...(hasUnseen ? [meanAndSd(unseen)] : []), meanAndSd(gap), ...tuned, gap.n];
 }
 
 /** @param {Api.Distribution} distribution */

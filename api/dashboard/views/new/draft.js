@@ -3,7 +3,7 @@
 
 import { parseNumber } from "../../lib/json.js";
 
-const COUNTS = ["iterations", "repetitions", "direct_repetitions", "seed", "priority", "max_parallel"];
+const COUNTS = ["iterations", "repetitions", "direct_repetitions", "seed", "priority", "max_parallel", "held_out"];
 export const EVALUATIONS = ["controller_evaluations", "selection_evaluations", "simulator_evaluations"];
 
 /** @typedef {Record<string, any>} Spec */
@@ -109,7 +109,7 @@ export function specOf(draft) {
 
 /** @param {Page.Draft["budget"]} budget */
 function budgetOf({ preset, reuse_transfer: isReused, ...evaluations }) {
-  const changes = withoutEmpty({ ...typedValues(evaluations), ...(isReused ? {} : { reuse_transfer: false }) });
+  const changes = withoutEmpty({ ...typedValues(evaluations), ...(isReused ? { reuse_transfer: true } : {}) });
   return Object.keys(changes).length ? { preset, ...changes } : preset;
 }
 

@@ -34,7 +34,8 @@ export function studyPart(form) {
       countField("direct_repetitions", "Repetitions of the direct baseline", "", "as the strategies"),
       countField("seed", "Seed", "the same seed gives the same numbers", "0"),
       countField("priority", "Priority", "−10 to 10; the highest is computed first", "0"),
-      countField("max_parallel", "Repetitions at once", "of an experiment", "any number")));
+      countField("max_parallel", "Repetitions at once", "of an experiment", "any number"),
+      countField("held_out", "Share of samples held out", "no tuning sees them, simulators are tested on them; 0.2: each fifth", "0")));
 }
 
 /**
@@ -220,6 +221,6 @@ export function budgetPart(form) {
   return part("Budget",
     field({ label: "Preset", value: budget.preset, set, pointer: "/budget", places, choices }),
     h("div", { class: "fields" }, ...numbers),
-    tickField("Reuse the transferred controller as the next sample, where a strategy would only search for it again",
+    tickField("Reuse the transferred controller as the next sample, where a strategy would only search for it again. This saves rollouts, but makes comparisons unfair: other strategies select from a search of their own",
       budget.reuse_transfer, form.setter(budget, "reuse_transfer")).element);
 }

@@ -1,0 +1,119 @@
+"""Identification: which tunables the samples determine, which they do not, and what would help.
+
+A tunable is as uncertain as its most uncertain sign says: the spread of best simulators over repetitions, the width of
+the tuner's 95 % intervals, and the spread of its posterior, each over that of a uniform draw between the bounds.
+Agreement is not truth: simulators that lack an effect agree on a value that makes up for it.
+
+Source: gaplab.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from gaplab.schemas.misfit import Identification, MisfitPoint, TunableDistribution, TunableVerdict
+from gaplab.services.core.misfit import OFTEN
+
+FEWEST = 5
+"""Fewest repetitions whose spread says something. Of five uniform draws, 1 % look identified; of three, 7 %."""
+
+IDENTIFIED = 0.3
+"""Largest remaining uncertainty of a tunable that is identified."""
+
+PARTLY = 0.6
+"""Largest remaining uncertainty of a tunable that is partly identified. One in ten draws of five spreads less."""
+
+FALLING = 0.8
+"""Share of its value at half the samples below which uncertainty still falls."""
+
+OVERFITTED = 2.0
+"""Error on held-out samples, over that on the samples tuned on, from which simulators are overfitted."""
+
+
+@dataclass(frozen=True)
+class Means:
+    """What an experiment has not used, which may help.
+
+    Attributes:
+        readings: discrepancies that compare readings which the robot has, and tuning ignores.
+        intervals: tuners that give intervals, if the experiment's gives none.
+    """
+
+    readings: Sequence[str] = ()
+    intervals: Sequence[str] = ()
+
+
+def verdicts(points: Sequence[MisfitPoint], means: Means) -> tuple[TunableVerdict, ...]:
+    """Return the verdict on each tunable at the latest iteration; none before the first sample.
+
+    Args:
+        points: misfit of each iteration, from 0.
+        means: what the experiment has not used.
+    """
+    tuned = [each for each in points if each.error.n]
+    if not tuned:
+        return ()
+    earlier = tuned[(len(tuned) - 1) // 2].tunables
+    return tuple(_verdict(now, then, len(tuned), means) for now, then in zip(tuned[-1].tunables, earlier, strict=True))
+
+
+def overfitting(point: MisfitPoint, unit: str) -> str:
+    """Return the error on held-out samples beside that on the others, in a sentence; "" without held-out samples."""
+    new, old = point.held_out_error.mean, point.error.mean
+    if new is None or old is None:
+        return ""
+    found = f"on held-out samples the best simulators err by {new:.2g} {unit}, on those tuned on by {old:.2g}"
+    return f"{found}: they fit their samples better than new ones" if new > OVERFITTED * old else found
+
+
+def remaining(found: TunableDistribution) -> float | None:
+    """Return the share of the uncertainty before any sample that is left; None if nothing says it."""
+    spread = found.spread if found.n >= FEWEST else None
+    return max((each for each in (spread, found.interval, found.posterior) if each is not None), default=None)
+
+
+def _verdict(now: TunableDistribution, then: TunableDistribution, samples: int, means: Means) -> TunableVerdict:
+    left = remaining(now)
+    verdict = _judged(left)
+    return TunableVerdict(
+        name=now.name,
+        verdict=verdict,
+        remaining=left,
+        sentence=_sentence(now, verdict, left),
+        helps=() if verdict is Identification.IDENTIFIED else tuple(_helps(now, then, samples, means)),
+    )
+
+
+def _judged(left: float | None) -> Identification:
+    if left is None:
+        return Identification.UNKNOWN
+    if left <= IDENTIFIED:
+        return Identification.IDENTIFIED
+    return Identification.PARTLY if left <= PARTLY else Identification.NOT
+
+
+def _sentence(now: TunableDistribution, verdict: Identification, left: float | None) -> str:
+    if left is None:
+        return f"{now.name}: unknown, for {now.n} repetitions are too few to compare, and the tuner gives no intervals"
+    deviation = f" \N{PLUS-MINUS SIGN} {now.sd:.2g}" if now.sd is not None else ""
+    value = f"{now.mean:.2g}{deviation} over {now.n} repetitions"
+    return f"{now.name}: {verdict.value}; {value}, with {100 * left:.0f} % of the uncertainty before any sample"
+
+
+def _helps(now: TunableDistribution, then: TunableDistribution, samples: int, means: Means) -> Iterator[str]:
+    """Yield what would help, what costs least first."""
+    left, before = remaining(now), remaining(then)
+    if left is None:
+        yield f"at least {FEWEST} repetitions"
+    if means.readings:
+        yield f"the discrepancy {' or '.join(means.readings)}: a fitness is one number a sample, sensors say more"
+    if left is None and means.intervals:
+        yield f"a tuner with intervals: {' or '.join(means.intervals)}"
+    if left is not None and before is not None and samples > 2:
+        if left < FALLING * before:
+            yield f"more samples: {100 * before:.0f} % were left at half of them"
+        else:
+            yield "another strategy, or a fixed value: more samples of this kind have not helped"
+    elif samples <= 2:
+        yield "more samples"
+    if (now.at_lower or 0.0) + (now.at_upper or 0.0) >= OFTEN:
+        yield "wider bounds, if they make sense: it often ends at one"

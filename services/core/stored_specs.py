@@ -1,0 +1,44 @@
+"""Stored specs, which may be older than some options of their strategies."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.core.strategies import strategies
+
+
+def spec_of(stored: Mapping[str, Any]) -> ResolvedSpec:
+    """Return a stored spec for reading, not for running: it may lack parameters of reality."""
+    return _with_options_of_before(spec_as_stored(stored))
+
+
+def spec_to_run(stored: Mapping[str, Any]) -> ResolvedSpec:
+    """Return a stored spec for running.
+
+    Raises:
+        ValidationError: a parameter of reality is null.
+    """
+    return _with_options_of_before(ResolvedSpec.model_validate(stored))
+
+
+def spec_as_stored(stored: Mapping[str, Any]) -> ResolvedSpec:
+    """Return a stored spec without null parameters of reality, and without options that were added since."""
+    reality = stored["reality"]
+    known = {name: value for name, value in reality["parameters"].items() if value is not None}
+    return ResolvedSpec.model_validate({**stored, "reality": {**reality, "parameters": known}})
+
+
+def _with_options_of_before(spec: ResolvedSpec) -> ResolvedSpec:
+    """Return the spec with the options that its strategy got since it was stored, so that its numbers stay the same.
+
+    The spec stays as it is if the strategy is not installed, or refuses its options.
+    """
+    name, options = spec.strategy.name, spec.strategy.options
+    before = strategies[name].before if name in strategies else {}
+    try:
+        _, complete = strategies.check(PluginRef(name=name, options={**before, **options}))
+    except InvalidSpec:
+        return spec
+    return spec.model_copy(update={"strategy": PluginRef(name=name, options=complete.model_dump(mode="json"))})

@@ -1,0 +1,101 @@
+"""Tunings: the best simulators, posteriors, and the samples that they were tuned and tested on."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.records import MeasurementKind
+from gaplab.services.core.held_out import is_held_out
+from gaplab.services.store.models import ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
+from gaplab.services.store.queries.repetition_rows import of_experiments
+
+
+@dataclass(frozen=True)
+class BestSimulator:
+    """The best simulator of one iteration, and the fitness of the controller that was evolved in it.
+
+    Attributes:
+        squared_error: None if the physics failed on a sample.
+        held_out_error: None without held-out samples, or if the physics failed on one.
+        lower: lower ends of the 95 % intervals; None if the tuner gives none.
+        upper: their upper ends.
+        simulated: fitness in the simulator; None if there is none.
+        real: fitness in reality; None if there is none.
+    """
+
+    repetition: int
+    iteration: int
+    parameters: list[float]
+    squared_error: float | None
+    held_out_error: float | None
+    lower: list[float] | None
+    upper: list[float] | None
+    simulated: float | None
+    real: float | None
+
+
+def best_simulators(session: Session, experiment: str) -> tuple[BestSimulator, ...]:
+    """Return the best simulator of every iteration of every repetition."""
+    row, found, probe = IterationRow, SimulatorRow, MeasurementRow
+    errors = found.squared_error, found.held_out_error
+    columns = found.parameters, *errors, found.lower, found.upper, row.simulated_fitness, probe.fitness
+    best = (found.repetition_id == row.repetition_id) & (found.iteration == row.number) & (found.rank == 0)
+    probed = (probe.repetition_id == row.repetition_id) & (probe.iteration == row.number)
+    query = of_experiments(row, [experiment], RepetitionRow.number, row.number, *columns)
+    query = query.join(found, best).outerjoin(probe, probed & (probe.kind == MeasurementKind.PROBE))
+    return tuple(BestSimulator(*each) for each in session.execute(query.order_by(RepetitionRow.number, row.number)))
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The iterations whose sample has a fitness, by repetition.
+
+    Attributes:
+        tuned_on: those of the samples that tuning sees.
+        held_out: those of the samples that it does not see.
+    """
+
+    tuned_on: Mapping[int, Sequence[int]]
+    held_out: Mapping[int, Sequence[int]]
+
+
+def measured(session: Session, experiment: ExperimentRow) -> Measured:
+    """Return the iterations whose sample has a fitness."""
+    row, share = MeasurementRow, experiment.spec.get("held_out", 0.0)
+    query = of_experiments(row, [experiment.id], RepetitionRow.number, row.iteration)
+    tuned_on, held_out = dict[int, list[int]](), dict[int, list[int]]()
+    for repetition, iteration in session.execute(
+        query.where(row.kind == MeasurementKind.SAMPLE, row.fitness.is_not(None))
+    ):
+        (held_out if is_held_out(iteration, share) else tuned_on).setdefault(repetition, []).append(iteration)
+    return Measured(tuned_on, held_out)
+
+
+def posteriors(session: Session, experiment: str) -> dict[tuple[int, int], tuple[list[list[float]], list[float]]]:
+    """Return parameters and weights of the simulators of each repetition and iteration whose tuner weights them."""
+    row = SimulatorRow
+    query = of_experiments(row, [experiment], RepetitionRow.number, row.iteration, row.parameters, row.weight)
+    found: dict[tuple[int, int], tuple[list[list[float]], list[float]]] = {}
+    for repetition, iteration, parameters, weight in session.execute(query.where(row.weight.is_not(None))):
+        members, weights = found.setdefault((repetition, iteration), ([], []))
+        members.append(parameters)
+        weights.append(weight)
+    return found
+
+
+def samples_until(iterations: Mapping[int, Sequence[int]], repetition: int, iteration: int) -> int:
+    """Return the number of samples until an iteration: those that its simulators were tuned or tested on.
+
+    Args:
+        iterations: iterations of these samples, by repetition.
+        repetition: number of the repetition.
+        iteration: number of the iteration.
+    """
+    return sum(each <= iteration for each in iterations.get(repetition, ()))
+
+
+def per_sample(squared_error: float | None, samples: int) -> float | None:
+    """Return the root mean square error; None without samples, or if the physics failed on one."""
+    return sqrt(squared_error / samples) if squared_error is not None and samples else None
