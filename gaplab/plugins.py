@@ -22,6 +22,7 @@ from gaplab.services.core.space import Space as Space
 from gaplab.services.core.strategies.base import EnsembleOptions as EnsembleOptions
 from gaplab.services.core.strategies.base import Search as Search
 from gaplab.services.core.strategies.base import Strategy as Strategy
+from gaplab.services.core.strategies.base import Untuned as Untuned
 from gaplab.services.core.tunables.base import MaterialTunable as MaterialTunable
 from gaplab.services.core.tunables.base import Tunable as Tunable
 from gaplab.services.core.types import Belief as Belief

@@ -14,7 +14,7 @@ from gaplab.services.core.errors import InvalidArchive
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
-from gaplab.services.specs.resolution import is_direct, spec_of
+from gaplab.services.specs.resolution import spec_of, takes_samples
 from gaplab.services.store.models import SPEC_VERSION
 from gaplab.services.store.queries import provenance
 from gaplab.services.store.texts import pack_tags, unpack_tags
@@ -117,5 +117,5 @@ def _iterations(spec: ResolvedSpec) -> set[int]:
     """Return the permitted iterations of a repetition: both numbers for a strategy that is not installed here."""
     several = spec.iterations + 1
     if spec.strategy.name in strategies:
-        return {1 if is_direct(spec) else several}
+        return {several if takes_samples(spec) else 1}
     return {1, several}

@@ -71,18 +71,18 @@ def holm(p_values: Sequence[float | None]) -> tuple[float | None, ...]:
 
 
 def compare_all(
-    recorded: dict[str, FloatArray], direct: frozenset[str], from_evaluations: int, to_evaluations: int
+    recorded: dict[str, FloatArray], levels: frozenset[str], from_evaluations: int, to_evaluations: int
 ) -> tuple[Comparison, ...]:
     """Compare every pair of experiments, pooled over a range of counts; Holm's correction is over all pairs, by test.
 
     Args:
         recorded: recorded fitness `(r, k)` by experiment, in the order of the result.
-        direct: experiments whose only column, at 0, counts at every number of real-world evaluations.
+        levels: experiments whose only column, at 0, counts at every number of real-world evaluations.
         from_evaluations: first pooled count.
         to_evaluations: last pooled count.
     """
     pooled = {
-        name: finite(values[:, :1] if name in direct else values[:, from_evaluations : to_evaluations + 1])
+        name: finite(values[:, :1] if name in levels else values[:, from_evaluations : to_evaluations + 1])
         for name, values in recorded.items()
     }
     pairs = list(combinations(pooled, 2))

@@ -68,12 +68,16 @@ class Belief:
         known: `(g,)`: the robot's hand-designed genome.
         samples: samples in the order of measurement.
         simulators: one simulator or a diverse ensemble; random before the first sample.
+        tunables: space of simulators.
+        names: `(p,)`, names of the tunables, in the order of simulators' parameters.
     """
 
     space: Space
     known: Genome
     samples: tuple[Sample, ...]
     simulators: tuple[Simulator, ...]
+    tunables: Space
+    names: tuple[str, ...]
 
     @property
     def parameters(self) -> Parameters:
@@ -149,10 +153,11 @@ class Tuned:
 
 @dataclass(frozen=True, eq=False)
 class Transferred:
-    """A controller was evolved in the best simulator, for a probe in reality.
+    """A controller was evolved in simulation, for a probe in reality.
 
     Attributes:
-        fitness: fitness in that simulator; nan if the physics failed for every controller tried.
+        fitness: score of the strategy's search, by default the fitness in the best simulator; nan if it is unknown, or
+            the physics failed for every controller tried.
     """
 
     iteration: int

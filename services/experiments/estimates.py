@@ -16,6 +16,7 @@ from gaplab.services.specs.resolution import (
     resolve_experiment,
     resolve_study,
     spec_of,
+    takes_samples,
 )
 from gaplab.services.store.queries import costs, supervisors
 from gaplab.services.store.session import Store
@@ -93,7 +94,7 @@ def _experiment(spec: ResolvedSpec, cost: EngineCost) -> ExperimentCost:
         strategy=spec.strategy.name,
         engine=cost.engine,
         repetitions=spec.repetitions,
-        iterations=0 if is_direct(spec) else spec.iterations,
+        iterations=spec.iterations if takes_samples(spec) else 0,
         rollouts=rollouts,
         core_seconds=rollouts * cost.seconds_per_rollout,
     )

@@ -97,6 +97,7 @@ class Level:
 
     Attributes:
         upright: the value is one of x, not of y.
+        marked: draw the markers of its style along the line.
     """
 
     name: str
@@ -105,6 +106,7 @@ class Level:
     lower: Number = None
     upper: Number = None
     upright: bool = False
+    marked: bool = False
 
     def __post_init__(self) -> None:
         check_numbers(self.name, ((self.value, self.lower, self.upper),))

@@ -69,7 +69,7 @@ def compare(
 ) -> tuple[Comparison, ...]:
     """Compare every pair of experiments on their recorded fitness, pooled over a range of real-world evaluations.
 
-    The only value of the direct baseline is in every range.
+    The only value of an experiment without samples is in every range.
 
     Args:
         store: database with the experiments.
@@ -92,11 +92,11 @@ def compare(
     if not 0 <= first <= final:
         message = f"the range of real-world evaluations must ascend from 0 or more, not from {first} to {final}"
         raise InvalidSpec([Violation("from_evaluations", first, message, f"0 to {final}")])
-    direct = frozenset(row.id for row in rows if is_direct(spec_of(row.spec)))
+    levels = frozenset(row.id for row in rows if row.iterations == 1)
     names = {row.id: row.name for row in rows}
     return tuple(
         pair.model_copy(update={"first_name": names[pair.first], "second_name": names[pair.second]})
-        for pair in compare_all(values, direct, first, final)
+        for pair in compare_all(values, levels, first, final)
     )
 
 
@@ -147,5 +147,6 @@ def _curve(row: ExperimentRow, values: FloatArray) -> Curve:
         state=row.state,
         unit=unit(spec),
         direct=is_direct(spec),
+        level=row.iterations == 1,
         points=curve_points(values),
     )

@@ -7,7 +7,7 @@ from gaplab.schemas.misfit import MisfitRead
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.misfit import Tuning, misfit_point, remarks
 from gaplab.services.specs.assembly import parameters_of
-from gaplab.services.specs.resolution import is_direct, spec_of, unit
+from gaplab.services.specs.resolution import spec_of, takes_samples, unit
 from gaplab.services.store.queries import experiments, results
 from gaplab.services.store.queries.results import BestSimulator
 from gaplab.services.store.session import Store
@@ -31,7 +31,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     names = [each.name for each in spec.tunables]
     points = tuple(
         misfit_point(iteration, tunings[iteration], names, parameters_of(spec.tunables))
-        for iteration in range(0 if is_direct(spec) else row.iterations)
+        for iteration in range(row.iterations if takes_samples(spec) else 0)
         if tunings[iteration]
     )
     return MisfitRead(experiment=row.id, unit=unit(spec), points=points, remarks=remarks(points, unit(spec)))

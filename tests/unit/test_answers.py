@@ -8,7 +8,8 @@ import pytest
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.answers import BLOCK, Answers, pack, unpack
-from gaplab.services.core.loop import History, next_step, repetition
+from gaplab.services.core.history import History
+from gaplab.services.core.loop import next_step, repetition
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.types import Budget

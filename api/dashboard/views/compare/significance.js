@@ -63,7 +63,7 @@ export function significance(view) {
 }
 
 /** @param {Api.ExperimentRead} experiment */
-const lastEvaluation = ({ direct, spec }) => (direct ? 0 : spec.iterations);
+const lastEvaluation = ({ level, spec }) => (level ? 0 : spec.iterations);
 
 /**
  * @param {Page.Range} range
