@@ -53,12 +53,13 @@ def curve(name: str, *points: CurvePoint, direct: bool = False, unit: str = "m/s
         state=State.RUNNING,
         unit=unit,
         direct=direct,
+        level=direct,
         points=points,
     )
 
 
 RISING = curve("simulated_fit", point(0, 0.9), point(1, 1.2), point(2, 1.3))
-DIRECT = curve("direct", point(0, 1.33, n=100, sd=0.1), direct=True, level=True)
+DIRECT = curve("direct", point(0, 1.33, n=100, sd=0.1), direct=True)
 
 _X, _Y = Axis("time (s)", (0, 4)), Axis("height (m)", (-1, 2))
 

@@ -41,6 +41,8 @@ declare namespace Api {
     engines: Array<PluginRead>;
     tunables: Array<PluginRead>;
     optimizers: Array<PluginRead>;
+    discrepancies: Array<PluginRead>;
+    tuners: Array<PluginRead>;
     budgets: Array<BudgetRead>;
     ignored: Array<IgnoredFile>;
     defaults: Record<string, any>;
@@ -80,6 +82,7 @@ declare namespace Api {
     state: State;
     unit: string;
     direct: boolean;
+    level: boolean;
     points: Array<CurvePoint>;
   }
   interface CurvePoint {
@@ -166,6 +169,7 @@ declare namespace Api {
     archived_at: string | null;
     strategy: string;
     direct: boolean;
+    level: boolean;
     state: State;
     spec: Record<string, any>;
     priority: number;
@@ -190,6 +194,8 @@ declare namespace Api {
     engine: PluginRef | null;
     optimizer: PluginRef;
     tunables: Array<TunableRef>;
+    discrepancy: PluginRef;
+    tuner: PluginRef;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
@@ -380,6 +386,7 @@ declare namespace Api {
     kind: MeasurementKind;
     genome: Array<number>;
     fitness: number | null;
+    readings: Array<number | null> | null;
     measured_by: string;
     measured_at: string;
   }
@@ -417,6 +424,8 @@ declare namespace Api {
     engine: PluginRef | null;
     optimizer: PluginRef;
     tunables: Array<TunableRef>;
+    discrepancy: PluginRef;
+    tuner: PluginRef;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
@@ -443,6 +452,8 @@ declare namespace Api {
     parameters: Record<string, number>;
     squared_error: number | null;
     error: number | null;
+    intervals: Record<string, [number, number]> | null;
+    weight: number | null;
   }
   interface SpecDiff {
     columns: Array<DiffColumn>;
@@ -486,6 +497,8 @@ declare namespace Api {
     engine: PluginRef | null;
     optimizer: PluginRef;
     tunables: Array<TunableRef>;
+    discrepancy: PluginRef;
+    tuner: PluginRef;
     reality: RealitySpec;
     budget: BudgetSpec;
     seed: number;
