@@ -1,4 +1,4 @@
-"""Names for your own plug-ins: a strategy, robot, tunable, optimizer or engine, each in one file.
+"""Names for your own plug-ins: a strategy, robot, tunable, optimizer, engine, discrepancy or tuner, each in one file.
 
 Put the file into a folder that GAPLAB_PLUGINS names, and start the service. docs/how-to describes each kind.
 """
@@ -9,11 +9,15 @@ from gaplab.services.core.arrays import Fitnesses as Fitnesses
 from gaplab.services.core.arrays import FloatArray as FloatArray
 from gaplab.services.core.arrays import Genome as Genome
 from gaplab.services.core.arrays import Genomes as Genomes
+from gaplab.services.core.arrays import Outcomes as Outcomes
+from gaplab.services.core.arrays import Parameters as Parameters
 from gaplab.services.core.arrays import frozen as frozen
+from gaplab.services.core.discrepancies.base import Discrepancy as Discrepancy
 from gaplab.services.core.errors import TryAgain as TryAgain
 from gaplab.services.core.optimizers.base import Optimizer as Optimizer
 from gaplab.services.core.optimizers.base import Population as Population
 from gaplab.services.core.robots.base import Robot as Robot
+from gaplab.services.core.robots.base import Sensors as Sensors
 from gaplab.services.core.scoring import simulator_weights as simulator_weights
 from gaplab.services.core.scoring import uniqueness_penalty as uniqueness_penalty
 from gaplab.services.core.scoring import weighted_deviation as weighted_deviation
@@ -25,6 +29,8 @@ from gaplab.services.core.strategies.base import Strategy as Strategy
 from gaplab.services.core.strategies.base import Untuned as Untuned
 from gaplab.services.core.tunables.base import MaterialTunable as MaterialTunable
 from gaplab.services.core.tunables.base import Tunable as Tunable
+from gaplab.services.core.tuners.base import Task as Task
+from gaplab.services.core.tuners.base import Tuner as Tuner
 from gaplab.services.core.types import Belief as Belief
 from gaplab.services.core.types import Sample as Sample
 from gaplab.services.core.types import Simulator as Simulator

@@ -16,7 +16,7 @@ from gaplab.services.plugins import folders
 if TYPE_CHECKING:
     from gaplab.services.contract.files import Checked
 
-Kind = Literal["strategy", "robot", "engine", "tunable", "optimizer"]
+Kind = Literal["strategy", "robot", "engine", "tunable", "optimizer", "discrepancy", "tuner"]
 
 plugin = typer.Typer(help="Write your own plug-ins, and check them.", no_args_is_help=True)
 app.add_typer(plugin, name="plugin", rich_help_panel=PLUGINS)

@@ -6,7 +6,7 @@ from inspect import getdoc
 from traceback import extract_tb
 from typing import Any
 
-from gaplab.services.contract import engines, optimizers, robots, strategies, tunables
+from gaplab.services.contract import discrepancies, engines, optimizers, robots, strategies, tunables, tuners
 
 Check = Callable[[type[Any]], None]
 
@@ -16,6 +16,8 @@ CHECKS: dict[str, tuple[Check, ...]] = {
     "engine": engines.CHECKS,
     "tunable": tunables.CHECKS,
     "optimizer": optimizers.CHECKS,
+    "discrepancy": discrepancies.CHECKS,
+    "tuner": tuners.CHECKS,
 }
 """The checks of each kind of plug-in."""
 

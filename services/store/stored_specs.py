@@ -11,6 +11,15 @@ def checked(spec: Mapping[str, Any]) -> Checked:
     return Checked.model_validate({name: spec[name] for name in ("robot", "engine", "tunables")})
 
 
+LATER = {"discrepancy": {"name": "squared_fitness", "options": {}}, "tuner": {"name": "search", "options": {}}}
+"""Fields that specs have had since readings are stored, with what an earlier spec means without them."""
+
+
+def complete(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the spec with every field, also if it was stored before a field was added."""
+    return {**LATER, **spec}
+
+
 def without_truth(spec: Mapping[str, Any]) -> dict[str, Any]:
     """Return the spec with null in place of each of reality's parameters."""
     reality = spec["reality"]

@@ -10,14 +10,14 @@ const CATALOGUE = {
   tunables: [{ name: "grip" }, { name: "mass" }],
   defaults: {
     strategies: [{ name: "two", options: {} }, { name: "one", options: {} }], robot: { name: "legs", options: {} },
-    optimizer: { name: "climber", options: {} }, tunables: [{ name: "grip" }], budget: { preset: "paper", reuse_transfer: true },
+    optimizer: { name: "climber", options: {} }, discrepancy: { name: "squares", options: {} }, tuner: { name: "hill", options: {} }, tunables: [{ name: "grip" }], budget: { preset: "paper", reuse_transfer: true },
   },
 };
 
 test("a spec goes through the form unchanged", () => {
   const spec = {
     name: "all", strategies: ["two", { name: "two", options: { weight: 0.5 } }], robot: { name: "wheels", options: { radius: 2 } }, engine: "fast",
-    optimizer: "climber", tunables: ["grip", { name: "mass", lower: 0, upper: 2.5 }],
+    optimizer: "climber", discrepancy: { name: "squares", options: { to: 1 } }, tuner: "hill", tunables: ["grip", { name: "mass", lower: 0, upper: 2.5 }],
     reality: { engine: "slow", parameters: { grip: 0 } },
     budget: { preset: "smoke", controller_evaluations: 100, reuse_transfer: false },
     iterations: 3, repetitions: 4, direct_repetitions: 8, seed: 18446744073709551615n, priority: -10, max_parallel: 2,
@@ -27,7 +27,7 @@ test("a spec goes through the form unchanged", () => {
 
 test("what a spec leaves out is the catalogue's default, and counts are left to the service", () => {
   assert.deepEqual(specOf(draftOf({}, CATALOGUE)), {
-    strategies: ["two", "one"], robot: "legs", optimizer: "climber", tunables: ["grip"], budget: "paper" });
+    strategies: ["two", "one"], robot: "legs", optimizer: "climber", discrepancy: "squares", tuner: "hill", tunables: ["grip"], budget: "paper" });
 });
 
 test("strategies that are not chosen follow unticked, in the order of the catalogue", () => {

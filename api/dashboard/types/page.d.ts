@@ -119,6 +119,8 @@ declare namespace Page {
     robot: PluginDraft;
     engine: PluginDraft;
     optimizer: PluginDraft;
+    discrepancy: PluginDraft;
+    tuner: PluginDraft;
     tunables: TunableDraft[];
     realityEngine: PluginDraft;
     realityParameters: Record<string, any>;

@@ -45,7 +45,7 @@ class Tuner(Plugin):
 
     @abstractmethod
     def tune(self, task: Task, rng: Generator) -> tuple[Simulator, ...]:
-        """Return `task.ensemble` simulators, best first."""
+        """Return `task.ensemble` simulators, the best estimate first."""
 
     @classmethod
     def details(cls) -> dict[str, Any]:

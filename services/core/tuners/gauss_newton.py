@@ -1,4 +1,4 @@
-"""A tuner for few rollouts: least squares by the slopes of all differences."""
+"""A tuner for few rollouts: least squares by slopes, with intervals."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -6,139 +6,165 @@ from typing import Annotated
 import numpy as np
 from numpy.random import Generator
 from pydantic import Field
-from scipy.optimize import least_squares
+from scipy import stats
+from scipy.stats.qmc import LatinHypercube
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.tuners.base import Task, Tuner
 from gaplab.services.core.types import Simulator
 
-NORMAL_95 = 1.96
-"""Standard deviations on each side of the mean that hold 95 % of a normal distribution."""
+CONFIDENCE = 0.95
+"""Probability that an interval contains the truth."""
 
-FLATTEST = 1e-9
-"""Smallest curvature, as a share of the largest, along which the differences say anything."""
+PRIOR_VARIANCE = 0.25
+"""Variance of a tunable before any sample, in units of its bounds. It is three times that of a uniform one, so that a
+truth on a bound is hardly drawn to the middle."""
+
+OWN = 0.3
+"""Share of the scatter of a difference that is taken as its own, independent of the others."""
+
+FARTHEST = 3.0
+"""Deviations from the median at which a difference is cut; a robot that falls is no line."""
+
+REACH = 2.0
+"""Half the width of the next box, in standard deviations of the estimate."""
+
+NARROWEST = 1e-3
+"""Least width of a box, as a share of the bounds."""
 
 
 class GaussNewtonOptions(Frozen):
     """Options of least squares."""
 
-    starts: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(
-        default=3, description="descents: from the best simulator so far, and from random ones"
-    )
-    difference: Annotated[float, Field(strict=True, gt=0, lt=0.5)] = Field(
-        default=0.02,
-        description="step of the slopes as a share of the bounds; contact is too rough for smaller ones",
-    )
-    evaluations: Annotated[int, Field(strict=True, ge=2, le=1_000_000)] = Field(
+    evaluations: Annotated[int, Field(strict=True, ge=8, le=1_000_000)] = Field(
         default=60, description="most simulators to evaluate; the rest of the budget is saved"
     )
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """The end of a descent.
-
-    Attributes:
-        place: `(p,)`, in units of the bounds, from 0 to 1.
-        residuals: `(r,)`, differences there.
-        slopes: `(r, p)`, of the differences there.
-    """
-
-    place: FloatArray
-    residuals: FloatArray
-    slopes: FloatArray
-
-    @property
-    def cost(self) -> float:
-        """The sum of squares."""
-        return float(self.residuals @ self.residuals)
-
-    def covariance(self, noise: float) -> FloatArray:
-        """Return `(p, p)`: the covariance of the place, in units of the bounds.
-
-        Along a direction on which no difference depends, the deviation is the whole of the bounds.
-
-        Args:
-            noise: variance of a difference if the simulator is right; a larger remaining error counts instead.
-        """
-        rows, columns = self.slopes.shape
-        if rows <= columns:
-            return np.eye(columns)
-        curvatures, directions = np.linalg.eigh(self.slopes.T @ self.slopes)
-        told = curvatures > FLATTEST * max(float(curvatures[-1]), np.finfo(float).tiny)
-        noise = max(noise, self.cost / (rows - columns))
-        variances = np.ones(columns)
-        variances[told] = np.minimum(1.0, noise / curvatures[told])
-        return np.asarray((directions * variances) @ directions.T)
+    rounds: Annotated[int, Field(strict=True, ge=1, le=20)] = Field(
+        default=2, description="linear models, each in a smaller box around the estimate so far"
+    )
 
 
 class GaussNewton(Tuner):
-    """Least squares from several starts, with a 95 % confidence interval of each tunable.
+    """Least squares with linear models over boxes of simulators, and a 95 % interval of each tunable.
 
-    Slopes are differences over a share of the bounds. The interval is of a linear model around the best simulator. It
-    is as wide as the bounds if there are no more differences than tunables, or where no difference depends on the
-    tunable. An ensemble consists of the best simulator and of draws from its confidence region.
+    Contact is rough: a step of a thousandth of the bounds may change a reading as much as a tenth. So slopes are not
+    differences between two simulators, but regressions over a box of them. The scatter around the lines counts as
+    noise. The next box surrounds the estimate.
+
+    An interval comes from the errors of the same estimate of each simulator of the box, left out of the regression. It
+    is as wide as the bounds where the samples say nothing about a tunable. An ensemble is the estimate and draws from
+    its error, all equally probable.
     """
 
     name = "gauss_newton"
-    source = "As in MuJoCo's sysid toolbox (2026); starts, differences and intervals are gaplab's"
+    source = "Gauss-Newton with statistical linearisation, as in iterated Kalman filters; all numbers are gaplab's"
     needs_squares = True
     Options = GaussNewtonOptions
     options: GaussNewtonOptions
 
     def tune(self, task: Task, rng: Generator) -> tuple[Simulator, ...]:
-        """Return the best simulator of all descents with its interval, then draws from its confidence region."""
-        left = min(self.options.evaluations, task.evaluations) - (task.ensemble - 1)
-        starts = self._starts(task, rng)
-        share = max(1, left // (len(starts) * (task.space.size + 1)))
-        fits = [fit for start in starts if (fit := self._descent(task, start, share)) is not None]
-        if not fits:
-            return tuple(Simulator(each, np.inf) for each in task.space.draw(task.ensemble, rng))
-        best = min(fits, key=lambda fit: fit.cost)
-        covariance = best.covariance(task.misfit.noise)
-        deviation = NORMAL_95 * np.sqrt(np.diag(covariance))
-        ends = np.clip([best.place - deviation, best.place + deviation], 0.0, 1.0)
-        interval = (task.space.lower + ends * task.space.extent).T
-        return (
-            Simulator(_parameters(task, best.place), best.cost, interval),
-            *_drawn(task, best.place, covariance, rng),
-        )
+        """Return the estimate with its intervals, then draws from its error."""
+        left = min(self.options.evaluations, task.evaluations) - task.ensemble
+        box = np.array([np.zeros(task.space.size), np.ones(task.space.size)])
+        places, differences = np.empty((0, task.space.size)), None
+        estimate = None
+        for share in np.array_split(np.arange(max(left, 1)), self.options.rounds):
+            drawn = box[0] + (box[1] - box[0]) * LatinHypercube(task.space.size, seed=rng).random(len(share))
+            found = task.misfit.residuals(_parameters(task, drawn))
+            places = np.vstack([places, drawn])
+            differences = found if differences is None else np.vstack([differences, found])
+            inside = ((box[0] <= places) & (places <= box[1])).all(axis=1) & np.isfinite(differences).all(axis=1)
+            if inside.sum() > task.space.size + 2:
+                estimate = _estimate(places[inside], differences[inside], task.misfit.noise)
+                box = estimate.box(box)
+        return _simulators(task, estimate or Estimate.unknown(task.space.size), rng)
 
-    def _starts(self, task: Task, rng: Generator) -> FloatArray:
-        """Return the places where descents begin, in units of the bounds."""
-        drawn = rng.random((self.options.starts - 1, task.space.size))
-        return np.vstack([(task.previous[0].parameters - task.space.lower) / task.space.extent, drawn])
 
-    def _descent(self, task: Task, start: FloatArray, steps: int) -> Fit | None:
-        """Return the end of a descent of so many steps; None if the physics fails at its start."""
-        answered: dict[bytes, FloatArray] = {}
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """An estimate of the tunables, in units of their bounds.
 
-        def residuals(place: FloatArray) -> FloatArray:
-            key = place.tobytes()
-            if key not in answered:
-                answered[key] = task.misfit.residuals(_parameters(task, place[None, :]))[0]
-            return answered[key]
+    Attributes:
+        place: `(p,)`, from 0 to 1.
+        errors: `(n, p)`: errors of the same estimate of n simulators that are known.
+    """
 
-        def slopes(place: FloatArray) -> FloatArray:
-            away = np.where(place + self.options.difference <= 1.0, self.options.difference, -self.options.difference)
-            beside = task.misfit.residuals(_parameters(task, place + np.diag(away)))
-            return np.nan_to_num(((beside - residuals(place)) / away[:, None]).T)
+    place: FloatArray
+    errors: FloatArray
 
-        if not np.isfinite(residuals(start)).all():
-            return None
-        found = least_squares(residuals, start, slopes, bounds=(0.0, 1.0), max_nfev=steps)
-        return Fit(found.x, found.fun, found.jac)
+    @classmethod
+    def unknown(cls, size: int) -> "Estimate":
+        """Return the middle of the bounds, with both bounds as its errors."""
+        return cls(np.full(size, 0.5), np.array([np.full(size, -0.5), np.full(size, 0.5)]))
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Return `(p, p)`: the mean products of errors."""
+        return np.asarray(self.errors.T @ self.errors / len(self.errors))
+
+    def interval(self) -> FloatArray:
+        """Return `(p, 2)`: ends of the interval of each tunable, by Student's t."""
+        freedom = max(1, len(self.errors) - self.place.size - 1)
+        half = stats.t.ppf((1 + CONFIDENCE) / 2, freedom) * np.sqrt(np.diag(self.covariance))
+        return np.asarray(np.clip(np.transpose([self.place - half, self.place + half]), 0.0, 1.0))
+
+    def box(self, within: FloatArray) -> FloatArray:
+        """Return the next box `(2, p)`, a part of this one."""
+        half = np.maximum(REACH * np.sqrt(np.diag(self.covariance)), NARROWEST / 2)
+        lower = np.clip(self.place - half, within[0], within[1] - NARROWEST)
+        return np.array([lower, np.clip(self.place + half, lower + NARROWEST, within[1])])
+
+
+def _estimate(places: FloatArray, differences: FloatArray, noise: float) -> Estimate:
+    """Return an estimate of where all differences are 0, and its errors where the answer is known.
+
+    Args:
+        places: `(n, p)`, n simulators in units of the bounds.
+        differences: `(n, r)`: of their readings from those of reality.
+        noise: variance of a difference of the right simulator.
+    """
+    middle = np.median(differences, axis=0)
+    reach = FARTHEST * np.maximum(stats.median_abs_deviation(differences, axis=0, scale="normal"), noise**0.5)
+    cut = np.clip(differences, middle - reach, middle + reach)
+    others = ~np.eye(len(places), dtype=bool)
+    known = [_place(places[rest], cut[rest], one, noise) for rest, one in zip(others, cut, strict=True)]
+    return Estimate(_place(places, cut, np.clip(0.0, middle - reach, middle + reach), noise), np.array(known) - places)
+
+
+def _place(places: FloatArray, answers: FloatArray, asked: FloatArray, noise: float) -> FloatArray:
+    """Return the place `(p,)` whose answers `(r,)` are those asked for, by a linear model of n answers `(n, r)`.
+
+    It is the mean of a normal posterior. The scatter around the model is low-rank plus diagonal, so that it can be
+    inverted although there are more answers than places.
+    """
+    (count, size), centre = places.shape, places.mean(axis=0)
+    design = np.column_stack([np.ones(count), places - centre])
+    lines, *_ = np.linalg.lstsq(design, answers, rcond=None)
+    level, slopes = lines[0], lines[1:].T
+    scatter = (answers - design @ lines) / np.sqrt(max(1, count - size - 1))
+    own = OWN * (scatter**2).sum(axis=0) + noise
+    own = np.maximum(own, 1e-12 * max(float(own.max()), 1e-300))
+    shared = np.sqrt(1 - OWN) * scatter
+    weighted = slopes / own[:, None]
+    inner = np.eye(count) + shared / own @ shared.T
+    weighted -= shared.T / own[:, None] @ np.linalg.solve(inner, shared @ weighted)
+    middle = np.full(size, 0.5)
+    away = asked - level - slopes @ (middle - centre)
+    found = middle + np.linalg.solve(slopes.T @ weighted + np.eye(size) / PRIOR_VARIANCE, weighted.T @ away)
+    return np.asarray(np.clip(found, 0.0, 1.0))
+
+
+def _simulators(task: Task, estimate: Estimate, rng: Generator) -> tuple[Simulator, ...]:
+    """Return the estimate with its intervals, then draws from its error; each with its discrepancy."""
+    drawn = rng.multivariate_normal(estimate.place, estimate.covariance, task.ensemble - 1)
+    found = _parameters(task, np.clip(np.vstack([estimate.place, drawn]), 0.0, 1.0))
+    errors, weight = task.misfit.of(found), 1.0 / task.ensemble
+    interval = _parameters(task, estimate.interval().T).T
+    first = Simulator(found[0], float(errors[0]), interval, weight)
+    others = zip(found[1:], errors[1:], strict=True)
+    return (first, *(Simulator(parameters, float(error), None, weight) for parameters, error in others))
 
 
 def _parameters(task: Task, places: FloatArray) -> FloatArray:
-    return task.space.lower + places * task.space.extent
-
-
-def _drawn(task: Task, place: FloatArray, covariance: FloatArray, rng: Generator) -> list[Simulator]:
-    """Return the other simulators of an ensemble, best first."""
-    if task.ensemble == 1:
-        return []
-    drawn = _parameters(task, np.clip(rng.multivariate_normal(place, covariance, task.ensemble - 1), 0.0, 1.0))
-    costs = task.misfit.of(drawn)
-    return [Simulator(drawn[index], float(costs[index])) for index in np.argsort(costs, kind="stable")]
+    return np.asarray(task.space.lower + places * task.space.extent)

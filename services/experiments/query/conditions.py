@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from sqlalchemy import ColumnElement, and_, not_, or_, select
+from sqlalchemy import ColumnElement, and_, func, not_, or_, select
 
 from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.services.experiments.query import fields
@@ -11,6 +11,7 @@ from gaplab.services.experiments.query.parsing import Comparison, Every, Not, So
 from gaplab.services.store.cursor import Column
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries.fitness import best_of_all, points_of_all
+from gaplab.services.store.stored_specs import LATER
 from gaplab.services.store.texts import storable
 
 Fields = Mapping[str, Field]
@@ -72,6 +73,11 @@ def _either(first: Field, second: Field) -> Field:
     return Field(first.meaning, first.operators, lambda *asked: or_(first.meets(*asked), second.meets(*asked)))
 
 
+def _named(kind: str) -> ColumnElement[str]:
+    """SQL: the name of the plug-in of a kind that specs did not have from the beginning."""
+    return func.coalesce(_E.spec[kind]["name"].as_string(), LATER[kind]["name"])
+
+
 EXPERIMENT_FIELDS: Fields = {
     "id": fields.text(_E.id, "id"),
     "name": fields.text(_E.name, "name"),
@@ -83,6 +89,8 @@ EXPERIMENT_FIELDS: Fields = {
     "engine": fields.text(_E.spec["engine"]["name"].as_string(), "engine of the simulators"),
     "reality": fields.text(_E.spec["reality"]["engine"]["name"].as_string(), "engine that is its reality"),
     "optimizer": fields.text(_E.spec["optimizer"]["name"].as_string(), "name of the optimizer"),
+    "tuner": fields.text(_named("tuner"), "name of the tuner"),
+    "discrepancy": fields.text(_named("discrepancy"), "name of the discrepancy that tuning minimises"),
     "state": fields.state(lambda state: _E.state == state, "state"),
     "fitness": fields.fitness(_E.id, *points_of_all(), "fitness after the last common number of evaluations"),
     "best_fitness": fields.fitness(_E.id, *best_of_all(), "best recorded fitness, averaged over repetitions"),

@@ -5,7 +5,7 @@ import { h, refill } from "../../lib/dom.js";
 import { letter } from "./ranges.js";
 
 /** @type {Record<string, string>} */
-const SETTINGS = { engine: "engine", tunables: "tunables", budget: "budget", optimizer: "optimizer", iterations: "number of iterations" };
+const SETTINGS = { engine: "engine", tunables: "tunables", budget: "budget", optimizer: "optimizer", discrepancy: "discrepancy", tuner: "tuner", iterations: "number of iterations" };
 
 /** @typedef {{ id: string, study: string | null, direct: boolean, level: boolean, spec: Record<string, any> }} Experiment */
 /** @typedef {[letter: string, experiment: Experiment]} Lettered */

@@ -36,6 +36,8 @@ export function draftOf(spec, catalogue) {
     robot: pluginDraft(spec.robot ?? defaults.robot),
     engine: pluginDraft(spec.engine),
     optimizer: pluginDraft(spec.optimizer ?? defaults.optimizer),
+    discrepancy: pluginDraft(spec.discrepancy ?? defaults.discrepancy),
+    tuner: pluginDraft(spec.tuner ?? defaults.tuner),
     tunables: tunableDrafts(spec.tunables ?? defaults.tunables, catalogue),
     realityEngine: pluginDraft(spec.reality?.engine),
     realityParameters: { ...spec.reality?.parameters },
@@ -89,13 +91,15 @@ export const ticked = (list) => list.filter(({ on }) => on);
  * @returns {Spec}
  */
 export function specOf(draft) {
-  const { strategies, robot, engine, optimizer, tunables, realityEngine, realityParameters, budget } = draft;
+  const { strategies, robot, engine, optimizer, discrepancy, tuner, tunables, realityEngine, realityParameters, budget } = draft;
   return withoutEmpty({
     name: draft.name.trim(),
     strategies: ticked(strategies).map(pluginName),
     robot: pluginName(robot),
     engine: engine.name ? pluginName(engine) : "",
     optimizer: pluginName(optimizer),
+    discrepancy: pluginName(discrepancy),
+    tuner: pluginName(tuner),
     tunables: ticked(tunables).map(({ name, lower, upper }) => shortest({ name, ...withoutEmpty(typedValues({ lower, upper })) })),
     reality: withoutEmpty({ engine: realityEngine.name ? pluginName(realityEngine) : "", parameters: withoutEmpty(typedValues(realityParameters)) }),
     budget: budgetOf(budget),

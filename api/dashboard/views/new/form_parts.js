@@ -92,7 +92,7 @@ function strategyField(form, strategy) {
 }
 
 /**
- * Return the robot, the engine of the simulators, and the optimizer.
+ * Return the robot, the engine of the simulators, the optimizer, and how simulators are tuned.
  *
  * @param {Form} form
  */
@@ -103,7 +103,9 @@ export function simulationPart(form) {
   return part("Simulation",
     pluginField(form, "Robot", draft.robot, catalogue.robots, "/robot"),
     pluginField(form, "Engine of the simulators", draft.engine, catalogue.engines, "/engine", robotEngine),
-    pluginField(form, "Optimizer", draft.optimizer, catalogue.optimizers, "/optimizer"));
+    pluginField(form, "Optimizer", draft.optimizer, catalogue.optimizers, "/optimizer"),
+    pluginField(form, "Tuner", draft.tuner, catalogue.tuners, "/tuner"),
+    pluginField(form, "Tuning minimises", draft.discrepancy, catalogue.discrepancies, "/discrepancy"));
 }
 
 /**

@@ -1,0 +1,145 @@
+"""The contract of a tuner."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gaplab.services.core.answers import Answers
+from gaplab.services.core.arrays import NO_READINGS, Fitnesses, Genomes, Outcomes, Parameters
+from gaplab.services.core.discrepancies.readings import Readings
+from gaplab.services.core.optimizers.steady_state import SteadyState
+from gaplab.services.core.space import Space
+from gaplab.services.core.tuners.base import Task, Tuner
+from gaplab.services.core.tuning import Misfit
+from gaplab.services.core.types import Sample, Simulator
+
+SPACE = Space.box([0.0, -2.0], [1.0, 2.0])
+TRUTH = np.array([0.7, -1.0])
+TIMES_S = np.array([0.25, 0.5, 0.75])
+EVALUATIONS = 200
+Plugin = type[Tuner]
+
+
+def sensed(genomes: Genomes, parameters: Parameters) -> Outcomes:
+    """Return fitness and three readings `(n, m, 4)`: smooth functions of genomes `(n, 2)` and parameters `(m, 2)`."""
+    places = (parameters - SPACE.lower) / SPACE.extent
+    product = genomes[:, None, :] * places[None, :, :]
+    readings = np.stack([product[..., 0], product[..., 1], np.sin(product.sum(axis=-1))], axis=-1)
+    return np.concatenate([product.sum(axis=-1)[..., None], 100.0 * readings], axis=-1)
+
+
+class Physics:
+    """Physics that counts its rollouts, and fails above a value of the first tunable."""
+
+    def __init__(self, fails_above: float = np.inf) -> None:
+        self.fails_above = fails_above
+        self.rollouts = 0
+        self.asked: list[Parameters] = []
+
+    def fitness(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
+        """Return the fitness `(n, m)`."""
+        return self.sense(genomes, parameters)[..., 0]
+
+    def sense(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
+        """Return fitness and readings `(n, m, 4)`."""
+        self.rollouts += len(genomes) * len(parameters)
+        self.asked.append(parameters)
+        found = sensed(genomes, parameters)
+        found[:, parameters[:, 0] > self.fails_above] = np.nan
+        return found
+
+
+def samples() -> tuple[Sample, ...]:
+    """Return three samples, measured where the tunables are `TRUTH`."""
+    genomes = np.random.default_rng(4).random((3, 2))
+    measured = sensed(genomes, TRUTH[None, :])[:, 0]
+    return tuple(Sample(genome, float(row[0]), row[1:]) for genome, row in zip(genomes, measured, strict=True))
+
+
+def tuned(plugin: Plugin, physics: Physics, ensemble: int = 1, seed: int = 0) -> Sequence[Simulator]:
+    """Return the simulators that a tuner finds."""
+    answers = Answers(physics.fitness, sense=physics.sense)
+    misfit = Misfit(answers, samples(), Readings(), TIMES_S if Readings.senses else NO_READINGS)
+    optimizer = SteadyState().diverse(ensemble) if ensemble > 1 else SteadyState()
+    rng = np.random.default_rng(seed)
+    previous = tuple(Simulator(row) for row in SPACE.draw(ensemble, rng))
+    return plugin().tune(Task(misfit, SPACE, optimizer, ensemble, EVALUATIONS, previous), rng)
+
+
+def finds_the_simulator(plugin: Plugin) -> None:
+    """Finds the simulator where readings say enough."""
+    found = tuned(plugin, Physics())[0]
+    away = np.abs(found.parameters - TRUTH) / SPACE.extent
+    assert away.max() < 0.15, f"it finds {found.parameters.tolist()}; the truth is {TRUTH.tolist()}"
+
+
+def returns_as_many_as_wanted(plugin: Plugin) -> None:
+    """Returns one simulator or an ensemble, within the bounds."""
+    for ensemble in (1, 7):
+        found = np.array([each.parameters for each in tuned(plugin, Physics(), ensemble)])
+        assert found.shape == (ensemble, 2), f"of {ensemble} simulators it returns an array of shape {found.shape}"
+        inside = (SPACE.lower <= found) & (found <= SPACE.upper)
+        assert inside.all(), "it returns simulators outside the bounds"
+
+
+def states_the_discrepancy_of_each(plugin: Plugin) -> None:
+    """Returns each simulator with its own discrepancy."""
+    found = tuned(plugin, Physics(), 7)
+    misfit = Misfit(Answers(Physics().fitness, sense=Physics().sense), samples(), Readings(), TIMES_S)
+    own = misfit.of(np.array([each.parameters for each in found]))
+    stated = np.array([each.squared_error for each in found])
+    assert np.allclose(own, stated), "its simulators have the discrepancy of others"
+
+
+def keeps_to_its_budget(plugin: Plugin) -> None:
+    """Evaluates no more simulators than it may, within the bounds."""
+    physics = Physics()
+    tuned(plugin, physics, 7)
+    permitted = EVALUATIONS * len(samples())
+    assert physics.rollouts <= permitted, f"it takes {physics.rollouts} rollouts; permitted: {permitted}"
+    asked = np.vstack(physics.asked)
+    assert np.all((SPACE.lower <= asked) & (asked <= SPACE.upper)), "it asks for simulators outside the bounds"
+
+
+def repeats_itself(plugin: Plugin) -> None:
+    """Finds the same with the same random stream."""
+    first, second = (tuned(plugin, Physics(), 7) for _ in range(2))
+    same = all(np.array_equal(a.parameters, b.parameters) for a, b in zip(first, second, strict=True))
+    assert same, "two tunings with the same stream differ: use only `rng`"
+
+
+def copes_with_failed_physics(plugin: Plugin) -> None:
+    """Copes with simulators whose physics fails."""
+    found = tuned(plugin, Physics(fails_above=0.8), 3)
+    assert np.isfinite(found[0].squared_error), "its best simulator is one whose physics fails"
+    assert len(tuned(plugin, Physics(fails_above=-1.0), 3)) == 3, "it returns too few where all physics fails"
+
+
+def states_intervals_around_its_best(plugin: Plugin) -> None:
+    """States intervals and weights that mean something, if it states any."""
+    found = tuned(plugin, Physics(), 7)
+    for each in found:
+        if each.interval is not None:
+            assert each.interval.shape == (2, 2), f"its interval has the shape {each.interval.shape}; permitted: (p, 2)"
+            assert (each.interval[:, 0] <= each.interval[:, 1]).all(), "an interval ends before it begins"
+    weights = [each.weight for each in found if each.weight is not None]
+    assert len(weights) in {0, len(found)}, "some of its simulators have a weight, and others none"
+    assert not weights or np.isclose(sum(weights), 1.0), f"its weights sum to {sum(weights)}; permitted: 1"
+
+
+def is_described(plugin: Plugin) -> None:
+    """Has a docstring whose first line is a sentence."""
+    summary = plugin.describe().summary
+    assert summary.endswith("."), f"its summary in the catalogue is {summary!r}; end it with a full stop"
+
+
+CHECKS = (
+    finds_the_simulator,
+    returns_as_many_as_wanted,
+    states_the_discrepancy_of_each,
+    keeps_to_its_budget,
+    repeats_itself,
+    copes_with_failed_physics,
+    states_intervals_around_its_best,
+    is_described,
+)
