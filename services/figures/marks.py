@@ -12,7 +12,6 @@ from gaplab.services.figures.checks import check_numbers
 from gaplab.services.figures.style import INK, Style
 
 Numbers = tuple[Number, ...]
-
 PLAIN = Style(INK, "solid", "circle")
 
 
@@ -240,8 +239,7 @@ class FigureDefinition:
 
 def faint_lines(name: str, x: Sequence[Number], rows: Sequence[Sequence[Number]], style: Style) -> Line:
     """Return a faint line through each row of y as a single mark, with gaps between the rows."""
-    y = tuple(value for row in rows for value in (*row, None))
-    return Line(name, (*x, None) * len(rows), y, style, faint=True)
+    return Line(name, (*x, None) * len(rows), tuple(y for row in rows for y in (*row, None)), style, faint=True)
 
 
 def _has_data(mark: Mark) -> bool:
