@@ -224,6 +224,7 @@ class SampleRead(Frozen):
         default=None,
         description="what the sensors said, each divided by its noise, all sensors at one time after the other; null: "
         "the robot has none, or a sensor failed",
+        examples=[(0.4, -1.2, None)],
     )
     measured_by: str = Field(examples=["pybullet"])
     measured_at: Moment
@@ -245,6 +246,8 @@ class SimulatorRead(Frozen):
         description="root mean square error per sample, in the unit of fitness; null without samples too",
     )
     intervals: dict[str, tuple[float, float]] | None = Field(
-        default=None, description="95 % interval of each tunable, if the tuner gives them"
+        default=None,
+        description="95 % interval of each tunable, if the tuner gives them",
+        examples=[{"dynamic_friction": (0.7, 0.9)}],
     )
-    weight: float | None = Field(default=None, description="share of the posterior probability, if the tuner gives it")
+    weight: Statistic = Field(default=None, description="share of the posterior probability, if the tuner gives it")

@@ -55,6 +55,25 @@ class ReplayWorld(Frozen):
     )
 
 
+class ReplayReadings(Frozen):
+    """What the sensors of a robot say during one rollout, in simulation and in reality."""
+
+    sensors: tuple[str, ...] = Field(description="names", examples=[("roll", "pitch")])
+    units: tuple[str, ...] = Field(examples=[("rad", "rad")])
+    noises: tuple[float, ...] = Field(
+        description="standard deviation of each sensor's noise, in its unit", examples=[(0.02, 0.02)]
+    )
+    times_s: tuple[float, ...] = Field(description="times at which all sensors are read", examples=[(0.75, 1.0)])
+    simulation: tuple[tuple[Statistic, ...], ...] | None = Field(
+        description="values of each sensor, a row each; null: no simulator, or its physics failed",
+        examples=[((0.01, 0.03), (0.0, -0.02))],
+    )
+    reality: tuple[tuple[Statistic, ...], ...] | None = Field(
+        description="the measured values, a row each, with null where a sensor failed; null: none were stored",
+        examples=[((0.02, 0.05), (0.01, None))],
+    )
+
+
 class Replay(Frozen):
     """One controller in its simulator and in reality, from the same start."""
 
@@ -77,3 +96,4 @@ class Replay(Frozen):
     reality: ReplayWorld | None = Field(
         description="null: reality's parameters are unknown here, or reality is hardware, which no replay moves"
     )
+    readings: ReplayReadings | None = Field(default=None, description="null: the robot has no sensors")

@@ -79,7 +79,7 @@ class Client:
         self.curves, self.curves_of, self.curves_csv = results.curves, results.curves_of, results.curves_csv
         self.compare, self.misfit, self.diff = results.compare, results.misfit, results.diff
         self.curve, self.samples = tables.curve, tables.samples
-        self.simulators, self.predictions = tables.simulators, tables.predictions
+        self.simulators, self.predictions, self.readings = tables.simulators, tables.predictions, tables.readings
         self.figure, self.figure_kinds = figures.draw, figures.kinds
         self.verdict, self.report = reports.verdict, reports.save
         self.replay, self.video = replays.replay, replays.video

@@ -1,14 +1,16 @@
 """Results as tables: pandas frames with one row per observation, complete however many pages the service sends."""
 
 import time
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.frames import frame, pandas_library
 from gaplab.api.clients.results import Results
 from gaplab.schemas.curves import CurvePoint
+from gaplab.schemas.plugin import Catalogue
 from gaplab.schemas.predictions import Prediction, Predictions
-from gaplab.schemas.records import MeasurementKind, Page, SampleRead, SimulatorRead
+from gaplab.schemas.records import ExperimentRead, MeasurementKind, Page, SampleRead, SimulatorRead
 
 if TYPE_CHECKING:
     import pandas
@@ -50,13 +52,36 @@ class Tables:
             repetition: only this repetition.
             kind: only "sample" (learned from) or "probe" (only recorded).
         """
-        path, wanted = f"/experiments/{segment(id)}/samples", None if kind is None else MeasurementKind(kind)
-        samples = list(self._connection.items(Page[SampleRead], path, limit=PAGE, repetition=repetition, kind=wanted))
+        samples = self._samples(id, repetition, kind)
         columns = ("repetition", "iteration", "kind", "fitness", "measured_by", "measured_at")
         table = frame([[getattr(sample, name) for name in columns] for sample in samples], columns, ("fitness",))
         table["kind"] = table["kind"].astype(str)
         genes = pandas_library().DataFrame([sample.genome for sample in samples], index=table.index)
         return table.join(genes.rename(columns=lambda gene: f"gene_{gene}"))
+
+    def readings(self, id: str, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
+        """Return what the sensors said in the real-world evaluations of an experiment, with a column for each sensor.
+
+        A row is one time of one evaluation. Values are in the sensors' units, nan where a sensor failed. The table is
+        empty if the robot has no sensors.
+
+        Args:
+            id: id of the experiment.
+            repetition: only this repetition.
+            kind: only "sample" (learned from) or "probe" (only recorded).
+        """
+        robot = self._connection.get(ExperimentRead, f"/experiments/{segment(id)}").spec["robot"]["name"]
+        details = next(
+            each.details for each in self._connection.get(Catalogue, "/catalogue").robots if each.name == robot
+        )
+        sensors, times_s = details.get("sensors", []), details.get("reading_times_s", [])
+        names = [f"{sensor['name']}_{sensor['unit']}" for sensor in sensors]
+        rows = [
+            (sample.repetition, sample.iteration, str(sample.kind), time_s, *values)
+            for sample in self._samples(id, repetition, kind)
+            for time_s, *values in _values(sample.readings or (), times_s, [sensor["noise"] for sensor in sensors])
+        ]
+        return frame(rows, ("repetition", "iteration", "kind", "time_s", *names), ("time_s", *names))
 
     def simulators(self, id: str, *, repetition: int | None = None, iteration: int | None = None) -> "pandas.DataFrame":
         """Return the tuned simulators of an experiment, with a column for each tunable; rank 0 is an iteration's best.
@@ -98,6 +123,19 @@ class Tables:
             time.sleep(every_s)
         columns = tuple(Prediction.model_fields)
         return frame([[getattr(item, name) for name in columns] for item in predictions.items], columns, columns)
+
+    def _samples(self, id: str, repetition: int | None, kind: str | None) -> list[SampleRead]:
+        path, wanted = f"/experiments/{segment(id)}/samples", None if kind is None else MeasurementKind(kind)
+        return list(self._connection.items(Page[SampleRead], path, limit=PAGE, repetition=repetition, kind=wanted))
+
+
+def _values(
+    readings: Sequence[float | None], times_s: Sequence[float], noises: Sequence[float]
+) -> Iterator[tuple[float | None, ...]]:
+    """Yield each time of one evaluation with the values of all sensors, in their units."""
+    for start, time_s in zip(range(0, len(readings), len(noises) or 1), times_s, strict=False):
+        of_time = zip(readings[start : start + len(noises)], noises, strict=True)
+        yield time_s, *(None if reading is None else reading * noise for reading, noise in of_time)
 
 
 def _rows(point: CurvePoint, *, each: bool) -> list[tuple[float | None, ...]]:

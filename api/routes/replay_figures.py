@@ -1,4 +1,4 @@
-"""Figures of one controller or one iteration: its gait, and the toy function of the paper's Fig. 3."""
+"""Figures of one controller or one iteration: its gait, its sensors, and the toy function of the paper's Fig. 3."""
 
 from typing import Annotated
 
@@ -9,17 +9,21 @@ from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
 from gaplab.api.http.figures import Drawing, answer, responses
 from gaplab.api.routes.replays import ReplayQuery
 from gaplab.schemas.figures import FigureRead
+from gaplab.schemas.replays import Replay
 from gaplab.services.figures.kinds.gait import gait_figure
+from gaplab.services.figures.kinds.readings import readings_figure
 from gaplab.services.figures.kinds.toy import toy_figure
+from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.replay.replays import replay
 from gaplab.services.replay.rollout import ReplayChoice
 from gaplab.services.results.toy import toy_iterations
+from gaplab.services.store.session import Store
 
 router = APIRouter(prefix="/figures", tags=["figures"])
 
 
-class GaitDrawing(Drawing, ReplayQuery):
-    """The controller whose gait to draw, and how."""
+class ReplayDrawing(Drawing, ReplayQuery):
+    """The controller whose motion to draw, and how."""
 
     experiment: Id
 
@@ -35,13 +39,18 @@ class ToyDrawing(Drawing):
 
 
 @router.get("/gait", summary="Draw a gait", response_model=FigureRead, responses=responses(409))
-def draw_gait(store: StoreDep, process: RolloutProcessDep, query: Annotated[GaitDrawing, Query()]) -> Response:
+def draw_gait(store: StoreDep, process: RolloutProcessDep, query: Annotated[ReplayDrawing, Query()]) -> Response:
     """Draw a controller's footfalls, height and speed over time, in its simulator and in reality.
 
     Like a replay, it shows reality for controllers that were measured there; before, the answer is 409.
     """
-    wanted = ReplayChoice(query.repetition, query.iteration, query.kind, query.simulator)
-    return answer(gait_figure(replay(store, process, query.experiment, wanted), title=query.title), query)
+    return answer(gait_figure(_replay(store, process, query), title=query.title), query)
+
+
+@router.get("/readings", summary="Draw the readings of sensors", response_model=FigureRead, responses=responses(409))
+def draw_readings(store: StoreDep, process: RolloutProcessDep, query: Annotated[ReplayDrawing, Query()]) -> Response:
+    """Draw what the robot's sensors said in reality, and what they say in a tuned simulator."""
+    return answer(readings_figure(_replay(store, process, query), title=query.title), query)
 
 
 @router.get("/toy", summary="Draw the toy function", response_model=FigureRead, responses=responses())
@@ -52,3 +61,8 @@ def draw_toy(store: StoreDep, query: Annotated[ToyDrawing, Query()]) -> Response
     """
     iterations = toy_iterations(store, query.experiment, query.repetition, query.iteration)
     return answer(toy_figure(iterations, title=query.title), query)
+
+
+def _replay(store: Store, process: RolloutProcess, query: ReplayDrawing) -> Replay:
+    wanted = ReplayChoice(query.repetition, query.iteration, query.kind, query.simulator)
+    return replay(store, process, query.experiment, wanted)

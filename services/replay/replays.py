@@ -81,6 +81,7 @@ def _request(session: Session, row: ExperimentRow, spec: ResolvedSpec, choice: R
         parameters=None if simulator is None else _best(session, row.id, choice.repetition, simulator),
         simulated=found.simulated if simulator == own and takes_samples(spec) else None,
         real=found.real,
+        readings=None if found.readings is None else tuple(found.readings),
         known=None not in row.spec["reality"]["parameters"].values() and hardware_of(spec) is None,
     )
 

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gaplab.schemas.replays import ControllerKind, Interval, Replay, ReplayWorld
+from gaplab.schemas.replays import ControllerKind, Interval, Replay, ReplayReadings, ReplayWorld
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m
 from gaplab.services.core.robots import robots
-from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.robots.base import Robot, Sensors
 from gaplab.services.core.world import Recording, World
 from gaplab.services.replay.shapes import feet_of, labels, shapes_of
 from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, reality_of
@@ -53,6 +53,7 @@ class ReplayRequest:
         parameters: parameters of the simulator.
         simulated: the stored fitness in the simulator, if there is one.
         real: the stored fitness in reality.
+        readings: the stored readings in reality, if there are any.
         known: whether reality can be shown: the spec has its parameters, and it is no hardware.
     """
 
@@ -64,6 +65,7 @@ class ReplayRequest:
     parameters: tuple[float, ...] | None
     simulated: float | None
     real: float | None
+    readings: tuple[float | None, ...] | None
     known: bool
 
 
@@ -78,11 +80,12 @@ def compute_replay(request: ReplayRequest) -> bytes:
     genome = np.array(request.genome)
     observed = robot.motion(genome).observe_s
     times = np.arange(int(min(LONGEST_S, observed[-1]) * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S
-    simulation = reality = None
+    simulation = reality = readings = None
     if request.parameters is not None:
         simulate = Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))
         world, recording = simulate.record(genome, np.array(request.parameters), times)
         simulation = _shown(robot, spec.engine.name, world, recording, request.simulated)
+        readings = simulate.sense(genome[None, :], np.array([request.parameters]))[0, 0, 1:]
     if request.known:
         truth, real = reality_of(spec, robot)
         world, recording = real.record(genome, truth, times)
@@ -102,10 +105,34 @@ def compute_replay(request: ReplayRequest) -> bytes:
             counted_s=(float(observed[0]), float(observed[-1])),
             simulation=simulation,
             reality=reality,
+            readings=_sensed(robot.sensors, readings, request.readings),
         )
         .model_dump_json()
         .encode()
     )
+
+
+def _sensed(
+    sensors: Sensors, simulated: FloatArray | None, real: tuple[float | None, ...] | None
+) -> ReplayReadings | None:
+    """Return the readings in both worlds, in the sensors' units; None if the robot has no sensors."""
+    if not sensors.size:
+        return None
+    measured = None if real is None or len(real) != sensors.size else np.array(real, dtype=float)
+    return ReplayReadings(
+        sensors=sensors.names,
+        units=sensors.units,
+        noises=tuple(sensors.noises.tolist()),
+        times_s=tuple(sensors.times_s.tolist()),
+        simulation=None if simulated is None or np.isnan(simulated).all() else _values(sensors, simulated),
+        reality=None if measured is None else _values(sensors, measured),
+    )
+
+
+def _values(sensors: Sensors, readings: FloatArray) -> tuple[tuple[float | None, ...], ...]:
+    """Return the values of each sensor, a row each; None where a sensor failed."""
+    rows = _rounded(sensors.values(readings).T, 6).tolist()
+    return tuple(tuple(None if np.isnan(value) else value for value in row) for row in rows)
 
 
 def _shown(robot: Robot, engine: str, world: World, recording: Recording, recorded: float | None) -> ReplayWorld:

@@ -63,17 +63,18 @@ def walked(store: Store, **changes: Any) -> Any:
     def simulated(genome: Any, parameters: Any) -> Any:
         return float(setting_.simulate(genome[None], np.array([parameters]))[0, 0])
 
+    there, then = setting_.reality(known), setting_.reality(moved)
     log = [
         Tuned(0, (Simulator(frozen(UNTUNED)), Simulator(frozen(BEST)))),
         Transferred(0, known, simulated(known, UNTUNED)),
-        Probed(0, setting_.reality(known).fitness, 0.1),
+        Probed(0, there.fitness, 0.1, there.readings),
         Selected(1, moved),
-        Measured(1, Sample(moved, setting_.reality(moved).fitness)),
+        Measured(1, Sample(moved, *then)),
         Tuned(1, (Simulator(frozen(BEST)),)),
         Transferred(1, moved, simulated(moved, BEST)),
-        Probed(1, setting_.reality(moved).fitness, 0.2),
+        Probed(1, then.fitness, 0.2, then.readings),
         Selected(2, known),
-        Measured(2, Sample(known, setting_.reality(known).fitness)),
+        Measured(2, Sample(known, *there)),
     ]
     for step in log:
         assert execution.record(store, claim, step)  # type: ignore[arg-type]
@@ -103,6 +104,22 @@ def test_a_transferred_controller_walks_in_its_simulator_and_in_reality_as_it_wa
         assert all(len(feet) > 2 for feet in world.contacts)
         counted = [speed for time, speed in zip(shown.times_s, world.speeds_m_s, strict=True) if time >= 0.5]
         assert np.mean(counted) == pytest.approx(world.fitness, rel=0.2)
+
+
+def test_a_replay_has_what_the_sensors_said_in_both_worlds(sqlite_store: Store, api: Any) -> None:
+    experiment, log, claim = walked(sqlite_store)
+    sensors = Quadruped().sensors
+    simulated = setting(claim.spec, 0).sense(log[6].genome[None], np.array([BEST]))[0, 0, 1:]
+
+    shown = Replay.model_validate_json(api.get(f"/experiments/{experiment}/replay?iteration=1&kind=transfer").content)
+    figure = api.get(f"/figures/readings?experiment={experiment}&iteration=1&kind=transfer&format=json").json()
+
+    found = shown.readings
+    assert (found.sensors, found.times_s) == (sensors.names, tuple(sensors.times_s))
+    assert np.allclose(found.reality, sensors.values(log[7].readings).T, atol=1e-6)
+    assert np.allclose(found.simulation, sensors.values(simulated).T, atol=1e-6)
+    assert figure["caption"].startswith("Noise of the sensors")
+    assert [row[0] for row in figure["table"]["rows"]] == list(sensors.names)
 
 
 class Lab(PyBullet):

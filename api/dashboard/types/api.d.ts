@@ -367,6 +367,15 @@ declare namespace Api {
     counted_s: [number, number];
     simulation: ReplayWorld | null;
     reality: ReplayWorld | null;
+    readings: ReplayReadings | null;
+  }
+  interface ReplayReadings {
+    sensors: Array<string>;
+    units: Array<string>;
+    noises: Array<number>;
+    times_s: Array<number>;
+    simulation: Array<Array<number | null>> | null;
+    reality: Array<Array<number | null>> | null;
   }
   interface ReplayWorld {
     engine: string;

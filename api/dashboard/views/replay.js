@@ -3,9 +3,10 @@
 
 import { get, queryString } from "../lib/api.js";
 import { h } from "../lib/dom.js";
-import { downloadLink } from "../lib/downloads.js";
+import { downloadLink, figureDownloads } from "../lib/downloads.js";
 import { number, readableName } from "../lib/format.js";
 import { empty, failed, loading } from "../lib/placeholders.js";
+import { plot } from "../lib/plot.js";
 import { choices } from "./replay/choices.js";
 import { gait } from "./replay/gait.js";
 import { player } from "./replay/player.js";
@@ -96,7 +97,8 @@ async function fill(place, choice, signal) {
     };
     const timeline = player(replay.times_s[replay.times_s.length - 1], showTime, signal);
     const figure = gait(choice, (time) => timeline.goTo(time), signal);
-    place.replaceChildren(stages.element, timeline.element, videos(choice), ...differences(replay), figure.element);
+    place.replaceChildren(stages.element, timeline.element, videos(choice), ...differences(replay), figure.element,
+      ...(replay.readings ? [readings(choice, signal)] : []));
     timeline.begin();
   } catch (error) {
     if (signal.aborted) return;
@@ -104,6 +106,19 @@ async function fill(place, choice, signal) {
     const button = h("button", { type: "button", class: "quiet", onclick: again }, "Try again");
     place.replaceChildren(error.status === 409 ? empty(`${error.message[0].toUpperCase()}${error.message.slice(1)}.`, button) : failed(error, again, "h2"));
   }
+}
+
+/**
+ * Return the figure of what the sensors said in reality, and say in the simulator.
+ *
+ * @param {Page.ReplayChoice} choice
+ * @param {AbortSignal} signal
+ */
+function readings(choice, signal) {
+  const place = h("div");
+  plot(place, "readings", signal)(choice);
+  const downloads = figureDownloads("readings", choice, `gaplab-${choice.experiment}-readings`);
+  return h("section", { class: "card" }, h("h2", {}, "Readings of the sensors"), place, downloads);
 }
 
 /**

@@ -38,6 +38,12 @@ class Sensors:
         """Return the time of each reading, `(q,)`."""
         return np.repeat(self.times_s, len(self.names))
 
+    def details(self) -> dict[str, Any]:
+        """Return name, unit and noise of each sensor, and the times of reading, for the catalogue."""
+        named = zip(self.names, self.units, self.noises.tolist(), strict=True)
+        sensors = [{"name": name, "unit": unit, "noise": noise} for name, unit, noise in named]
+        return {"sensors": sensors, "reading_times_s": self.times_s.tolist()}
+
     def standardised(self, values: FloatArray) -> FloatArray:
         """Return readings `(..., q)`, each divided by its noise, from values `(..., r, s)` in the sensors' units."""
         return (values / self.noises).reshape(*values.shape[:-2], self.size)
@@ -92,6 +98,5 @@ class Robot(Plugin):
             "unit": cls.unit,
             "genes": robot.space.size,
             "function": robot.is_function,
-            "sensors": list(robot.sensors.names),
-            "readings": robot.sensors.size,
+            **robot.sensors.details(),
         }

@@ -44,11 +44,13 @@ class MeasuredController:
         real: fitness in reality; None if the measurement failed.
         simulated: fitness of a transferred controller in the simulator it evolved in; None for a sample, or if the
             physics failed.
+        readings: what the sensors said in reality, each divided by its noise; None if there are none.
     """
 
     genome: list[float]
     real: float | None
     simulated: float | None
+    readings: list[float | None] | None = None
 
 
 def measured_controller(
@@ -57,15 +59,17 @@ def measured_controller(
     """Return the sample or the transferred controller of an iteration; None if it is not measured yet."""
     row, measured = IterationRow, MeasurementRow
     query = (
-        of_experiments(measured, [experiment], measured.genome, measured.fitness, row.simulated_fitness)
+        of_experiments(
+            measured, [experiment], measured.genome, measured.fitness, row.simulated_fitness, measured.readings
+        )
         .join(row, (row.repetition_id == measured.repetition_id) & (row.number == measured.iteration))
         .where(RepetitionRow.number == repetition, measured.iteration == iteration, measured.kind == kind)
     )
     found = session.execute(query).first()
     if found is None:
         return None
-    genome, real, simulated = found
-    return MeasuredController(genome, real, simulated if kind is MeasurementKind.PROBE else None)
+    genome, real, simulated, readings = found
+    return MeasuredController(genome, real, simulated if kind is MeasurementKind.PROBE else None, readings)
 
 
 def tuned_parameters(session: Session, experiment: str, repetition: int, iteration: int) -> list[list[float]]:

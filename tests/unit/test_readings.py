@@ -1,0 +1,135 @@
+"""Readings: what sensors say, from a robot to its samples."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.answers import Answers, pack
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.discrepancies.readings import Readings, ReadingsOptions
+from gaplab.services.core.errors import InvalidSpec, PluginBroken
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.robots.base import Sensors
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.types import Measured, Probed
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
+
+SENSORS = Sensors(("roll", "x"), ("rad", "m"), frozen([0.1, 2.0]), frozen([1.0, 2.0, 3.0]))
+
+
+def quadruped(**changes: Any) -> Any:
+    small = {"strategy": "random", "iterations": 1, "repetitions": 1, "engine": "mujoco"}
+    budget = {"preset": "smoke", "controller_evaluations": 30, "simulator_evaluations": 30}
+    return resolve_experiment(ExperimentSpec.model_validate(small | {"budget": budget} | changes))
+
+
+def test_readings_are_in_units_of_noise_and_come_time_by_time() -> None:
+    values = np.array([[0.1, 2.0], [0.2, 4.0], [0.3, 6.0]])
+
+    readings = SENSORS.standardised(values)
+
+    assert (SENSORS.size, readings.tolist()) == (6, pytest.approx([1, 1, 2, 2, 3, 3]))
+    assert SENSORS.reading_times_s.tolist() == [1, 1, 2, 2, 3, 3]
+    assert np.allclose(SENSORS.values(readings), values)
+
+
+def test_sensing_changes_no_fitness_and_repeats_itself() -> None:
+    made, rng = setting(quadruped(), 0), np.random.default_rng(0)
+    genomes, parameters = made.genomes.draw(3, rng), made.parameters.draw(2, rng)
+
+    outcomes = made.sense(genomes, parameters)
+
+    assert outcomes.shape == (3, 2, 1 + Quadruped().sensors.size)
+    assert np.array_equal(outcomes[..., 0], made.simulate(genomes, parameters))
+    assert np.array_equal(outcomes, made.sense(genomes, parameters))
+    assert np.isfinite(outcomes).all()
+
+
+def test_the_quadruped_senses_how_it_stands_and_where() -> None:
+    made = setting(quadruped(), 0)
+    sensors = Quadruped().sensors
+
+    roll, pitch, height, x, y = sensors.values(made.reality(made.known).readings).T
+
+    assert (height > 0.05).all()
+    assert (np.abs(roll) < 0.5).all()
+    assert (np.abs(pitch) < 0.5).all()
+    reached = np.hypot(x[-1], y[-1]) / (sensors.times_s[-1] - sensors.times_s[0])
+    assert reached == pytest.approx(made.reality(made.known).fitness, rel=0.3)
+
+
+def test_a_sample_and_a_probe_carry_their_readings() -> None:
+    steps = list(repetition(setting(quadruped(discrepancy="readings"), 0)))
+
+    measured = [step for step in steps if isinstance(step, Measured)]
+    probed = [step for step in steps if isinstance(step, Probed)]
+    assert [len(step.sample.readings) for step in measured] == [50]
+    assert [len(step.readings) for step in probed] == [50, 50]
+
+
+def test_early_readings_count_and_a_failed_sensor_does_not() -> None:
+    discrepancy = Readings(ReadingsOptions(seconds=1.0))
+    simulated = np.zeros((1, 1, 7))
+    measured = np.array([[9.0, 1.0, np.nan, 3.0, 5.0, 100.0, 100.0]])
+
+    (term,) = discrepancy.terms(simulated, measured, SENSORS.reading_times_s)[0]
+
+    assert term == pytest.approx((1 + 9 + 25) / 3)  # the last time is two seconds after the first
+
+
+def test_a_spec_that_compares_readings_needs_a_robot_that_has_some() -> None:
+    with pytest.raises(InvalidSpec) as refused:
+        resolve_experiment(
+            ExperimentSpec(
+                strategy=PluginRef(name="random"),
+                robot=PluginRef(name="toy_function"),
+                discrepancy=PluginRef(name="readings"),
+            )
+        )
+
+    (violation,) = refused.value.violations
+    assert (violation.pointer, violation.permitted) == ("/discrepancy", ["absolute_fitness", "squared_fitness"])
+
+
+def test_a_tuner_that_needs_squares_says_so() -> None:
+    with pytest.raises(InvalidSpec, match="needs a sum of squares"):
+        quadruped(tuner="gauss_newton", discrepancy="absolute_fitness")
+
+
+def test_readings_that_a_robot_does_not_have_cannot_be_asked_for() -> None:
+    answers = Answers(lambda genomes, parameters: np.zeros((len(genomes), len(parameters))))
+
+    with pytest.raises(PluginBroken, match="no sensors"):
+        answers.sense(np.zeros((1, 1)), np.zeros((1, 1)))
+
+
+def test_answers_with_readings_go_through_checkpoints() -> None:
+    recorded: list[Any] = []
+
+    class Recorder:
+        def genomes_per_call(self, simulators: int) -> int:
+            return 2
+
+        def record(self, answers: Any, rollouts: int) -> None:
+            recorded.extend(answers)
+
+    calls = []
+
+    def sense(genomes: Any, parameters: Any) -> Any:
+        calls.append(len(genomes))
+        return np.arange(len(genomes) * len(parameters) * 3, dtype=float).reshape(len(genomes), len(parameters), 3)
+
+    def fitness(genomes: Any, parameters: Any) -> Any:
+        return sense(genomes, parameters)[..., 0]
+
+    genomes, parameters = np.random.default_rng(0).random((3, 2)), np.random.default_rng(1).random((4, 2))
+    first = Answers(fitness, recorder=Recorder(), sense=sense).sense(genomes, parameters)
+
+    again = Answers(fitness, checkpoints=[pack(recorded)], sense=sense).sense(genomes, parameters)
+
+    assert np.array_equal(first, again)
+    assert calls == [2, 1]
