@@ -28,7 +28,7 @@ STRATEGIES = (
 """The paper's strategies with a curve, in the order of the colours, so that each has its own."""
 
 LATER: dict[str, tuple[str, Dash, Marker]] = {
-    "estimation_exploration": ("#B0305C", "long", "square"),
+    "estimation_exploration": ("#D1477A", "long", "square"),
     "weighted": ("#8A8A2B", "dotted", "diamond"),
     "domain_randomization": ("#9C6B3F", "dashed", "triangle"),
     "noise_envelope": ("#7A5CC0", "dashdot", "inverted"),
