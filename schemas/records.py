@@ -104,11 +104,7 @@ class ExperimentRead(Frozen):
         description="true for the direct baseline: controllers evolve in reality itself, without simulators and "
         "samples, so iteration 0 is the only one",
     )
-    level: bool = Field(
-        default=False,
-        description="true for a strategy without samples, so that iteration 0 is the only one, and its curve a level; "
-        "the direct baseline is one",
-    )
+    level: bool = Field(default=False, description="true for a strategy without samples: iteration 0 only")
     state: State
     spec: dict[str, Any] = Field(
         examples=[{"strategy": {"name": "simulated_fit"}, "iterations": 10, "repetitions": 40}]

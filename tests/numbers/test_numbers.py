@@ -18,6 +18,7 @@ from gaplab.services.experiments import reading
 from gaplab.services.results import curves
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.session import Store
+from gaplab.services.store.stored_specs import complete
 from tests.numbers.kept_numbers import (
     FOLDER,
     ITERATION,
@@ -123,7 +124,7 @@ def test_an_import_shows_and_exports_the_kept_numbers(kept: Any, store: Store) -
 def assert_shown(store: Store, found: Any) -> None:
     for experiment, curve in zip(found["experiment"], found["curves"], strict=True):
         id_ = experiment["id"]
-        assert reading.read_experiment(store, id_).spec == experiment["spec"]
+        assert reading.read_experiment(store, id_).spec == complete(experiment["spec"])
         assert pages(reading.list_samples, store, id_, SAMPLE) == kept_samples(found, id_)
         assert pages(reading.list_simulators, store, id_, SIMULATOR) == kept_simulators(found, experiment)
         shown = curves.curve(store, id_)
