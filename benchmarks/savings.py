@@ -1,7 +1,7 @@
 """Rollouts saved in a whole study at desk budgets; none of them could have changed a number."""
 
 from benchmarks.measure import Row
-from gaplab.schemas.spec import ExperimentSpec
+from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.types import Cost, Selected, Transferred, Tuned
@@ -15,8 +15,8 @@ def costs() -> list[tuple[type, Cost]]:
     """Return kind and cost of every step of six strategies on the toy function."""
     specs = [
         resolve_experiment(ExperimentSpec.model_validate({"strategy": name, "robot": "toy_function", "budget": "desk"}))
-        for name, strategy in strategies.items()
-        if not strategy.in_reality
+        for name in (ref.name for ref in StudySpec().strategies)
+        if strategies[name].takes_samples
     ]
     return [
         (type(step), step.cost)

@@ -77,12 +77,13 @@ class Calls:
 def phases(spec: ExperimentSpec) -> Iterator[Calls]:
     """Yield the phases of one repetition of a resolved spec, as budgeted, without savings."""
     strategy, iterations = strategies.create(spec.strategy), spec.iterations or 0
-    if strategy.in_reality:
-        yield Calls(spec.budget.controller_evaluations or 0, 1)
+    if not strategy.takes_samples:
+        yield Calls(spec.budget.controller_evaluations or 0, strategy.transfer_simulators(len(spec.tunables)))
         return
     yield Calls((iterations + 1) * (spec.budget.controller_evaluations or 0), 1)
     if strategy.searches:
-        yield Calls(iterations * (spec.budget.selection_evaluations or 0), strategy.ensemble)
+        simulators = strategy.selection_simulators(len(spec.tunables))
+        yield Calls(iterations * (spec.budget.selection_evaluations or 0), simulators)
     for samples in range(1, iterations + 1):
         yield Calls(spec.budget.simulator_evaluations or 0, samples)
 
@@ -96,7 +97,7 @@ def figure() -> Iterator[tuple[int, tuple[Calls, ...]]]:
 def steps() -> int:
     """Return the steps that the supervisor stores for the figure: five in an iteration, three in iteration 0."""
     specs = resolve_study(FIGURE_4)
-    ends = ((spec, 0 if strategies.create(spec.strategy).in_reality else spec.iterations or 0) for spec in specs)
+    ends = ((spec, (spec.iterations or 0) * strategies[spec.strategy.name].takes_samples) for spec in specs)
     return sum((spec.repetitions or 0) * (5 * iterations + 3) for spec, iterations in ends)
 
 

@@ -20,7 +20,7 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tuners.base import Task
-from gaplab.services.core.tuning import Misfit, draw_simulators
+from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Sample, Simulator
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
@@ -81,7 +81,7 @@ def tunings(method: Method, engine: str, number: int, samples: int) -> Iterator[
     truth = space.draw(1, stream(0, "truth", number))[0]
     one = made(method, engine, truth)
     rng, measured = stream(0, "samples", number), list[Sample]()
-    previous = draw_simulators(space, method.ensemble, stream(0, "first", number))
+    previous = tuple(Simulator(row) for row in space.draw(method.ensemble, stream(0, "first", number)))
     optimizer = one.optimizer.diverse(method.ensemble) if method.ensemble > 1 else one.optimizer
     for count in range(1, samples + 1):
         while len(measured) < count:

@@ -28,6 +28,7 @@ from gaplab.services.core.strategies.base import DiverseOptions as DiverseOption
 from gaplab.services.core.strategies.base import EnsembleOptions as EnsembleOptions
 from gaplab.services.core.strategies.base import Search as Search
 from gaplab.services.core.strategies.base import Strategy as Strategy
+from gaplab.services.core.strategies.base import Untuned as Untuned
 from gaplab.services.core.tunables.base import MaterialTunable as MaterialTunable
 from gaplab.services.core.tunables.base import Tunable as Tunable
 from gaplab.services.core.tuners.base import Task as Task

@@ -24,7 +24,8 @@ class CurvePoint(Frozen):
 class Curve(Frozen):
     """The curve of one experiment.
 
-    The direct baseline has a single point, at 0: it has no samples, because its controllers evolve in reality itself.
+    A strategy without samples has a single point, at 0, which is a level across the figure. The direct baseline is one:
+    its controllers evolve in reality itself.
     """
 
     experiment: Id
@@ -32,5 +33,6 @@ class Curve(Frozen):
     strategy: Name
     state: State
     unit: Unit
-    direct: bool = False
+    direct: bool = Field(default=False, description="true for the direct baseline, which evolves in reality itself")
+    level: bool = Field(default=False, description="true for a strategy without samples: a level across the figure")
     points: tuple[CurvePoint, ...]

@@ -24,7 +24,7 @@ class ExperimentCost(Frozen):
     strategy: Name
     engine: EngineName = Field(description="engine of the simulators; for the direct baseline, the engine of reality")
     repetitions: int
-    iterations: int = Field(description="real-world evaluations of a repetition; 0 for the direct baseline")
+    iterations: int = Field(description="real-world evaluations of a repetition; 0 for a strategy without samples")
     rollouts: int = Field(
         description="upper bound over all repetitions; rollouts that cannot change a number are saved"
     )

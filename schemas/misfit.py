@@ -77,7 +77,7 @@ class TunableVerdict(Frozen):
 
 
 class MisfitRead(Frozen):
-    """Misfit of an experiment, by iteration. The direct baseline tunes nothing, so it has none."""
+    """Misfit of an experiment, by iteration; empty for a strategy without samples, which tunes nothing."""
 
     experiment: Id
     unit: Unit = Field(description="unit of fitness, error and gap")

@@ -77,7 +77,7 @@ class FitnessRead(Frozen):
 class BestRead(FitnessRead):
     """The fittest experiment of a study, after the last number of real-world evaluations that its experiments share.
 
-    The direct baseline takes part only in a study without any other experiment.
+    An experiment without samples takes part with its only value; the direct baseline, only if there is no other.
     """
 
     experiment: Id
@@ -104,6 +104,7 @@ class ExperimentRead(Frozen):
         description="true for the direct baseline: controllers evolve in reality itself, without simulators and "
         "samples, so iteration 0 is the only one",
     )
+    level: bool = Field(default=False, description="true for a strategy without samples: iteration 0 only")
     state: State
     spec: dict[str, Any] = Field(
         examples=[{"strategy": {"name": "simulated_fit"}, "iterations": 10, "repetitions": 40}]
@@ -164,11 +165,11 @@ class StudyRead(Frozen):
 def common_count(experiments: Sequence[ExperimentRead]) -> int | None:
     """Return the last number of real-world evaluations that experiments share; None if none has a fitness.
 
-    The direct baseline has a single value, which is compared with every number. Experiments that failed or were
-    cancelled lower the number only if no other has a fitness.
+    An experiment without samples has a single value, which is compared with every number. Experiments that failed or
+    were cancelled lower the number only if no other has a fitness.
     """
     found = [each for each in experiments if each.fitness]
-    found = [each for each in found if not each.direct] or found
+    found = [each for each in found if not each.level] or found
     lasting = [each for each in found if each.state not in {State.FAILED, State.CANCELLED}] or found
     return min((each.fitness.evaluations for each in lasting if each.fitness), default=None)
 

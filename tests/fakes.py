@@ -63,10 +63,11 @@ def small_setting(strategy: Any = "simulated_fit", options: Any = None, **change
         genomes=Space.box([0.0, 0.0], [1.0, 1.0], [True, False]),
         parameters=Space.box([0.0, 0.0], [1.0, 1.0]),
         known=np.array([0.5, 0.5]),
-        budget=Budget(40, 30, 50),
-        iterations=3,
+        budget=Budget(controller_evaluations=40, selection_evaluations=30, simulator_evaluations=50),
+        iterations=3 if chosen.takes_samples else 0,
         seed=11,
         repetition=4,
+        names=("static_friction", "dynamic_friction"),
     )
     return replace(setting, **changes)
 

@@ -53,6 +53,7 @@ def curve(name: str, *points: CurvePoint, direct: bool = False, unit: str = "m/s
         state=State.RUNNING,
         unit=unit,
         direct=direct,
+        level=direct,
         points=points,
     )
 

@@ -20,7 +20,7 @@ def findings(client: Client, curves: Sequence[Curve]) -> Iterator[str]:
     learned = [curve for curve in curves if not curve.direct]
     names = {curve.experiment: curve.name.replace("_", " ") for curve in learned}
     last = max((point.evaluations for curve in curves for point in curve.points), default=0)
-    shared = min((max(_reached(curve), default=0) for curve in learned), default=0)
+    shared = min((max(_reached(curve), default=0) for curve in learned if not curve.level), default=0)
     ranges = [(shared, shared), (1, 1), (3, shared), (6, shared)]  # Source: the caption of the paper's Fig. 4
     for first, final in dict.fromkeys(ranges):
         if len(names) > 1 and first <= final <= shared:

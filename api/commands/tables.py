@@ -24,7 +24,7 @@ def overview(records: Iterable[Record]) -> Table:
 
 def repetitions(found: Iterable[RepetitionRead], experiment: ExperimentRead) -> Table:
     """Return a table of the repetitions of an experiment."""
-    iterations = 0 if experiment.direct else int(experiment.spec["iterations"])
+    iterations = 0 if experiment.level else int(experiment.spec["iterations"])
     columns = ("repetition", "state", "iterations", "rollouts", "attempts", "reason of failure")
     return table(columns, (_repetition(repetition, iterations) for repetition in found))
 
@@ -34,7 +34,7 @@ def curves(found: Sequence[Curve]) -> Table:
 
     Seven curves fit into 80 columns: headings break between words, numbers never.
     """
-    lines = [curve for curve in found if not curve.direct]
+    lines = [curve for curve in found if not curve.level]
     points = {(curve.experiment, point.evaluations): point for curve in lines for point in curve.points}
     rows = [
         (f"{count}", *(_mean(points.get((curve.experiment, count))) for curve in lines))
@@ -46,11 +46,12 @@ def curves(found: Sequence[Curve]) -> Table:
 
 
 def baselines(found: Sequence[Curve]) -> list[str]:
-    """Return a sentence for each direct baseline."""
+    """Return a sentence for each experiment without samples, like the direct baseline."""
     return [
-        f"{escape(curve.name)} (evolved in reality itself): {_mean(point)} {curve.unit}, n = {point.n}"
+        f"{escape(curve.name)} ({'evolved in reality itself' if curve.direct else 'without samples'}): "
+        f"{_mean(point)} {curve.unit}, n = {point.n}"
         for curve in found
-        if curve.direct
+        if curve.level
         for point in curve.points[:1]
     ]
 

@@ -23,7 +23,7 @@ from gaplab.services.results import curves
 from gaplab.services.results.coordinates import experiment_coordinates, simulator_coordinates
 from gaplab.services.results.curve_costs import cost_axis
 from gaplab.services.results.tuned_simulators import tuned_simulators
-from gaplab.services.specs.resolution import is_direct
+from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.session import Store
 
 router = APIRouter(prefix="/figures", tags=["figures"])
@@ -34,6 +34,7 @@ NARROW_IN = 5.0
 """A file narrower than this has two panels in a row, else three."""
 
 DIRECT = "the direct baseline tunes no simulators"
+NO_SAMPLES = "a strategy without samples tunes no simulators"
 """The message in place of a figure of simulators that do not exist."""
 
 
@@ -86,7 +87,7 @@ class SimulatorsDrawing(ExperimentDrawing):
 
 @router.get("/curves", summary="Draw curves", response_model=FigureRead, responses=responses())
 def draw_curves(store: StoreDep, query: Annotated[CurvesDrawing, Query()]) -> Response:
-    """Draw the paper's Fig. 4 for any studies and experiments: curves with bands, the direct baseline with its SD."""
+    """Draw the paper's Fig. 4 for any studies and experiments: curves with bands, and levels with their SD."""
     return answer(_curves(store, query), query)
 
 
@@ -171,9 +172,11 @@ def _title(store: Store, query: ExperimentDrawing) -> str:
 
 def _explained(store: Store, query: ExperimentDrawing, figure: FigureDefinition) -> FigureDefinition:
     """Return the figure, with an explanation if it will always be empty."""
-    if not figure.empty or not is_direct(spec_of(reading.read_experiment(store, query.experiment).spec)):
+    spec = spec_of(reading.read_experiment(store, query.experiment).spec)
+    if not figure.empty or takes_samples(spec):
         return figure
-    return replace(figure, nothing=DIRECT, alt=f"Nothing: {DIRECT}.")
+    why = DIRECT if is_direct(spec) else NO_SAMPLES
+    return replace(figure, nothing=why, alt=f"Nothing: {why}.")
 
 
 def _curves(store: Store, query: CurvesDrawing) -> FigureDefinition:

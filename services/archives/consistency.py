@@ -15,7 +15,7 @@ from gaplab.services.core.robots import robots
 from gaplab.services.core.stored_specs import spec_as_stored
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
-from gaplab.services.specs.resolution import is_direct
+from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.store.models import SPEC_VERSION
 from gaplab.services.store.queries import provenance
 from gaplab.services.store.texts import pack_tags, unpack_tags
@@ -118,5 +118,5 @@ def _iterations(spec: ResolvedSpec) -> set[int]:
     """Return the permitted iterations of a repetition: both numbers for a strategy that is not installed here."""
     several = spec.iterations + 1
     if spec.strategy.name in strategies:
-        return {1 if is_direct(spec) else several}
+        return {several if takes_samples(spec) else 1}
     return {1, several}

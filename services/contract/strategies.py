@@ -1,15 +1,19 @@
-"""The contract of a strategy."""
+"""The contract of a strategy.
+
+A strategy without samples selects nothing, so that what it transfers is checked in place of what it selects.
+"""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from gaplab.services.core.arrays import Fitnesses, Genome, Genomes, Parameters
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Score, Strategy
 from gaplab.services.core.types import Belief, Sample, Simulator
 
 SPACE = Space.box([0.0, 0.0], [1.0, 1.0], [True, False])
+TUNABLES, NAMES = Space.box([0.0, 0.0], [1.0, 1.0]), ("static_friction", "dynamic_friction")
 SAMPLES = (Sample(np.array([0.5, 0.5]), 0.8), Sample(np.array([0.1, 0.5]), float("nan")))
 Plugin = type[Strategy]
 
@@ -20,43 +24,75 @@ def hill(genomes: Genomes, parameters: Parameters) -> Fitnesses:
     return fitnesses
 
 
+def seen(genomes: Genomes, parameters: Parameters) -> Outcomes:
+    """Return that fitness, and as readings the differences from the summits, `(n, m, 3)`."""
+    return np.concatenate([hill(genomes, parameters)[..., None], genomes[:, None, :] - parameters], axis=2)
+
+
 def belief(strategy: Strategy, samples: Sequence[Sample] = ()) -> Belief:
     """Return what a strategy knows: its simulators, a hand-designed genome and samples."""
     rng = np.random.default_rng(5)
-    simulators = tuple(Simulator(row, 0.1) for row in rng.random((strategy.ensemble, 2)))
-    return Belief(SPACE, np.array([0.2, 0.9]), tuple(samples), simulators)
+    drawn = np.asarray(strategy.draw(TUNABLES, NAMES, rng))
+    expected = (strategy.ensemble, 2)
+    assert drawn.shape == expected, f"its first simulators have the shape {drawn.shape}, not {expected}"
+    assert np.all((drawn >= 0.0) & (drawn <= 1.0)), f"it draws simulators outside the bounds 0 to 1: {drawn.tolist()}"
+    simulators = tuple(Simulator(row, 0.1) for row in drawn)
+    return Belief(SPACE, np.array([0.2, 0.9]), tuple(samples), simulators, TUNABLES, NAMES)
 
 
 class GridSearch:
-    """A search that looks at every point of a grid, and counts its calls."""
+    """A search that looks at every point of a grid, and counts its calls and its simulators."""
 
     def __init__(self, believed: Belief) -> None:
         self.believed = believed
-        self.calls = 0
+        self.calls = self.simulators = 0
 
-    def __call__(self, score: Score) -> Genome:
-        """Return the genome of the grid with the highest score."""
+    def __call__(
+        self,
+        score: Score,
+        *,
+        parameters: Parameters | None = None,
+        senses: bool = False,
+        candidates: Genomes | None = None,
+    ) -> Genome:
+        """Return the genome of the grid, or of the candidates, with the highest score."""
         self.calls += 1
+        simulators = self.believed.parameters if parameters is None else parameters
+        self.simulators = max(self.simulators, len(simulators))
         axis = np.linspace(0, 1, 41)
-        grid = np.array(np.meshgrid(axis, axis)).reshape(2, -1).T
-        scores = np.asarray(score(grid, hill(grid, self.believed.parameters)))
+        grid = np.array(np.meshgrid(axis, axis)).reshape(2, -1).T if candidates is None else candidates
+        scores = np.asarray(score(grid, (seen if senses else hill)(grid, simulators)))
         assert scores.shape == (len(grid),), f"its score of {len(grid)} genomes has the shape {scores.shape}"
-        best: Genome = grid[int(np.argmax(scores))]
+        best: Genome = grid[int(np.argmax(np.where(np.isnan(scores), -np.inf, scores)))]
         return best
 
 
 def selected(strategy: Strategy, samples: Sequence[Sample] = (), seed: int = 0) -> Genome:
-    """Return the genome that a strategy selects."""
+    """Return the genome that a strategy selects, or transfers if it takes no samples."""
+    return chosen(strategy, samples, seed, transfer=not strategy.takes_samples)
+
+
+def chosen(strategy: Strategy, samples: Sequence[Sample] = (), seed: int = 0, *, transfer: bool = False) -> Genome:
+    """Return the genome that a strategy selects or transfers."""
     believed = belief(strategy, samples)
-    return strategy.select(believed, GridSearch(believed), np.random.default_rng(seed))
+    choose = strategy.transfer if transfer else strategy.select
+    return choose(believed, GridSearch(believed), np.random.default_rng(seed))
 
 
 def selects_a_genome_of_the_space(plugin: Plugin) -> None:
     """Selects a genome within the bounds of the space."""
-    genome = np.asarray(selected(plugin()))
-    assert genome.shape == (2,), f"in a space of 2 genes it selects an array of shape {genome.shape}"
+    _check_inside(np.asarray(selected(plugin())), "selects")
+
+
+def transfers_a_genome_of_the_space(plugin: Plugin) -> None:
+    """Transfers a genome within the bounds of the space."""
+    _check_inside(np.asarray(chosen(plugin(), SAMPLES, transfer=True)), "transfers")
+
+
+def _check_inside(genome: FloatArray, verb: str) -> None:
+    assert genome.shape == (2,), f"in a space of 2 genes it {verb} an array of shape {genome.shape}"
     inside = bool(np.all((genome >= SPACE.lower) & (genome <= SPACE.upper)))
-    assert inside, f"it selects {genome.tolist()}, outside the bounds 0 to 1"
+    assert inside, f"it {verb} {genome.tolist()}, outside the bounds 0 to 1"
 
 
 def selects_the_same_from_the_same(plugin: Plugin) -> None:
@@ -74,10 +110,33 @@ def copes_with_failed_measurements(plugin: Plugin) -> None:
 def searches_as_it_says(plugin: Plugin) -> None:
     """Searches once, or never with `searches = False`."""
     strategy = plugin()
+    if not strategy.takes_samples:
+        return
     search = GridSearch(belief(strategy))
     strategy.select(belief(strategy), search, np.random.default_rng(0))
     expected = int(strategy.searches)
     assert search.calls == expected, f"it has searches = {strategy.searches}, but searches {search.calls} times"
+    stated = strategy.selection_simulators(TUNABLES.size)
+    assert search.simulators <= stated, f"it searches in {search.simulators} simulators, but states {stated}"
+
+
+def transfers_as_it_says(plugin: Plugin) -> None:
+    """Searches at most once for a transfer, in as many simulators as it states."""
+    strategy = plugin()
+    search = GridSearch(belief(strategy, SAMPLES))
+    strategy.transfer(belief(strategy, SAMPLES), search, np.random.default_rng(0))
+    stated = strategy.transfer_simulators(TUNABLES.size)
+    assert search.calls <= 1, f"its transfer searches {search.calls} times"
+    assert search.simulators <= stated, f"it transfers from {search.simulators} simulators, but states {stated}"
+
+
+def learns_from_its_samples(plugin: Plugin) -> None:
+    """Says whether it learns from its samples, and which of them are lessons."""
+    strategy = plugin()
+    learns, lessons = strategy.learns(SAMPLES), strategy.lessons(SAMPLES)
+    assert learns in {True, False}, f"`learns` returns {learns!r}"
+    strange = [each for each in lessons if not any(each is sample for sample in SAMPLES)]
+    assert not strange, f"its lessons have {len(strange)} samples that were not measured"
 
 
 def is_described(plugin: Plugin) -> None:
@@ -91,5 +150,8 @@ CHECKS = (
     selects_the_same_from_the_same,
     copes_with_failed_measurements,
     searches_as_it_says,
+    transfers_a_genome_of_the_space,
+    transfers_as_it_says,
+    learns_from_its_samples,
     is_described,
 )

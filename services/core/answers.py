@@ -119,6 +119,11 @@ class Answers:
         self._failures += int(np.isnan(outcomes[:, :, 0]).sum())
         return outcomes
 
+    @property
+    def senses(self) -> bool:
+        """Return whether the robot has sensors."""
+        return self._with_readings is not None
+
     def cost_of(self, budget: int) -> Cost:
         """Return the cost of the step so far; `budget` is the number of rollouts that it was given."""
         return Cost(self._rollouts, self._failures, budget - self._rollouts)

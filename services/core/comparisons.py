@@ -57,7 +57,7 @@ class Compared:
         id: its id.
         name: its name.
         recorded: recorded fitness `(r, k)` by repetition and number of real-world evaluations; nan is missing.
-        direct: whether its only column, at 0, counts at every number of real-world evaluations.
+        level: whether its only column, at 0, counts at every number of real-world evaluations.
         seed: seed of its random streams.
         strategy: name of its strategy, which is in the address of its random streams.
     """
@@ -65,7 +65,7 @@ class Compared:
     id: str
     name: str
     recorded: FloatArray
-    direct: bool
+    level: bool
     seed: int
     strategy: str
 
@@ -80,7 +80,7 @@ class Range:
     @np.errstate(over="ignore", invalid="ignore")
     def values(self, one: Compared) -> FloatArray:
         """Return the mean of each repetition over the range, `(r,)`; nan if a number of the range is missing."""
-        complete = one.direct or self.last < one.recorded.shape[1]
+        complete = one.level or self.last < one.recorded.shape[1]
         return self._columns(one).mean(axis=1) if complete else np.full(len(one.recorded), np.nan)
 
     def pooled(self, one: Compared) -> FloatArray:
@@ -88,7 +88,7 @@ class Range:
         return finite(self._columns(one))
 
     def _columns(self, one: Compared) -> FloatArray:
-        return one.recorded[:, :1] if one.direct else one.recorded[:, self.first : self.last + 1]
+        return one.recorded[:, :1] if one.level else one.recorded[:, self.first : self.last + 1]
 
 
 def shares_streams(one: Compared, other: Compared) -> bool:

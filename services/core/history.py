@@ -1,11 +1,10 @@
-"""The history of a repetition: all that its next step follows from, gathered from the log."""
+"""The result of the steps of a repetition so far, read from its log."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gaplab.services.core.arrays import Genome
-from gaplab.services.core.types import Measured, Sample, Simulator, Step, Transferred, Tuned
+from gaplab.services.core.types import Measured, Probed, Sample, Simulator, Step, Transferred, Tuned
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,14 +15,16 @@ class History:
         last: the latest step; None at the very start.
         samples: samples measured so far.
         simulators: simulators of the latest tuning, best first.
-        transferred: the latest transferred genome.
+        transferred: the latest transferred controller.
+        probed: its latest probe.
         scale: size of the fitness in simulation of the first transferred controller that has one; None without any.
     """
 
     last: Step | None = None
     samples: tuple[Sample, ...] = ()
     simulators: tuple[Simulator, ...] = ()
-    transferred: Genome | None = None
+    transferred: Transferred | None = None
+    probed: Probed | None = None
     scale: float | None = None
 
     def after(self, step: Step) -> "History":
@@ -33,8 +34,10 @@ class History:
                 return replace(self, last=step, samples=(*self.samples, sample))
             case Tuned(simulators=simulators):
                 return replace(self, last=step, simulators=simulators)
-            case Transferred(genome=genome, fitness=fitness):
-                return replace(self, last=step, transferred=genome, scale=self.scale or _size(fitness))
+            case Transferred(fitness=fitness):
+                return replace(self, last=step, transferred=step, scale=self.scale or _size(fitness))
+            case Probed():
+                return replace(self, last=step, probed=step)
         return replace(self, last=step)
 
 

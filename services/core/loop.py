@@ -12,7 +12,8 @@ import numpy as np
 from numpy.random import Generator
 
 from gaplab.services.core.answers import Answers
-from gaplab.services.core.arrays import FloatArray, Genome, Parameters, no_readings
+from gaplab.services.core.arrays import FloatArray, Genome, no_readings
+from gaplab.services.core.controller_search import Allowance, ControllerSearch
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.errors import PluginBroken
@@ -20,13 +21,12 @@ from gaplab.services.core.held_out import split, tested
 from gaplab.services.core.history import History
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.ports import Reality, Sense, Simulate
-from gaplab.services.core.search import maximise
 from gaplab.services.core.space import Space
-from gaplab.services.core.strategies.base import Score, Search, Strategy
+from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tuners.base import Task, Tuner
 from gaplab.services.core.tuners.search import Search as SearchTuner
-from gaplab.services.core.tuning import Misfit, draw_simulators
+from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import (
     Belief,
     Budget,
@@ -35,6 +35,7 @@ from gaplab.services.core.types import (
     Probed,
     Sample,
     Selected,
+    Simulator,
     Step,
     Transferred,
     Tuned,
@@ -55,7 +56,7 @@ class Setting:
         parameters: the space of simulators.
         known: `(g,)`, the hand-designed genome.
         budget: evaluations of each search.
-        iterations: real-world evaluations to spend; 0 for the direct baseline.
+        iterations: real-world evaluations to spend; 0 for a strategy without samples.
         seed: seed of the experiment.
         repetition: number of the repetition, from 0.
         batch_size: returns how many rollouts a call of `simulate` should have at present; it changes no number.
@@ -64,6 +65,7 @@ class Setting:
         discrepancy: what tuning minimises.
         tuner: finds simulators.
         held_out: share of the samples that no tuning sees.
+        names: `(p,)`: names of the tunables.
     """
 
     simulate: Simulate
@@ -83,6 +85,7 @@ class Setting:
     discrepancy: Discrepancy = field(default_factory=SquaredFitness)
     tuner: Tuner = field(default_factory=SearchTuner)
     held_out: float = 0.0
+    names: tuple[str, ...] = ()
 
     def stream(self, iteration: int, phase: str) -> Generator:
         """Return the random stream of one phase of one iteration."""
@@ -115,7 +118,7 @@ def next_step(setting: Setting, history: History, answers: Answers) -> Step | No
     """Return the next step, whose rollouts come from `answers`; None at the end."""
     match history.last:
         case None:
-            return _draw(setting)
+            return Tuned(0, _drawn(setting, 0))
         case Tuned(iteration=iteration):
             return _transfer(setting, history, iteration, answers)
         case Transferred(iteration=iteration, genome=genome):
@@ -129,67 +132,73 @@ def next_step(setting: Setting, history: History, answers: Answers) -> Step | No
     return None
 
 
-def _draw(setting: Setting) -> Tuned:
-    """Return random simulators, because iteration 0 tunes nothing."""
-    return Tuned(0, draw_simulators(setting.parameters, setting.strategy.ensemble, setting.stream(0, "tune")))
+def _drawn(setting: Setting, iteration: int) -> tuple[Simulator, ...]:
+    """Return simulators before the first sample, which are random. Source: paper, section 2."""
+    strategy, space = setting.strategy, setting.parameters
+    drawn = strategy.draw(space, setting.names, setting.stream(iteration, "tune"))
+    source = f"strategy {strategy.name!r}"
+    if len(drawn) != strategy.ensemble:
+        raise PluginBroken(f"{source} drew {len(drawn)} simulators; permitted: {strategy.ensemble}, its ensemble")
+    return tuple(Simulator(space.check(parameters, source)) for parameters in drawn)
+
+
+def _keeps(setting: Setting, history: History) -> bool:
+    """Return whether simulators and controller stay as they are after the latest sample."""
+    return bool(history.samples) and not setting.strategy.learns(history.samples)
+
+
+def _belief(setting: Setting, history: History) -> Belief:
+    return Belief(
+        space=setting.genomes,
+        known=setting.known,
+        samples=history.samples,
+        simulators=history.simulators,
+        tunables=setting.parameters,
+        names=setting.names,
+        scale=history.scale or 1.0,
+        discrepancy=setting.discrepancy,
+    )
+
+
+def _search(
+    setting: Setting, belief: Belief, answers: Answers, allowance: Allowance, rng: Generator
+) -> ControllerSearch:
+    return ControllerSearch(setting.strategy.name, setting.optimizer, belief, answers, allowance, rng)
 
 
 def _select(setting: Setting, history: History, iteration: int, answers: Answers) -> Selected:
-    searched = setting.budget.selection_evaluations * setting.strategy.ensemble if setting.strategy.searches else 0
-    if setting.budget.reuse_transfer and setting.strategy.selects_transferred and history.transferred is not None:
-        return Selected(iteration, history.transferred, Cost(saved=searched))
-    scale = history.scale or 1.0
-    belief = Belief(
-        setting.genomes, setting.known, history.samples, history.simulators, scale, discrepancy=setting.discrepancy
-    )
-    search = _search(setting, answers, belief.parameters, setting.stream(iteration, "search"))
-    selected = setting.strategy.select(belief, search, setting.stream(iteration, "select"))
-    genome = setting.genomes.check(selected, f"strategy {setting.strategy.name!r}")
-    return Selected(iteration, genome, answers.cost_of(searched))
-
-
-def _search(setting: Setting, answers: Answers, parameters: Parameters, rng: Generator) -> Search:
-    """Return the one search that a selection has a budget for; strategies with `searches = False` get none."""
-    name, left = setting.strategy.name, int(setting.strategy.searches)
-
-    def search(score: Score) -> Genome:
-        nonlocal left
-        if not left:
-            permitted = (
-                "one search a selection is permitted" if setting.strategy.searches else "it has searches = False"
-            )
-            raise PluginBroken(f"strategy {name!r} has no budget left for this search: {permitted}")
-        left -= 1
-        found = maximise(
-            setting.optimizer,
-            setting.genomes,
-            lambda asked: score(asked.genomes, answers(asked.genomes, parameters, asked.following)),
-            setting.budget.selection_evaluations,
-            rng,
-        )
-        best: Genome = found.genomes[0]
-        return best
-
-    return search
+    """Return the controller that the strategy selects, from a search if it has one."""
+    budget, strategy = setting.budget, setting.strategy
+    allowance = Allowance.of_selection(strategy, budget.selection_evaluations, setting.parameters.size)
+    if budget.reuse_transfer and strategy.selects_transferred and history.transferred is not None:
+        return Selected(iteration, history.transferred.genome, Cost(saved=allowance.rollouts))
+    belief = _belief(setting, history)
+    search = _search(setting, belief, answers, allowance, setting.stream(iteration, "search"))
+    selected = strategy.select(belief, search, setting.stream(iteration, "select"))
+    genome = setting.genomes.check(selected, f"strategy {strategy.name!r}")
+    return Selected(iteration, genome, answers.cost_of(allowance.rollouts))
 
 
 def _tune(setting: Setting, history: History, iteration: int, answers: Answers) -> Tuned:
-    """Return simulators tuned on all samples whose measurement succeeded; random ones if there are none.
+    """Return simulators tuned on the strategy's lessons whose measurement succeeded; random ones if there are none.
 
-    Held-out samples are not tuned on: the best simulator is tested on them. The budget includes samples whose
-    measurement failed; their rollouts count as saved.
+    Samples that are held out are not tuned on: the best simulator is tested on them. The budget includes samples that
+    are no lessons or whose measurement failed; their rollouts count as saved.
     """
-    ensemble, evaluations = setting.strategy.ensemble, setting.budget.simulator_evaluations
+    strategy, evaluations = setting.strategy, setting.budget.simulator_evaluations
+    if not strategy.tunes:
+        return Tuned(iteration, history.simulators)
     seen, unseen = split(history.samples, setting.held_out)
-    budget = evaluations * len(seen) + len(unseen)
-    rng = setting.stream(iteration, "tune")
-    samples, tests = learnable(seen), learnable(unseen)
+    ensemble, budget = strategy.ensemble, evaluations * len(seen) + len(unseen)
+    if _keeps(setting, history):
+        return Tuned(iteration, history.simulators, Cost(saved=budget))
+    samples, tests = learnable(strategy.lessons(seen)), learnable(unseen)
     if not samples:
-        return Tuned(iteration, draw_simulators(setting.parameters, ensemble, rng), Cost(saved=budget))
+        return Tuned(iteration, _drawn(setting, iteration), Cost(saved=budget))
     optimizer = setting.optimizer.diverse(ensemble) if ensemble > 1 else setting.optimizer
     misfit = Misfit(answers, samples, setting.discrepancy, setting.reading_times_s)
     task = Task(misfit, setting.parameters, optimizer, ensemble, evaluations, history.simulators)
-    found = setting.tuner.tune(task, rng)
+    found = setting.tuner.tune(task, setting.stream(iteration, "tune"))
     source = f"tuner {setting.tuner.name!r} with optimizer {setting.optimizer.name!r}"
     if not 1 <= len(found) <= ensemble:
         raise PluginBroken(f"{source} returned {len(found)} simulators; permitted: {ensemble}")
@@ -201,23 +210,25 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
 
 
 def _transfer(setting: Setting, history: History, iteration: int, answers: Answers) -> Transferred:
-    """Return a controller evolved in the best simulator."""
-    best = history.simulators[0].parameters[None, :]
-    found = maximise(
-        setting.optimizer,
-        setting.genomes,
-        lambda asked: answers(asked.genomes, best, asked.following)[:, 0],
-        setting.budget.controller_evaluations,
-        setting.stream(iteration, "transfer"),
-    )
-    fitness = float(found.fitness[0]) if np.isfinite(found.fitness[0]) else float("nan")
-    cost = answers.cost_of(setting.budget.controller_evaluations)
-    genome = setting.genomes.check(found.genomes[0], f"optimizer {setting.optimizer.name!r}")
-    return Transferred(iteration, genome, fitness, cost)
+    """Return the controller that the strategy transfers, from a search if it has one."""
+    strategy, evaluations = setting.strategy, setting.budget.controller_evaluations
+    allowance = Allowance.of_transfer(strategy, evaluations, setting.parameters.size)
+    if history.transferred is not None and _keeps(setting, history):
+        last = history.transferred
+        return Transferred(iteration, last.genome, last.fitness, Cost(saved=allowance.rollouts))
+    belief = _belief(setting, history)
+    search = _search(setting, belief, answers, allowance, setting.stream(iteration, "transfer"))
+    transferred = strategy.transfer(belief, search, setting.stream(iteration, "transfer draws"))
+    genome = setting.genomes.check(transferred, f"strategy {strategy.name!r}")
+    return Transferred(iteration, genome, search.score_of(genome), answers.cost_of(allowance.rollouts))
 
 
 def _probe(setting: Setting, history: History, iteration: int, genome: Genome) -> Probed:
-    fitness, readings = setting.reality(genome)
+    """Return the probe of the transferred controller; one that was kept is not measured again."""
+    if history.probed is not None and _keeps(setting, history):
+        fitness, readings = history.probed.fitness, history.probed.readings
+    else:
+        fitness, readings = setting.reality(genome)
     return Probed(iteration, fitness, recorded_fitness(fitness, history.samples), readings)
 
 

@@ -3,15 +3,13 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.random import Generator
 
 from gaplab.services.core.answers import Answers, Following, nothing
 from gaplab.services.core.arrays import NO_READINGS, Fitnesses, FloatArray, Genomes, Outcomes, Parameters
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.search import Question
-from gaplab.services.core.space import Space
-from gaplab.services.core.types import Sample, Simulator
+from gaplab.services.core.types import Sample
 
 ROUNDING = 1e-9
 """Relative excess of a partial sum over a limit: from it on, the whole sum exceeds the limit in spite of rounding."""
@@ -44,11 +42,6 @@ def simulator_fitness(squared_error: FloatArray) -> FloatArray:
     """Return f(sim) = 1 / Σe²; infinite at a perfect fit. Source: paper, section 2."""
     with np.errstate(divide="ignore"):
         return 1.0 / squared_error
-
-
-def draw_simulators(space: Space, count: int, rng: Generator) -> tuple[Simulator, ...]:
-    """Return simulators drawn uniformly, for use before the first sample. Source: paper, section 2."""
-    return tuple(Simulator(parameters) for parameters in space.draw(count, rng))
 
 
 class Misfit:

@@ -79,6 +79,8 @@ class Belief:
         known: `(g,)`: the robot's hand-designed genome.
         samples: samples in the order of measurement.
         simulators: one simulator or a diverse ensemble; random before the first sample.
+        tunables: space of simulators.
+        names: `(p,)`, names of the tunables, in the order of simulators' parameters.
         scale: about the fitness that evolution in reality would reach, above 0. It is the fitness in simulation of the
             first transferred controller.
         discrepancy: what `simulators` were tuned to minimise.
@@ -88,6 +90,8 @@ class Belief:
     known: Genome
     samples: tuple[Sample, ...]
     simulators: tuple[Simulator, ...]
+    tunables: Space
+    names: tuple[str, ...]
     scale: float = 1.0
     discrepancy: Discrepancy = field(default_factory=SquaredFitness)
 
@@ -165,10 +169,11 @@ class Tuned:
 
 @dataclass(frozen=True, eq=False)
 class Transferred:
-    """A controller was evolved in the best simulator, for a probe in reality.
+    """A controller was evolved in simulation, for a probe in reality.
 
     Attributes:
-        fitness: fitness in that simulator; nan if the physics failed for every controller tried.
+        fitness: score of the strategy's search, by default the fitness in the best simulator; nan if it is unknown, or
+            the physics failed for every controller tried.
     """
 
     iteration: int

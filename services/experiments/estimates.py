@@ -11,7 +11,13 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import check_extent
 from gaplab.services.settings import Limits
-from gaplab.services.specs.resolution import expected_rollouts, is_direct, resolve_experiment, resolve_study
+from gaplab.services.specs.resolution import (
+    expected_rollouts,
+    is_direct,
+    resolve_experiment,
+    resolve_study,
+    takes_samples,
+)
 from gaplab.services.store.queries import costs, supervisors
 from gaplab.services.store.session import Store
 
@@ -88,7 +94,7 @@ def _experiment(spec: ResolvedSpec, cost: EngineCost) -> ExperimentCost:
         strategy=spec.strategy.name,
         engine=cost.engine,
         repetitions=spec.repetitions,
-        iterations=0 if is_direct(spec) else spec.iterations,
+        iterations=spec.iterations if takes_samples(spec) else 0,
         rollouts=rollouts,
         core_seconds=rollouts * cost.seconds_per_rollout,
     )

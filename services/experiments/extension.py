@@ -15,7 +15,7 @@ from gaplab.services.experiments.limits import FREELY, Admission, check_extent, 
 from gaplab.services.experiments.states import move, settle
 from gaplab.services.experiments.submission import extent_of
 from gaplab.services.experiments.views import view_experiments
-from gaplab.services.specs.resolution import is_direct
+from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import insert_repetitions, repetitions_of
@@ -35,7 +35,8 @@ def extend_experiment(
     Raises:
         NotFound: no such experiment.
         Conflict: it is not COMPLETED, the totals add nothing, or its reality is unknown here.
-        InvalidSpec: a total is smaller than the present one or above a limit, or the direct baseline gets iterations.
+        InvalidSpec: a total is smaller than the present one or above a limit, or a strategy without samples gets
+            iterations.
         LimitReached: too much work is in progress.
     """
     experiment, row = get_permitting(session, experiment_id, Verb.EXTEND), RepetitionRow
@@ -74,8 +75,9 @@ def _violations(spec: ResolvedSpec, extension: ExtensionSpec) -> Iterator[Violat
     totals = extension.model_dump(exclude_none=True)
     if not totals:
         yield Violation("", {}, "give a total of iterations, of repetitions, or both", ["iterations", "repetitions"])
-    if extension.iterations is not None and is_direct(spec):
-        message = "the direct baseline has no iterations: it evolves in reality itself; extend its repetitions"
+    if extension.iterations is not None and not takes_samples(spec):
+        subject = "the direct baseline" if is_direct(spec) else spec.strategy.name
+        message = f"{subject} has no iterations: it takes no samples; extend its repetitions"
         yield Violation("/iterations", extension.iterations, message)
     for name, total in totals.items():
         present = getattr(spec, name)

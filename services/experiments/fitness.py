@@ -44,11 +44,13 @@ def best_of(session: Session, studies: Mapping[str, Sequence[ExperimentRead]]) -
     counts = {study: count for study, count in shared.items() if count is not None}
     rivals = {study: _rivals(studies[study]) for study in counts}
     points = {each.id: each.fitness for found in rivals.values() for each in found if each.fitness}
-    wanted = {each.id: counts[study] for study, found in rivals.items() for each in found}
+    wanted = {each.id: counts[study] for study, found in rivals.items() for each in found if not each.level}
     elsewhere = {id_: count for id_, count in wanted.items() if points[id_].evaluations != count}
     points |= points_at(session, elsewhere)
     return {
-        study: _fittest([(each, points[each.id]) for each in found if points[each.id].evaluations == counts[study]])
+        study: _fittest(
+            [(each, points[each.id]) for each in found if each.level or points[each.id].evaluations == counts[study]]
+        )
         for study, found in rivals.items()
     }
 

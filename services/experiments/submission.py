@@ -11,7 +11,7 @@ from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
 from gaplab.services.experiments.views import view_experiments, view_studies
 from gaplab.services.specs.hardware import hardware_of
-from gaplab.services.specs.resolution import expected_rollouts, is_direct, resolve_experiment, resolve_study
+from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment, resolve_study, takes_samples
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries.experiments import Extent, insert_experiment, insert_study
 from gaplab.services.store.session import Session, Store
@@ -86,5 +86,5 @@ def _insert(
 
 def extent_of(spec: ResolvedSpec) -> Extent:
     """Return the size of one repetition of a resolved spec."""
-    samples = 0 if is_direct(spec) else spec.iterations
+    samples = spec.iterations if takes_samples(spec) else 0
     return Extent(iterations=samples + 1, rollouts=expected_rollouts(spec))

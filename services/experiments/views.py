@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import BestRead, ExperimentRead, FitnessRead, Progress, RepetitionRead, StudyRead
+from gaplab.services.core.strategies import strategies
 from gaplab.services.experiments.checks import CheckSummary, summaries
 from gaplab.services.experiments.fitness import best_of, fitness_of
 from gaplab.services.experiments.hiding import hidden
@@ -138,7 +139,8 @@ def _experiment(row: ExperimentRow, work: _Work, found: _Found, *, secret: bool)
         edits=row.edits,
         archived_at=row.archived_at,
         strategy=row.strategy,
-        direct=row.iterations == 1,  # other strategies have at least one iteration after number 0
+        direct=row.strategy in strategies and strategies[row.strategy].in_reality,
+        level=row.iterations == 1,  # a strategy with samples has at least one iteration after number 0
         state=row.state,
         caveat=caveat_of(row.state, work.tally),
         spec=without_truth(complete(row.spec)) if secret else complete(row.spec),

@@ -12,7 +12,6 @@ from gaplab.services.figures.checks import check_numbers
 from gaplab.services.figures.style import INK, Style
 
 Numbers = tuple[Number, ...]
-
 PLAIN = Style(INK, "solid", "circle")
 
 
@@ -97,6 +96,7 @@ class Level:
 
     Attributes:
         upright: the value is one of x, not of y.
+        marked: draw the markers of its style along the line.
     """
 
     name: str
@@ -105,6 +105,7 @@ class Level:
     lower: Number = None
     upper: Number = None
     upright: bool = False
+    marked: bool = False
 
     def __post_init__(self) -> None:
         check_numbers(self.name, ((self.value, self.lower, self.upper),))
@@ -238,8 +239,7 @@ class FigureDefinition:
 
 def faint_lines(name: str, x: Sequence[Number], rows: Sequence[Sequence[Number]], style: Style) -> Line:
     """Return a faint line through each row of y as a single mark, with gaps between the rows."""
-    y = tuple(value for row in rows for value in (*row, None))
-    return Line(name, (*x, None) * len(rows), y, style, faint=True)
+    return Line(name, (*x, None) * len(rows), tuple(y for row in rows for y in (*row, None)), style, faint=True)
 
 
 def _has_data(mark: Mark) -> bool:

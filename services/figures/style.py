@@ -25,7 +25,15 @@ STRATEGIES = (
     "random",
     "known_fit",
 )
-"""gaplab's strategies with a curve, in the order of the colours, so that each has its own."""
+"""The paper's strategies with a curve, in the order of the colours, so that each has its own."""
+
+LATER: dict[str, tuple[str, Dash, Marker]] = {
+    "estimation_exploration": ("#D1477A", "long", "square"),
+    "weighted": ("#8A8A2B", "dotted", "diamond"),
+    "domain_randomization": ("#9C6B3F", "dashed", "triangle"),
+    "noise_envelope": ("#7A5CC0", "dashdot", "inverted"),
+}
+"""Colour, dash and marker of gaplab's other strategies; the colours are legible on white and on dark pages."""
 
 INK = "#222222"
 """The colour of text; a dark page replaces it by a light colour."""
@@ -62,6 +70,8 @@ def strategy_style(strategy: str) -> Style:
     """
     if strategy in STRATEGIES:
         return style_of(STRATEGIES.index(strategy))
+    if strategy in LATER:
+        return Style(*LATER[strategy])
     known, all_ = len(COLORS), len(COLORS) ** 2
     return style_of(known + crc32(strategy.encode()) % (all_ - known))
 

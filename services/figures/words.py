@@ -74,6 +74,11 @@ def drawable(value: float | None) -> float | None:
     return value if value is not None and abs(value) <= LARGEST else None
 
 
+def evenly(least: float, most: float) -> tuple[float, ...]:
+    """Return nine evenly spaced places from one end of an axis to the other."""
+    return tuple(least + (most - least) * eighth / 8 for eighth in range(9))
+
+
 def limits(values: Iterable[float | None], *, margin: float = 0.05) -> tuple[float, float]:
     """Return the ends of an axis with a margin around all values; 0 to 1 if there are none."""
     there = [each for each in values if each is not None]

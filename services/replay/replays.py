@@ -10,7 +10,7 @@ from gaplab.services.replay.process import Key, RolloutProcess
 from gaplab.services.replay.rollout import ReplayChoice, ReplayRequest, compute_replay
 from gaplab.services.specs.assembly import refuse_missing
 from gaplab.services.specs.hardware import hardware_of
-from gaplab.services.specs.resolution import is_direct
+from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.session import Session, Store
@@ -80,7 +80,7 @@ def _request(session: Session, row: ExperimentRow, spec: ResolvedSpec, choice: R
         genome=tuple(found.genome),
         simulator=simulator,
         parameters=None if simulator is None else _best(session, row.id, choice.repetition, simulator),
-        simulated=found.simulated if simulator == own else None,
+        simulated=found.simulated if simulator == own and takes_samples(spec) else None,
         real=found.real,
         readings=None if found.readings is None else tuple(found.readings),
         known=None not in row.spec["reality"]["parameters"].values() and hardware_of(spec) is None,

@@ -43,7 +43,7 @@ class Facts:
             if there is a single count.
         differing: settings that differ between the experiments; None for one experiment.
         checks: sensitivity checks, each once.
-        misfits: misfit by experiment, without the direct baseline.
+        misfits: misfit by experiment, without levels.
         work: work by experiment.
         provenance: provenance by experiment.
         leading: simulators of the experiment with the highest mean; None if there are none.
@@ -133,7 +133,7 @@ def _facts(
         over_all=_over_all(store, ids, verdict.evaluations),
         differing=differences(columns) if len(ids) > 1 else None,
         checks=_checks(store, experiments),
-        misfits={each.id: misfit(store, each.id) for each in experiments if not each.direct},
+        misfits={each.id: misfit(store, each.id) for each in experiments if not each.level},
         work=work,
         provenance={id_: provenance.read(store, id_) for id_ in ids},
         leading=_leading(store, judged),
@@ -169,7 +169,7 @@ def _checks(store: Store, experiments: Sequence[ExperimentRead]) -> tuple[Sensit
 
 
 def _leading(store: Store, judged: Sequence[Judged]) -> tuple[Judged, TunedSimulators] | None:
-    learned = [one for one in judged if not one.curve.direct and one.point]
+    learned = [one for one in judged if not one.curve.level and one.point]
     if not learned:
         return None
     best = max(learned, key=lambda one: one.mean)

@@ -23,7 +23,7 @@ class Judged:
         name: its name among the others.
         curve: the curve.
         end: what its end says; None without values.
-        point: its values at the count where all are compared, or of the direct baseline; None without values.
+        point: its values at the count where all are compared, or of a level; None without values.
     """
 
     name: str
@@ -68,8 +68,8 @@ def p_of(pair: Comparison) -> float | None:
 
 
 def _judged(name: str, curve: Curve, experiment: ExperimentRead, count: int | None) -> Judged:
-    last = None if curve.direct or experiment.fitness is None else experiment.fitness.evaluations
+    last = None if curve.level or experiment.fitness is None else experiment.fitness.evaluations
     end = None if last is None else curve_end(recorded_of(curve), last)
-    at = 0 if curve.direct else count
+    at = 0 if curve.level else count
     point = next((point for point in curve.points if point.evaluations == at and point.mean is not None), None)
     return Judged(name, curve, end, point)

@@ -33,9 +33,11 @@ def _study(experiments: Sequence[ExperimentRead], specs: Sequence[dict[str, Any]
     """Return the spec of a study that resolves to these specs; None if they differ in more than a study can."""
     both = list(zip(experiments, specs, strict=True))
     learned = [spec for experiment, spec in both if not experiment.direct] or list(specs)
+    sampled = [spec for experiment, spec in both if not experiment.level] or learned
     baselines = [spec["repetitions"] for experiment, spec in both if experiment.direct]
-    shared = _without(learned[0], "name", "strategy")
-    alike = all(_without(spec, "name", "strategy") == shared for spec in learned)
+    shared = _without(sampled[0], "name", "strategy")
+    alike = all(_without(spec, "name", "strategy") == shared for spec in sampled)
+    alike = alike and len({spec["repetitions"] for spec in learned}) == 1
     rest = _without(shared, "repetitions", "iterations")
     if not alike or any(_without(spec, *APART) != rest for spec in specs) or len(set(baselines)) > 1:
         return None

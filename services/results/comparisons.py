@@ -12,7 +12,7 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments.fitness import fitness_of
 from gaplab.services.experiments.views import view_experiments
 from gaplab.services.results.curves import recorded_of
-from gaplab.services.specs.resolution import is_direct
+from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments
 from gaplab.services.store.session import Session, Store
@@ -45,7 +45,7 @@ def compare(
 ) -> tuple[Comparison, ...]:
     """Compare every pair of experiments on their recorded fitness, one value for each repetition.
 
-    The only value of the direct baseline is compared with every number of real-world evaluations.
+    The only value of an experiment without samples is compared with every number of real-world evaluations.
 
     Args:
         store: database with the experiments.
@@ -78,7 +78,7 @@ def compare(
 
 def _compared(row: ExperimentRow, recorded: FloatArray) -> Compared:
     spec = spec_of(row.spec)
-    return Compared(row.id, row.name, recorded, is_direct(spec), spec.seed, spec.strategy.name)
+    return Compared(row.id, row.name, recorded, not takes_samples(spec), spec.seed, spec.strategy.name)
 
 
 def _common_count(session: Session, rows: Sequence[ExperimentRow]) -> int:

@@ -27,12 +27,12 @@ def cost_axis(store: Store, curves: Sequence[Curve], cost: Cost, *, cost_s: floa
 
     Args:
         store: database with the experiments.
-        curves: curves of the experiments; the direct baseline is a level without a place on the axis.
+        curves: curves of the experiments; a level has no place on the axis.
         cost: the rollouts so far, or the time of simulation and real-world evaluations so far.
         cost_s: seconds that one real-world evaluation takes.
     """
     with store.reading() as session:
-        costs = results.iteration_costs(session, [curve.experiment for curve in curves if not curve.direct])
+        costs = results.iteration_costs(session, [curve.experiment for curve in curves if not curve.level])
     means = _mean_costs(costs)
     if cost == "rollouts":
         return _rollouts({point: rollouts for point, (rollouts, _) in means.items()})

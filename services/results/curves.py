@@ -110,5 +110,6 @@ def _curve(row: ExperimentRow, values: FloatArray) -> Curve:
         state=row.state,
         unit=unit(spec),
         direct=is_direct(spec),
+        level=row.iterations == 1,
         points=curve_points(values),
     )

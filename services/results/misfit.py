@@ -17,7 +17,7 @@ from gaplab.services.core.robots import robots
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.tuners import tuners
 from gaplab.services.specs.assembly import parameters_of
-from gaplab.services.specs.resolution import is_direct, unit
+from gaplab.services.specs.resolution import takes_samples, unit
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.queries.tunings import BestSimulator, Measured
 from gaplab.services.store.session import Store
@@ -47,7 +47,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
     names = [each.name for each in spec.tunables]
     points = tuple(
         misfit_point(iteration, by_iteration[iteration], names, parameters_of(spec.tunables))
-        for iteration in range(0 if is_direct(spec) else row.iterations)
+        for iteration in range(row.iterations if takes_samples(spec) else 0)
         if by_iteration[iteration]
     )
     unseen = overfitting(points[-1], unit(spec)) if points else ""

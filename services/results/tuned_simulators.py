@@ -39,14 +39,14 @@ class TunedSimulators:
 
 
 def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
-    """Return the best simulators of an experiment so far.
+    """Return the best simulators of an experiment so far; none of one without samples, which tunes nothing.
 
     Raises:
         NotFound: the experiment does not exist.
     """
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
-        simulators = tunings.best_simulators(session, experiment_id)
+        simulators = tunings.best_simulators(session, experiment_id) if row.iterations > 1 else ()
         tuned_on = tunings.measured(session, row).tuned_on
         hidden = row.id in hiding.hidden(session, [row])
     spec = spec_of(row.spec)

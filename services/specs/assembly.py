@@ -161,7 +161,7 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
         parameters=parameters_of(spec.tunables),
         known=robot.known,
         budget=Budget(**spec.budget.model_dump(exclude={"preset"})),
-        iterations=0 if strategy.in_reality else spec.iterations,
+        iterations=spec.iterations if strategy.takes_samples else 0,
         seed=spec.seed,
         repetition=repetition,
         batch_size=lambda: engine.batch,
@@ -169,6 +169,7 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
         tuner=tuners.create(spec.tuner),
         held_out=spec.held_out,
         reading_times_s=robot.sensors.reading_times_s,
+        names=tuple(ref.name for ref in spec.tunables),
     )
 
 

@@ -8,6 +8,7 @@ from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.resolved import ResolvedBudget, ResolvedReality, ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked, SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, SharedSettings, StudySpec
+from gaplab.services.core.controller_search import Allowance
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import InvalidSpec, Violation, gather
@@ -30,6 +31,7 @@ from gaplab.services.specs.violations import (
     bounds_of,
     budget_violations,
     reality_violations,
+    strategy_violations,
     tunable_violations,
     tuning_violations,
 )
@@ -53,9 +55,10 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     budget = _budget(spec, preset)
     if violations := [
         *tunable_violations(spec, engine),
+        *strategy_violations(spec, strategy, robot),
         *tuning_violations(robot, discrepancy, tuner),
         *reality_violations(spec, strategy, engine, reality_engine),
-        *budget_violations(budget, strategy, optimizer),
+        *budget_violations(budget, strategy, optimizer, len(spec.tunables)),
     ]:
         raise InvalidSpec(violations)
     return ResolvedSpec(
@@ -153,6 +156,11 @@ def is_direct(spec: ExperimentSpec) -> bool:
     return spec.strategy.name in strategies and strategies[spec.strategy.name].in_reality
 
 
+def takes_samples(spec: ExperimentSpec) -> bool:
+    """Return whether the experiment takes samples; one without them has iteration 0 only, and a level for a curve."""
+    return spec.strategy.name not in strategies or strategies[spec.strategy.name].takes_samples
+
+
 def unit(spec: ExperimentSpec | Checked) -> str:
     """Return the unit of fitness; "" if the robot is not installed."""
     return robots[spec.robot.name].unit if spec.robot.name in robots else ""
@@ -163,16 +171,16 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
 
     The evaluations of the direct baseline would be real ones. They count, because they are its whole cost.
     """
-    strategy = strategies.create(spec.strategy)
-    budget, iterations = spec.budget, spec.iterations
-    if strategy.in_reality:
-        return budget.controller_evaluations
-    selecting = iterations * budget.selection_evaluations * strategy.ensemble if strategy.searches else 0
+    strategy, tunables = strategies.create(spec.strategy), len(spec.tunables)
+    budget, iterations = spec.budget, spec.iterations if strategy.takes_samples else 0
+    selection = Allowance.of_selection(strategy, budget.selection_evaluations, tunables)
+    transfer = Allowance.of_transfer(strategy, budget.controller_evaluations, tunables)
     tuning = sum(
         (iterations + 1 - number) * (1 if is_held_out(number, spec.held_out) else budget.simulator_evaluations)
         for number in range(1, iterations + 1)
     )
-    return budget.controller_evaluations * (iterations + 1) + selecting + tuning
+    tuned = tuning if strategy.tunes else 0
+    return transfer.rollouts * (iterations + 1) + selection.rollouts * iterations + tuned
 
 
 def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:

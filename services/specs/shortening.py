@@ -12,7 +12,7 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.schemas.submitted import SpecRead
 from gaplab.services.core.errors import GaplabError
 from gaplab.services.core.stored_specs import spec_of
-from gaplab.services.specs.resolution import is_direct, resolve_experiment, resolve_study
+from gaplab.services.specs.resolution import is_direct, resolve_experiment, resolve_study, takes_samples
 
 Spec = dict[str, Any]
 Stored = Mapping[str, Any]
@@ -38,7 +38,7 @@ def study_spec(name: str, stored: Sequence[Stored]) -> SpecRead:
     if not specs:
         return SpecRead(spec=None, resolved=(), remarks=("the study has no experiments",))
     size, wanted = _common_size(specs)
-    base = next((spec for spec in wanted if not is_direct(spec)), wanted[0])
+    base = max(wanted, key=lambda spec: (takes_samples(spec), not is_direct(spec)))
     strategies = [_shortest(_complete(spec), within="strategy")["strategy"] for spec in wanted]
     shared = {field: value for field, value in _shortest(_complete(base)).items() if field not in {"name", "strategy"}}
     spec = ({"name": name} if name != "study" else {}) | {"strategies": strategies} | shared | size
@@ -56,8 +56,8 @@ def study_spec(name: str, stored: Sequence[Stored]) -> SpecRead:
 
 def _common_size(specs: Sequence[ResolvedSpec]) -> tuple[Spec, list[ResolvedSpec]]:
     """Return the field for repetitions of the baseline, and the specs with the size that all have."""
-    learned = [spec for spec in specs if not is_direct(spec)] or list(specs)
-    iterations, repetitions = (min(getattr(spec, field) for spec in learned) for field in ("iterations", "repetitions"))
+    iterations = min(spec.iterations for spec in [spec for spec in specs if takes_samples(spec)] or specs)
+    repetitions = min(spec.repetitions for spec in [spec for spec in specs if not is_direct(spec)] or specs)
     direct = min((spec.repetitions for spec in specs if is_direct(spec)), default=repetitions)
     counts = [direct if is_direct(spec) else repetitions for spec in specs]
     wanted = [

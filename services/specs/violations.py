@@ -10,6 +10,7 @@ from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import Violation, unknown_name
 from gaplab.services.core.optimizers.base import Optimizer
+from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.tunables import tunables
@@ -43,6 +44,22 @@ def tuning_violations(robot: Robot, discrepancy: Discrepancy, tuner: Tuner) -> I
         able = [name for name, each in discrepancies.items() if each.squares]
         message = f"the tuner {tuner.name} needs a sum of squares, and {discrepancy.name} is none"
         yield Violation("/discrepancy", discrepancy.name, message, able)
+
+
+def strategy_violations(spec: ExperimentSpec, strategy: Strategy, robot: Robot) -> Iterator[Violation]:
+    """Yield a strategy that needs sensors which the robot lacks, and named tunables that the spec does not tune."""
+    if strategy.senses and not robot.sensors.size:
+        able = [name for name, each in robots.items() if each().sensors.size]
+        message = (
+            f"the {robot.name} has no sensors, and {strategy.name} with these options selects by readings; "
+            f"{' and '.join(able) or 'no robot'} has sensors"
+        )
+        yield Violation("/strategy", strategy.name, message, able)
+    tuned = [ref.name for ref in spec.tunables]
+    for name in strategy.named_tunables:
+        if name not in tuned:
+            message = f"{strategy.name} names {name}, which the spec does not tune; it tunes {' and '.join(tuned)}"
+            yield Violation("/strategy/options", name, message, tuned)
 
 
 def bounds_of(ref: TunableRef) -> tuple[float, float]:
@@ -97,16 +114,22 @@ def reality_violations(
         yield from _range_violations(tunables[name], value, pointer)
 
 
-def budget_violations(budget: ResolvedBudget, strategy: Strategy, optimizer: Optimizer) -> Iterator[Violation]:
+def budget_violations(
+    budget: ResolvedBudget, strategy: Strategy, optimizer: Optimizer, tunables: int
+) -> Iterator[Violation]:
     """Yield searches whose budget is smaller than the population that they start with."""
     least = optimizer.least_evaluations
     tuning = optimizer.diverse(strategy.ensemble).least_evaluations if strategy.ensemble > 1 else least
-    needed = {"controller_evaluations": (budget.controller_evaluations, least)}
-    if strategy.searches and not strategy.in_reality:
-        needed["selection_evaluations"] = (budget.selection_evaluations, least)
-    if not strategy.in_reality:
-        needed["simulator_evaluations"] = (budget.simulator_evaluations, tuning)
-    for name, (given, minimum) in needed.items():
+    needed = {"controller_evaluations": (budget.controller_evaluations, least, strategy.transfer_simulators(tunables))}
+    if strategy.searches and strategy.takes_samples:
+        selection = strategy.selection_simulators(tunables)
+        needed["selection_evaluations"] = (budget.selection_evaluations, least, selection)
+    if strategy.tunes and strategy.takes_samples:
+        needed["simulator_evaluations"] = (budget.simulator_evaluations, tuning, 1)
+    for name, (given, population, simulators) in needed.items():
+        shared = strategy.equal_rollouts and simulators > 1
+        minimum = population * simulators if shared else population
         if given < minimum:
-            message = f"{given} evaluations do not fill the population of {minimum} that the search starts with"
+            message = f"{given} evaluations do not fill the population of {population} that the search starts with"
+            message += f"; equal_rollouts divides them by {simulators} simulators" if shared else ""
             yield Violation(f"/budget/{name}", given, message, f"at least {minimum}")

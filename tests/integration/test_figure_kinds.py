@@ -260,7 +260,7 @@ def test_every_figure_is_drawn_however_large_its_numbers_are(large: float) -> No
     figures = [
         curves_figure([curve("a", *ends)], band="sd", each=True),
         curves_figure([curve("a", *ends)], band="interval"),
-        curves_figure([curve("a", point(0, large, sd=large)).model_copy(update={"direct": True})]),
+        curves_figure([curve("a", point(0, large, sd=large)).model_copy(update={"level": True})]),
         predictions_figure([prediction(large, -large, large), prediction(0.5, 1.0, 1.0, 1)]),
         squared_error_figure({1: {0: large, 1: large, 2: 1.0}, 2: {0: large}}, each=True),
         squared_error_figure({1: {0: large}, 2: {0: large, 1: large}}),

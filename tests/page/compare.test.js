@@ -14,7 +14,7 @@ const PAIR = {
 
 /** Experiments that differ in their specs alone, with their letters. */
 const lettered = (...experiments) => experiments.map((experiment, index) => [
-  letter(index), { id: String(index), study: null, direct: false, ...experiment, spec: { robot: { name: "legs" }, reality: { parameters: { grip: 1 } }, ...experiment.spec } }]);
+  letter(index), { id: String(index), study: null, direct: false, level: false, ...experiment, spec: { robot: { name: "legs" }, reality: { parameters: { grip: 1 } }, ...experiment.spec } }]);
 
 test("letters go on after Z", () => {
   assert.deepEqual([0, 25, 26, 51, 52, 701, 702].map(letter), ["A", "Z", "AA", "AZ", "BA", "ZZ", "AAA"]);
@@ -29,8 +29,8 @@ test("a comparison begins at the last shared number, where the paper's ranges en
   assert.deepEqual([isSeveral([3, 3]), isSeveral([3, 10])], [false, true]);
 });
 
-test("the last shared number is that of experiments which go on or have completed, without the direct baseline", () => {
-  const at = (evaluations, state = "COMPLETED", direct = false) => ({ state, direct, fitness: evaluations === null ? null : { evaluations } });
+test("the last shared number is that of experiments which go on or have completed, without levels", () => {
+  const at = (evaluations, state = "COMPLETED", level = false) => ({ state, level, fitness: evaluations === null ? null : { evaluations } });
   assert.equal(commonCount([at(5), at(3), at(0, "COMPLETED", true), at(null)]), 3);
   assert.equal(commonCount([at(5), at(1, "CANCELLED"), at(2, "FAILED")]), 5);
   assert.equal(commonCount([at(1, "CANCELLED"), at(2, "FAILED")]), 1);
@@ -93,5 +93,6 @@ test("a hidden reality is the same within a study, and unknown beyond it", () =>
 test("other settings are named, except those of the direct baseline", () => {
   const small = { spec: { iterations: 3 } };
   assert.deepEqual(differentSettings(lettered(small, { spec: { iterations: 10 } })), ["number of iterations"]);
-  assert.deepEqual(differentSettings(lettered(small, { direct: true, spec: { iterations: 10 } })), []);
+  assert.deepEqual(differentSettings(lettered(small, { direct: true, level: true, spec: { iterations: 10 } })), []);
+  assert.deepEqual(differentSettings(lettered(small, { level: true, spec: { iterations: 10 } })), []);
 });

@@ -48,7 +48,7 @@ test("texts of several experiments come once, with the experiments unless all ha
 });
 
 test("a replay begins with the last iteration that the first repetition is sure to have", () => {
-  const at = (done, direct = false) => lastIteration({ direct, progress: { iterations_done: done, repetitions: 4 }, spec: { iterations: 10 } });
+  const at = (done, level = false) => lastIteration({ level, progress: { iterations_done: done, repetitions: 4 }, spec: { iterations: 10 } });
   assert.deepEqual([at(0), at(4), at(19), at(44), at(44, true)], [0, 0, 3, 10, 0]);
 });
 

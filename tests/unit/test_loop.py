@@ -30,13 +30,11 @@ def test_iteration_0_tunes_nothing_and_the_others_run_through_every_phase() -> N
 
 @pytest.mark.parametrize("strategy", sorted(strategies))
 def test_a_resumed_repetition_equals_an_uninterrupted_one_wherever_it_stopped(strategy: Any) -> None:
-    setting = small_setting(strategy)
-    whole = [flat(step) for step in repetition(setting)]
+    steps = list(repetition(small_setting(strategy)))
 
-    for stopped_after in range(len(whole) + 1):
-        log = list(repetition(setting))[:stopped_after]
-        rest = repetition(small_setting(strategy), log)
-        assert [flat(step) for step in (*log, *rest)] == whole
+    for stopped_after in range(len(steps) + 1):
+        rest = repetition(small_setting(strategy), steps[:stopped_after])
+        assert [flat(step) for step in rest] == [flat(step) for step in steps[stopped_after:]]
 
 
 @pytest.mark.parametrize("batch", [2, 9, 1_000])
@@ -277,3 +275,13 @@ def test_a_strategy_is_told_the_scale_and_the_discrepancy() -> None:
 
     first = next(step.fitness for step in steps if isinstance(step, Transferred))
     assert [(each.scale, each.discrepancy.name) for each in told] == [(first, "absolute_fitness")] * 3
+
+
+@pytest.mark.parametrize("count", [1, 20])
+def test_simulators_drawn_before_any_sample_have_no_error(count: Any) -> None:
+    options = {"simulators": count}
+
+    drawn = next(repetition(small_setting("domain_randomization", options))).simulators  # type: ignore[union-attr]
+
+    assert len(drawn) == count
+    assert all(each.squared_error == 0.0 for each in drawn)

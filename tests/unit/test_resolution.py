@@ -207,3 +207,55 @@ def test_what_is_wrong_with_a_study_points_into_the_study() -> None:
         resolve_study(spec)
 
     assert {each.pointer for each in refusal.value.violations} == {"/strategies/1", "/engine"}
+
+
+def test_a_strategy_that_selects_by_readings_is_refused_for_a_robot_without_sensors() -> None:
+    by_readings = {"name": "estimation_exploration", "options": {"select": "disagreement"}}
+
+    violation = refused(strategy=by_readings, robot="toy_function")["/strategy"]
+
+    assert violation.permitted == ["quadruped"]
+    assert "toy_function has no sensors" in violation.message
+    assert resolve_experiment(experiment(strategy=by_readings))
+    assert resolve_experiment(experiment(strategy="estimation_exploration", robot="toy_function"))
+
+
+def test_tunables_that_a_strategy_names_must_be_tuned_unless_they_are_its_default() -> None:
+    envelope = {"name": "noise_envelope", "options": {"base": ["restitution", "gravity"]}}
+
+    violations = refused(strategy=envelope, tunables=["static_friction", "restitution"])
+
+    assert violations["/strategy/options"].value == "gravity"
+    assert resolve_experiment(experiment(strategy="noise_envelope", tunables=["restitution"]))
+
+
+def test_a_search_whose_evaluations_are_divided_must_still_fill_its_population() -> None:
+    sharing = {"name": "domain_randomization", "options": {"equal_rollouts": True}}
+
+    violation = refused(strategy=sharing, budget={"controller_evaluations": 399})["/budget/controller_evaluations"]
+
+    assert violation.permitted == "at least 400"
+    assert resolve_experiment(experiment(strategy=sharing, budget={"controller_evaluations": 400}))
+
+
+@pytest.mark.parametrize(
+    ("strategy", "options", "expected"),
+    [
+        ("domain_randomization", {}, 20 * 500),
+        ("domain_randomization", {"equal_rollouts": True}, 500),
+        ("noise_envelope", {"simulators": 3}, 3 * 500),
+        ("estimation_exploration", {}, 6 * 500 + 5 * 150 + 15 * 200),
+        ("estimation_exploration", {"select": "disagreement"}, 6 * 500 + 5 * 150 * 10 + 15 * 200),
+        ("weighted", {"information_weight": 1}, 6 * 500 + 5 * 150 * 23 + 15 * 200),
+    ],
+)
+def test_expected_rollouts_follow_from_how_many_simulators_an_evaluation_needs(
+    strategy: Any, options: Any, expected: Any
+) -> None:
+    budget = {"controller_evaluations": 500, "selection_evaluations": 150, "simulator_evaluations": 200}
+
+    resolved = resolve_experiment(
+        experiment(strategy={"name": strategy, "options": options}, budget=budget, iterations=5)
+    )
+
+    assert expected_rollouts(resolved) == expected

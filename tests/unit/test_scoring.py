@@ -61,7 +61,7 @@ def test_a_controller_on_top_of_a_sample_has_a_large_but_finite_penalty() -> Non
 
 def believed(*samples: Sample, scale: float = 1.0, discrepancy: str = "squared_fitness") -> Belief:
     space = Space.box([0.0, 0.0], [2.0, 10.0], [True, False])
-    return Belief(space, np.zeros(2), samples, (), scale, discrepancies[discrepancy]())
+    return Belief(space, np.zeros(2), samples, (), space, ("a", "b"), scale, discrepancies[discrepancy]())
 
 
 def test_scaled_distances_count_extents_turns_and_shares_of_the_scale() -> None:

@@ -10,7 +10,7 @@ from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStat
 from gaplab.services.core.space import Space
 from gaplab.services.core.tuners.base import Task
 from gaplab.services.core.tuners.search import Search
-from gaplab.services.core.tuning import Misfit, draw_simulators, simulator_fitness, squared_errors
+from gaplab.services.core.tuning import Misfit, simulator_fitness, squared_errors
 from gaplab.services.core.types import Sample
 from tests.fakes import TRUTH, Recorder, paraboloid
 
@@ -128,11 +128,3 @@ def test_failing_physics_never_wins() -> None:
     best, *_ = tune(Misfit(Answers(half_broken), SAMPLES), SPACE, SteadyState(), 300, np.random.default_rng(1))
 
     assert best.parameters[0] >= 0.5
-
-
-@pytest.mark.parametrize("count", [1, 20])
-def test_simulators_drawn_before_any_sample_have_no_error(count: Any) -> None:
-    drawn = draw_simulators(SPACE, count, np.random.default_rng(0))
-
-    assert len(drawn) == count
-    assert all(each.squared_error == 0.0 for each in drawn)

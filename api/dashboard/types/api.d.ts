@@ -97,6 +97,7 @@ declare namespace Api {
     state: State;
     unit: string;
     direct: boolean;
+    level: boolean;
     points: Array<CurvePoint>;
   }
   interface CurvePoint {
@@ -197,6 +198,7 @@ declare namespace Api {
     archived_at: string | null;
     strategy: string;
     direct: boolean;
+    level: boolean;
     state: State;
     spec: Record<string, any>;
     priority: number;

@@ -54,7 +54,7 @@ export async function show(root, parameters, signal) {
  * @returns {Parameters<typeof tabs>[1]}
  */
 function panels(page) {
-  const misfitPanel = page.experiment.direct ? [] : [/** @type {[string, string, Page.Child]} */ (["misfit", "Misfit", misfit(page)])];
+  const misfitPanel = page.experiment.level ? [] : [/** @type {[string, string, Page.Child]} */ (["misfit", "Misfit", misfit(page)])];
   return [
     ["repetitions", "Repetitions", repetitions(page)],
     ["samples", "Real-world samples", samples(page)],

@@ -73,8 +73,8 @@ function choiceOf(experiment, parameters) {
  *
  * @param {Api.ExperimentRead} experiment
  */
-export function lastIteration({ direct, progress, spec }) {
-  if (direct) return 0;
+export function lastIteration({ level, progress, spec }) {
+  if (level) return 0;
   return Math.max(0, Math.min(spec.iterations, Math.floor(progress.iterations_done / progress.repetitions) - 1));
 }
 

@@ -24,8 +24,8 @@ export async function show(root, parameters, signal) {
     return;
   }
   /** @type {Api.ExperimentRead} */
-  const { name, direct, spec } = await get(`/experiments/${id}`, {}, signal);
-  const last = direct ? 0 : spec.iterations;
+  const { name, level, spec } = await get(`/experiments/${id}`, {}, signal);
+  const last = level ? 0 : spec.iterations;
   const query = { experiment: id, repetition: Number(parameters.get("repetition") ?? 0), iteration: Math.min(Number(parameters.get("iteration") ?? 0), last) };
   const figure = h("div", { class: "card toy" });
   const drawFigure = plot(figure, "toy", signal);

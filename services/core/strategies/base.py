@@ -1,53 +1,116 @@
-"""The contract of a strategy: from beliefs to the next controller to try in reality."""
+"""The contract of a strategy: from beliefs to the controllers to try in reality."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Protocol, TypeAlias
 
 from numpy.random import Generator
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen
-from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
+from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Parameters
+from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.registry import Plugin
 from gaplab.services.core.scoring import NO_FLOOR
-from gaplab.services.core.types import Belief
+from gaplab.services.core.space import Space
+from gaplab.services.core.types import Belief, Sample
 
-Score: TypeAlias = Callable[[Genomes, Fitnesses], FloatArray]
-"""A function from genomes `(n, g)` and their fitnesses `(n, m)` in the tuned simulators to scores `(n,)`, maximised."""
+Score: TypeAlias = Callable[[Genomes, FloatArray], FloatArray]
+"""A function from genomes `(n, g)` and their fitnesses `(n, m)` in the simulators to scores `(n,)`, maximised.
+
+A search with readings gives it outcomes `(n, m, 1 + q)`: fitness, then readings.
+"""
 
 
 class Search(Protocol):
-    """A search over controllers, with the whole budget of a selection; it can be called once."""
+    """A search over controllers, with the whole budget of a selection or a transfer; it can be called once."""
 
-    def __call__(self, score: Score) -> Genome:
+    def __call__(
+        self,
+        score: Score,
+        *,
+        parameters: Parameters | None = None,
+        senses: bool = False,
+        candidates: Genomes | None = None,
+    ) -> Genome:
         """Return the genome `(g,)` with the highest score found.
 
+        Args:
+            score: what to maximise; a score that is not finite never wins.
+            parameters: `(m, p)`, the simulators to search in; default: all that the belief has.
+            senses: true if the score needs readings; a robot without sensors has none, so q is 0.
+            candidates: `(n, g)`, the only genomes to evaluate, as far as the budget goes; default: the optimizer's.
+
         Raises:
-            PluginBroken: the selection has searched before, or the strategy has `searches = False`.
+            PluginBroken: the budget is spent, or an evaluation needs more simulators than the strategy states.
         """
         ...
 
 
 class Strategy(Plugin):
-    """Selects the samples: the controllers whose evaluation in reality guides tuning.
+    """Selects the samples: the controllers whose evaluation in reality guides tuning; then transfers a controller.
 
     Attributes:
         searches: true if a selection searches, which spends its budget.
         selects_transferred: true if its search has the transfer's goal, the fittest controller in the best simulator.
+        takes_samples: false if it transfers a controller at once: a level across the figure of curves.
+        tunes: false if its first simulators stay as they are, at no cost.
         in_reality: true for the direct baseline, which evolves in reality and takes no samples.
         published: options of the formula as its source prints it, which the preset `as_published` sets.
     """
 
     searches: ClassVar[bool] = True
     selects_transferred: ClassVar[bool] = False
+    takes_samples: ClassVar[bool] = True
+    tunes: ClassVar[bool] = True
     in_reality: ClassVar[bool] = False
     published: ClassVar[Mapping[str, Any]] = {}
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        cls.takes_samples = cls.takes_samples and not cls.in_reality
 
     @property
     def ensemble(self) -> int:
         """Return the number of simulators to tune: one, or a diverse ensemble."""
         return 1
+
+    @property
+    def senses(self) -> bool:
+        """Return whether it cannot do without readings, so that a robot without sensors is refused."""
+        return False
+
+    @property
+    def equal_rollouts(self) -> bool:
+        """Return whether a search costs as many rollouts as one in a single simulator, by fewer evaluations."""
+        return False
+
+    @property
+    def named_tunables(self) -> tuple[str, ...]:
+        """Return the tunables that its options name; a spec that does not tune them is refused."""
+        return ()
+
+    def selection_simulators(self, tunables: int) -> int:  # noqa: ARG002 - for those that need it
+        """Return the most simulators that an evaluation of a selection needs, given the number of tunables."""
+        return self.ensemble
+
+    def transfer_simulators(self, tunables: int) -> int:  # noqa: ARG002 - for those that need it
+        """Return the most simulators that an evaluation of a transfer needs, given the number of tunables."""
+        return 1
+
+    def search_evaluations(self, budget: int, simulators: int) -> int:
+        """Return the evaluations of a search, each in this number of simulators."""
+        return budget // simulators if self.equal_rollouts else budget
+
+    def draw(self, tunables: Space, names: Sequence[str], rng: Generator) -> Parameters:  # noqa: ARG002 - the port's
+        """Return the simulators `(m, p)` before the first sample, by default drawn uniformly.
+
+        Args:
+            tunables: bounds of the p tunables.
+            names: their names.
+            rng: random generator of these draws.
+        """
+        return tunables.draw(self.ensemble, rng)
 
     @abstractmethod
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:
@@ -59,10 +122,51 @@ class Strategy(Plugin):
             rng: random generator of the strategy; the search has its own.
         """
 
+    def transfer(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
+        """Return the genome `(g,)` to transfer to reality, by default the fittest found in the best simulator.
+
+        Args:
+            belief: samples so far, and simulators tuned on them.
+            search: finds the controller that maximises a score; optional.
+            rng: random generator of the strategy; the search has its own.
+        """
+        return search(lambda _, fitnesses: fitnesses[:, 0], parameters=belief.parameters[:1])
+
+    def learns(self, samples: Sequence[Sample]) -> bool:  # noqa: ARG002 - the port's signature
+        """Return whether to tune and transfer after the last of these samples.
+
+        Otherwise the simulators, the transferred controller and its probe stay, at no cost.
+        """
+        return True
+
+    def lessons(self, samples: Sequence[Sample]) -> Sequence[Sample]:
+        """Return the samples that simulators are tuned on, by default all."""
+        return samples
+
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return the number of simulators and whether this is the baseline, for the catalogue."""
-        return {"simulators": cls().ensemble, "baseline": cls.in_reality}
+        """Return the number of simulators, and whether it takes samples or is the baseline, for the catalogue."""
+        return {"simulators": cls().ensemble, "takes_samples": cls.takes_samples, "baseline": cls.in_reality}
+
+
+class Untuned(Strategy):
+    """A strategy without samples: a controller that evolves in simulators that nothing tunes is transferred once."""
+
+    searches = False
+    takes_samples = False
+    tunes = False
+
+    def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
+        """Refuse, because there is nothing to select."""
+        raise PluginBroken(f"strategy {self.name!r} takes no samples, so it selects no controller")
+
+    def transfer_simulators(self, tunables: int) -> int:  # noqa: ARG002 - the port's signature
+        """Return the number of all its simulators."""
+        return self.ensemble
+
+    @abstractmethod
+    def transfer(self, belief: Belief, search: Search, rng: Generator) -> Genome:
+        """Return the genome `(g,)` to transfer to reality."""
 
 
 EnsembleSize = Annotated[int, Field(strict=True, ge=2, le=1_000)]

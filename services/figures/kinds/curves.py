@@ -58,7 +58,7 @@ def curves_figure(
         curves: curves in the order of the legend.
         title: text above the figure; empty for none.
         band: band around the lines; by default the interval, or the SD if few repetitions would make the interval fill
-            the figure. The direct baseline always has its SD, as in the paper.
+            the figure. Levels, like the direct baseline, always have their SD, as in the paper.
         against: the horizontal axis; by default the number of real-world evaluations.
         each: draw a thin line for every repetition.
     """
@@ -66,14 +66,14 @@ def curves_figure(
     band = band or _default_band(curves)
     names = distinct_names([(one.name, one.experiment) for one in curves])
     placed = [_placed(name, one, against) for name, one in zip(names, curves, strict=True)]
-    lines = [one for one in placed if not one.curve.direct]
-    levels = [one for one in placed if one.curve.direct and one.points]
+    lines = [one for one in placed if not one.curve.level]
+    levels = [one for one in placed if one.curve.level and one.points]
     styles = strategy_styles([one.curve.strategy for one in lines])
     marks: list[Mark] = [_mean(one, band, style) for one, style in zip(lines, styles, strict=True)]
     marks += [
         _repetitions(one, against, style) for one, style in zip(lines, styles, strict=True) if each and one.points
     ]
-    marks += [_level(one, at) for at, one in enumerate(levels)]
+    marks += [_level(one, style) for one, style in zip(levels, _level_styles(levels), strict=True)]
     span = max([1.0, *(x for one in lines for x, _, _ in one.points)])
     x = Axis(against.label if against else EVALUATIONS, (-0.02 * span, 1.02 * span), whole=against is None)
     y = Axis(with_unit("Fitness in reality", {one.unit for one in curves}), _limits(marks))
@@ -105,13 +105,13 @@ def _placed(name: str, curve: Curve, against: CostAxis | None) -> _Placed:
 
 
 def _place(curve: Curve, point: CurvePoint, against: CostAxis | None) -> float | None:
-    if against is None or curve.direct:
+    if against is None or curve.level:
         return point.evaluations
     return against.at.get((curve.experiment, point.evaluations))
 
 
 def _default_band(curves: Sequence[Curve]) -> Band:
-    counts = [point.n for one in curves if not one.direct for point in one.points if point.n]
+    counts = [point.n for one in curves if not one.level for point in one.points if point.n]
     return "interval" if min(counts, default=FEW) >= FEW else "sd"
 
 
@@ -139,9 +139,18 @@ def _repetitions(one: _Placed, against: CostAxis | None, style: Style) -> Line:
     return faint_lines(one.name, places, rows, style)
 
 
-def _level(one: _Placed, position: int) -> Level:
+def _level(one: _Placed, style: Style) -> Level:
     ((_, mean, point), *_) = one.points
-    return Level(one.name, mean, Style(INK, style_of(position + 1).dash, "circle"), *_ends(point, "sd"))
+    return Level(one.name, mean, style, *_ends(point, "sd"), marked=not style.ink)
+
+
+def _level_styles(levels: Sequence[_Placed]) -> list[Style]:
+    """Return the styles of levels: the colour of text for the direct baseline, and of their strategies for others."""
+    looks = zip(levels, strategy_styles([one.curve.strategy for one in levels]), strict=True)
+    return [
+        Style(INK, style_of(position + 1).dash, "circle") if one.curve.direct else style
+        for position, (one, style) in enumerate(looks)
+    ]
 
 
 def _ends(point: CurvePoint, band: Band) -> tuple[float | None, float | None]:
@@ -169,7 +178,8 @@ def _caption(
     parts = [f"Mean over {number_of('repetition', *counts)}{bands}."] if counts else []
     parts += ["Thin lines: single repetitions."] if counts and each else []
     parts += [against.note] if against else []
-    parts += [f"{one.name}: evolved in reality itself, {_level_in_words(one)}." for one in levels]
+    origins = {True: "evolved in reality itself", False: "without samples"}
+    parts += [f"{one.name}: {origins[one.curve.direct]}, {_level_in_words(one)}." for one in levels]
     return " ".join(parts)
 
 

@@ -17,6 +17,7 @@ from gaplab.services.figures.marks import (
 )
 from gaplab.services.figures.matplotlib.text_size import printable
 from gaplab.services.figures.style import INK, SHADES, Style
+from gaplab.services.figures.words import evenly
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -131,7 +132,13 @@ def _points(points: Points, axes: "Axes", order: float, shades: tuple[float, flo
 
 def _level(level: Level, axes: "Axes") -> None:
     line, area = (axes.axvline, axes.axvspan) if level.upright else (axes.axhline, axes.axhspan)
-    line(level.value, **_thin(level.name, level.style))
+    if level.marked:
+        places = evenly(*(axes.get_ylim() if level.upright else axes.get_xlim()))
+        marker: dict[str, Any] = {"marker": MARKERS[level.style.marker], "markersize": 3.2, "markeredgewidth": 0}
+        along = (places, [level.value] * len(places))
+        axes.plot(*along[:: -1 if level.upright else 1], **_thin(level.name, level.style), **marker)
+    else:
+        line(level.value, **_thin(level.name, level.style))
     if level.lower is not None and level.upper is not None:
         alpha = 0.07 if level.style.ink else 0.13
         area(level.lower, level.upper, color=level.style.color, alpha=alpha, linewidth=0, zorder=1)

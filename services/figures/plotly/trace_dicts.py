@@ -7,6 +7,7 @@ from typing import Any
 
 from gaplab.services.figures.marks import Bars, Diagonal, Level, Line, Mark, Number, Panel, Points, Polylines
 from gaplab.services.figures.style import SHADES, Style, shade_at, tint
+from gaplab.services.figures.words import evenly
 
 Trace = dict[str, Any]
 
@@ -127,7 +128,12 @@ def _polylines(lines: Polylines) -> list[Trace]:
 def _level(level: Level, panel: Panel) -> list[tuple[int, Trace]]:
     least, most = (panel.y if level.upright else panel.x).limits
     turn = -1 if level.upright else 1  # an upright level has x and y exchanged
-    found = [(2, _across(level.name, level.style, *((least, most), (level.value, level.value))[::turn]))]
+    places = evenly(least, most) if level.marked else (least, most)
+    line = _across(level.name, level.style, *(places, (level.value,) * len(places))[::turn])
+    if level.marked:
+        symbol = MARKERS.get(level.style.marker, level.style.marker)
+        line |= {"mode": "lines+markers", "marker": {"color": level.style.color, "symbol": symbol, "size": 7}}
+    found = [(2, line)]
     if level.lower is not None and level.upper is not None:
         corners = (least, most, most, least), (level.upper, level.upper, level.lower, level.lower)
         found.append((0, _area(level.name, level.style, *corners[::turn])))

@@ -4,13 +4,13 @@
 /**
  * Return the last number of real-world evaluations that experiments share; 0 without any result.
  *
- * The direct baseline has a single value, which is compared with every number. Experiments that failed or were cancelled lower the
+ * An experiment without samples has a single value, which is compared with every number. Experiments that failed or were cancelled lower the
  * number only if no other has a result.
  *
- * @param {{ direct: boolean, state: Api.State, fitness: Api.FitnessRead | null }[]} experiments
+ * @param {{ level: boolean, state: Api.State, fitness: Api.FitnessRead | null }[]} experiments
  */
 export function commonCount(experiments) {
-  const known = experiments.filter(({ fitness, direct }) => fitness && !direct);
+  const known = experiments.filter(({ fitness, level }) => fitness && !level);
   const lasting = known.filter(({ state }) => state !== "FAILED" && state !== "CANCELLED");
   const counts = (lasting.length ? lasting : known).map(({ fitness }) => fitness?.evaluations ?? 0);
   return counts.length ? Math.min(...counts) : 0;

@@ -7,7 +7,7 @@ import { letter } from "./ranges.js";
 /** @type {Record<string, string>} */
 const SETTINGS = { engine: "engine", tunables: "tunables", budget: "budget", optimizer: "optimizer", discrepancy: "discrepancy", tuner: "tuner", iterations: "number of iterations" };
 
-/** @typedef {{ id: string, study: string | null, direct: boolean, spec: Record<string, any> }} Experiment */
+/** @typedef {{ id: string, study: string | null, direct: boolean, level: boolean, spec: Record<string, any> }} Experiment */
 /** @typedef {[letter: string, experiment: Experiment]} Lettered */
 /** @typedef {{ name: string, options?: Record<string, unknown> }} Plugin */
 
@@ -58,13 +58,14 @@ export function warnings(experiments) {
 }
 
 /**
- * Return the names of the other settings that are not the same; those of the direct baseline mean nothing.
+ * Return the names of the other settings that are not the same; those of the direct baseline mean nothing, nor does
+ * the number of iterations of an experiment without samples.
  *
  * @param {Lettered[]} experiments
  */
 export function differentSettings(experiments) {
-  const iterative = experiments.filter(([, { direct }]) => !direct);
-  const differ = (/** @type {string} */ setting) => groups(iterative, ({ spec }) => canonicalText(spec[setting])).length > 1;
+  const counts = (/** @type {string} */ setting, /** @type {Experiment} */ { direct, level }) => !direct && !(level && setting === "iterations");
+  const differ = (/** @type {string} */ setting) => groups(experiments.filter(([, experiment]) => counts(setting, experiment)), ({ spec }) => canonicalText(spec[setting])).length > 1;
   return Object.keys(SETTINGS).filter(differ).map((setting) => SETTINGS[setting]);
 }
 

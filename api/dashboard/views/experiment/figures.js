@@ -38,12 +38,12 @@ export function curve(page) {
 }
 
 /**
- * Return the figures about simulators; the direct baseline has none.
+ * Return the figures about simulators; an experiment without samples has none.
  *
  * @param {Page.ExperimentPage} page
  */
 export const otherFigures = (page) =>
-  (page.experiment.direct ? [] : [h("div", { class: "figures" }, ...OTHERS.map((figure) => card(page, figure)))]);
+  (page.experiment.level ? [] : [h("div", { class: "figures" }, ...OTHERS.map((figure) => card(page, figure)))]);
 
 /**
  * @param {Page.ExperimentPage} page

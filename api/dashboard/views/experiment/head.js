@@ -63,12 +63,12 @@ export function head(page) {
  *
  * @param {Api.ExperimentRead} experiment
  */
-function summary({ strategy, direct, spec }) {
+function summary({ strategy, direct, level, spec }) {
   const engine = spec.engine?.name;
   const realEngine = spec.reality?.engine?.name;
   const engines = engine && realEngine && engine !== realEngine ? `${engine}, reality in ${realEngine}` : engine;
   const tunables = (/** @type {{ name: string }[]} */ (spec.tunables ?? [])).map(({ name }) => name.replaceAll("_", " ")).join(", ");
-  const tunes = tunables && !direct ? `tunes ${tunables}` : null;
+  const tunes = tunables && !direct ? `${level ? "varies" : "tunes"} ${tunables}` : null;
   return [readableName(strategy), spec.robot?.name.replaceAll("_", " "), engines, tunes].filter(Boolean).join(" · ");
 }
 

@@ -50,14 +50,14 @@ export function repetitions(page) {
  * @param {Api.ExperimentRead} experiment
  * @param {(number: number) => Promise<void>} showAttempts
  */
-function row({ number, state, attempts, started_at: started, ended_at: ended, ...others }, { direct, spec }, showAttempts) {
+function row({ number, state, attempts, started_at: started, ended_at: ended, ...others }, { level, spec }, showAttempts) {
   const done = Math.max(0, others.iterations_done - 1);  // number 0 is not counted
-  const caveat = state === "COMPLETED" && !direct && done < spec.iterations ? "stopped early" : null;
+  const caveat = state === "COMPLETED" && !level && done < spec.iterations ? "stopped early" : null;
   const button = h("button", {
     type: "button", class: "link", dataset: { repetition: number }, "aria-label": `Attempts at repetition ${number}: ${attempts}`,
     onclick: () => showAttempts(number).catch(() => {}),
   }, attempts);
-  return [number, stateBadge(state, caveat), direct ? "–" : `${count(done)} of ${count(spec.iterations)}`, count(others.rollouts_done),
+  return [number, stateBadge(state, caveat), level ? "–" : `${count(done)} of ${count(spec.iterations)}`, count(others.rollouts_done),
     attempts ? button : "0", started ? age(started) : "–", timeBetween(started, ended), others.error];
 }
 

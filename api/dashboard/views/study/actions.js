@@ -102,7 +102,7 @@ function extend(page) {
 }
 
 /**
- * Extend experiments one by one; one that is large enough refuses, and is left alone. The direct baseline has no iterations to add.
+ * Extend experiments one by one; one that is large enough refuses, and is left alone. An experiment without samples has no iterations to add.
  *
  * @param {Api.ExperimentRead[]} experiments
  * @param {number} iterations
@@ -110,8 +110,8 @@ function extend(page) {
  */
 async function enlarge(experiments, iterations, repetitions) {
   const refusals = [];
-  for (const { id, direct, spec } of experiments) {
-    const totals = { repetitions: Math.max(spec.repetitions, repetitions), ...(direct ? {} : { iterations: Math.max(spec.iterations, iterations) }) };
+  for (const { id, level, spec } of experiments) {
+    const totals = { repetitions: Math.max(spec.repetitions, repetitions), ...(level ? {} : { iterations: Math.max(spec.iterations, iterations) }) };
     try {
       await post(`/experiments/${id}/extend`, totals);
     } catch (error) {

@@ -1,0 +1,211 @@
+"""What a strategy of one's own may decide: its transfer, its simulators, its lessons, and whether it tunes."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.contract.strategies import seen
+from gaplab.services.core.errors import PluginBroken
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.strategies.base import Strategy
+from gaplab.services.core.types import Cost, Measured, Probed, Selected, Transferred, Tuned
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
+from tests.fakes import CountedReality, Recorder, flat, paraboloid, small_setting
+
+
+class Plain(Strategy):
+    """Searches for the fittest in all three simulators."""
+
+    name = "plain"
+    ensemble = 3  # type: ignore[assignment]
+
+    def select(self, belief: Any, search: Any, rng: Any) -> Any:
+        return search(lambda _, fitnesses: fitnesses.mean(axis=1))
+
+
+class Robust(Plain):
+    """Transfers the fittest on average."""
+
+    def transfer_simulators(self, tunables: Any) -> Any:
+        return self.ensemble
+
+    def transfer(self, belief: Any, search: Any, rng: Any) -> Any:
+        return self.select(belief, search, rng)
+
+
+class Patient(Plain):
+    """Learns after every second sample, and from those alone whose fitness is high."""
+
+    def learns(self, samples: Any) -> Any:
+        return len(samples) % 2 == 0
+
+    def lessons(self, samples: Any) -> Any:
+        return [each for each in samples if each.fitness > 0.5]
+
+
+class Stubborn(Plain):
+    """Keeps its random simulators."""
+
+    tunes = False
+
+
+def steps_of(strategy: Any, **changes: Any) -> Any:
+    return list(repetition(replace(small_setting(**changes), strategy=strategy)))
+
+
+def of(kind: Any, steps: Any) -> Any:
+    return [step for step in steps if isinstance(step, kind)]
+
+
+def test_a_transfer_in_several_simulators_reports_the_score_and_costs_all_of_them() -> None:
+    simulate = Recorder()
+    steps = steps_of(Robust(), simulate=simulate)
+
+    transferred, tuned = of(Transferred, steps), of(Tuned, steps)
+    for controller, simulators in zip(transferred, tuned, strict=True):
+        parameters = np.array([each.parameters for each in simulators.simulators])
+        assert controller.fitness == pytest.approx(paraboloid(controller.genome[None], parameters).mean())
+        assert controller.cost.rollouts + controller.cost.saved == 40 * 3
+    assert sum(step.cost.rollouts for step in steps if hasattr(step, "cost")) == simulate.rollouts
+
+
+def test_the_fitness_of_a_controller_that_no_search_found_is_unknown() -> None:
+    class Known(Plain):
+        def transfer(self, belief: Any, search: Any, rng: Any) -> Any:
+            return belief.known
+
+    (first, *_) = of(Transferred, steps_of(Known()))
+
+    assert np.isnan(first.fitness)
+    assert first.cost == Cost(saved=40)
+
+
+def test_more_simulators_than_stated_are_refused_and_so_are_those_outside_of_the_bounds() -> None:
+    class Greedy(Plain):
+        def transfer(self, belief: Any, search: Any, rng: Any) -> Any:
+            return search(lambda _, fitnesses: fitnesses[:, 0])
+
+    class Outside(Plain):
+        def transfer(self, belief: Any, search: Any, rng: Any) -> Any:
+            return search(lambda _, fitnesses: fitnesses[:, 0], parameters=belief.parameters[:1] + 5)
+
+    with pytest.raises(PluginBroken, match="searches in 3 simulators; permitted: 1 to 1"):
+        steps_of(Greedy())
+    with pytest.raises(PluginBroken, match=r"'plain' returned .* permitted: 0\.0 to 1\.0"):
+        steps_of(Outside())
+
+
+def test_fewer_simulators_than_stated_are_saved() -> None:
+    class Modest(Plain):
+        def select(self, belief: Any, search: Any, rng: Any) -> Any:
+            return search(lambda _, fitnesses: fitnesses[:, 0], parameters=belief.parameters[:1])
+
+    for step in of(Selected, steps_of(Modest())):
+        assert step.cost.rollouts <= 30
+        assert step.cost.rollouts + step.cost.saved == 30 * 3
+
+
+def test_readings_are_given_to_a_search_that_asks_for_them_and_are_none_without_sensors() -> None:
+    widths = []
+
+    class Sensing(Plain):
+        def select(self, belief: Any, search: Any, rng: Any) -> Any:
+            def score(genomes: Any, outcomes: Any) -> Any:
+                widths.append(outcomes.shape[1:])
+                return outcomes[:, 0, 0]
+
+            return search(score, senses=True)
+
+    with_sensors = steps_of(Sensing(), sense=lambda genomes, parameters: seen(genomes, parameters))
+    assert set(widths) == {(3, 3)}
+    widths.clear()
+    without = steps_of(Sensing())
+    assert set(widths) == {(3, 1)}
+    assert [flat(step) for step in of(Selected, with_sensors)] == [flat(step) for step in of(Selected, without)]
+
+
+def test_candidates_are_the_only_genomes_that_a_search_evaluates_as_far_as_its_budget_goes() -> None:
+    class Choosing(Plain):
+        def select(self, belief: Any, search: Any, rng: Any) -> Any:
+            candidates = np.column_stack([np.linspace(0, 0.9, 100), np.full(100, 0.5)])
+            found = search(lambda genomes, _: genomes[:, 0], candidates=candidates)
+            assert found[0] == candidates[29, 0]
+            return found
+
+    for step in of(Selected, steps_of(Choosing())):
+        assert step.cost.rollouts == 30 * 3
+
+
+def test_after_a_sample_that_teaches_nothing_simulators_controller_and_probe_stay_at_no_cost() -> None:
+    reality = CountedReality()
+    steps = steps_of(Patient(), reality=reality)
+
+    tuned, transferred, probed = (of(kind, steps) for kind in (Tuned, Transferred, Probed))
+    for kept in (1, 3):
+        assert flat(tuned[kept].simulators) == flat(tuned[kept - 1].simulators)
+        assert tuned[kept].cost == Cost(saved=50 * kept)
+        assert flat(transferred[kept].genome) == flat(transferred[kept - 1].genome)
+        assert (transferred[kept].fitness, transferred[kept].cost) == (transferred[kept - 1].fitness, Cost(saved=40))
+        assert probed[kept].fitness == probed[kept - 1].fitness
+    assert flat(tuned[2].simulators) != flat(tuned[1].simulators)
+    assert reality.asked == 3 + 2  # three samples, and the probes of iterations 0 and 2
+    samples = [step.sample.fitness for step in of(Measured, steps)]
+    assert probed[3].recorded == max(probed[3].fitness, *samples)
+
+
+def test_samples_that_are_no_lessons_are_not_tuned_on() -> None:
+    class Deaf(Plain):
+        def lessons(self, samples: Any) -> Any:
+            return ()
+
+    steps = steps_of(Deaf())
+
+    assert [step.cost for step in of(Tuned, steps)] == [Cost(), *(Cost(saved=50 * count) for count in (1, 2, 3))]
+
+
+def test_a_strategy_that_does_not_tune_keeps_its_first_simulators_at_no_cost() -> None:
+    tuned = of(Tuned, steps_of(Stubborn()))
+
+    assert len({flat(step.simulators) for step in tuned}) == 1
+    assert {step.cost for step in tuned} == {Cost()}
+
+
+@pytest.mark.parametrize("strategy", [Robust(), Patient(), Stubborn()], ids=lambda each: type(each).__name__)
+def test_a_repetition_with_a_strategy_of_ones_own_resumes_bit_equal_wherever_it_stopped(strategy: Any) -> None:
+    steps = steps_of(strategy)
+
+    for stopped_after in range(len(steps) + 1):
+        rest = repetition(replace(small_setting(), strategy=strategy), steps[:stopped_after])
+        assert [flat(step) for step in rest] == [flat(step) for step in steps[stopped_after:]]
+
+
+OPTIONS: list[tuple[str, dict[str, Any]]] = [
+    *((name, {}) for name in sorted(strategies)),
+    ("domain_randomization", {"simulators": 3, "equal_rollouts": True}),
+    ("noise_envelope", {"simulators": 2, "fitness": "mean_minus_deviation", "equal_rollouts": True}),
+    ("noise_envelope", {"base": "static_friction, dynamic_friction", "epsilon": 0.02}),
+    ("weighted", {"simulators": 4, "uniqueness_weight": 1, "reliability_weight": 1, "information_weight": 0.5}),
+    ("weighted", {"fit_weight": 0, "disagreement_weight": 0, "information_weight": 1, "information": "trace"}),
+]
+
+
+@pytest.mark.parametrize(("name", "options"), OPTIONS)
+def test_every_strategy_runs_on_the_toy_and_costs_what_was_estimated(name: Any, options: Any) -> None:
+    spec = ExperimentSpec.model_validate({
+        "strategy": {"name": name, "options": options}, "robot": "toy_function", "iterations": 2, "repetitions": 1,
+        "tunables": ["static_friction", "dynamic_friction"], "budget": "smoke",
+    })  # fmt: skip
+    resolved = resolve_experiment(spec)
+
+    steps = list(repetition(setting(resolved, 0)))
+
+    costs = [step.cost for step in steps if hasattr(step, "cost")]
+    assert sum(cost.rollouts + cost.saved for cost in costs) == expected_rollouts(resolved)
+    assert len(of(Probed, steps)) == (3 if strategies[name].takes_samples else 1)
+    assert all(np.isfinite(step.fitness) for step in of(Transferred, steps))
+    assert resolve_experiment(resolved) == resolved
