@@ -1,18 +1,23 @@
 """Overhead of gaplab beside physics: time of an evolution step, and memory of a worker."""
 
 import resource
+from collections.abc import Callable
 from pathlib import Path
+from statistics import median
 from time import perf_counter
 
 import numpy as np
 
-from benchmarks.measure import Row
+from benchmarks.measure import Row, rates, ratio
 from benchmarks.physics import genomes, simulation
-from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.arrays import FloatArray, Genomes, Parameters
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.search import Question, maximise
 from gaplab.services.core.streams import stream
+from gaplab.services.engines.base import Engine
+from gaplab.services.engines.mujoco import MuJoCo
+from gaplab.services.engines.pybullet.engine import PyBullet
 
 STEPS = 20_000
 ROLLOUTS = 5_000
@@ -46,8 +51,25 @@ def memory(rollouts: int = ROLLOUTS) -> tuple[int, int, float]:
     return early, resident_bytes(), (perf_counter() - begun) / rollouts
 
 
+def sensing(engine: Engine, rounds: int = 7) -> Row:
+    """Return the rate of rollouts with readings beside those without, one controller in one simulator a call."""
+    simulate, drawn, nominal = simulation(engine), genomes(40), np.array([[1.0, 0.8, 0.0]])
+
+    def all_by(ask: Callable[[Genomes, Parameters], FloatArray]) -> Callable[[], int]:
+        def work() -> int:
+            for index in range(len(drawn)):
+                ask(drawn[[index]], nominal)
+            return len(drawn)
+
+        return work
+
+    found = rates({"with": all_by(simulate.sense), "without": all_by(simulate)}, rounds)
+    share = ratio(found["with"], found["without"])
+    return Row(f"readings, {engine.name}", f"{median(found['with']):.0f}/s", share, "without readings", "≥ 0.97")
+
+
 def rows() -> list[Row]:
-    """Measure an evolution step as a share of a rollout, and memory over many rollouts."""
+    """Measure an evolution step as a share of a rollout, memory over many rollouts, and the cost of readings."""
     step_s = evolution_step_s()
     early, late, rollout_s = memory()
     mebibyte = 2**20
@@ -60,4 +82,6 @@ def rows() -> list[Row]:
             f"after {ROLLOUTS // 10:,}: {early / mebibyte:.1f} MiB",
             "flat",
         ),
+        sensing(PyBullet()),
+        *([sensing(MuJoCo())] if MuJoCo.available() else []),
     ]
