@@ -36,6 +36,9 @@ from gaplab.services.specs.violations import (
     tuning_violations,
 )
 
+NEED_NO_OTHERS: tuple[Registry[Any], ...] = (robots, strategies, optimizers, discrepancies, tuners)
+"""The kinds of plug-ins of a spec that can be created without others; the field of each has the name of its kind."""
+
 
 def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     """Return the spec with every field, as it is stored and run. Resolving it again changes nothing.
@@ -67,13 +70,9 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         name=spec.name or _label(strategy),
         iterations=spec.iterations or preset.iterations,
         repetitions=spec.repetitions or preset.repetitions,
-        robot=_completed(robots, spec.robot),
-        strategy=_completed(strategies, spec.strategy),
-        optimizer=_completed(optimizers, spec.optimizer),
+        **{registry.kind: _completed(registry, getattr(spec, registry.kind)) for registry in NEED_NO_OTHERS},
         engine=_completed(engines, simulated),
         tunables=tuple(_with_bounds(ref) for ref in spec.tunables),
-        discrepancy=_completed(discrepancies, spec.discrepancy),
-        tuner=_completed(tuners, spec.tuner),
         held_out=spec.held_out,
         reality=ResolvedReality(engine=_completed(engines, real), parameters=_truth(spec, robot, reality_engine)),
         budget=budget,
