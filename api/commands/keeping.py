@@ -17,7 +17,11 @@ from gaplab.schemas.views import Order, Shown, ViewRead
 
 ViewName = Annotated[str, typer.Argument(metavar="NAME", help="name of the view")]
 
-views = typer.Typer(help="List, save and delete saved views: queries that all users share.", no_args_is_help=False)
+views = typer.Typer(
+    help="List, save and delete saved views: queries that all users share. Without a command: list.",
+    no_args_is_help=False,
+    subcommand_metavar="[COMMAND] [ARGS]...",
+)
 app.add_typer(views, name="views", rich_help_panel=RESULTS)
 
 

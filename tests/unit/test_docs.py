@@ -87,6 +87,13 @@ def test_the_reference_is_what_the_code_says() -> None:
     assert set(kept) == set(pages())
 
 
+def test_the_reference_lists_groups_that_run_by_themselves_or_have_options() -> None:
+    headings = set(re.findall(r"^## (gaplab.*)$", pages()["commands.md"], re.MULTILINE))
+
+    assert {"gaplab", "gaplab views", "gaplab views save", "gaplab token list"} <= headings
+    assert headings.isdisjoint({"gaplab token", "gaplab plugin"})
+
+
 def test_the_types_of_the_page_are_those_of_the_openapi_document() -> None:
     assert typescript.FILE.read_text() == typescript.declarations(), "run `make docs`"
 
