@@ -28,7 +28,7 @@ app.add_typer(views, name="views", rich_help_panel=RESULTS)
 @app.command(rich_help_panel=KEEPING)
 def tag(
     id: Id,
-    tags: Annotated[list[str], typer.Argument(metavar="TAG...", help="tags, like gait")],
+    tags: Annotated[list[str], typer.Argument(metavar="TAG", help="tags, like gait")],
     remove: Annotated[bool, typer.Option("--remove", help="remove the tags")] = False,
     as_json: AsJson = False,
     url: Url = None,
