@@ -6,6 +6,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
+from tests.e2e.service import wait_until
+
 SLOW_MS = 120_000
 expect.set_options(timeout=SLOW_MS)
 STUDY = "MuJoCo in MuJoCo"
@@ -23,10 +25,10 @@ def walker(study: Any) -> Any:
     return study["experiments"][0]["id"]
 
 
-def saved(page: Any, link: str) -> Any:
-    """The name and the content of the file that a link saves."""
+def saved(page: Any, link: str, part: Any = None) -> Any:
+    """The name and the content of the file that a link of the page, or of a part of it, saves."""
     with page.expect_download(timeout=SLOW_MS) as download:
-        page.get_by_role("link", name=link, exact=True).click()
+        (part or page).get_by_role("link", name=link, exact=True).click()
     return download.value.suggested_filename, download.value.path().read_bytes()
 
 
@@ -57,8 +59,8 @@ def test_simulators_are_drawn_in_parallel_coordinates(archive: Any, walker: Any,
         expect(
             figure.locator("svg").get_by_text(re.compile(tunable.replace("_", " "), re.IGNORECASE)).first
         ).to_be_visible()
-    name, content = saved(figure, "SVG")
-    assert (name, content[:5]) == (f"gaplab-{walker}-coordinates.svg", b"<?xml")
+    name, content = saved(page, "SVG", figure)
+    assert (name.rpartition("-")[2], content[:5]) == ("coordinates.svg", b"<?xml")
 
 
 @pytest.mark.parametrize("of", ["studies", "experiments"])
@@ -77,7 +79,11 @@ def test_a_report_is_saved_with_the_verdict_that_the_service_gives(
 
 
 def test_a_replay_is_saved_as_a_video_of_the_controller_that_is_shown(archive: Any, walker: Any, visit: Any) -> None:
-    page = visit(f"{archive.url}/#/replay?experiment={walker}&repetition=0&iteration=1&kind=sample")
+    query = "repetition=0&iteration=1&kind=sample"
+    computed = lambda: archive.http.get(f"/experiments/{walker}/replay?{query}").status_code  # noqa: E731
+    wait_until(lambda: computed() == 200, 300, computed)  # the first rollouts of a process take long
+
+    page = visit(f"{archive.url}/#/replay?experiment={walker}&{query}")
 
     name, content = saved(page, "GIF")
 
