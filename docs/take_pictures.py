@@ -1,6 +1,6 @@
 """`python -m docs.take_pictures`, or `make pictures`: take the pictures of docs/pictures from the page as it is now.
 
-A real service has the published studies and computes the toy; a real Chromium visits the views in light and dark, and
+A real service has the published studies and the toy; a real Chromium visits the views in light and dark, and
 reports any error on the page. Look at the pictures before you keep them.
 """
 
@@ -14,9 +14,17 @@ from typing import NamedTuple
 from PIL import Image
 from playwright.sync_api import Page
 
-from gaplab.api.clients.client import Client
-from gaplab.api.process.local_service import local_service
+from gaplab import migrations
+from gaplab.api.process.local_service import start_service
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.archives import import_archive
+from gaplab.services.core.loop import repetition
+from gaplab.services.experiments.submission import submit_study
+from gaplab.services.running.execution import claim
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.session import Store
 from tests.e2e.browser import Chromium
+from tests.experiments import run
 
 ROOT = Path(__file__).parents[1]
 FOLDER = Path(__file__).with_name("pictures")
@@ -50,7 +58,7 @@ VIEWS = (
     View("list", "", ".list tbody tr >> nth=3", 560),
     View("new", "new", ".panel .big", press="Quadruped, quickly"),
     View("study", "studies/{study}", ".plot .scatterlayer .point >> nth=0"),
-    View("experiment", "experiments/{experiment}", ".figure-squared-error .scatterlayer .point >> nth=0", 1330),
+    View("experiment", "experiments/{experiment}", ".figure-predictions .scatterlayer .point >> nth=0", 1330),
     View("compare", "compare?experiments={all}", "table.matrix", 1130),
     View("replay", "replay?experiment={experiment}", ".gait .main-svg >> nth=0", fields=(("Time", "2"),)),
     View("toy", "toy?experiment={toy}&iteration=3", ".toy .main-svg >> nth=0"),
@@ -60,21 +68,28 @@ VIEWS = (
 @contextmanager
 def prepared() -> Iterator[tuple[str, dict[str, str]]]:
     """Serve the studies, and yield the address of the page and the ids in `VIEWS`."""
-    with TemporaryDirectory(prefix="gaplab-pictures-") as folder, local_service(folder) as client:
+    with TemporaryDirectory(prefix="gaplab-pictures-") as folder:
+        database_url = f"sqlite:///{Path(folder) / 'gaplab.db'}"
+        migrations.upgrade(database_url)
+        store = Store(database_url)
         for name in STUDIES:
             with (ROOT / "docs" / "studies" / f"{name}.zip").open("rb") as archive:
-                imported = client.import_(archive)
-        experiments = imported.experiments
-        assert imported.study
-        ids = {"study": imported.study, "experiment": experiments[0], "all": ",".join(experiments), "toy": toy(client)}
-        yield client.url, ids
+                shown = import_archive(store, archive)
+        ids = {"study": shown.study or "", "experiment": shown.experiments[0], "all": ",".join(shown.experiments)}
+        ids["toy"] = toy(store)
+        store.dispose()
+        with start_service(database_url, Path(folder) / "api.log", workers=False) as client:
+            yield client.url, ids
 
 
-def toy(client: Client) -> str:
-    """Compute the toy of the examples, and return its first experiment."""
-    study = client.submit(json.loads((ROOT / "examples" / "toy.json").read_text()), yes=True)
-    client.wait(study.id, progress=False, timeout_s=LONGEST_S)
-    return client.study(study.id).experiments[0].id
+def toy(store: Store) -> str:
+    """Compute the toy of the examples with two strategies, and return the first experiment."""
+    spec = json.loads((ROOT / "examples" / "toy.json").read_text()) | {"strategies": ["simulated_fit", "random"]}
+    study = submit_study(store, StudySpec.model_validate(spec))
+    while claims := claim(store, "pictures", 1):
+        for claimed in claims:
+            run(store, claimed, repetition(setting(claimed.spec, claimed.number)))
+    return study.experiments[0].id
 
 
 def take(page: Page, view: View, path: Path) -> None:

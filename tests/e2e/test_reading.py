@@ -126,7 +126,7 @@ def test_what_a_document_says_can_be_done(path: Path, service: LocalService, hom
     }
 
     run = ["bash", "-c", script(path)]
-    done = subprocess.run(run, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(run, cwd=folder, env=environment, capture_output=True, text=True, timeout=900, check=False)
 
     assert done.returncode == 0, done.stdout + done.stderr
     assert [name for name in LEAVES.get(path.stem, ()) if not (folder / name).stat().st_size] == []

@@ -44,7 +44,7 @@ UNTIL_STOPPED = {"serve", "demo"}
 
 def commands(of: Any = None, name: str = "") -> Iterator[tuple[str, Any]]:
     """Every command that runs by itself, with its name: those of groups, and groups like `views`."""
-    command = of or typer.main.get_command(app)
+    command: Any = of or typer.main.get_command(app)
     parts = getattr(command, "commands", {})
     if not parts or command.invoke_without_command:
         yield name, command
