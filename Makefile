@@ -31,6 +31,9 @@ bench: .venv/installed-dev  ## measure speeds, as ratios within one run
 docs: .venv/installed-dev  ## generate docs/reference/ from the code
 	$(BIN)/python -m docs.generate
 
+pictures: .venv/prepared  ## take the pictures of docs/ from the page as it is now
+	$(BIN)/python -m docs.take_pictures
+
 soak: .venv/installed-dev  ## inject a thousand random faults into the real service and check every acknowledgement: three quarters of an hour
 	$(BIN)/python -m tests.soak $(if $(FAULTS),--faults $(FAULTS)) $(if $(SEED),--seed $(SEED))
 
@@ -52,4 +55,4 @@ clean:  ## remove the environment and caches; results stay
 	$(BIN)/python -m tests.e2e.prepare_machine
 	touch $@
 
-.PHONY: help demo serve test lint bench docs soak clean
+.PHONY: help demo serve test lint bench docs pictures soak clean

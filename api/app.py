@@ -94,8 +94,8 @@ MODULES = (
 """The modules of the API, in the order of the documentation."""
 
 
-RELOADING = (studies, estimates, experiments, sensitivity, catalogue)
-"""The modules whose answers depend on the plug-ins: these are imported again if their files were changed."""
+WITHOUT_PLUGINS = (views, webhooks, events, health, metrics)
+"""The modules whose answers do not depend on plug-ins; before others answer, edited plug-ins are imported again."""
 
 
 def create_app(
@@ -135,7 +135,7 @@ def create_app(
     app.add_middleware(RequestCounter, metrics=app.state.metrics)
     problems.install(app)
     for module in MODULES:
-        reloading = [Depends(reload_plugins)] if module in RELOADING else []
+        reloading = [] if module in WITHOUT_PLUGINS else [Depends(reload_plugins)]
         app.include_router(module.router, dependencies=[Depends(refuse_repeated_parameters), *reloading])
     figures.install(app)
     dashboard.install(app)

@@ -111,11 +111,12 @@ def settings() -> Iterator[str]:
 
 
 def _commands(command: Any, name: str) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 - of typer's own click
-    if hasattr(command, "commands"):
-        for part, each in command.commands.items():
-            yield from _commands(each, f"{name} {part}")
-    else:
+    """Yield every command that runs by itself or has options, also one that has commands of its own."""
+    parts = getattr(command, "commands", {})
+    if not parts or command.invoke_without_command or command.params:
         yield name, command
+    for part, each in parts.items():
+        yield from _commands(each, f"{name} {part}")
 
 
 def _parameter(found: Any) -> tuple[str, str, str]:  # noqa: ANN401 - of typer's own click

@@ -53,6 +53,7 @@ def check_here(expected: Versions) -> None:
     """
     limit_prints()
     folders.find()
+    imported.contents()
     _compare(platform.node(), versions(), _shared(expected))
     wanted = {name.removeprefix(PLUGIN): text for name, text in expected.items() if name.startswith(PLUGIN)}
     if wanted and _different(imported.contents(), wanted) and (different := _different(imported.renewed(), wanted)):
@@ -84,6 +85,7 @@ def check_nodes() -> None:
 @ray.remote(num_cpus=0, max_retries=0)
 def _versions_of_node() -> Versions:
     folders.find()
+    imported.contents()
     return versions() | _prefixed(plugin_versions(imported.contents()))
 
 

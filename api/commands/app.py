@@ -29,9 +29,7 @@ OTHERS = "Access and help"
 
 Id = Annotated[str, typer.Argument(metavar="ID", help="a study or an experiment", autocompletion=completion.ids)]
 ExperimentId = Annotated[str, typer.Argument(metavar="ID", help="an experiment", autocompletion=completion.experiments)]
-Ids = Annotated[
-    list[str], typer.Argument(metavar="ID...", help="studies or experiments", autocompletion=completion.ids)
-]
+Ids = Annotated[list[str], typer.Argument(metavar="ID", help="studies or experiments", autocompletion=completion.ids)]
 AsJson = Annotated[bool, typer.Option("--json", help="print one JSON document, for programs")]
 Url = Annotated[
     str | None,

@@ -21,7 +21,7 @@ FILES = {".zip", ".json"}
 Compared = Annotated[
     list[str],
     typer.Argument(
-        metavar="ID|FILE...",
+        metavar="ID|FILE",
         help="studies, experiments, archives (.zip) or specs (.json); a single study is compared within",
         autocompletion=completion.ids,
     ),

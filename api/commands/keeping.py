@@ -17,14 +17,18 @@ from gaplab.schemas.views import Order, Shown, ViewRead
 
 ViewName = Annotated[str, typer.Argument(metavar="NAME", help="name of the view")]
 
-views = typer.Typer(help="List, save and delete saved views: queries that all users share.", no_args_is_help=False)
+views = typer.Typer(
+    help="List, save and delete saved views: queries that all users share. Without a command: list.",
+    no_args_is_help=False,
+    subcommand_metavar="[COMMAND] [ARGS]...",
+)
 app.add_typer(views, name="views", rich_help_panel=RESULTS)
 
 
 @app.command(rich_help_panel=KEEPING)
 def tag(
     id: Id,
-    tags: Annotated[list[str], typer.Argument(metavar="TAG...", help="tags, like gait")],
+    tags: Annotated[list[str], typer.Argument(metavar="TAG", help="tags, like gait")],
     remove: Annotated[bool, typer.Option("--remove", help="remove the tags")] = False,
     as_json: AsJson = False,
     url: Url = None,

@@ -1,47 +1,55 @@
 """The cost of a study or an experiment, before it is submitted."""
 
-from typing import Annotated
+from collections.abc import Callable
+from functools import partial
+from typing import Annotated, TypeAlias
 
-from fastapi import APIRouter, Body, Request
+from fastapi import APIRouter, Body, Depends, Request
 
 from gaplab.api.http.dependencies import StoreDep
-from gaplab.api.http.problems import documented
+from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.estimates import EstimateRead
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.experiments import estimates
 
-router = APIRouter()
+_experiment = APIRouter(prefix="/experiments", tags=["experiments"])
+_study = APIRouter(prefix="/studies", tags=["studies"])
+
+Estimate: TypeAlias = Callable[[StudySpec | ExperimentSpec], EstimateRead]
+
+_COST = "The expected cost"
+_RESPONSES: Responses = documented(413, 415, 422)
 
 
-@router.post(
-    "/studies/estimate",
-    tags=["studies"],
-    summary="Estimate a study",
-    response_description="The expected cost",
-    responses=documented(413, 415, 422),
-)
+def _estimate(store: StoreDep, request: Request) -> Estimate:
+    """Return the function that estimates a spec under the limits and with the cores of this service."""
+    state = request.app.state
+    return partial(estimates.estimate, store, limits=state.limits, cores=state.cores)
+
+
+EstimateDep = Annotated[Estimate, Depends(_estimate)]
+
+
+@_study.post("/estimate", summary="Estimate a study", response_description=_COST, responses=_RESPONSES)
 def estimate_study(
-    spec: Annotated[StudySpec, Body(openapi_examples=StudySpec.EXAMPLES)], store: StoreDep, request: Request
+    spec: Annotated[StudySpec, Body(openapi_examples=StudySpec.EXAMPLES)], estimate: EstimateDep
 ) -> EstimateRead:
     """Check a study as on submission, and return its rollouts and the time they take here; nothing is stored.
 
     A reader's token suffices. The seconds per rollout are those that this service measured in its newest experiments
     with the same robot and engine.
     """
-    state = request.app.state
-    return estimates.estimate(store, spec, limits=state.limits, cores=state.cores)
+    return estimate(spec)
 
 
-@router.post(
-    "/experiments/estimate",
-    tags=["experiments"],
-    summary="Estimate an experiment",
-    response_description="The expected cost",
-    responses=documented(413, 415, 422),
-)
+@_experiment.post("/estimate", summary="Estimate an experiment", response_description=_COST, responses=_RESPONSES)
 def estimate_experiment(
-    spec: Annotated[ExperimentSpec, Body(openapi_examples=ExperimentSpec.EXAMPLES)], store: StoreDep, request: Request
+    spec: Annotated[ExperimentSpec, Body(openapi_examples=ExperimentSpec.EXAMPLES)], estimate: EstimateDep
 ) -> EstimateRead:
     """Check an experiment as on submission, and return its rollouts and the time they take here; nothing is stored."""
-    state = request.app.state
-    return estimates.estimate(store, spec, limits=state.limits, cores=state.cores)
+    return estimate(spec)
+
+
+router = APIRouter()
+router.include_router(_study)
+router.include_router(_experiment)

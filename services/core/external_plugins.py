@@ -42,6 +42,7 @@ def set_folders(folders: tuple[Path, ...]) -> None:
     package = ModuleType(PACKAGE, "External plug-ins.")
     package.__path__ = [str(folder) for folder in folders]
     sys.modules[PACKAGE] = package
+    _load.cache_clear()
     invalidate_caches()
 
 
@@ -78,6 +79,11 @@ def classes(base: type[P]) -> tuple[list[type[P]], list[Unusable]]:
 def loaded() -> Loaded:
     """Return the modules of the folders; the first call after `set_folders` imports them."""
     return _load(package())
+
+
+def are_loaded() -> bool:
+    """Return whether the modules were imported since the last `set_folders`."""
+    return _load.cache_info().currsize > 0
 
 
 def file_of(plugin: type) -> str | None:

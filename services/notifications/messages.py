@@ -1,11 +1,10 @@
 """What a notification says about a study or an experiment that has ended."""
 
-from sqlalchemy.orm import Session
-
 from gaplab.schemas.notifications import EndedExperiment, Notification
 from gaplab.services.experiments.views import state_of
 from gaplab.services.store.models import EventRow, ExperimentRow, StudyRow
 from gaplab.services.store.queries.experiments import experiments_of
+from gaplab.services.store.session import Session
 
 
 def of_experiment(event: EventRow, row: ExperimentRow) -> Notification:

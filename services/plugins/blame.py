@@ -1,9 +1,11 @@
 """Blame: the plug-in whose code raised an error."""
 
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from traceback import walk_tb
+from types import ModuleType
 
+from gaplab.services.core import external_plugins
 from gaplab.services.plugins.external import REGISTRIES
 
 LONGEST = 2_000
@@ -23,17 +25,21 @@ def describe(error: BaseException) -> str:
 def raised(error: BaseException) -> str:
     """Return the sentence without the message, which may name hidden parameters."""
     kind = type(error).__name__
+    plugins = _plugins(external_plugins.package())
     for frame, line in reversed(list(walk_tb(error.__traceback__))):
-        plugins = _plugins()
         places = (type(frame.f_locals.get("self")), frame.f_globals.get("__name__"))
         if named := next((plugins[place] for place in places if place in plugins), None):
             return f"{named} raised {kind} ({Path(frame.f_code.co_filename).name}, line {line})"
     return kind
 
 
-@cache
-def _plugins() -> dict[type | str | None, str]:
-    """Return the kind and name of each plug-in, by its class and by its module; of several in a module, the first."""
+@lru_cache(maxsize=1)
+def _plugins(_package: ModuleType | None) -> dict[type | str | None, str]:
+    """Return the kind and name of each plug-in, by its class and by its module; of several in a module, the first.
+
+    Args:
+        _package: the package of external plug-ins, another one after each import of them.
+    """
     found: dict[type | str | None, str] = {}
     for registry in REGISTRIES.values():
         for name, plugin in registry.items():

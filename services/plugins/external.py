@@ -13,7 +13,7 @@ from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
 from gaplab.services.plugins.contents import Contents
-from gaplab.services.plugins.watching import present
+from gaplab.services.plugins.watching import imported, present
 
 REGISTRIES: Mapping[str, Registry[Any]] = {
     registry.kind: registry for registry in (strategies, robots, engines, tunables, optimizers, discrepancies, tuners)
@@ -40,6 +40,12 @@ def external_plugins(contents: Contents | None = None) -> Mapping[str, str]:
 def named_in(spec: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the plug-ins that a resolved spec names, or the spec of a sensitivity check, by kind and name."""
     return tuple(dict.fromkeys(_named_in(spec)))
+
+
+def imported_files(spec: Mapping[str, Any]) -> str:
+    """Return the external plug-ins that a resolved spec names, with the hashes of the files that were imported."""
+    found = external_plugins(imported.contents())
+    return "; ".join(f"{plugin}: {found[plugin]}" for plugin in named_in(spec) if plugin in found)
 
 
 def unavailable(plugin: str) -> str | None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from gaplab.services.core import external_plugins
 from gaplab.services.plugins.external import REGISTRIES
 from gaplab.services.plugins.ignored import ignored_files
+from gaplab.services.plugins.watching import imported
 
 VARIABLE = "GAPLAB_PLUGINS"
 
@@ -35,6 +36,7 @@ def find() -> None:
 def load() -> None:
     """Find and import every plug-in, and warn of those that cannot be used; later calls do nothing."""
     find()
+    imported.contents()
     for folder in external_plugins.named_folders():
         if not folder.is_dir():
             log.warning("there is no plug-in folder %s, which %s names", folder, VARIABLE)

@@ -72,7 +72,12 @@ class Imported:
 
 
 def _import() -> Contents:
-    """Import the plug-ins, again if a file is edited meanwhile, and return what was imported."""
+    """Import the plug-ins, again if a file is edited meanwhile, and return what was imported.
+
+    If they were imported before, their files may have been edited since, so they are imported again.
+    """
+    if (named := external_plugins.named_folders()) and external_plugins.are_loaded():
+        external_plugins.set_folders(named)
     for _ in range(TRIES):
         before = contents.read()
         external_plugins.loaded()

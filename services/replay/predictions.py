@@ -9,6 +9,8 @@ from gaplab.schemas.predictions import Prediction, Predictions
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.robots import robots
 from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.plugins.external import imported_files
+from gaplab.services.plugins.watching import imported
 from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess
 from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, refuse_missing
 from gaplab.services.specs.resolution import unit
@@ -35,6 +37,9 @@ Fitness = float | None
 Pair = tuple[Fitness, Fitness]
 """Fitness before and after tuning."""
 
+Place = tuple[str, str]
+"""An experiment, and the files of its external plug-ins."""
+
 
 def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, seconds: float = SECONDS) -> Predictions:
     """Return the predictions of an experiment's samples that are computed so far.
@@ -60,14 +65,15 @@ def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, se
         every = replays.tuned_samples(session, experiment_id)
     samples = every[:MOST_KEPT]
     spec = spec_of(row.spec)
-    unknown = [each for each in samples if process.answers.get(_key(row.id, each)) is None]
+    place = (row.id, imported_files(row.spec))
+    unknown = [each for each in samples if process.answers.get(_key(place, each)) is None]
     unknown.sort(key=lambda each: (each.iteration, each.repetition))
     if unknown:
         refuse_missing(spec)
         pairs = process.call(predict, spec.model_dump_json(), unknown[:MOST_AT_ONCE], seconds)
         for sample, pair in zip(unknown, pairs, strict=False):
-            process.answers.keep(_key(row.id, sample), pair, SIZE_BYTES)
-    items = _items(row.id, samples, process.answers)
+            process.answers.keep(_key(place, sample), pair, SIZE_BYTES)
+    items = _items(place, samples, process.answers)
     return Predictions(
         experiment=row.id,
         unit=unit(spec),
@@ -80,11 +86,14 @@ def predictions(store: Store, process: RolloutProcess, experiment_id: str, *, se
 def predict(spec: str, samples: Sequence[TunedSample], seconds: float) -> list[Pair]:
     """Return the fitness of samples before and after tuning: of the first one, and of as many others as time permits.
 
+    It is computed with the plug-ins as their files are now.
+
     Args:
         spec: resolved spec, as JSON.
         samples: samples, with the simulators before and after them.
         seconds: time limit.
     """
+    imported.renewed()
     read = ResolvedSpec.model_validate_json(spec)
     robot = robots.create(read.robot)
     simulate = Simulation(robot, engine_of(read.engine), edits_of(ref.name for ref in read.tunables))
@@ -98,8 +107,8 @@ def predict(spec: str, samples: Sequence[TunedSample], seconds: float) -> list[P
     return found
 
 
-def _items(experiment: str, samples: Sequence[TunedSample], answers: AnswerCache) -> tuple[Prediction, ...]:
-    found: list[tuple[TunedSample, Pair | None]] = [(each, answers.get(_key(experiment, each))) for each in samples]
+def _items(place: Place, samples: Sequence[TunedSample], answers: AnswerCache) -> tuple[Prediction, ...]:
+    found: list[tuple[TunedSample, Pair | None]] = [(each, answers.get(_key(place, each))) for each in samples]
     return tuple(
         Prediction(
             repetition=sample.repetition,
@@ -113,8 +122,8 @@ def _items(experiment: str, samples: Sequence[TunedSample], answers: AnswerCache
     )
 
 
-def _key(experiment: str, sample: TunedSample) -> Key:
-    return "prediction", experiment, sample.repetition, sample.iteration
+def _key(place: Place, sample: TunedSample) -> Key:
+    return "prediction", *place, sample.repetition, sample.iteration
 
 
 def _finite(value: float) -> float | None:

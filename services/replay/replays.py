@@ -6,6 +6,7 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound, Violation
 from gaplab.services.core.robots import robots
 from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.plugins.external import imported_files
 from gaplab.services.replay.process import Key, RolloutProcess
 from gaplab.services.replay.rollout import ReplayChoice, ReplayRequest, compute_replay
 from gaplab.services.specs.assembly import refuse_missing
@@ -41,7 +42,8 @@ def replay_json(store: Store, process: RolloutProcess, experiment_id: str, choic
         spec = spec_of(row.spec)
         _refuse_impossible(row, spec, choice)
         request = _request(session, row, spec, choice)
-    key: Key = ("replay", row.id, choice.repetition, choice.iteration, choice.kind, request.simulator)
+    place = row.id, choice.repetition, choice.iteration, choice.kind, request.simulator
+    key: Key = ("replay", *place, imported_files(row.spec))
     found: bytes | None = process.answers.get(key)
     if found is None:
         refuse_missing(spec, reality=request.known)

@@ -11,6 +11,7 @@ from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot, Sensors
 from gaplab.services.core.world import Recording, World
+from gaplab.services.plugins.watching import imported
 from gaplab.services.replay.shapes import feet_of, labels, shapes_of
 from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, reality_of
 
@@ -70,11 +71,12 @@ class ReplayRequest:
 
 
 def compute_replay(request: ReplayRequest) -> bytes:
-    """Return the Replay as JSON.
+    """Return the Replay as JSON, computed with the plug-ins as their files are now.
 
     Raises:
         EngineUnavailable: the library of an engine is not installed.
     """
+    imported.renewed()
     spec, choice = ResolvedSpec.model_validate_json(request.spec), request.choice
     robot = robots.create(spec.robot)
     genome = np.array(request.genome)

@@ -1,5 +1,6 @@
 """Notebooks, tutorial and how-tos, run as their readers run them, on one real service that has their plug-ins."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -24,13 +25,41 @@ from tests.e2e.reading import (
     service_with,
 )
 
-LEAVES = {"tutorial": ["curves.svg", "curves.pdf", "curves.html", "study.zip"], "scripts": ["ended.json"]}
+LEAVES = {
+    "tutorial": ["curves.svg", "curves.pdf", "curves.html", "study.zip"],
+    "day": [
+        "walk.gif",
+        "report.html",
+        "report.pdf",
+        "curves.pdf",
+        "simulators.pdf",
+        "study.zip",
+        "copy.db",
+        "again.json",
+    ],
+    "scripts": ["ended.json"],
+}
 """Files that a document promises."""
+
+SMALL_TOY = {
+    "strategies": ["simulated_fit", "random"],
+    "robot": "toy_function",
+    "iterations": 3,
+    "repetitions": 2,
+    "budget": "smoke",
+    "seed": 2012,
+}
 
 
 @pytest.fixture(scope="module")
-def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalService]:
-    with service_with(tmp_path_factory.mktemp("reading"), plugins_of_notebooks() | plugins_of_documents()) as found:
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the service."""
+    return tmp_path_factory.mktemp("reading")
+
+
+@pytest.fixture(scope="module")
+def service(home: Path) -> Iterator[LocalService]:
+    with service_with(home, plugins_of_notebooks() | plugins_of_documents()) as found:
         yield found
 
 
@@ -77,8 +106,10 @@ def test_it_has_the_outputs_of_one_run_and_no_place_of_the_machine_that_ran_it(p
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Where a reader is: in a clone."""
+    """Where a reader is: in a clone, here with a small toy."""
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    (tmp_path / "examples" / "toy.json").write_text(json.dumps(SMALL_TOY))
+    (tmp_path / "docs").symlink_to(ROOT / "docs")
     return tmp_path
 
 
@@ -86,15 +117,16 @@ HERE = [path for path in DOCUMENTS if any(each.mark is None for each in blocks(p
 
 
 @pytest.mark.parametrize("path", HERE, ids=lambda path: path.stem)
-def test_what_a_document_says_can_be_done(path: Path, service: LocalService, folder: Path) -> None:
+def test_what_a_document_says_can_be_done(path: Path, service: LocalService, home: Path, folder: Path) -> None:
     environment = os.environ | {
         "GAPLAB_URL": service.url,
+        "GAPLAB_DATABASE_URL": f"sqlite:///{home / 'gaplab.db'}",
         "PATH": os.pathsep.join([str(commands(folder)), os.environ["PATH"]]),
         "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
     }
 
     run = ["bash", "-c", script(path)]
-    done = subprocess.run(run, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(run, cwd=folder, env=environment, capture_output=True, text=True, timeout=900, check=False)
 
     assert done.returncode == 0, done.stdout + done.stderr
     assert [name for name in LEAVES.get(path.stem, ()) if not (folder / name).stat().st_size] == []

@@ -43,13 +43,13 @@ UNTIL_STOPPED = {"serve", "demo"}
 
 
 def commands(of: Any = None, name: str = "") -> Iterator[tuple[str, Any]]:
-    """Every command with its name, those of groups too."""
-    command = of or typer.main.get_command(app)
-    if hasattr(command, "commands"):
-        for part, each in command.commands.items():
-            yield from commands(each, f"{name} {part}".strip())
-    else:
+    """Every command that runs by itself, with its name: those of groups, and groups like `views`."""
+    command: Any = of or typer.main.get_command(app)
+    parts = getattr(command, "commands", {})
+    if not parts or command.invoke_without_command:
         yield name, command
+    for part, each in parts.items():
+        yield from commands(each, f"{name} {part}".strip())
 
 
 NAMES = [name for name, _ in commands()]
@@ -122,6 +122,7 @@ def tidy(ask: Callable[..., Any], ended: str) -> None:
     assert ask("archive", ended)["archived_at"]
     assert ask("unarchive", ended)["archived_at"] is None
     assert ask("views save", "mine", "--query", "tag = gait")["name"] == "mine"
+    assert [view["name"] for view in ask("views")] == ["mine"]
     assert ask("views delete", "mine")["query"] == "tag = gait"
     assert ask("delete", ended)["id"] == ended
 

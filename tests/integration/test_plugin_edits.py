@@ -16,7 +16,7 @@ from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import checks, reading, submission
-from gaplab.services.plugins import watching
+from gaplab.services.plugins import blame, watching
 from gaplab.services.plugins.watching import Watch
 from gaplab.services.running import execution, provenance, sensitivity, versions
 from gaplab.services.specs.assembly import engine_of
@@ -112,6 +112,29 @@ def test_a_process_imports_edited_files_again_when_the_supervisor_has_the_new_on
 
     assert strategies["careful"] is not before
     assert strategies["careful"].describe().summary == "Stays in the very middle."
+
+
+def test_files_that_were_edited_between_their_import_and_the_first_look_are_imported_again(put: Any) -> None:
+    home = put(careful=CAREFUL)
+    before = strategies["careful"]
+    (home / "careful.py").write_text(EDITED)
+
+    watching.reload()
+
+    assert strategies["careful"] is not before
+    assert strategies["careful"].describe().summary == "Stays in the very middle."
+
+
+def test_an_error_of_a_plug_in_that_was_added_later_names_it(put: Any) -> None:
+    home = put()
+    assert blame.describe(ValueError("first")) == "ValueError: first"
+    (home / "careful.py").write_text(CAREFUL)
+    watching.reload()
+
+    with pytest.raises(AttributeError) as raised:
+        strategies["careful"]().select(None, None, None)  # type: ignore[arg-type]
+
+    assert blame.describe(raised.value).startswith("strategy 'careful' raised AttributeError (careful.py, line 1")
 
 
 def test_an_engine_is_warm_until_its_file_is_edited(put: Any) -> None:

@@ -21,6 +21,8 @@ from gaplab.services.core.types import Measured, Probed, Sample, Selected, Simul
 from gaplab.services.engines import engines
 from gaplab.services.engines.pybullet.engine import PyBullet
 from gaplab.services.experiments import submission
+from gaplab.services.plugins import watching
+from gaplab.services.plugins.folders import VARIABLE
 from gaplab.services.replay.predictions import predictions
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
@@ -275,6 +277,38 @@ def test_what_was_computed_once_is_remembered(sqlite_store: Store, app: Any, api
     assert api.get(f"/experiments/{experiment}/replay").content == first
     other = api.get(f"/experiments/{experiment}/replay?iteration=1")
     assert (other.status_code, other.headers["Retry-After"]) == (503, "5")
+
+
+WALKER = """
+from gaplab.services.core.robots.quadruped import Quadruped
+
+
+class Walker(Quadruped):
+    name = "walker"
+
+    def fitness(self, trajectory):
+        return 1 * super().fitness(trajectory)
+"""
+
+
+def test_replays_and_predictions_follow_an_edit_of_a_plug_in(
+    sqlite_store: Store, api: Any, put: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home = put(walker=WALKER)
+    monkeypatch.setenv(VARIABLE, str(home))
+    monkeypatch.setattr(watching, "LOOK_S", 0)
+    experiment, log, _ = walked(sqlite_store, robot="walker")
+
+    def computed() -> tuple[float, float]:
+        replay = api.get(f"/experiments/{experiment}/replay?iteration=1").json()
+        prediction = api.get(f"/experiments/{experiment}/predictions").json()["items"][0]
+        return replay["simulation"]["fitness"], prediction["simulated_after"]
+
+    before = computed()
+    (home / "walker.py").write_text(WALKER.replace("1 *", "2 *"))
+
+    assert before == (log[6].fitness,) * 2
+    assert computed() == (2 * log[6].fitness,) * 2
 
 
 def test_predictions_are_of_the_simulators_before_and_after_a_sample(store: Store, app: Any) -> None:

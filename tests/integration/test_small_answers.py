@@ -1,5 +1,6 @@
 """Answers of the command in small things: what is wrong, and what to do."""
 
+import io
 import logging
 from collections.abc import Iterator
 from pathlib import Path
@@ -72,16 +73,24 @@ def test_every_command_is_in_a_group_of_the_help() -> None:
     assert [each.name or each.callback for each in groups if not isinstance(each.rich_help_panel, str)] == []
 
 
-def test_a_figure_logs_no_fonts() -> None:
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_figure_and_a_report_as_pdf_log_no_fonts(
+    gaplab: Gaplab, sqlite_store: Store, tmp_path: Path, terminal: bool
+) -> None:
+    study = submission.submit_study(sqlite_store, StudySpec.model_validate(SMALL))
+    log = io.StringIO()
+    log.isatty = lambda: terminal  # type: ignore[method-assign]
     root = logging.getLogger()
     before = root.handlers[:], root.level
     try:
-        logs.configure()
-        assert not logging.getLogger("fontTools.subset").isEnabledFor(logging.INFO)
-        assert not logging.getLogger("matplotlib").isEnabledFor(logging.INFO)
+        logs.configure(log)
+        assert gaplab("figure", "curves", study.id, "--out", str(tmp_path / "a.pdf")).code == 0
+        assert gaplab("report", study.id, "--save", str(tmp_path / "b.pdf")).code == 0
     finally:
-        root.handlers[:], _ = before
+        root.handlers[:] = before[0]
         root.setLevel(before[1])
+
+    assert log.getvalue() == ""
 
 
 def test_where_the_robots_engine_is_not_installed_another_of_gaplabs_own_runs_it(

@@ -1,6 +1,7 @@
 """The arrows between the layers, and the sizes of things, read from the source itself."""
 
 import ast
+import re
 import sys
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
@@ -89,6 +90,11 @@ def imports(path: Any) -> Iterator[Any]:
             yield node.module
 
 
+def tops_of(path: Any) -> Any:
+    """The packages that the file imports something of."""
+    return {module.partition(".")[0] for module in imports(path)}
+
+
 def name_of(path: Path) -> str:
     """Return the dotted name of a file's module, without `gaplab`."""
     return ".".join(path.with_suffix("").parts).removesuffix(".__init__")
@@ -125,6 +131,16 @@ def test_each_room_of_services_imports_only_rooms_before_it() -> None:
     assert folders == set(ROOMS)
 
 
+def test_the_guide_names_the_rooms_in_their_order_and_those_that_write_sql() -> None:
+    guide = " ".join((ROOT / "services" / "README.md").read_text().split())
+    writers, others = re.findall(r"called with a store\. (.*) may write SQL|before it in this list: (.*)\.", guide)
+    sql = {path.parts[1] for path in MODULES if path.parts[0] == "services" and "sqlalchemy" in tops_of(path)}
+
+    assert re.findall(r"`(\w+)`", others[1]) == list(ROOMS)
+    assert set(re.findall(r"`(\w+)/`", writers[0])) == sql & set(ROOMS) - {"store"}
+    assert sql - set(ROOMS) == {"access.py", "events.py", "health.py"}
+
+
 def test_states_are_written_in_one_place() -> None:
     """`move` alone, which uses the table of permitted moves; what is inserted or imported is no move."""
     writers = set()
@@ -158,12 +174,12 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 
 @pytest.mark.parametrize("path", [each for each in MODULES if each.as_posix().startswith("services/core/")], ids=str)
 def test_the_core_has_no_clock_no_chance_of_its_own_and_no_side_effects(path: Any) -> None:
-    assert not {module.partition(".")[0] for module in imports(path)} & IMPURE
+    assert not tops_of(path) & IMPURE
 
 
 @pytest.mark.parametrize("path", [each for each in MODULES if not each.as_posix().startswith("workers/")], ids=str)
 def test_only_the_workers_know_ray_and_nobody_imports_physics_at_the_top(path: Any) -> None:
-    tops = {module.partition(".")[0] for module in imports(path)}
+    tops = tops_of(path)
 
     assert "ray" not in tops
     assert not tops & PHYSICS

@@ -87,8 +87,24 @@ def test_the_reference_is_what_the_code_says() -> None:
     assert set(kept) == set(pages())
 
 
+def test_the_reference_lists_groups_that_run_by_themselves_or_have_options() -> None:
+    headings = set(re.findall(r"^## (gaplab.*)$", pages()["commands.md"], re.MULTILINE))
+
+    assert {"gaplab", "gaplab views", "gaplab views save", "gaplab token list"} <= headings
+    assert headings.isdisjoint({"gaplab token", "gaplab plugin"})
+
+
 def test_the_types_of_the_page_are_those_of_the_openapi_document() -> None:
     assert typescript.FILE.read_text() == typescript.declarations(), "run `make docs`"
+
+
+def test_what_is_said_of_other_tools_names_its_source() -> None:
+    lines = (ROOT / "docs" / "other-tools.md").read_text().splitlines()
+    heads, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
+
+    assert heads[2:] == ["Optuna Dashboard", "MLflow", "Weights & Biases"]
+    assert [(row[0], cell) for row in rows for cell in row[2:] if cell and "](https://" not in cell] == []
+    assert {len(row) for row in rows} == {len(heads)}
 
 
 def test_documents_name_no_path_of_a_machine() -> None:

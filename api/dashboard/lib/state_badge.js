@@ -23,4 +23,4 @@ const PARTLY = "◑";
 export const stateBadge = (state, caveat = null) =>
   h("span", { class: `state-badge ${state.toLowerCase()}${caveat ? " partly" : ""}`, title: caveat ?? undefined },
     h("span", { "aria-hidden": "true" }, caveat && ENDED.includes(state) ? PARTLY : SIGNS[state]), " ", state.toLowerCase(),
-    caveat ? h("span", { class: "caveat" }, `, ${caveat}`) : null);
+    ...(caveat ? [h("span", { class: "separator" }, ", "), h("span", { class: "caveat" }, caveat)] : []));

@@ -1,0 +1,128 @@
+"""`python -m docs.take_pictures`, or `make pictures`: take the pictures of docs/pictures from the page as it is now.
+
+A real service has the published studies and the toy; a real Chromium visits the views in light and dark, and
+reports any error on the page. Look at the pictures before you keep them.
+"""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from PIL import Image
+from playwright.sync_api import Page
+
+from gaplab import migrations
+from gaplab.api.process.local_service import start_service
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.archives import import_archive
+from gaplab.services.core.loop import repetition
+from gaplab.services.experiments.submission import submit_study
+from gaplab.services.running.execution import claim
+from gaplab.services.specs.assembly import setting
+from gaplab.services.store.session import Store
+from tests.e2e.browser import Chromium
+from tests.experiments import run
+
+ROOT = Path(__file__).parents[1]
+FOLDER = Path(__file__).with_name("pictures")
+STUDIES = ("mujoco-in-mujoco", "pybullet-in-pybullet", "mujoco-in-physx")
+"""The archives to import; the last one is shown."""
+
+LONGEST_S = 600
+
+
+class View(NamedTuple):
+    """A view of the page.
+
+    Attributes:
+        name: name of the picture.
+        address: its fragment, with the names of ids in braces.
+        ready: what is visible once the view is complete.
+        height: height of the picture in pixels.
+        fields: values to enter, by label.
+        press: the button to press first, if any.
+    """
+
+    name: str
+    address: str
+    ready: str
+    height: int = 900
+    fields: tuple[tuple[str, str], ...] = ()
+    press: str | None = None
+
+
+VIEWS = (
+    View("list", "", ".list tbody tr >> nth=3", 560),
+    View("new", "new", ".panel .big", press="Quadruped, quickly"),
+    View("study", "studies/{study}", ".plot .scatterlayer .point >> nth=0"),
+    View("experiment", "experiments/{experiment}", ".figure-predictions .scatterlayer .point >> nth=0", 1330),
+    View("compare", "compare?experiments={all}", "table.matrix", 1130),
+    View("replay", "replay?experiment={experiment}", ".gait .main-svg >> nth=0", fields=(("Time", "2"),)),
+    View("toy", "toy?experiment={toy}&iteration=3", ".toy .main-svg >> nth=0"),
+)
+
+
+@contextmanager
+def prepared() -> Iterator[tuple[str, dict[str, str]]]:
+    """Serve the studies, and yield the address of the page and the ids in `VIEWS`."""
+    with TemporaryDirectory(prefix="gaplab-pictures-") as folder:
+        database_url = f"sqlite:///{Path(folder) / 'gaplab.db'}"
+        migrations.upgrade(database_url)
+        store = Store(database_url)
+        for name in STUDIES:
+            with (ROOT / "docs" / "studies" / f"{name}.zip").open("rb") as archive:
+                shown = import_archive(store, archive)
+        ids = {"study": shown.study or "", "experiment": shown.experiments[0], "all": ",".join(shown.experiments)}
+        ids["toy"] = toy(store)
+        store.dispose()
+        with start_service(database_url, Path(folder) / "api.log", workers=False) as client:
+            yield client.url, ids
+
+
+def toy(store: Store) -> str:
+    """Compute the toy of the examples with two strategies, and return the first experiment."""
+    spec = json.loads((ROOT / "examples" / "toy.json").read_text()) | {"strategies": ["simulated_fit", "random"]}
+    study = submit_study(store, StudySpec.model_validate(spec))
+    while claims := claim(store, "pictures", 1):
+        for claimed in claims:
+            run(store, claimed, repetition(setting(claimed.spec, claimed.number)))
+    return study.experiments[0].id
+
+
+def take(page: Page, view: View, path: Path) -> None:
+    """Store the picture of a view, with 256 colours."""
+    if view.press:
+        page.get_by_role("button", name=view.press).click()
+    page.locator(view.ready).wait_for(timeout=LONGEST_S * 1000)
+    for label, value in view.fields:
+        page.get_by_label(label, exact=True).fill(value)
+    page.wait_for_timeout(1000)  # figures are painted after they are loaded
+    page.screenshot(path=path)
+    with Image.open(path) as picture:
+        picture.convert("RGB").quantize(256).save(path, optimize=True)
+
+
+def main() -> None:
+    """Take every picture in light and in dark."""
+    browser = Chromium()
+    try:
+        with prepared() as (url, ids):
+            for view in VIEWS:
+                for dark in (False, True):
+                    path = FOLDER / f"{view.name}-{'dark' if dark else 'light'}.png"
+                    take(
+                        browser.visit(f"{url}/#/{view.address.format(**ids)}", dark=dark, height=view.height),
+                        view,
+                        path,
+                    )
+                    browser.end()
+                    print(f"Wrote {path}.")  # noqa: T201
+    finally:
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()

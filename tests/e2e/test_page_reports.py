@@ -1,0 +1,93 @@
+"""What leaves the page besides figures: settings that differ, coordinates, reports and videos, in a real Chromium."""
+
+import re
+from typing import Any
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.e2e.service import wait_until
+
+SLOW_MS = 120_000
+expect.set_options(timeout=SLOW_MS)
+STUDY = "MuJoCo in MuJoCo"
+
+
+@pytest.fixture
+def study(archive: Any) -> Any:
+    """The published study, with seven experiments."""
+    return archive.get("/studies", text=STUDY)["items"][0]
+
+
+@pytest.fixture
+def walker(study: Any) -> Any:
+    """The id of an experiment of the study with simulators."""
+    return study["experiments"][0]["id"]
+
+
+def saved(page: Any, link: str, part: Any = None) -> Any:
+    """The name and the content of the file that a link of the page, or of a part of it, saves."""
+    with page.expect_download(timeout=SLOW_MS) as download:
+        (part or page).get_by_role("link", name=link, exact=True).click()
+    return download.value.suggested_filename, download.value.path().read_bytes()
+
+
+def test_the_settings_that_differ_are_those_that_the_service_found(archive: Any, study: Any, visit: Any) -> None:
+    ids = [each["id"] for each in study["experiments"]][:3]
+    found = archive.get("/differences", experiment=ids)
+
+    page = visit(f"{archive.url}/#/compare?experiments={','.join(ids)}")
+
+    table = page.get_by_role("region", name="Settings that differ").get_by_role("table")
+    expect(table.locator("tbody tr")).to_have_count(len(found["settings"]))
+    assert table.locator("tbody code").all_inner_texts() == [each["pointer"] for each in found["settings"]]
+    strategies = table.locator("tbody tr", has_text="/strategy").locator("td").all_inner_texts()
+    assert strategies[-3:] == [each["strategy"].replace("_", " ") for each in study["experiments"][:3]]
+    expect(page.get_by_text(f"{found['equal']} other settings are equal.")).to_be_visible()
+
+
+def test_simulators_are_drawn_in_parallel_coordinates(archive: Any, walker: Any, visit: Any) -> None:
+    tunables = [each["name"] for each in archive.get(f"/experiments/{walker}")["spec"]["tunables"]]
+
+    page = visit(f"{archive.url}/#/experiments/{walker}")
+    figure = page.locator(".figure-coordinates")
+    figure.scroll_into_view_if_needed()
+
+    expect(figure.get_by_role("heading")).to_have_text("Simulators in parallel coordinates")
+    expect(figure.locator(".scatterlayer .js-line").first).to_be_attached()
+    for tunable in tunables:
+        expect(
+            figure.locator("svg").get_by_text(re.compile(tunable.replace("_", " "), re.IGNORECASE)).first
+        ).to_be_visible()
+    name, content = saved(page, "SVG", figure)
+    assert (name.rpartition("-")[2], content[:5]) == ("coordinates.svg", b"<?xml")
+
+
+@pytest.mark.parametrize("of", ["studies", "experiments"])
+def test_a_report_is_saved_with_the_verdict_that_the_service_gives(
+    archive: Any, study: Any, walker: Any, visit: Any, of: str
+) -> None:
+    id_ = study["id"] if of == "studies" else walker
+    page = visit(f"{archive.url}/#/{of}/{id_}")
+
+    name, content = saved(page, "Report")
+
+    assert name == f"gaplab-{id_}-report.html"
+    assert content.startswith(b"<!doctype html>")
+    assert archive.get(f"/{of}/{id_}/report", format="json")["headline"] in content.decode()
+    expect(page.get_by_role("link", name="Report as PDF")).to_have_attribute("href", re.compile("format=pdf"))
+
+
+def test_a_replay_is_saved_as_a_video_of_the_controller_that_is_shown(archive: Any, walker: Any, visit: Any) -> None:
+    query = "repetition=0&iteration=1&kind=sample"
+    computed = lambda: archive.http.get(f"/experiments/{walker}/replay?{query}").status_code  # noqa: E731
+    wait_until(lambda: computed() == 200, 300, computed)  # the first rollouts of a process take long
+
+    page = visit(f"{archive.url}/#/replay?experiment={walker}&{query}")
+
+    name, content = saved(page, "GIF")
+
+    assert (name, content[:6]) == (f"gaplab-{walker}-0-1.gif", b"GIF89a")
+    for format_ in ("WEBP", "MP4"):
+        link = page.get_by_role("link", name=format_, exact=True)
+        expect(link).to_have_attribute("href", re.compile(rf"iteration=1&kind=sample.*format={format_.lower()}"))
