@@ -92,26 +92,23 @@ def compute_replay(request: ReplayRequest) -> bytes:
         truth, real = reality_of(spec, robot)
         world, recording = real.record(genome, truth, times)
         reality = _shown(robot, spec.reality.engine.name, world, recording, request.real)
-    return (
-        Replay(
-            experiment=request.experiment,
-            repetition=choice.repetition,
-            iteration=choice.iteration,
-            kind=choice.kind,
-            simulator=request.simulator,
-            robot=robot.name,
-            unit=robot.unit,
-            bodies=tuple(body.name for body in robot.world.bodies),
-            feet=labels(robot.world),
-            times_s=tuple(times.tolist()),
-            counted_s=(float(observed[0]), float(observed[-1])),
-            simulation=simulation,
-            reality=reality,
-            readings=_sensed(robot.sensors, readings, request.readings),
-        )
-        .model_dump_json()
-        .encode()
+    computed = Replay(
+        experiment=request.experiment,
+        repetition=choice.repetition,
+        iteration=choice.iteration,
+        kind=choice.kind,
+        simulator=request.simulator,
+        robot=robot.name,
+        unit=robot.unit,
+        bodies=tuple(body.name for body in robot.world.bodies),
+        feet=labels(robot.world),
+        times_s=tuple(times.tolist()),
+        counted_s=(float(observed[0]), float(observed[-1])),
+        simulation=simulation,
+        reality=reality,
+        readings=_sensed(robot.sensors, readings, request.readings),
     )
+    return computed.model_dump_json().encode()
 
 
 def _sensed(
