@@ -43,7 +43,8 @@ class MisfitPoint(Frozen):
 
     iteration: int
     error: Distribution = Field(
-        description="root mean square of simulated minus real fitness, over the samples tuned on"
+        description="error per sample over the samples tuned on; by default the root mean square of simulated minus "
+        "real fitness"
     )
     held_out_error: Distribution = Field(
         description="the same over the held-out samples, which no tuning sees; it has no values without any"
@@ -80,7 +81,10 @@ class MisfitRead(Frozen):
     """Misfit of an experiment, by iteration; empty for a strategy without samples, which tunes nothing."""
 
     experiment: Id
-    unit: Unit = Field(description="unit of fitness, error and gap")
+    unit: Unit = Field(description="unit of fitness and gap")
+    error_unit: str = Field(
+        default="", description="unit of errors, by default that of fitness", examples=["m/s", "× noise"]
+    )
     points: tuple[MisfitPoint, ...]
     remarks: tuple[str, ...] = Field(
         description="sentences about the latest iteration", examples=[("restitution is at its lower bound, 0",)]

@@ -7,7 +7,7 @@ from gaplab.services.figures.kinds.coordinates import Coordinate, coordinates_fi
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.predictions import predictions_figure
 from gaplab.services.figures.kinds.simulators import Dimension, SimulatorPoint, simulators_figure
-from gaplab.services.figures.kinds.squared_error import squared_error_figure
+from gaplab.services.figures.kinds.squared_error import ErrorKind, squared_error_figure
 from gaplab.services.figures.marks import (
     Arrow,
     Axis,
@@ -173,7 +173,7 @@ FIGURES = [
     predictions_figure(PREDICTIONS, unit="m/s", title="predictions"),
     predictions_figure(PREDICTIONS[:1]),
     predictions_figure([], pending=5),
-    squared_error_figure(ERRORS, unit="m/s", title="squared error", each=True),
+    squared_error_figure(ERRORS, ErrorKind("m/s"), title="squared error", each=True),
     squared_error_figure({1: {0: 0.0}}),
     squared_error_figure({1: {0: None}}),
 ]

@@ -96,7 +96,7 @@ def draw_squared_error(store: StoreDep, query: Annotated[ErrorDrawing, Query()])
     """Draw the error of an experiment's best simulator by iteration, per sample and summed: median and quartiles."""
     tuned = tuned_simulators(store, query.experiment)
     title, samples = _title(store, query), tuned.samples
-    figure = squared_error_figure(tuned.errors, samples=samples, unit=tuned.unit, title=title, each=query.each)
+    figure = squared_error_figure(tuned.errors, tuned.error, samples=samples, title=title, each=query.each)
     return answer(_explained(store, query, figure), query)
 
 

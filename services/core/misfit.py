@@ -8,13 +8,15 @@ Source: gaplab.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from gaplab.schemas.misfit import Distribution, MisfitPoint, TunableDistribution
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import known
+from gaplab.services.core.discrepancies.base import Discrepancy
+from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.space import Space
 
 AT_BOUND = 0.01
@@ -36,14 +38,15 @@ class Tuning:
 
     Attributes:
         parameters: `(p,)`, values of its tunables.
-        squared_error: Σe² over its samples; inf if the physics failed on one.
+        squared_error: discrepancy summed over its samples, by default Σe²; inf if the physics failed on one.
         samples: number of samples that it was tuned on.
         simulated: simulated fitness of the controller that evolved in it; nan if there is none yet.
         real: fitness of that controller in reality; nan if there is none yet.
-        held_out_error: Σe² over held-out samples; nan if there are none yet, or the physics failed on one.
+        held_out_error: the same over held-out samples; nan if there are none yet, or the physics failed on one.
         held_out: number of held-out samples.
         interval: `(p, 2)`: ends of the 95 % intervals of its tunables; None if the tuner gives none.
         posterior: `(p,)`: standard deviations of the posterior; None if the tuner gives none.
+        discrepancy: what tuning minimised.
     """
 
     parameters: FloatArray
@@ -55,16 +58,20 @@ class Tuning:
     held_out: int = 0
     interval: FloatArray | None = None
     posterior: FloatArray | None = None
+    discrepancy: Discrepancy = field(default_factory=SquaredFitness)
 
     @property
     def error(self) -> float:
-        """Root mean square error, √(Σe² / samples); nan without samples, or if the physics failed."""
-        return _root_mean(self.squared_error, self.samples)
+        """Error per sample, by default √(Σe² / samples); nan without samples, or if the physics failed."""
+        return self._error(self.squared_error, self.samples)
 
     @property
     def error_on_held_out(self) -> float:
-        """Root mean square error on held-out samples; nan without any, or if the physics failed."""
-        return _root_mean(self.held_out_error, self.held_out)
+        """Error per held-out sample; nan without any, or if the physics failed."""
+        return self._error(self.held_out_error, self.held_out)
+
+    def _error(self, total: float, count: int) -> float:
+        return self.discrepancy.error(total / count) if count and np.isfinite(total) else float("nan")
 
 
 def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str], space: Space) -> MisfitPoint:
@@ -94,14 +101,20 @@ def misfit_point(iteration: int, tunings: Sequence[Tuning], names: Sequence[str]
     )
 
 
-def remarks(points: Sequence[MisfitPoint], unit: str) -> tuple[str, ...]:
-    """Return the latest point that has an error in sentences; none before the first sample."""
+def remarks(points: Sequence[MisfitPoint], unit: str, error_unit: str | None = None) -> tuple[str, ...]:
+    """Return the latest point that has an error in sentences; none before the first sample.
+
+    Args:
+        points: misfit of each iteration.
+        unit: unit of fitness.
+        error_unit: unit of errors; by default that of fitness.
+    """
     with_error = [each for each in points if each.error.n]
     if not with_error:
         return ()
     last, first = with_error[-1], points[0]
     stuck = [sentence for each in last.tunables for sentence in _stuck(each)]
-    return (_remaining(last, unit), *_gaps(first, last, unit), *stuck)
+    return (_remaining(last, unit if error_unit is None else error_unit), *_gaps(first, last, unit), *stuck)
 
 
 def _tunable_distribution(name: str, values: FloatArray, lower: float, upper: float) -> TunableDistribution:
@@ -117,10 +130,6 @@ def _tunable_distribution(name: str, values: FloatArray, lower: float, upper: fl
 def _shares(found: Sequence[FloatArray], prior: FloatArray) -> list[float | None]:
     """Return the mean of each tunable's number over that of the prior; None without any."""
     return [None] * len(prior) if not found else [known(each) for each in np.mean(found, axis=0) / prior]
-
-
-def _root_mean(total: float, count: int) -> float:
-    return float(np.sqrt(total / count)) if count and np.isfinite(total) else float("nan")
 
 
 def _distribution(values: Sequence[float] | FloatArray) -> dict[str, float | int | None]:

@@ -5,6 +5,9 @@ from typing import Any
 
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.core.discrepancies import discrepancies
+from gaplab.services.core.discrepancies.base import Discrepancy
+from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.errors import InvalidSpec
 from gaplab.services.core.strategies import strategies
 
@@ -42,3 +45,12 @@ def _with_options_of_before(spec: ResolvedSpec) -> ResolvedSpec:
     except InvalidSpec:
         return spec
     return spec.model_copy(update={"strategy": PluginRef(name=name, options=complete.model_dump(mode="json"))})
+
+
+def discrepancy_of(spec: Mapping[str, Any]) -> Discrepancy:
+    """Return what the tuning of a stored spec minimises; of one that is not installed, the squared difference."""
+    ref = PluginRef.model_validate(spec.get("discrepancy", SquaredFitness.name))
+    try:
+        return discrepancies.create(ref)
+    except InvalidSpec:
+        return SquaredFitness()

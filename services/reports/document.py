@@ -94,7 +94,7 @@ def _simulators(store: Store, facts: Facts) -> tuple[Block, ...]:
         if one.curve.experiment in facts.misfits
         for remark in facts.misfits[one.curve.experiment].remarks
     )
-    error = squared_error_figure(tuned.errors, samples=tuned.samples, unit=tuned.unit, title=leading.name)
+    error = squared_error_figure(tuned.errors, tuned.error, samples=tuned.samples, title=leading.name)
     return (
         *simulator_tables.misfit(facts),
         *simulator_tables.identified(facts),

@@ -16,9 +16,9 @@ def misfit(facts: Facts) -> Iterator[Grid]:
     found = [(names[id_], read) for id_, read in facts.misfits.items() if read.points]
     if not found:
         return
-    last = [(name, read.points[-1], read.unit) for name, read in found]
-    unit = last[0][2]
-    errors = (f"Error per sample ({unit})", f"On held-out samples ({unit})")
+    last = [(name, read.points[-1]) for name, read in found]
+    unit, units = found[0][1].unit, " or ".join(sorted({read.error_unit for _, read in found}))
+    errors = (f"Error per sample ({units})", f"On held-out samples ({units})")
     head = ("Experiment", "Iteration", "n", *errors, f"Gap in reality ({unit})")
     rows = tuple(
         (
@@ -27,11 +27,11 @@ def misfit(facts: Facts) -> Iterator[Grid]:
             str(point.error.n),
             *(spread(each) for each in (point.error, point.held_out_error, point.gap)),
         )
-        for name, point, _ in last
+        for name, point in last
     )
     yield Grid("Misfit of the best simulators after the last iteration: mean ± SD over repetitions", head, rows)
     columns = ("Experiment", "Tunable", "Tuned", "Bounds", "At a bound")
-    tuned = tuple((name, *_tuned(tunable)) for name, point, _ in last for tunable in point.tunables)
+    tuned = tuple((name, *_tuned(tunable)) for name, point in last for tunable in point.tunables)
     yield Grid("Tuned values after the last iteration: mean ± SD over repetitions", columns, tuned)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from gaplab.schemas.differences import SettingRead
 from gaplab.schemas.records import ExperimentRead
-from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tunables import tunables
 from gaplab.services.experiments import reading
 from gaplab.services.experiments.differences import read_differences
@@ -35,7 +35,9 @@ def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") 
     spec = spec_of(row.spec)
     space = parameters_of(spec.tunables)
     samples = [tunings.samples_until(tuned_on, each.repetition, each.iteration) for each in found]
-    errors = tuple(tunings.per_sample(each.squared_error, n) for each, n in zip(found, samples, strict=True))
+    discrepancy = discrepancy_of(row.spec)
+    pairs = zip(found, samples, strict=True)
+    errors = tuple(tunings.per_sample(each.squared_error, count, discrepancy) for each, count in pairs)
     axes = [
         Coordinate("Iteration", tuple(float(each.iteration) for each in found)),
         *(
@@ -47,7 +49,7 @@ def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") 
             )
             for at, tunable in enumerate(spec.tunables)
         ),
-        Coordinate(with_unit("RMS error", [unit(spec)]), errors, wide=True),
+        Coordinate(with_unit("Error per sample", [discrepancy.error_unit(unit(spec))]), errors, wide=True),
         Coordinate(with_unit("Real fitness", [unit(spec)]), tuple(each.real for each in found)),
     ]
     return coordinates_figure(

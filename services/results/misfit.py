@@ -3,6 +3,7 @@
 import csv
 import io
 from collections import defaultdict
+from dataclasses import replace
 from math import inf, nan
 
 import numpy as np
@@ -14,7 +15,7 @@ from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.identification import Means, overfitting, verdicts
 from gaplab.services.core.misfit import Tuning, misfit_point, remarks
 from gaplab.services.core.robots import robots
-from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tuners import tuners
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import takes_samples, unit
@@ -38,24 +39,26 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         simulators = tunings.best_simulators(session, experiment_id)
         measured = tunings.measured(session, row)
         members = tunings.posteriors(session, experiment_id)
-    spec = spec_of(row.spec)
+    spec, discrepancy = spec_of(row.spec), discrepancy_of(row.spec)
     posteriors = {place: _deviations(*found) for place, found in members.items()}
     by_iteration: dict[int, list[Tuning]] = defaultdict(list)
     for best in simulators:
         posterior = posteriors.get((best.repetition, best.iteration))
-        by_iteration[best.iteration].append(_tuning(best, measured, posterior))
+        by_iteration[best.iteration].append(replace(_tuning(best, measured, posterior), discrepancy=discrepancy))
     names = [each.name for each in spec.tunables]
     points = tuple(
         misfit_point(iteration, by_iteration[iteration], names, parameters_of(spec.tunables))
         for iteration in range(row.iterations if takes_samples(spec) else 0)
         if by_iteration[iteration]
     )
-    unseen = overfitting(points[-1], unit(spec)) if points else ""
+    error_unit = discrepancy.error_unit(unit(spec))
+    unseen = overfitting(points[-1], error_unit) if points else ""
     return MisfitRead(
         experiment=row.id,
         unit=unit(spec),
+        error_unit=error_unit,
         points=points,
-        remarks=(*remarks(points, unit(spec)), *([unseen] if unseen else [])),
+        remarks=(*remarks(points, unit(spec), error_unit), *([unseen] if unseen else [])),
         held_out=spec.held_out,
         verdicts=verdicts(points, _means(spec)),
     )

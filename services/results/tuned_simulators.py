@@ -5,10 +5,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tunables import tunables
 from gaplab.services.experiments import hiding
 from gaplab.services.figures.kinds.simulators import Dimension, SimulatorPoint
+from gaplab.services.figures.kinds.squared_error import ErrorKind
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import unit
 from gaplab.services.store.queries import experiments, tunings
@@ -21,6 +22,7 @@ class TunedSimulators:
 
     Attributes:
         unit: unit of fitness.
+        error: kind of error that tuning minimised.
         dimensions: the tunables.
         simulators: the best of each iteration of each repetition.
         errors: squared errors by iteration and repetition, without iteration 0; None if the physics failed.
@@ -30,6 +32,7 @@ class TunedSimulators:
     """
 
     unit: str
+    error: ErrorKind
     dimensions: tuple[Dimension, ...]
     simulators: tuple[SimulatorPoint, ...]
     errors: Mapping[int, Mapping[int, float | None]]
@@ -49,7 +52,7 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
         simulators = tunings.best_simulators(session, experiment_id) if row.iterations > 1 else ()
         tuned_on = tunings.measured(session, row).tuned_on
         hidden = row.id in hiding.hidden(session, [row])
-    spec = spec_of(row.spec)
+    spec, discrepancy = spec_of(row.spec), discrepancy_of(row.spec)
     errors: dict[int, dict[int, float | None]] = defaultdict(dict)
     samples: dict[int, dict[int, int]] = defaultdict(dict)
     for simulator in simulators:
@@ -59,6 +62,9 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
     elsewhere = spec.reality.engine.name != spec.engine.name
     return TunedSimulators(
         unit=unit(spec),
+        error=ErrorKind(
+            discrepancy.error_unit(unit(spec)), discrepancy.error, discrepancy.squares, discrepancy.error_text
+        ),
         dimensions=_dimensions(spec),
         simulators=tuple(
             SimulatorPoint(each.repetition, each.iteration, tuple(each.parameters)) for each in simulators

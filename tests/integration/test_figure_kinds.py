@@ -14,7 +14,7 @@ from gaplab.services.experiments import submission
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.kinds.predictions import AFTER, BEFORE, predictions_figure
 from gaplab.services.figures.kinds.simulators import MOST, REALITY, simulators_figure
-from gaplab.services.figures.kinds.squared_error import squared_error_figure
+from gaplab.services.figures.kinds.squared_error import ErrorKind, squared_error_figure
 from gaplab.services.figures.marks import Diagonal, FigureDefinition, Label, Level, Line, Mark, Points, Polylines
 from gaplab.services.figures.matplotlib.files import render_file
 from gaplab.services.figures.plotly.chart import chart
@@ -162,7 +162,7 @@ def test_predictions_that_are_on_their_way_say_so() -> None:
 
 
 def test_squared_errors_have_their_median_and_quartiles_and_failures_are_counted() -> None:
-    figure = squared_error_figure({1: {0: 1.0, 1: 2.0, 2: 9.0}, 2: {0: 4.0, 1: None}}, unit="m/s")
+    figure = squared_error_figure({1: {0: 1.0, 1: 2.0, 2: 9.0}, 2: {0: 4.0, 1: None}}, ErrorKind("m/s"))
 
     line = marks(figure)["Best simulator"]
     assert (line.x, line.y) == ((1, 2), (2.0, 4.0))  # type: ignore[union-attr]
@@ -177,8 +177,8 @@ def test_squared_errors_have_their_median_and_quartiles_and_failures_are_counted
 def test_the_error_per_sample_stands_beside_the_sum_which_grows_with_the_samples() -> None:
     figure = squared_error_figure(
         {1: {0: 0.04, 1: 0.16}, 2: {0: 0.08, 1: None}, 3: {0: 0.12, 1: 0.3}},
+        ErrorKind("m/s"),
         samples={1: {0: 1, 1: 1}, 2: {0: 2, 1: 2}, 3: {0: 3, 1: 0}},
-        unit="m/s",
     )
 
     per_sample, total = (marks(figure, panel)["Best simulator"] for panel in (0, 1))

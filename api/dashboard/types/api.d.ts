@@ -276,6 +276,7 @@ declare namespace Api {
   interface MisfitRead {
     experiment: string;
     unit: string;
+    error_unit: string;
     points: Array<MisfitPoint>;
     remarks: Array<string>;
     held_out: number;

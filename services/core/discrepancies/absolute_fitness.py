@@ -11,6 +11,7 @@ class AbsoluteFitness(Discrepancy):
 
     name = "absolute_fitness"
     source = "Zagal, Ruiz-del-Solar and Vallejos 2004, as surveyed"
+    error_text = "mean absolute difference between fitness in simulation and in reality"
 
     def terms(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:  # noqa: ARG002 - the contract's
         """Return the absolute differences, in the unit of fitness."""
@@ -19,3 +20,7 @@ class AbsoluteFitness(Discrepancy):
     def floor(self, error: float) -> float:
         """Return the error itself."""
         return error
+
+    def error(self, term: float) -> float:
+        """Return the term itself."""
+        return term

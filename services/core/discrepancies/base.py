@@ -1,6 +1,7 @@
 """The contract of a discrepancy: how much a simulator's answer about a sample differs from reality's."""
 
 from abc import abstractmethod
+from math import sqrt
 from typing import Any, ClassVar
 
 from gaplab.services.core.arrays import FloatArray, Outcomes
@@ -13,10 +14,12 @@ class Discrepancy(Plugin):
     Attributes:
         senses: true if it compares readings; false if fitness alone, which costs fewer observations.
         squares: true if a term is the sum of squared `residuals`, as some tuners need.
+        error_text: what the error per sample is, in words.
     """
 
     senses: ClassVar[bool] = False
     squares: ClassVar[bool] = False
+    error_text: ClassVar[str] = "root mean square difference between fitness in simulation and in reality"
 
     @abstractmethod
     def terms(self, simulated: Outcomes, measured: FloatArray, times_s: FloatArray) -> FloatArray:
@@ -39,6 +42,14 @@ class Discrepancy(Plugin):
     def floor(self, error: float) -> float:
         """Return the discrepancy of a simulator that errs by `error`, at least 0, on one sample alone."""
         return error**2
+
+    def error(self, term: float) -> float:
+        """Return the error of a simulator on samples whose mean term is this: the inverse of `floor`."""
+        return sqrt(term)
+
+    def error_unit(self, unit: str) -> str:
+        """Return the unit of the error, given that of fitness."""
+        return unit
 
     def least_error(self, fitness_error: float) -> float:
         """Return the error below which simulators are equally good, given one in the unit of fitness."""

@@ -10,6 +10,9 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Outcomes
 from gaplab.services.core.discrepancies.base import Discrepancy
 
+NOISE = "× noise"
+"""The unit of an error of readings."""
+
 
 class ReadingsOptions(Frozen):
     """Options of the discrepancy of readings."""
@@ -30,6 +33,7 @@ class Readings(Discrepancy):
     source = "Bongard and Lipson 2004: readings rather than fitness; the first second and the mean are gaplab's"
     senses = True
     squares = True
+    error_text = "root mean square difference between readings in simulation and in reality, over the sensors' noise"
     Options = ReadingsOptions
     options: ReadingsOptions
 
@@ -55,3 +59,7 @@ class Readings(Discrepancy):
 
     def _early(self, times_s: FloatArray) -> NDArray[np.intp]:
         return np.flatnonzero(times_s <= times_s.min() + self.options.seconds + 1e-9)
+
+    def error_unit(self, unit: str) -> str:  # noqa: ARG002 - readings have no unit
+        """Return the noise of the sensors."""
+        return NOISE

@@ -3,7 +3,7 @@
 The sum grows with every sample, so it can rise while tuning gets better. The error per sample cannot mislead like that.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
 from statistics import median, quantiles
@@ -26,6 +26,26 @@ Counts = Mapping[int, int]
 
 
 @dataclass(frozen=True)
+class ErrorKind:
+    """The kind of error that was summed over samples.
+
+    Attributes:
+        unit: its unit.
+        per_sample: returns the error, given the mean over samples of what was summed.
+        squares: whether squares were summed.
+        text: the error per sample, in words.
+    """
+
+    unit: str = ""
+    per_sample: Callable[[float], float] = sqrt
+    squares: bool = True
+    text: str = "root mean square difference between fitness in simulation and in reality"
+
+
+DEFAULT = ErrorKind()
+
+
+@dataclass(frozen=True)
 class _Measure:
     """One measure of the error, by iteration and repetition.
 
@@ -44,46 +64,49 @@ class _Measure:
 
 def squared_error_figure(
     errors: Mapping[int, Errors],
+    kind: ErrorKind = DEFAULT,
     *,
     samples: Mapping[int, Counts] | None = None,
-    unit: str = "",
     title: str = "",
     each: bool = False,
 ) -> FigureDefinition:
     """Return a figure of median and quartiles of the error after each iteration with tuning.
 
-    One panel has the root mean square error per sample, the other the sum of squared errors.
+    One panel has the error per sample, the other the sum that tuning minimises.
 
     Args:
-        errors: squared errors by iteration; values too large to compute with are left out.
+        errors: sums by iteration; values too large to compute with are left out.
+        kind: what they are sums of; by default squared differences in fitness.
         samples: numbers of samples by iteration; left out: the figure has only the sum.
-        unit: unit of fitness.
         title: text above the figure.
         each: draw a thin line for every repetition.
     """
     errors = {at: {one: drawable(value) for one, value in found.items()} for at, found in errors.items()}
-    shown = printable(unit)
-    square = f"({shown})²" if shown not in {"", "1"} else ""
-    measures = [_measure(errors, "Sum of squared errors", "Sum", square, each=each)]
+    unit = printable(kind.unit)
+    square = f"({unit})²" if unit not in {"", "1"} else ""
+    summed = "Sum of squared errors" if kind.squares else "Sum of errors"
+    measures = [_measure(errors, summed, "Sum", square if kind.squares else unit, each=each)]
     if samples:
-        per_sample = _per_sample(errors, samples)
+        per_sample = _per_sample(errors, samples, kind)
         measures.insert(0, _measure(per_sample, "Error per sample", "Per sample", unit, each=each))
     return FigureDefinition(
         name="squared-error",
         title=heading(title),
         panels=tuple(measure.panel for measure in measures),
-        caption=_caption(errors, measures, each=each),
+        caption=_caption(errors, measures, kind, each=each),
         alt=_alt(measures),
         share_x=True,
         table=_table(measures),
     )
 
 
-def _per_sample(errors: Mapping[int, Errors], samples: Mapping[int, Counts]) -> dict[int, dict[int, Number]]:
-    """Return the root mean square errors, where the number of samples is known."""
+def _per_sample(
+    errors: Mapping[int, Errors], samples: Mapping[int, Counts], kind: ErrorKind
+) -> dict[int, dict[int, Number]]:
+    """Return the errors per sample, where the number of samples is known."""
     return {
         at: {
-            repetition: None if value is None else sqrt(value / samples[at][repetition])
+            repetition: None if value is None else kind.per_sample(value / samples[at][repetition])
             for repetition, value in found.items()
             if samples.get(at, {}).get(repetition)
         }
@@ -152,17 +175,16 @@ def _limits(lines: Sequence[Line], *, logarithmic: bool) -> tuple[float, float]:
     return 0.0, limits([0.0, *found])[1] if found else 1.0
 
 
-def _caption(errors: Mapping[int, Errors], measures: Sequence[_Measure], *, each: bool) -> str:
+def _caption(errors: Mapping[int, Errors], measures: Sequence[_Measure], kind: ErrorKind, *, each: bool) -> str:
     there = measures[-1].values
     if not there:
         return ""
     counts = [len(found) for found in there.values()]
     band = "; band: from the first to the third quartile" if max(counts) > 1 else ""
     failed = sum(value is None for found in errors.values() for value in found.values())
-    difference = "difference between fitness in simulation and in reality"
-    parts = [f"Error per sample: root mean square {difference}."] if len(measures) > 1 else []
+    parts = [f"Error per sample: {kind.text}."] if len(measures) > 1 else []
     parts += [
-        f"The sum of the squared {difference} over the samples so far grows with their number.",
+        f"The sum of {'squared errors' if kind.squares else 'errors'} over the samples so far grows with their number.",
         f"Median over {number_of('repetition', *counts)}{band}.",
     ]
     parts += ["Thin lines: single repetitions."] if each else []

@@ -8,6 +8,8 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
+from gaplab.services.core.discrepancies.base import Discrepancy
+from gaplab.services.core.stored_specs import discrepancy_of
 from gaplab.services.store.cursor import decode, encode
 from gaplab.services.store.models import ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
 from gaplab.services.store.queries.repetition_rows import of_experiments
@@ -76,13 +78,16 @@ def page_of_simulators(
     wanted = {RepetitionRow.number: repetition, row.iteration: iteration}
     names = [each["name"] for each in experiment.spec["tunables"]]
     tuned_on = measured(session, experiment).tuned_on
+    discrepancy = discrepancy_of(experiment.spec)
     return tuple(
-        _simulator(number, found, names, samples_until(tuned_on, number, found.iteration))
+        _simulator(number, found, names, samples_until(tuned_on, number, found.iteration), discrepancy)
         for number, *_, found in _page(session, query, key, wanted, limit, cursor)
     )
 
 
-def _simulator(repetition: int, row: SimulatorRow, names: Sequence[str], samples: int) -> SimulatorRead:
+def _simulator(
+    repetition: int, row: SimulatorRow, names: Sequence[str], samples: int, discrepancy: Discrepancy
+) -> SimulatorRead:
     pairs = None if row.lower is None or row.upper is None else zip(row.lower, row.upper, strict=True)
     return SimulatorRead(
         repetition=repetition,
@@ -90,7 +95,7 @@ def _simulator(repetition: int, row: SimulatorRow, names: Sequence[str], samples
         rank=row.rank,
         parameters=dict(zip(names, row.parameters, strict=True)),
         squared_error=row.squared_error,
-        error=per_sample(row.squared_error, samples),
+        error=per_sample(row.squared_error, samples, discrepancy),
         intervals=None if pairs is None else dict(zip(names, pairs, strict=True)),
         weight=row.weight,
         held_out_error=row.held_out_error,

@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import sqrt
 
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.records import MeasurementKind
+from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.held_out import is_held_out
 from gaplab.services.store.models import ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
 from gaplab.services.store.queries.repetition_rows import of_experiments
@@ -96,6 +96,6 @@ def samples_until(iterations: Mapping[int, Sequence[int]], repetition: int, iter
     return sum(each <= iteration for each in iterations.get(repetition, ()))
 
 
-def per_sample(squared_error: float | None, samples: int) -> float | None:
-    """Return the root mean square error; None without samples, or if the physics failed on one."""
-    return sqrt(squared_error / samples) if squared_error is not None and samples else None
+def per_sample(squared_error: float | None, samples: int, discrepancy: Discrepancy) -> float | None:
+    """Return the error per sample; None without samples, or if the physics failed on one."""
+    return discrepancy.error(squared_error / samples) if squared_error is not None and samples else None

@@ -8,7 +8,7 @@ import { empty } from "../../lib/placeholders.js";
 import { table } from "../../lib/table.js";
 
 const KINDS = ["tuned", "probed"];
-const NOTE = "The error per sample is the root mean square over the samples. Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound. Iteration 0 is not tuned.";
+const NOTE = "Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound. Iteration 0 is not tuned.";
 
 const VERDICT_NOTE = "100 % is as uncertain as before any sample. The largest counts of the spread over repetitions, the tuner’s 95 % intervals, and its posterior. Agreement is not truth: simulators that lack an effect agree on a value that makes up for it.";
 
@@ -21,14 +21,14 @@ export function misfit(page) {
   const place = h("div");
   page.sections.add(place, KINDS, async () => {
     /** @type {Api.MisfitRead} */
-    const { points, remarks, unit, verdicts, held_out: share } = await get(`/experiments/${page.id}/misfit`, {}, page.signal);
+    const { points, remarks, unit, error_unit: errorUnit, verdicts, held_out: share } = await get(`/experiments/${page.id}/misfit`, {}, page.signal);
     if (!points.length) {
       place.replaceChildren(empty("Nothing is tuned yet."));
       return;
     }
     const tunables = points[0].tunables.map(({ name }) => readableName(name));
-    const unseen = share ? [`On held-out samples (${unit})`] : [];
-    const columns = ["Iteration", `Error per sample (${unit})`, ...unseen, `Gap of what it evolved (${unit})`, ...tunables, "n"];
+    const unseen = share ? [`On held-out samples (${errorUnit})`] : [];
+    const columns = ["Iteration", `Error per sample (${errorUnit})`, ...unseen, `Gap of what it evolved (${unit})`, ...tunables, "n"];
     place.replaceChildren(...identified(verdicts), h("h3", {}, "Misfit"),
       h("ul", { class: "misfit-remarks" }, ...remarks.map((remark) => h("li", {}, remark))),
       table("Misfit by iteration", columns, points.map((point) => row(point, Boolean(share)))), h("p", { class: "note" }, NOTE,
