@@ -1,12 +1,14 @@
 """Files of the page: small on the way, and not sent twice."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
+from gaplab.api.http.assets import version_of
 from gaplab.api.routes.dashboard import FILES
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.plugins.catalogue import catalogue
@@ -48,6 +50,20 @@ def test_a_module_that_has_not_changed_is_not_sent_again(api: TestClient, encodi
     assert first.headers["cache-control"] == again.headers["cache-control"] == "no-cache"
     assert first.headers["vary"] == "Accept-Encoding"
     assert (again.status_code, again.content) == (304, b"")
+
+
+def test_the_next_visit_asks_for_no_module(api: TestClient, tmp_path: Path) -> None:
+    (app,) = re.findall(r'src="(assets/[^"]+/app.js)"', api.get("/").text)
+
+    found, older = api.get(f"/{app}"), api.get("/assets/0123456789ab/dashboard/app.js")
+
+    assert found.text == older.text == (FILES / "app.js").read_text()
+    assert "immutable" in found.headers["cache-control"]
+    assert older.headers["cache-control"] == "no-cache"
+    (tmp_path / "a.js").write_text("1")
+    before = version_of(tmp_path)
+    (tmp_path / "a.js").write_text("12")
+    assert version_of(tmp_path) != before
 
 
 def test_a_module_is_script_also_where_it_is_compressed(api: TestClient) -> None:
@@ -104,7 +120,7 @@ def test_the_starts_of_the_form_are_the_examples(file: str) -> None:
 def test_the_catalogue_has_the_named_budgets() -> None:
     found = {each.name: each for each in catalogue().budgets}
 
-    assert list(found) == ["smoke", "desk", "paper"]
+    assert list(found) == ["smoke", "desk", "paper", "as_published"]
     assert (found["paper"].iterations, found["paper"].repetitions, found["paper"].controller_evaluations) == (
         10,
         40,
