@@ -156,7 +156,8 @@ def test_details_are_reached_by_keyboard_and_are_in_the_address(archive: Any, en
 
     page.get_by_role("tab", name="Real-world samples").press("ArrowRight")
     expect(page.get_by_role("tab", name="Misfit")).to_be_focused()
-    expect(panel.get_by_role("row")).to_have_count(7)
+    expect(panel.get_by_role("table", name="Misfit by iteration").get_by_role("row")).to_have_count(7)
+    expect(panel.get_by_role("table", name="Which tunables are identified").get_by_role("row")).to_have_count(4)
     assert page.evaluate("() => location.hash").endswith("?tab=misfit")
     page.get_by_role("tab", name="Misfit").press("End")
     expect(panel.locator("code")).to_contain_text('"seed": 2012')
