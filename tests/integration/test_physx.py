@@ -210,6 +210,6 @@ def test_reality_in_physx_is_a_gap_that_no_simulator_in_another_engine_closes() 
     across = setting(resolve_experiment(ExperimentSpec.model_validate(spec)), 0)
 
     truth = np.array([[1.0, 0.8, 0.0]])
-    real, simulated = across.reality(ROBOT.known), across.simulate(ROBOT.known[None], truth)[0, 0]
+    real, simulated = across.reality(ROBOT.known).fitness, across.simulate(ROBOT.known[None], truth)[0, 0]
     assert real == pytest.approx(simulated, rel=0.3)
     assert real != simulated

@@ -75,6 +75,6 @@ def test_evolution_in_reality_finds_the_maximum_of_reality() -> None:
     spec = ExperimentSpec.model_validate({"strategy": "direct", "robot": "toy_function", "budget": "smoke"})
     reality = setting(resolve_experiment(spec), 0).reality
 
-    maximum = max(reality(np.array([x])) for x in np.linspace(0, 1, 1001))
+    maximum = max(reality(np.array([x])).fitness for x in np.linspace(0, 1, 1001))
 
     assert recorded("direct").min() == pytest.approx(maximum, rel=1e-3)
