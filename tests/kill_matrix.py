@@ -146,13 +146,19 @@ def spread(total: int, wanted: int) -> list[int]:
 
 
 def survived(databases: Databases, point: str, when: str, occurrence: int, expected: str) -> bool:
-    """Whether a kill there was one, and left no trace in the results."""
+    """Whether a kill there was one, and left no trace in the results.
+
+    Repetitions that end at the same time complete together, so a point may be passed less often than it was counted. It
+    is then killed where it is passed the last time.
+    """
     url = databases.new()
-    died = killed(url, point, when, occurrence)
+    if not killed(url, point, when, occurrence):
+        databases.drop(url)
+        return occurrence > 1 and survived(databases, point, when, occurrence - 1, expected)
     went_on = in_a_child(lambda: work(url)) == 0
     found = results(url)
     databases.drop(url)
-    return died and went_on and found == expected
+    return went_on and found == expected
 
 
 def rows(databases: Databases, kills: int) -> dict[tuple[str, str], tuple[int, int]]:
