@@ -51,7 +51,7 @@ METHODS = (
 
 
 @dataclass(frozen=True)
-class Tuning:
+class Trial:
     """One tuning.
 
     Attributes:
@@ -75,7 +75,7 @@ def made(method: Method, engine: str, truth: FloatArray | None = None) -> Settin
     return setting(resolve_experiment(ExperimentSpec.model_validate(spec)), 0)
 
 
-def tunings(method: Method, engine: str, number: int, samples: int) -> Iterator[Tuning]:
+def tunings(method: Method, engine: str, number: int, samples: int) -> Iterator[Trial]:
     """Yield the tunings of one repetition, on one sample more each."""
     space = made(method, engine).parameters
     truth = space.draw(1, stream(0, "truth", number))[0]
@@ -94,7 +94,7 @@ def tunings(method: Method, engine: str, number: int, samples: int) -> Iterator[
         task = Task(misfit, space, optimizer, method.ensemble, method.evaluations, previous)
         previous = one.tuner.tune(task, stream(0, "tune", number, count))
         away = np.abs(previous[0].parameters - truth) / space.extent
-        yield Tuning(away, _inside(previous, truth), answers.cost_of(0).rollouts)
+        yield Trial(away, _inside(previous, truth), answers.cost_of(0).rollouts)
 
 
 def _inside(found: Sequence[Simulator], truth: FloatArray) -> FloatArray:
@@ -131,7 +131,7 @@ def main() -> None:
     for column in ("tuning", "samples", "rollouts", *(f"away: {name}" for name in tunables), "distance", *regions):
         table.add_column(column)
     for method in METHODS:
-        by_count: dict[int, list[Tuning]] = defaultdict(list)
+        by_count: dict[int, list[Trial]] = defaultdict(list)
         for number in range(arguments.repetitions):
             for count, tuning in enumerate(tunings(method, arguments.engine, number, arguments.samples), 1):
                 by_count[count].append(tuning)

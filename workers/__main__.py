@@ -10,7 +10,7 @@ from secrets import token_hex
 from gaplab.services import logs
 from gaplab.services.core.errors import ClusterUnusable, RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.plugins import folders
-from gaplab.services.running.pulse import Pulse
+from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.settings import Settings
 from gaplab.services.store.session import ANSWER_S, Store
 from gaplab.services.store.sqlite_file import in_use
@@ -29,7 +29,7 @@ RAY_NOTICES = {
 def serve(settings: Settings) -> int:
     """Work until SIGTERM or SIGINT; return 1 if there is no cluster to work on, or the database was changed."""
     choose_authentication(settings)
-    pulse = Pulse.inherited()
+    pulse = PulsePipe.inherited()
     logs.adopt("ray")
     logs.configure()
     folders.load()
@@ -49,7 +49,7 @@ def serve(settings: Settings) -> int:
     return 0
 
 
-def _work(store: Store, settings: Settings, pulse: Pulse) -> None:
+def _work(store: Store, settings: Settings, pulse: PulsePipe) -> None:
     """Run what is queued until a signal.
 
     Raises:

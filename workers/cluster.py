@@ -16,7 +16,7 @@ from gaplab.services.settings import Settings
 from gaplab.workers.nodes import Versions, check_nodes, versions
 from gaplab.workers.output import limit_files
 from gaplab.workers.ray_folder import ray_folder
-from gaplab.workers.watch import Watch, kill_ray
+from gaplab.workers.watch import RayWatch, kill_ray
 
 OBJECT_STORE_BYTES = 100 * 2**20
 """Steps are small: nothing here needs a large object store."""
@@ -35,7 +35,7 @@ class Cluster:
 
     workers: int | None
     versions: Versions
-    watch: Watch
+    watch: RayWatch
 
     def capacity(self) -> int:
         """Return the number of repetitions to submit to Ray at once; it changes as nodes join or leave.
@@ -65,7 +65,7 @@ def cluster(settings: Settings) -> Iterator[Cluster]:
     """
     logging.getLogger("ray").setLevel(logging.ERROR)
     with _joined(settings.ray_address) if settings.ray_address else _started(settings.workers):
-        watch = Watch(own=settings.ray_address is None)
+        watch = RayWatch(own=settings.ray_address is None)
         try:
             yield Cluster(settings.workers if settings.ray_address else None, versions(), watch)
         finally:

@@ -16,7 +16,7 @@ from time import monotonic
 
 from gaplab.services.core.errors import RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.running import execution, supervisors
-from gaplab.services.running.pulse import Pulse
+from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.store.session import Store
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.nodes import Versions
@@ -67,14 +67,14 @@ class Supervisor:
         self._lease_s = lease_s
         self._beat = -lease_s
         self._noted: datetime | None = None
-        self._pulse = Pulse()
+        self._pulse = PulsePipe()
 
     @property
     def busy(self) -> bool:
         """Whether repetitions are running."""
         return bool(self._repetitions.runs)
 
-    def serve(self, stop: Stop | Event, pulse: Pulse | None = None) -> None:
+    def serve(self, stop: Stop | Event, pulse: PulsePipe | None = None) -> None:
         """Work until told to stop; then hand back unfinished repetitions, each after one more delivery.
 
         Args:

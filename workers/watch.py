@@ -20,7 +20,7 @@ _VITAL = {ray_constants.PROCESS_TYPE_GCS_SERVER, ray_constants.PROCESS_TYPE_RAYL
 """The processes of Ray without which nothing runs."""
 
 
-class Watch:
+class RayWatch:
     """What Ray says of its nodes, and whether it still says it.
 
     Args:

@@ -14,7 +14,7 @@ from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.services.plugins import folders
 
 if TYPE_CHECKING:
-    from gaplab.services.contract.files import Checked
+    from gaplab.services.contract.files import CheckedPlugin
 
 Kind = Literal["strategy", "robot", "engine", "tunable", "optimizer", "discrepancy", "tuner"]
 
@@ -62,7 +62,7 @@ def check(
         raise typer.Exit(Exit.FAILED)
 
 
-def _lines(found: "Checked") -> Iterator[str]:
+def _lines(found: "CheckedPlugin") -> Iterator[str]:
     yield f"[bold]{found.kind} {escape(found.name)}[/]"
     if found.unusable:
         yield f"  [bold red]unusable[/]: {escape(found.unusable)}"

@@ -33,7 +33,7 @@ _DRAWING = WaitingLine("figures")
 _FORMATS = "a self-contained page, JSON for Plotly, or a file for a paper"
 
 
-class Drawing(Parameters):
+class FigureQuery(Parameters):
     """How to draw a figure; each kind of figure adds what to draw."""
 
     format: Literal["html", "json", "svg", "png", "pdf"] = Field(default="html", description=_FORMATS)
@@ -46,7 +46,7 @@ class Drawing(Parameters):
     caption: bool = Field(default=True, description="whether a file has the caption below the figure")
 
 
-def answer(figure: FigureDefinition, query: Drawing) -> Response:
+def answer(figure: FigureDefinition, query: FigureQuery) -> Response:
     """Return the figure in the requested format.
 
     Raises:

@@ -7,7 +7,7 @@ from fastapi import APIRouter, FastAPI, Query, Request, Response
 from pydantic import Field, model_validator
 
 from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
-from gaplab.api.http.figures import Drawing, answer, responses
+from gaplab.api.http.figures import FigureQuery, answer, responses
 from gaplab.schemas.figures import FigureRead
 from gaplab.services.core.errors import NotFound
 from gaplab.services.core.stored_specs import spec_of
@@ -38,7 +38,7 @@ NO_SAMPLES = "a strategy without samples tunes no simulators"
 """The message in place of a figure of simulators that do not exist."""
 
 
-class CoordinatesDrawing(Drawing):
+class CoordinatesDrawing(FigureQuery):
     """The experiments to draw, and how."""
 
     experiment: list[Id] = Field(default=[], max_length=100, description="id of an experiment; repeat for more")
@@ -67,7 +67,7 @@ class CurvesDrawing(CoordinatesDrawing):
     each: bool = EACH
 
 
-class ExperimentDrawing(Drawing):
+class ExperimentDrawing(FigureQuery):
     """The experiment to draw, and how."""
 
     experiment: Id

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
 from gaplab.api.http.dependencies import Id, RolloutProcessDep, StoreDep
-from gaplab.api.http.figures import Drawing, answer, responses
+from gaplab.api.http.figures import FigureQuery, answer, responses
 from gaplab.api.routes.replays import ReplayQuery
 from gaplab.schemas.figures import FigureRead
 from gaplab.schemas.replays import Replay
@@ -22,13 +22,13 @@ from gaplab.services.store.session import Store
 router = APIRouter(prefix="/figures", tags=["figures"])
 
 
-class ReplayDrawing(Drawing, ReplayQuery):
+class ReplayDrawing(FigureQuery, ReplayQuery):
     """The controller whose motion to draw, and how."""
 
     experiment: Id
 
 
-class ToyDrawing(Drawing):
+class ToyDrawing(FigureQuery):
     """The iterations to draw, and how."""
 
     experiment: Id

@@ -13,7 +13,7 @@ from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import BODY_M, COUNTED_S, PERIOD_S, SETTLING_S
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tuners.base import Task
-from gaplab.services.core.tuners.search import Search
+from gaplab.services.core.tuners.search import SearchTuner
 from gaplab.services.core.tuning import Misfit, squared_errors
 from gaplab.services.core.types import Sample
 from gaplab.services.core.world import Motion
@@ -109,7 +109,7 @@ def identifiable(laboratory: Laboratory, arguments: Namespace) -> None:
                 chosen = [samples[index] for index in rng.permutation(10)[:count]]
                 misfit = Misfit(Answers(laboratory.simulate), chosen)
                 task = Task(misfit, laboratory.parameters, SteadyState(), 1, arguments.tuning, ())
-                best = Search().tune(task, rng)[0]
+                best = SearchTuner().tune(task, rng)[0]
                 fitness = laboratory.real(laboratory.evolve(best.parameters, "tuned", arguments.tuning, count, seed))
                 found.setdefault(count, []).append((best.parameters, fitness))
                 error = np.sqrt(best.squared_error / count)

@@ -16,7 +16,7 @@ KINDS = tuple(CHECKS)
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedPlugin:
     """A plug-in that was checked.
 
     Attributes:
@@ -64,7 +64,7 @@ def write_skeleton(kind: str, name: str, folder: Path) -> Path:
     return file
 
 
-def check_file(file: Path) -> Iterator[Checked]:
+def check_file(file: Path) -> Iterator[CheckedPlugin]:
     """Import a file as if its folder were a plug-in folder, and yield each of its plug-ins, checked.
 
     Args:
@@ -84,10 +84,10 @@ def check_file(file: Path) -> Iterator[Checked]:
         own = [plugin for plugin in registry.values() if (external_plugins.file_of(plugin) or "").startswith(module)]
         for plugin in own:
             found = True
-            yield Checked(kind, plugin.name, tuple(results(kind, plugin)))
+            yield CheckedPlugin(kind, plugin.name, tuple(results(kind, plugin)))
     for name, refused_kind, why in _unusable(module):
         found = True
-        yield Checked(refused_kind or "plug-in", name, unusable=why)
+        yield CheckedPlugin(refused_kind or "plug-in", name, unusable=why)
     if not found:
         bases = ", ".join(kind.capitalize() for kind in KINDS)
         raise GaplabError(f"{file} has no plug-in; it needs a class of one of {bases} from gaplab.plugins")

@@ -25,7 +25,7 @@ from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tuners.base import Task, Tuner
-from gaplab.services.core.tuners.search import Search as SearchTuner
+from gaplab.services.core.tuners.search import SearchTuner
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import (
     Belief,

@@ -108,7 +108,7 @@ def _view(
     fitness = fitness_of(session, ids)
     secret = frozenset() if reveal else hidden(session, rows)
     found = {
-        id_: _Found(
+        id_: _Findings(
             failures=failures.get(id_, ()),
             check=checks.get(id_, CheckSummary()),
             fitness=fitness.get(id_),
@@ -120,7 +120,7 @@ def _view(
 
 
 @dataclass(frozen=True)
-class _Found:
+class _Findings:
     """Findings on an experiment: reasons of failure, its sensitivity check, and its fitness."""
 
     failures: tuple[str, ...]
@@ -129,7 +129,7 @@ class _Found:
     best: float | None
 
 
-def _experiment(row: ExperimentRow, work: _Work, found: _Found, *, secret: bool) -> ExperimentRead:
+def _experiment(row: ExperimentRow, work: _Work, found: _Findings, *, secret: bool) -> ExperimentRead:
     return ExperimentRead(
         id=row.id,
         study=row.study_id,

@@ -23,7 +23,7 @@ _GONE = {400, 401, 403, 404, 405, 410, 422}
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Attempt:
     """How an attempt ended.
 
     Attributes:
@@ -35,7 +35,7 @@ class Outcome:
     hopeless: bool = False
 
 
-def deliver(message: Notification, channel: Channel, webhook: str | None, notify: Notify) -> Outcome:
+def deliver(message: Notification, channel: Channel, webhook: str | None, notify: Notify) -> Attempt:
     """Send a notification once.
 
     Args:
@@ -51,11 +51,11 @@ def deliver(message: Notification, channel: Channel, webhook: str | None, notify
     if webhook is None:
         return _no_longer("its webhook")
     if why := refusal(webhook, notify.permitted_hosts):
-        return Outcome(why, hopeless=True)
+        return Attempt(why, hopeless=True)
     return post(webhook, message, notify.secret)
 
 
-def post(url: str, message: Notification, secret: str | None = None) -> Outcome:
+def post(url: str, message: Notification, secret: str | None = None) -> Attempt:
     """POST the message as JSON. Redirects are not followed, and the body of the answer is not read."""
     body = message.model_dump_json().encode()
     headers = {"Content-Type": "application/json", "User-Agent": "gaplab", "Gaplab-Notification": message.id}
@@ -68,12 +68,12 @@ def post(url: str, message: Notification, secret: str | None = None) -> Outcome:
         ):
             status = answer.status_code
     except httpx2.TimeoutException:
-        return Outcome(f"it did not answer within {WEBHOOK_S:g} s")
+        return Attempt(f"it did not answer within {WEBHOOK_S:g} s")
     except (httpx2.HTTPError, httpx2.InvalidURL, UnicodeError) as error:
-        return Outcome(f"it cannot be reached ({type(error).__name__})")
+        return Attempt(f"it cannot be reached ({type(error).__name__})")
     if 200 <= status < 300:
-        return Outcome()
-    return Outcome(f"it answered {status}", hopeless=status in _GONE or 300 <= status < 400)
+        return Attempt()
+    return Attempt(f"it answered {status}", hopeless=status in _GONE or 300 <= status < 400)
 
 
 def signature(secret: str, body: bytes, at: int) -> str:
@@ -82,7 +82,7 @@ def signature(secret: str, body: bytes, at: int) -> str:
     return f"t={at},v1={digest}"
 
 
-def run(command: str, message: Notification) -> Outcome:
+def run(command: str, message: Notification) -> Attempt:
     """Run the owner's command without a shell; it reads the message as JSON from its standard input.
 
     Nothing that users write is an argument of it. Its environment has no secrets of gaplab.
@@ -104,11 +104,11 @@ def run(command: str, message: Notification) -> Outcome:
             check=False,
         )
     except subprocess.TimeoutExpired:
-        return Outcome(f"the command did not end within {COMMAND_S:g} s")
+        return Attempt(f"the command did not end within {COMMAND_S:g} s")
     except (OSError, ValueError) as error:
-        return Outcome(f"the command cannot be run: {getattr(error, 'strerror', None) or 'it is not a command line'}")
-    return Outcome(f"the command ended with code {ended.returncode}" if ended.returncode else None)
+        return Attempt(f"the command cannot be run: {getattr(error, 'strerror', None) or 'it is not a command line'}")
+    return Attempt(f"the command ended with code {ended.returncode}" if ended.returncode else None)
 
 
-def _no_longer(what: str) -> Outcome:
-    return Outcome(f"{what} was removed before it was told", hopeless=True)
+def _no_longer(what: str) -> Attempt:
+    return Attempt(f"{what} was removed before it was told", hopeless=True)

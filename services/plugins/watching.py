@@ -18,7 +18,7 @@ TRIES = 3
 """Most imports of files that are edited meanwhile."""
 
 
-class Watch:
+class FolderWatch:
     """The contents of the plug-in folders, read again after an edit.
 
     Args:
@@ -31,9 +31,9 @@ class Watch:
         self._state: tuple[object, contents.State] | None = None
         self._contents = Contents()
 
-    def __reduce__(self) -> tuple[type["Watch"], tuple[()]]:
+    def __reduce__(self) -> tuple[type["FolderWatch"], tuple[()]]:
         """Let another process, to which Ray sends this with a function, look at its own folders."""
-        return Watch, ()
+        return FolderWatch, ()
 
     def contents(self) -> Contents:
         """Return the contents, at most `LOOK_S` old; the same object as long as they do not change."""
@@ -87,7 +87,7 @@ def _import() -> Contents:
     return before
 
 
-present = Watch().contents
+present = FolderWatch().contents
 imported = Imported()
 _RELOADING = Lock()
 

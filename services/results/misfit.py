@@ -20,7 +20,7 @@ from gaplab.services.core.tuners import tuners
 from gaplab.services.specs.assembly import parameters_of
 from gaplab.services.specs.resolution import takes_samples, unit
 from gaplab.services.store.queries import experiments, tunings
-from gaplab.services.store.queries.tunings import BestSimulator, Measured
+from gaplab.services.store.queries.tunings import BestSimulator, MeasuredIterations
 from gaplab.services.store.session import Store
 
 DISTRIBUTIONS = ("error", "held_out_error", "gap")
@@ -79,7 +79,7 @@ def misfit_csv(found: MisfitRead) -> str:
     return text.getvalue()
 
 
-def _tuning(best: BestSimulator, measured: Measured, posterior: FloatArray | None) -> Tuning:
+def _tuning(best: BestSimulator, measured: MeasuredIterations, posterior: FloatArray | None) -> Tuning:
     place = best.repetition, best.iteration
     pairs = None if best.lower is None or best.upper is None else list(zip(best.lower, best.upper, strict=True))
     return Tuning(

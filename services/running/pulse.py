@@ -17,7 +17,7 @@ EVERY_S = 0.5
 _BEAT, _OWNER, _REASON = ".", "o", "r"
 
 
-class Pulse:
+class PulsePipe:
     """The supervisor's end; without a keeper it does nothing.
 
     Args:

@@ -17,7 +17,7 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import checks, reading, submission
 from gaplab.services.plugins import blame, watching
-from gaplab.services.plugins.watching import Watch
+from gaplab.services.plugins.watching import FolderWatch
 from gaplab.services.running import execution, provenance, sensitivity, versions
 from gaplab.services.specs.assembly import engine_of
 from gaplab.services.specs.resolution import resolve_experiment
@@ -308,7 +308,7 @@ def test_folders_are_looked_at_once_a_second(put: Any, monkeypatch: pytest.Monke
     monkeypatch.undo()
     now = [0.0]
     home = put(careful=CAREFUL)
-    watch = Watch(lambda: now[0])
+    watch = FolderWatch(lambda: now[0])
     first = watch.contents()
 
     (home / "careful.py").write_text(EDITED)
@@ -324,4 +324,4 @@ def test_a_file_that_an_editor_replaces_meanwhile_stops_nothing(put: Any) -> Non
     Path(home / "broken.py").symlink_to(home / "nowhere.py")
     (home / "folder.py").mkdir()
 
-    assert set(Watch().contents().digests) == {"careful.py"}
+    assert set(FolderWatch().contents().digests) == {"careful.py"}

@@ -27,10 +27,10 @@ SOON = Silence(told_s=1, killed_s=3)
 BEATING = """
 import os, signal, sys, time
 from gaplab.services.running import execution
-from gaplab.services.running.pulse import Pulse
+from gaplab.services.running.pulse import PulsePipe
 from gaplab.services.store.session import Store
 
-pulse = Pulse.inherited()
+pulse = PulsePipe.inherited()
 pulse.name("kept")
 with open(os.environ["NOTES"], "a") as notes:
     notes.write(f"{os.getpid()}\\n")

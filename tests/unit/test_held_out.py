@@ -10,13 +10,13 @@ from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.held_out import is_held_out, split
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.strategies import strategies
-from gaplab.services.core.tuners.search import Search
+from gaplab.services.core.tuners.search import SearchTuner
 from gaplab.services.core.types import Measured, Sample, Tuned
 from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
 from tests.fakes import CountedReality, Recorder, flat, paraboloid, small_setting
 
 
-class Listener(Search):
+class Listener(SearchTuner):
     """A tuner that remembers how many samples it was given."""
 
     def __init__(self) -> None:

@@ -79,11 +79,11 @@ class GaussNewton(Tuner):
             if inside.sum() > task.space.size + 2:
                 estimate = _estimate(places[inside], differences[inside], task.misfit.noise)
                 box = estimate.box(box)
-        return _simulators(task, estimate or Estimate.unknown(task.space.size), rng)
+        return _simulators(task, estimate or LocalEstimate.unknown(task.space.size), rng)
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class LocalEstimate:
     """An estimate of the tunables, in units of their bounds.
 
     Attributes:
@@ -95,7 +95,7 @@ class Estimate:
     errors: FloatArray
 
     @classmethod
-    def unknown(cls, size: int) -> "Estimate":
+    def unknown(cls, size: int) -> "LocalEstimate":
         """Return the middle of the bounds, with both bounds as its errors."""
         return cls(np.full(size, 0.5), np.array([np.full(size, -0.5), np.full(size, 0.5)]))
 
@@ -117,7 +117,7 @@ class Estimate:
         return np.array([lower, np.clip(self.place + half, lower + NARROWEST, within[1])])
 
 
-def _estimate(places: FloatArray, differences: FloatArray, noise: float) -> Estimate:
+def _estimate(places: FloatArray, differences: FloatArray, noise: float) -> LocalEstimate:
     """Return an estimate of where all differences are 0, and its errors where the answer is known.
 
     Args:
@@ -130,7 +130,9 @@ def _estimate(places: FloatArray, differences: FloatArray, noise: float) -> Esti
     cut = np.clip(differences, middle - reach, middle + reach)
     others = ~np.eye(len(places), dtype=bool)
     known = [_place(places[rest], cut[rest], one, noise) for rest, one in zip(others, cut, strict=True)]
-    return Estimate(_place(places, cut, np.clip(0.0, middle - reach, middle + reach), noise), np.array(known) - places)
+    return LocalEstimate(
+        _place(places, cut, np.clip(0.0, middle - reach, middle + reach), noise), np.array(known) - places
+    )
 
 
 def _place(places: FloatArray, answers: FloatArray, asked: FloatArray, noise: float) -> FloatArray:
@@ -156,7 +158,7 @@ def _place(places: FloatArray, answers: FloatArray, asked: FloatArray, noise: fl
     return np.asarray(np.clip(found, 0.0, 1.0))
 
 
-def _simulators(task: Task, estimate: Estimate, rng: Generator) -> tuple[Simulator, ...]:
+def _simulators(task: Task, estimate: LocalEstimate, rng: Generator) -> tuple[Simulator, ...]:
     """Return the estimate with its intervals, then draws from its error; each with its discrepancy."""
     drawn = rng.multivariate_normal(estimate.place, estimate.covariance, task.ensemble - 1)
     found = _parameters(task, np.clip(np.vstack([estimate.place, drawn]), 0.0, 1.0))

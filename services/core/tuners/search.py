@@ -7,7 +7,7 @@ from gaplab.services.core.tuners.base import Task, Tuner
 from gaplab.services.core.types import Simulator
 
 
-class Search(Tuner):
+class SearchTuner(Tuner):
     """A search from scratch with the spec's optimizer, which keeps different simulators if an ensemble is wanted.
 
     The optimizer maximises minus the discrepancy. It ranks simulators as the paper's 1/Σe² does, and is finite at a

@@ -7,7 +7,7 @@ from sqlalchemy import ColumnElement, and_, func, not_, or_, select
 from gaplab.schemas.lifecycle import OPEN, State
 from gaplab.services.experiments.query import fields
 from gaplab.services.experiments.query.fields import Condition, Field, field_of
-from gaplab.services.experiments.query.parsing import Comparison, Every, Not, Some, Tree, Value, Words, parse, refusal
+from gaplab.services.experiments.query.parsing import Every, Not, Some, Term, Tree, Value, Words, parse, refusal
 from gaplab.services.store.cursor import Column
 from gaplab.services.store.models import ExperimentRow, StudyRow
 from gaplab.services.store.queries.fitness import best_of_all, points_of_all
@@ -159,7 +159,7 @@ def _condition(tree: Tree, known: Fields, texts: Sequence[Column]) -> ColumnElem
     match tree:
         case Words(value):
             return contains(value.text, *texts)
-        case Comparison():
+        case Term():
             return _compared(tree, known)
         case Not(part):
             return not_(_condition(part, known, texts))
@@ -169,7 +169,7 @@ def _condition(tree: Tree, known: Fields, texts: Sequence[Column]) -> ColumnElem
             return or_(*(_condition(part, known, texts) for part in parts))
 
 
-def _compared(tree: Comparison, known: Fields) -> ColumnElement[bool]:
+def _compared(tree: Term, known: Fields) -> ColumnElement[bool]:
     field = field_of(known, tree.field)
     operator = _NEGATED.get(tree.operator, tree.operator)
     single = "=" if operator == "in" else operator
@@ -189,7 +189,7 @@ def _permitted(field: Field) -> list[str]:
 
 def _mentions(tree: Tree, name: str) -> bool:
     match tree:
-        case Comparison(field=field):
+        case Term(field=field):
             return field.text.lower() == name
         case Not(part):
             return _mentions(part, name)

@@ -71,7 +71,7 @@ class Value:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Term:
     """A field, an operator and its values: several for `in`, else one."""
 
     field: Value
@@ -107,7 +107,7 @@ class Some:
     parts: tuple["Tree", ...]
 
 
-Tree: TypeAlias = Comparison | Words | Not | Every | Some
+Tree: TypeAlias = Term | Words | Not | Every | Some
 
 
 def parse(query: str) -> Tree | None:
@@ -165,7 +165,7 @@ class _Building(Transformer[Token, Tree]):
         field, operator, *values = found
         assert isinstance(field, Token)
         kept = tuple(value for value in values if isinstance(value, Value))
-        return Comparison(_value(field), " ".join(str(operator).lower().split()), kept)
+        return Term(_value(field), " ".join(str(operator).lower().split()), kept)
 
     def words(self, found: list[Value]) -> Tree:
         return Words(found[0])
@@ -190,7 +190,7 @@ def _check_size(query: str, tree: Tree) -> None:
     """Refuse a tree that is too large for a database."""
     level, conditions = [tree], 0
     for _ in range(DEEPEST):
-        conditions += sum(len(part.values) if isinstance(part, Comparison) else 1 for part in level)
+        conditions += sum(len(part.values) if isinstance(part, Term) else 1 for part in level)
         level = [child for part in level for child in _children(part)]
     if level or conditions > 3 * MOST_CONDITIONS:
         message = f"the query is too large: at most {MOST_CONDITIONS} conditions, nested at most {DEEPEST // 2} deep"

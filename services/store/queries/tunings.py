@@ -49,7 +49,7 @@ def best_simulators(session: Session, experiment: str) -> tuple[BestSimulator, .
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredIterations:
     """The iterations whose sample has a fitness, by repetition.
 
     Attributes:
@@ -61,7 +61,7 @@ class Measured:
     held_out: Mapping[int, Sequence[int]]
 
 
-def measured(session: Session, experiment: ExperimentRow) -> Measured:
+def measured(session: Session, experiment: ExperimentRow) -> MeasuredIterations:
     """Return the iterations whose sample has a fitness."""
     row, share = MeasurementRow, experiment.spec.get("held_out", 0.0)
     query = of_experiments(row, [experiment.id], RepetitionRow.number, row.iteration)
@@ -70,7 +70,7 @@ def measured(session: Session, experiment: ExperimentRow) -> Measured:
         query.where(row.kind == MeasurementKind.SAMPLE, row.fitness.is_not(None))
     ):
         (held_out if is_held_out(iteration, share) else tuned_on).setdefault(repetition, []).append(iteration)
-    return Measured(tuned_on, held_out)
+    return MeasuredIterations(tuned_on, held_out)
 
 
 def posteriors(session: Session, experiment: str) -> dict[tuple[int, int], tuple[list[list[float]], list[float]]]:
