@@ -1,0 +1,164 @@
+"""What stored studies found: distances from the truth, coverage of intervals, fitness, and paired differences.
+
+`python -m benchmarks.findings ARCHIVE.zip …` computes them from archives; experiments of all archives are compared.
+"""
+
+from argparse import ArgumentParser
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from gaplab import migrations
+from gaplab.schemas.comparisons import Comparison
+from gaplab.services.archives import import_archive
+from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.results.comparisons import compare
+from gaplab.services.results.curves import curves
+from gaplab.services.store.queries import experiments, tunings
+from gaplab.services.store.queries.tunings import BestSimulator
+from gaplab.services.store.session import Store
+
+Imported = dict[str, str]
+"""Labels of experiments by their ids: the study's file, and the strategy."""
+
+
+def imported(store: Store, archives: Sequence[Path]) -> Imported:
+    """Import archives, and return the labels of their experiments."""
+    labels: Imported = {}
+    for path in archives:
+        with path.open("rb") as file:
+            ids = import_archive(store, file).experiments
+        with store.reading() as session:
+            names = {id_: experiments.get_experiment(session, id_).name for id_ in ids}
+        labels |= {id_: path.stem if len(ids) == 1 else f"{path.stem}: {name}" for id_, name in names.items()}
+    return labels
+
+
+@dataclass(frozen=True)
+class Found:
+    """The best simulators after one number of samples.
+
+    Attributes:
+        away: `(n, p)`: distances from the truth, as shares of the bounds.
+        width: `(n, p)`: widths of the stated 95 % intervals, as shares of the bounds; None if none are stated.
+        inside: `(n, p)`: 1 where they contain the truth, else 0.
+    """
+
+    away: FloatArray
+    width: FloatArray | None = None
+    inside: FloatArray | None = None
+
+    def row(self) -> tuple[str, ...]:
+        """Return the number of repetitions, medians, and shares of intervals with the truth in them."""
+        together = np.median(np.linalg.norm(self.away, axis=1))
+        cells = str(len(self.away)), f"{together:.3f}", _each(np.median(self.away, axis=0))
+        if self.inside is None or self.width is None:
+            return cells
+        shares = f"{self.inside.mean():.2f}", _each(self.inside.mean(axis=0))
+        return *cells, *shares, _each(np.median(self.width, axis=0))
+
+
+def found(store: Store, id_: str) -> dict[int, Found]:
+    """Return what tuning found, by number of samples; nothing if reality has no truth for every tunable."""
+    with store.reading() as session:
+        spec = spec_of(experiments.get_experiment(session, id_).spec)
+        simulators = tunings.best_simulators(session, id_)
+    if not set(spec.reality.parameters) >= {tunable.name for tunable in spec.tunables}:
+        return {}
+    truth = np.array([spec.reality.parameters[tunable.name] for tunable in spec.tunables])
+    extent = np.array([tunable.upper - tunable.lower for tunable in spec.tunables])
+    by_samples = defaultdict(list)
+    for simulator in simulators:
+        by_samples[simulator.iteration].append(simulator)
+    return {samples: _found(best, truth, extent) for samples, best in by_samples.items()}
+
+
+def _found(best: Sequence[BestSimulator], truth: FloatArray, extent: FloatArray) -> Found:
+    away = np.abs(np.array([simulator.parameters for simulator in best]) - truth) / extent
+    if any(simulator.lower is None for simulator in best):
+        return Found(away)
+    lower = np.array([simulator.lower for simulator in best])
+    upper = np.array([simulator.upper for simulator in best])
+    return Found(away, (upper - lower) / extent, ((lower <= truth) & (truth <= upper)).astype(float))
+
+
+def distance_table(store: Store, labels: Imported) -> Table:
+    """Return medians over repetitions of the distances, and the coverage of intervals."""
+    columns = "study", "after", "n", "together", "each tunable", "truth in interval", "each", "median width"
+    table = _table("Median distance from the truth, as a share of the bounds; 95 % intervals", columns)
+    for id_, label in labels.items():
+        for samples, findings in found(store, id_).items():
+            table.add_row(label, str(samples), *findings.row())
+    return table
+
+
+def fitness_table(store: Store, labels: Imported) -> Table:
+    """Return recorded fitness in reality after each number of real-world evaluations."""
+    table = _table("Recorded fitness in reality", ("study", "after", "n", "mean", "SD"))
+    for curve in curves(store, list(labels)):
+        for point in curve.points:
+            table.add_row(
+                labels[curve.experiment], str(point.evaluations), str(point.n), *map(_number, (point.mean, point.sd))
+            )
+    return table
+
+
+def difference_table(store: Store, labels: Imported, counts: Sequence[int]) -> Table:
+    """Return the differences of all pairs after each number of evaluations, with Holm's p over the pairs of a count."""
+    title = "Differences of fitness with 90 % intervals; p of the trusted test after Holm"
+    table = _table(title, ("after", "first", "second", "difference", "p"))
+    for count in counts:
+        for pair in compare(store, list(labels), from_evaluations=count, to_evaluations=count, intervals=False):
+            table.add_row(str(count), labels[pair.first], labels[pair.second], *_difference(pair))
+    return table
+
+
+def _difference(pair: Comparison) -> Iterator[str]:
+    test = pair.paired_t if pair.paired_t.p is not None else pair.student
+    yield f"{_number(pair.difference)} ({_number(pair.lower)} to {_number(pair.upper)})"
+    yield "-" if test.p_holm is None else f"{test.p_holm:.2g}"
+
+
+def _table(title: str, columns: Sequence[str]) -> Table:
+    table = Table(title=title)
+    for column in columns:
+        table.add_column(column)
+    return table
+
+
+def _each(values: FloatArray) -> str:
+    return " ".join(f"{value:.3f}" for value in values)
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
+
+
+def main() -> None:
+    """Import the archives into a temporary database, and print the tables."""
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("archives", nargs="+", type=Path)
+    parser.add_argument("--after", type=int, nargs="+", default=[1, 3], help="numbers of evaluations to compare at")
+    arguments = parser.parse_args()
+    with TemporaryDirectory(prefix="gaplab-findings-") as folder:
+        url = f"sqlite:///{Path(folder) / 'gaplab.db'}"
+        migrations.upgrade(url)
+        store = Store(url)
+        labels = imported(store, arguments.archives)
+        console = Console()
+        console.print(distance_table(store, labels))
+        console.print(fitness_table(store, labels))
+        if len(labels) > 1:
+            console.print(difference_table(store, labels, arguments.after))
+        store.dispose()
+
+
+if __name__ == "__main__":
+    main()
