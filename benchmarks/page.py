@@ -1,7 +1,8 @@
-"""`python -m benchmarks.page`: size of the page, and time until it shows a list and a curve.
+"""`python -m benchmarks.page`: size of the page, time until it shows a list and a curve, and latencies of the API.
 
 A real Chromium loads it from a real API on SQLite, first with an empty cache and then with a full one. The database has
-a published study of this repository, alone and beside 10 000 experiments.
+a published study of this repository, alone and beside 10 000 experiments. Times are also ratios to `/livez`, the
+quickest answer of the same process in the same minute: these compare between machines and versions.
 """
 
 import argparse
@@ -16,6 +17,7 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
+import httpx2
 from playwright.sync_api import Browser, sync_playwright
 from rich.console import Console
 from rich.table import Table
@@ -40,6 +42,13 @@ VIEWS = {
 }
 
 
+ANSWERS = ("/experiments", "/studies/{study}", "/studies/{study}/curves", "/experiments/{experiment}/samples")
+"""Paths of the API whose latencies are measured."""
+
+ASKED = 30
+"""Requests for each latency."""
+
+
 @dataclass(frozen=True)
 class Visit:
     """One visit: seconds until the view showed, kilobytes and number of requests."""
@@ -56,14 +65,20 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5, help="number of visits; the table has medians")
     arguments = parser.parse_args()
     table = Table(title=f"The page on {os.cpu_count()} cores of {platform.machine()}")
-    for column in ("view", "experiments", "cold", "warm", "cold kB", "warm kB", "requests"):
+    columns = ("view", "experiments", "cold", "warm", "cold / livez", "warm / livez", "cold kB", "warm kB", "requests")
+    for column in columns:
         table.add_column(column, justify="left" if column == "view" else "right")
     for experiments in (0, arguments.experiments):
         with _served(experiments) as (url, ids), _chromium() as browser:
+            livez = _latency(f"{url}/livez")
             for name, (address, ready) in VIEWS.items():
                 id_ = ids["study" if "studies" in address else "experiment"]
                 visits = [_visits(browser, f"{url}/{address.format(id_)}", ready) for _ in range(arguments.rounds)]
-                table.add_row(name, f"{experiments + 7:,}", *_cells(visits))
+                table.add_row(name, f"{experiments + 7:,}", *_cells(visits, livez))
+            for path in ("/livez", *ANSWERS):
+                seconds = _latency(url + path.format(**ids))
+                cells = f"{1000 * seconds:.1f} ms", "", f"{seconds / livez:.1f}"
+                table.add_row(f"GET {path}", f"{experiments + 7:,}", *cells)
     Console().print(table)
 
 
@@ -112,12 +127,25 @@ def _visits(browser: Browser, address: str, ready: str) -> tuple[Visit, Visit]:
     return visits[0], visits[1]
 
 
-def _cells(pairs: list[tuple[Visit, Visit]]) -> tuple[str, ...]:
+def _latency(address: str) -> float:
+    """Return the median of the seconds that an answer takes on a kept connection."""
+    times = []
+    with httpx2.Client(trust_env=False) as client:
+        for _ in range(ASKED):
+            start = time.perf_counter()
+            client.get(address).raise_for_status()
+            times.append(time.perf_counter() - start)
+    return median(times)
+
+
+def _cells(pairs: list[tuple[Visit, Visit]], livez_s: float) -> tuple[str, ...]:
     cold, warm = zip(*pairs, strict=True)
+    seconds = [median(each.seconds for each in visits) for visits in (cold, warm)]
     return (
-        *(f"{1000 * median(each.seconds for each in visits):.0f} ms" for visits in (cold, warm)),
+        *(f"{1000 * each:.0f} ms" for each in seconds),
+        *(f"{each / livez_s:.0f}" for each in seconds),
         *(f"{median(each.kilobytes for each in visits):,.0f}" for visits in (cold, warm)),
-        f"{median(each.requests for each in cold):.0f}",
+        ", ".join(f"{median(each.requests for each in visits):.0f}" for visits in (cold, warm)),
     )
 
 
