@@ -8,7 +8,7 @@ from time import monotonic, sleep
 from typing import Any, TypeAlias
 
 import ray
-from ray.exceptions import GetTimeoutError, RayError
+from ray.exceptions import RayError
 
 from gaplab.services.core.arrays import Genome
 from gaplab.services.core.ports import Reality
@@ -30,9 +30,12 @@ Handle: TypeAlias = Any
 """A handle of a Permits actor, which Ray does not type."""
 
 
-@ray.remote(num_cpus=0, max_restarts=0)
+@ray.remote(num_cpus=0, max_restarts=-1)
 class Permits:
-    """The permits of one supervisor, in a separate process: they expire even if the supervisor is stopped."""
+    """The permits of one supervisor, in a separate process: they expire even if the supervisor is stopped.
+
+    If the process dies, Ray starts another. It permits nothing until the next heartbeat renews the permits.
+    """
 
     def __init__(self) -> None:
         self._until: dict[Key, float] = {}
@@ -49,7 +52,7 @@ class Permits:
 def asking(permits: Handle, key: Key) -> Callable[[], float]:
     """Return a function that asks for the seconds that are left of a permit.
 
-    It raises GetTimeoutError if there is no answer in time, and another RayError if the permits died.
+    It raises GetTimeoutError if there is no answer in time, and another RayError if the permits' process died.
     """
     return lambda: float(ray.get(permits.left.remote(key), timeout=ANSWER_S))
 
@@ -85,16 +88,15 @@ class PermittedReality:
             answered.set()
 
     def _expiry(self, known: float) -> float:
-        """Return when the permit expires; what is known, if nobody answers."""
+        """Return when the permit expires; what is known, if nobody answers or the permits' process has just died."""
         asked = monotonic()
-        with suppress(GetTimeoutError):
+        with suppress(RayError):
             return asked + self._left()
         return known
 
     def _watch(self, answered: Event, until: float) -> None:
         while not answered.wait(POLL_S):
-            with suppress(RayError):  # the permits died: the last one holds
-                until = self._expiry(until)
+            until = self._expiry(until)
             if monotonic() > until:
                 with suppress(Exception):
                     self._stop()

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from ray.exceptions import GetTimeoutError
+from ray.exceptions import ActorDiedError, ActorUnavailableError, GetTimeoutError
 
 from gaplab.schemas.lifecycle import Ending, State, Verb
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
@@ -388,6 +388,20 @@ def test_a_permit_runs_out_although_nobody_answers(monkeypatch: pytest.MonkeyPat
     permits.PermittedReality(moving, lambda: None, silent, done.set)(np.zeros(1))
 
     assert done.is_set()
+
+
+def test_a_measurement_waits_for_permits_whose_process_has_died(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(permits, "POLL_S", 0.001)
+    answers: list[Any] = [1e9, ActorUnavailableError("it starts again", None), ActorDiedError()]
+
+    def answering() -> float:
+        answer = answers.pop() if answers else 1e9
+        if isinstance(answer, Exception):
+            raise answer
+        return float(answer)
+
+    assert permits.PermittedReality(lambda _: Outcome(0.5), lambda: None, answering)(np.zeros(1)).fitness == 0.5
+    assert answers == []
 
 
 def test_a_check_that_no_experiment_needs_any_more_ends(store: Store) -> None:

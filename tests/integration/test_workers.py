@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 import ray
+from ray.exceptions import RayError
 
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.schemas.sensitivity import SensitivitySpec, Verdict
@@ -36,7 +37,7 @@ from gaplab.workers import task
 from gaplab.workers.checkpoints import recorded
 from gaplab.workers.cluster import cluster
 from gaplab.workers.patience import Patience
-from gaplab.workers.permits import PermittedReality
+from gaplab.workers.permits import Permits, PermittedReality, asking
 from gaplab.workers.supervisor import Supervisor
 from tests.experiments import cancel
 from tests.fakes import flat, install
@@ -191,6 +192,27 @@ def moving(told: Path) -> Any:
         yield from task.delivered(prepared, claim, 10.0)
 
     return task_
+
+
+def test_permits_whose_process_was_killed_permit_again_once_they_are_renewed() -> None:
+    handle: Any = Permits.remote()  # type: ignore[attr-defined]  # Ray adds it
+    key = (1, 1)
+    ask = asking(handle, key)
+    renewed = lambda: handle.renew.remote([key], 1e9)  # noqa: E731
+    renewed()
+    until(lambda: _answer(ask) > 0)
+    handle.__ray_call__.remote(lambda _: os._exit(1))
+    until(lambda: _answer(ask) <= 0)
+
+    until(lambda: renewed() and _answer(ask) > 0)
+    ray.kill(handle)
+
+
+def _answer(ask: Any) -> float:
+    try:
+        return float(ask())
+    except RayError:
+        return 0.0
 
 
 @pytest.mark.parametrize("cancelled", [True, False])
