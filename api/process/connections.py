@@ -3,6 +3,7 @@
 Uvicorn has no such deadline. Without one, clients that send nothing keep all files of the process open.
 """
 
+import socket
 from asyncio import TimerHandle, Transport
 from typing import Any
 
@@ -16,6 +17,8 @@ SLOWEST_BYTES_PER_S = 10_000.0
 
 TAKE_S = 120.0
 """Time for a client to take the part of an answer that was sent to it."""
+
+_OF_TCP = {socket.AF_INET, socket.AF_INET6}
 
 _TOO_LATE = b"HTTP/1.1 408 Request Timeout\r\nconnection: close\r\ncontent-length: 0\r\n\r\n"
 
@@ -41,8 +44,15 @@ class TimedConnection(H11Protocol):
         return self.conn.their_state is h11.IDLE and (self.cycle is None or self.cycle.response_complete)
 
     def connection_made(self, transport: Transport) -> None:  # type: ignore[override]
-        """Begin to wait for a request."""
+        """Begin to wait for a request.
+
+        Head and body of an answer leave at once: the body would else wait for the client to confirm the head, which it
+        does after 40 ms. asyncio only sees to that for sockets that name their protocol.
+        """
         super().connection_made(transport)
+        connection = transport.get_extra_info("socket")
+        if connection is not None and connection.family in _OF_TCP:
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._await_request()
         if self._most is not None and len(self.connections) > self._most:
             self._make_room()

@@ -162,6 +162,24 @@ def test_half_a_request_ends_its_connection(
         assert rest(connection).startswith(answer)
 
 
+def test_no_part_of_an_answer_waits_until_the_client_has_confirmed_another(
+    app: FastAPI, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else every answer on a kept connection takes 40 ms."""
+    at_once = []
+    made = connections.TimedConnection.connection_made
+
+    def observed(self: Any, transport: Any) -> None:
+        made(self, transport)
+        at_once.append(transport.get_extra_info("socket").getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
+
+    monkeypatch.setattr(connections.TimedConnection, "connection_made", observed)
+    with serving(app) as port:
+        assert httpx2.get(f"http://127.0.0.1:{port}/livez").status_code == 200
+    assert all(at_once)
+    assert at_once
+
+
 def test_half_an_archive_is_no_incident(
     sqlite_store: Store, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
