@@ -11,6 +11,7 @@ from gaplab.services.core.arrays import frozen
 from gaplab.services.core.identification import FEWEST, Means, overfitting, verdicts
 from gaplab.services.core.misfit import Tuning, misfit_point
 from gaplab.services.core.space import Space
+from gaplab.services.core.tuners.abc_smc import _moved
 
 SPACE = Space.box([0.0], [2.0])
 
@@ -122,3 +123,13 @@ def test_a_larger_error_on_held_out_samples_is_overfitting() -> None:
         overfitting(honest, "m/s") == "on held-out samples the best simulators err by 0.1 m/s, on those tuned on by 0.1"
     )
     assert overfitting(overfitted, "m/s").endswith("by 0.1: they fit their samples better than new ones")
+
+
+def test_two_particles_move_although_they_span_no_volume() -> None:
+    space = Space.box([0.0] * 3, [1.0] * 3)
+    particles = np.array([[0.2, 0.3, 0.4], [0.7, 0.1, 0.9]])
+    for weights in ([0.5, 0.5], [0.9, 0.1]):
+        moved, densities = _moved(particles, np.array(weights), space, 20, np.random.default_rng(0))
+        assert np.all(np.isfinite(moved))
+        assert np.all((space.lower <= moved) & (moved <= space.upper))
+        assert densities.sum() == pytest.approx(1.0)

@@ -1,5 +1,6 @@
 """A tuner that returns a posterior: simulators as probable as the samples make them."""
 
+from contextlib import suppress
 from typing import Annotated
 
 import numpy as np
@@ -14,6 +15,9 @@ from gaplab.services.core.types import Simulator
 
 WIDER = 2.0
 """Factor of the covariance of particles by which each is moved. Source: Beaumont, Cornuet, Marin and Robert 2009."""
+
+LEAST_WIDTHS = (1e-9, 1e-7, 1e-5, 1e-3)
+"""Least standard deviations of a move, as shares of the bounds: the first with which the covariance has a factor."""
 
 TRIES = 100
 """Draws of a move that leaves the bounds, before the particle stays where it is."""
@@ -64,8 +68,7 @@ def _moved(
 ) -> tuple[Parameters, FloatArray]:
     """Return new particles `(count, p)` near weighted ones, and the prior density over the density of each move."""
     covariance = WIDER * np.cov(particles.T, aweights=weights).reshape(space.size, space.size)
-    covariance += np.diag((1e-9 * space.extent) ** 2)
-    factor = np.linalg.cholesky(covariance)
+    factor = _factor(covariance, space.extent)
     found = particles[rng.choice(len(particles), count, p=weights)]
     outside = np.arange(count)
     origin = found.copy()
@@ -79,6 +82,19 @@ def _moved(
     away = np.linalg.solve(factor, (found[:, None, :] - particles[None, :, :]).reshape(-1, space.size).T)
     densities = np.exp(-0.5 * (away**2).sum(axis=0)).reshape(count, len(particles)) @ weights
     return found, (1.0 / densities) / (1.0 / densities).sum()
+
+
+def _factor(covariance: FloatArray, extent: FloatArray) -> FloatArray:
+    """Return the Cholesky factor of a covariance, made wider where too few particles leave it without a width.
+
+    Args:
+        covariance: `(p, p)`, positive semidefinite up to rounding.
+        extent: `(p,)`: widths of the bounds.
+    """
+    for share in LEAST_WIDTHS[:-1]:
+        with suppress(np.linalg.LinAlgError):
+            return np.asarray(np.linalg.cholesky(covariance + np.diag((share * extent) ** 2)))
+    return np.asarray(np.linalg.cholesky(covariance + np.diag((LEAST_WIDTHS[-1] * extent) ** 2)))
 
 
 def _interval(particles: Parameters, weights: FloatArray) -> FloatArray:
