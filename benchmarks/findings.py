@@ -66,11 +66,16 @@ class Found:
 
 
 def found(store: Store, id_: str) -> dict[int, Found]:
-    """Return what tuning found, by number of samples; nothing if reality has no truth for every tunable."""
+    """Return what tuning found, by number of samples.
+
+    Nothing if reality has no truth for every tunable: it has none in another engine, whose coefficients mean other
+    contacts.
+    """
     with store.reading() as session:
         spec = spec_of(experiments.get_experiment(session, id_).spec)
         simulators = tunings.best_simulators(session, id_)
-    if not set(spec.reality.parameters) >= {tunable.name for tunable in spec.tunables}:
+    elsewhere = spec.reality.engine.name != spec.engine.name
+    if elsewhere or not set(spec.reality.parameters) >= {tunable.name for tunable in spec.tunables}:
         return {}
     truth = np.array([spec.reality.parameters[tunable.name] for tunable in spec.tunables])
     extent = np.array([tunable.upper - tunable.lower for tunable in spec.tunables])

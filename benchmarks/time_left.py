@@ -69,6 +69,9 @@ def main() -> None:
         )
     console = Console()
     console.print(table)
+    if not known:
+        console.print("The study ended before its time left was known; ask for more repetitions.")
+        return
     right = sum(interval.low_s <= left <= interval.high_s for _, interval, left in known)
     off = median(abs((look.progress.seconds_left or 0.0) - left) / left for look, _, left in known)
     console.print(f"{right} of {len(known)} looks inside; known after {known[0][0].at_s:.0f} s; median error {off:.0%}")
