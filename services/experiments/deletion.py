@@ -121,7 +121,7 @@ def _delete(session: Session, experiments: Sequence[ExperimentRow], by: Deleter,
 
 
 def _bury(session: Session, row: ExperimentRow | StudyRow, study: str | None, by: Deleter) -> DeletionRead:
-    """Keep that the row was deleted; for an experiment, its last event says so too."""
+    """Record that a row was deleted; the last event of an experiment says so too."""
     deleted = DeletionRow(id=row.id, study_id=study, name=row.name, token_id=by.token, deleted_at=moment(session))
     session.add(deleted)
     session.flush()
