@@ -15,8 +15,11 @@ from gaplab.api.http.metrics import Metrics, RequestCounter
 from gaplab.api.http.security_headers import SecurityHeaders
 from gaplab.api.routes import (
     archives,
+    attachments,
+    bench,
     catalogue,
     comparisons,
+    corrections,
     curves,
     dashboard,
     differences,
@@ -32,6 +35,7 @@ from gaplab.api.routes import (
     replay_figures,
     replays,
     reports,
+    samples,
     sensitivity,
     specs,
     studies,
@@ -55,6 +59,7 @@ each place, what is permitted there, and the nearest valid name.
 TAGS = [
     {"name": "studies", "description": "experiments to be compared"},
     {"name": "experiments", "description": "one strategy with one set of settings, repeated"},
+    {"name": "bench", "description": "measurements of a robot on a bench: requests, takes, answers, corrections"},
     {"name": "views", "description": "saved queries of lists"},
     {"name": "curves", "description": "recorded fitness against the number of real-world evaluations"},
     {"name": "replays", "description": "the motion of controllers, computed on request"},
@@ -73,6 +78,10 @@ MODULES = (
     experiments,
     specs,
     lifecycle,
+    bench,
+    corrections,
+    attachments,
+    samples,
     keeping,
     views,
     webhooks,

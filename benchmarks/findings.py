@@ -74,8 +74,9 @@ def found(store: Store, id_: str) -> dict[int, Found]:
     with store.reading() as session:
         spec = spec_of(experiments.get_experiment(session, id_).spec)
         simulators = tunings.best_simulators(session, id_)
-    elsewhere = spec.reality.engine.name != spec.engine.name
-    if elsewhere or not set(spec.reality.parameters) >= {tunable.name for tunable in spec.tunables}:
+    if spec.reality.engine is None or spec.reality.engine.name != spec.engine.name:
+        return {}
+    if not set(spec.reality.parameters) >= {tunable.name for tunable in spec.tunables}:
         return {}
     truth = np.array([spec.reality.parameters[tunable.name] for tunable in spec.tunables])
     extent = np.array([tunable.upper - tunable.lower for tunable in spec.tunables])

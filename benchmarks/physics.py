@@ -16,7 +16,7 @@ from gaplab.services.core.world import Motion
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.engines.pybullet.scene import PyBulletScene
-from gaplab.services.specs.assembly import Simulation
+from gaplab.services.specs.simulation import Simulation
 
 TUNED = ("static_friction", "dynamic_friction", "restitution")
 GENOMES = 12

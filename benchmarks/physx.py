@@ -15,7 +15,7 @@ from gaplab.services.core.world import Motion
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.physx import PhysX
 from gaplab.services.engines.pybullet import PyBullet
-from gaplab.services.specs.assembly import Simulation
+from gaplab.services.specs.simulation import Simulation
 
 ROBOT = Quadruped()
 NEARBY = [np.array([values]) for values in ((1.02, 0.8, 0.0), (1.0, 0.81, 0.0), (1.0, 0.8, 0.02), (0.5, 0.5, 0.0))]

@@ -24,8 +24,8 @@ from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
-from gaplab.services.specs.assembly import Simulation
 from gaplab.services.specs.resolution import resolve_study
+from gaplab.services.specs.simulation import Simulation
 from gaplab.workers.pool import LEAST_S
 
 CORES = (2, 16, 64, 1_000)

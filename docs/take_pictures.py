@@ -16,13 +16,15 @@ from playwright.sync_api import Page
 
 from gaplab import migrations
 from gaplab.api.process.local_service import start_service
-from gaplab.schemas.spec import StudySpec
+from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import import_archive
 from gaplab.services.core.loop import repetition
-from gaplab.services.experiments.submission import submit_study
-from gaplab.services.running.execution import claim
+from gaplab.services.experiments.submission import submit_experiment, submit_study
+from gaplab.services.running.execution import claim, record_all
 from gaplab.services.specs.assembly import setting
+from gaplab.services.store.lease import Pulse
 from gaplab.services.store.session import Store
+from gaplab.workers.checkpoints import recorded
 from tests.e2e.browser import Chromium
 from tests.experiments import run
 
@@ -42,6 +44,7 @@ class View(NamedTuple):
         address: its fragment, with the names of ids in braces.
         ready: what is visible once the view is complete.
         height: height of the picture in pixels.
+        width: its width.
         fields: values to enter, by label.
         press: the button to press first, if any.
     """
@@ -52,6 +55,7 @@ class View(NamedTuple):
     height: int = 900
     fields: tuple[tuple[str, str], ...] = ()
     press: str | None = None
+    width: int = 1280
 
 
 VIEWS = (
@@ -61,6 +65,7 @@ VIEWS = (
     View("experiment", "experiments/{experiment}", ".figure-predictions .scatterlayer .point >> nth=0", 1330),
     View("compare", "compare?experiments={all}", "table.matrix", 1130),
     View("replay", "replay?experiment={experiment}", ".gait .main-svg >> nth=0", fields=(("Time", "2"),)),
+    View("bench", "bench?bench=table", ".gait, .motion, h2 >> nth=0", 844, width=390),
     View("toy", "toy?experiment={toy}&iteration=3", ".toy .main-svg >> nth=0"),
 )
 
@@ -77,6 +82,7 @@ def prepared() -> Iterator[tuple[str, dict[str, str]]]:
                 shown = import_archive(store, archive)
         ids = {"study": shown.study or "", "experiment": shown.experiments[0], "all": ",".join(shown.experiments)}
         ids["toy"] = toy(store)
+        ask_for_a_measurement(store)
         store.dispose()
         with start_service(database_url, Path(folder) / "api.log", workers=False) as client:
             yield client.url, ids
@@ -90,6 +96,25 @@ def toy(store: Store) -> str:
         for claimed in claims:
             run(store, claimed, repetition(setting(claimed.spec, claimed.number)))
     return study.experiments[0].id
+
+
+def ask_for_a_measurement(store: Store) -> None:
+    """Compute an experiment on a bench until it waits for its first measurement."""
+    spec = {
+        "name": "the robot on our table",
+        "strategy": "simulated_fit_and_informative",
+        "robot": "quadruped",
+        "engine": "mujoco",
+        "reality": {"kind": "physical", "bench": "table", "repeats": 3, "limits": {"torque": 7.0}},
+        "iterations": 2,
+        "repetitions": 1,
+        "budget": "smoke",
+    }
+    submit_experiment(store, ExperimentSpec.model_validate(spec))
+    for claimed in claim(store, "pictures", 1):
+        for delivered in recorded(setting(claimed.spec, claimed.number), claimed.log, claimed.checkpoints):
+            if not isinstance(delivered, Pulse):
+                record_all(store, [(claimed, [delivered])])
 
 
 def take(page: Page, view: View, path: Path) -> None:
@@ -114,7 +139,9 @@ def main() -> None:
                 for dark in (False, True):
                     path = FOLDER / f"{view.name}-{'dark' if dark else 'light'}.png"
                     take(
-                        browser.visit(f"{url}/#/{view.address.format(**ids)}", dark=dark, height=view.height),
+                        browser.visit(
+                            f"{url}/#/{view.address.format(**ids)}", dark=dark, width=view.width, height=view.height
+                        ),
                         view,
                         path,
                     )

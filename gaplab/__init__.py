@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from gaplab.api.clients.client import Client as Client
     from gaplab.api.clients.comparisons import Comparisons as Comparisons
     from gaplab.api.clients.confirmation import NotSubmitted as NotSubmitted
+    from gaplab.api.clients.drivers import MeasurementFailed as MeasurementFailed
     from gaplab.api.clients.errors import ExperimentFailed as ExperimentFailed
     from gaplab.api.clients.errors import ExtraMissing as ExtraMissing
     from gaplab.api.clients.errors import ServiceError as ServiceError
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from gaplab.api.clients.figures import Figure as Figure
     from gaplab.api.process.errors import CommandError as CommandError
     from gaplab.api.process.local_service import local_service as local_service
+    from gaplab.samples import InvalidSamples as InvalidSamples
+    from gaplab.samples import read_samples as read_samples
 
 _MODULES = {
     "Client": "gaplab.api.clients.client",
@@ -35,10 +38,13 @@ _MODULES = {
     "ExperimentFailed": "gaplab.api.clients.errors",
     "ExtraMissing": "gaplab.api.clients.errors",
     "Figure": "gaplab.api.clients.figures",
+    "InvalidSamples": "gaplab.samples",
+    "MeasurementFailed": "gaplab.api.clients.drivers",
     "NotSubmitted": "gaplab.api.clients.confirmation",
     "ServiceError": "gaplab.api.clients.errors",
     "ServiceUnreachable": "gaplab.api.clients.errors",
     "local_service": "gaplab.api.process.local_service",
+    "read_samples": "gaplab.samples",
 }
 
 __all__ = sorted(_MODULES)

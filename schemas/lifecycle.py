@@ -20,6 +20,10 @@ An experiment:
     extend   From COMPLETED, to QUEUED with more iterations or repetitions; existing numbers stay.
     retry    Queues the repetitions that FAILED once more; each goes on from its stored steps.
 
+If reality is a robot on a bench, a repetition is WAITING while a measurement is requested: it holds no core and no
+process, for a year if need be, and is QUEUED when the answer is stored. An experiment is WAITING while none of its
+repetitions can go on without an answer. To pause, stop or cancel it works as if it were QUEUED.
+
 An error of reality pauses the experiment: a person looks at the robot, and then resumes.
 
 A repetition is QUEUED, RUNNING or ended. It returns from RUNNING to QUEUED when it is paused or handed back, or when
@@ -44,6 +48,7 @@ class State(StrEnum):
     COMPLETED = "COMPLETED"
     FAILED = "FAILED"
     CANCELLED = "CANCELLED"
+    WAITING = "WAITING"
 
     @property
     def ended(self) -> bool:
@@ -74,6 +79,7 @@ class Ending(StrEnum):
     STOPPED = "stopped"
     CANCELLED = "cancelled"
     HANDED_BACK = "handed back"
+    WAITING = "waiting"
     LOST = "lost"
     FAILED = "failed"
 
@@ -83,25 +89,29 @@ ENDS = frozenset({State.COMPLETED, State.FAILED, State.CANCELLED})
 OPEN = tuple(state for state in State if state not in ENDS)
 """States that have not ended."""
 
+PENDING = (State.QUEUED, State.RUNNING, State.WAITING)
+"""States of a repetition that has not ended."""
+
 ASKED = (State.PAUSING, State.STOPPING)
 """States in which running repetitions end with their current step."""
 
 PERMITTED: dict[Verb, tuple[State, ...]] = {
-    Verb.PAUSE: (State.QUEUED, State.RUNNING),
+    Verb.PAUSE: (State.QUEUED, State.RUNNING, State.WAITING),
     Verb.RESUME: (State.PAUSING, State.PAUSED),
-    Verb.STOP: (State.QUEUED, State.RUNNING, State.PAUSING, State.PAUSED),
+    Verb.STOP: (State.QUEUED, State.RUNNING, State.WAITING, State.PAUSING, State.PAUSED),
     Verb.CANCEL: OPEN,
     Verb.EXTEND: (State.COMPLETED,),
-    Verb.RETRY: (State.QUEUED, State.RUNNING, State.PAUSED, State.COMPLETED, State.FAILED),
+    Verb.RETRY: (State.QUEUED, State.RUNNING, State.WAITING, State.PAUSED, State.COMPLETED, State.FAILED),
 }
 
 MOVES: dict[State, frozenset[State]] = {
-    State.QUEUED: frozenset({State.RUNNING, State.PAUSED, State.COMPLETED, State.FAILED, State.CANCELLED}),
-    State.RUNNING: frozenset({State.QUEUED, State.PAUSING, State.PAUSED, State.STOPPING, *ENDS}),
+    State.QUEUED: frozenset({State.RUNNING, State.WAITING, State.PAUSED, *ENDS}),
+    State.RUNNING: frozenset({State.QUEUED, State.WAITING, State.PAUSING, State.PAUSED, State.STOPPING, *ENDS}),
+    State.WAITING: frozenset({State.QUEUED, State.RUNNING, State.PAUSED, *ENDS}),
     State.PAUSING: frozenset({State.RUNNING, State.PAUSED, State.STOPPING, *ENDS}),
-    State.PAUSED: frozenset({State.QUEUED, *ENDS}),
+    State.PAUSED: frozenset({State.QUEUED, State.WAITING, *ENDS}),
     State.STOPPING: ENDS,
-    State.COMPLETED: frozenset({State.QUEUED}),
+    State.COMPLETED: frozenset({State.QUEUED, State.WAITING}),
     State.FAILED: frozenset({State.QUEUED}),
     State.CANCELLED: frozenset({State.QUEUED}),
 }

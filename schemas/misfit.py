@@ -90,6 +90,11 @@ class MisfitRead(Frozen):
         description="sentences about the latest iteration", examples=[("restitution is at its lower bound, 0",)]
     )
     held_out: float = Field(default=0.0, description="share of the samples that no tuning sees")
+    noise: Statistic = Field(
+        default=None,
+        description="standard deviation of one measured value, pooled over the repeats of all samples and probes, in "
+        "the unit of fitness; null: nothing was repeated",
+    )
     verdicts: tuple[TunableVerdict, ...] = Field(
         default=(), description="which tunables the samples identify; none before the first sample"
     )

@@ -1,16 +1,18 @@
-"""Studies, experiments, repetitions, samples and simulators, as the API returns them.
+"""Studies, experiments and repetitions, as the API returns them; `results` has samples and simulators.
 
 Times are UTC. A fitness of null means failed physics or a failed measurement; JSON has no nan.
 """
 
 from collections.abc import Sequence
-from enum import StrEnum
 from typing import Any, Generic, TypeVar
 
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Id, Moment, Name, Statistic
 from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.results import MeasurementKind as MeasurementKind
+from gaplab.schemas.results import SampleRead as SampleRead
+from gaplab.schemas.results import SimulatorRead as SimulatorRead
 
 T = TypeVar("T")
 
@@ -199,52 +201,3 @@ class AttemptRead(Frozen):
     reason: str | None = Field(
         default=None, description="reason of failure or loss", examples=["no heartbeat for 30 s"]
     )
-
-
-class MeasurementKind(StrEnum):
-    """Purpose of a real-world evaluation: samples are learned from and counted, probes are only recorded."""
-
-    SAMPLE = "sample"
-    PROBE = "probe"
-
-
-class SampleRead(Frozen):
-    """A real-world evaluation."""
-
-    repetition: int
-    iteration: int
-    kind: MeasurementKind
-    genome: tuple[float, ...] = Field(examples=[(0.12, 0.55, 0.83, 0.31)])
-    fitness: Statistic
-    readings: tuple[float | None, ...] | None = Field(
-        default=None,
-        description="what the sensors said, each divided by its noise, all sensors at one time after the other; null: "
-        "the robot has none, or a sensor failed",
-        examples=[(0.4, -1.2, None)],
-    )
-    measured_by: str = Field(examples=["pybullet"])
-    measured_at: Moment
-
-
-class SimulatorRead(Frozen):
-    """A tuned simulator; rank 0 is the best of its iteration."""
-
-    repetition: int
-    iteration: int
-    rank: int
-    parameters: dict[str, float] = Field(examples=[{"static_friction": 1.04, "restitution": 0.02}])
-    squared_error: Statistic = Field(
-        description="discrepancy, summed over the samples so far, which grows with their number; by default squared "
-        "differences in fitness; null if the physics failed on one"
-    )
-    error: Statistic = Field(
-        default=None,
-        description="root mean square error per sample, in the unit of fitness; null without samples too",
-    )
-    intervals: dict[str, tuple[float, float]] | None = Field(
-        default=None,
-        description="95 % interval of each tunable, if the tuner gives them",
-        examples=[{"dynamic_friction": (0.7, 0.9)}],
-    )
-    weight: Statistic = Field(default=None, description="share of the posterior probability, if the tuner gives it")
-    held_out_error: Statistic = Field(default=None, description="discrepancy from held-out samples, of rank 0")

@@ -7,7 +7,7 @@ from pydantic import model_validator
 
 from gaplab.schemas.base import Count, Label, Real, Seed
 from gaplab.schemas.plugin import PluginRef, TunableRef
-from gaplab.schemas.spec import BudgetName, BudgetSpec, ExperimentSpec, RealitySpec
+from gaplab.schemas.spec import BudgetName, BudgetSpec, ExperimentSpec, Probes, RealitySpec
 
 
 class ResolvedTunable(TunableRef):
@@ -33,10 +33,15 @@ class ResolvedBudget(BudgetSpec):
 
 
 class ResolvedReality(RealitySpec):
-    """Reality's engine and hidden parameters; of an imported experiment, some parameters may be unknown."""
+    """Reality with every field; a physical one has no engine and no parameters.
 
-    engine: PluginRef
+    Some hidden parameters of an imported experiment may be unknown. A spec from before there were physical realities
+    has none of their fields.
+    """
+
+    engine: PluginRef | None
     parameters: dict[str, Real]
+    probes: Probes = "each"
 
 
 class ResolvedSpec(ExperimentSpec):

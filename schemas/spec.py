@@ -9,7 +9,9 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from gaplab.schemas.base import Count, Examples, Frozen, Label, Priority, Real, Seed
+from gaplab.schemas.measurements import KnownSample
 from gaplab.schemas.plugin import PluginRef, TunableRef
+from gaplab.schemas.safety import Beyond, LimitsSpec
 
 BudgetName = Literal["smoke", "desk", "paper", "as_published"]
 
@@ -47,15 +49,52 @@ class BudgetSpec(Frozen):
         return {"preset": value} if isinstance(value, str) else value
 
 
-class RealitySpec(Frozen):
-    """Reality: an engine and hidden parameters, which the algorithm may evaluate but not read.
+RealityKind = Literal["simulated", "physical"]
+Probes = Literal["each", "last", "never"]
 
-    A missing engine is that of the simulators. A missing parameter is the robot's; for the quadruped, these are the
-    paper's (static friction 1.0, dynamic friction 0.8, restitution 0.0).
+
+class RealitySpec(Frozen):
+    """Reality: an engine with hidden parameters, or a robot that people or a driver run and measure.
+
+    The algorithm may evaluate reality but not read it. Of a simulated reality, a missing engine is that of the
+    simulators, and a missing parameter is the robot's; for the quadruped, these are the paper's (static friction 1.0,
+    dynamic friction 0.8, restitution 0.0). A physical reality has neither: its measurements are requested, and a
+    repetition waits for each without a core or a process.
     """
 
-    engine: PluginRef | None = None
-    parameters: dict[str, Real] = Field(default_factory=dict)
+    kind: RealityKind = Field(default="simulated", description="`physical`: a robot on a bench; measurements come in")
+    engine: PluginRef | None = Field(default=None, description="of a simulated reality; default: the simulators'")
+    parameters: dict[str, Real] = Field(default_factory=dict, description="hidden; of a simulated reality")
+    bench: Label | None = Field(
+        default=None,
+        description="name of the physical robot; default: the robot's. The requests of one bench are taken one at a "
+        "time, whatever experiment they are of",
+    )
+    repeats: Annotated[Count, Field(le=1_000)] = Field(
+        default=1,
+        description="values of each physical measurement; their mean is the fitness, and their spread is the noise",
+    )
+    samples: tuple[KnownSample, ...] = Field(
+        default=(),
+        max_length=10_000,
+        description="controllers of the physical robot that were measured before; the first simulators are tuned on "
+        "them",
+    )
+    probes: Probes | None = Field(
+        default=None,
+        description="which transferred controllers are measured: of `each` iteration (default), of the `last` (default "
+        "of a physical reality, where each costs), or `never`. Without a probe, the curve has the best sample so far",
+    )
+    limits: LimitsSpec | None = Field(
+        default=None,
+        description="limits of the physical robot; before a controller is offered, the believed simulators forecast "
+        "whether it keeps them",
+    )
+    beyond: Beyond = Field(
+        default="warn",
+        description="`warn`: a controller that is expected to exceed a limit is offered with a warning. `refuse`: it "
+        "is not offered; it counts as tried and failed, and teaches nothing",
+    )
 
 
 class SharedSettings(Frozen):

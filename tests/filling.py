@@ -12,7 +12,8 @@ from sqlalchemy.orm import Session
 from gaplab.schemas.lifecycle import State
 from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.spec import ExperimentSpec
-from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
+from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.specs.rollouts import expected_rollouts
 from gaplab.services.store.models import (
     Base,
     ExperimentRow,

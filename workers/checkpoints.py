@@ -1,18 +1,22 @@
 """Repetitions that deliver steps, checkpoints of the running step, and signs of life."""
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 from time import perf_counter, sleep
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
+import numpy as np
+
+from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.answers import Answer, Answers, pack
 from gaplab.services.core.arrays import Genome
-from gaplab.services.core.errors import RealityFailed, TryAgain
+from gaplab.services.core.errors import RealityAwaited, RealityFailed, TryAgain
 from gaplab.services.core.loop import Setting, repetition
-from gaplab.services.core.types import Outcome, Step
-from gaplab.services.store.lease import Checkpoint, Delivered, Pulse, TimedStep
+from gaplab.services.core.types import Outcome, Selected, Step, Tuned
+from gaplab.services.store.lease import Checkpoint, Delivered, Pulse, Requested, TimedStep
 from gaplab.workers.permits import PermittedReality
 
 CHECKPOINT_S = 10.0
@@ -31,6 +35,8 @@ PAUSES_S = (1.0, 10.0, 60.0)
 
 PASSING = (TryAgain, ConnectionError, TimeoutError, BlockingIOError, InterruptedError, MemoryError)
 """Errors that may pass by themselves."""
+
+log = logging.getLogger("gaplab.worker")
 
 Emit: TypeAlias = Callable[[Delivered | Pulse], None]
 
@@ -98,6 +104,9 @@ class StepRecorder:
             try:
                 for step in repetition(watched, tuple(self._log), lambda: self.answers(watched)):
                     self.end(step)
+            except RealityAwaited as awaited:
+                self._emit(self.request(setting, awaited.genome))
+                return
             except Exception as error:
                 tries = tries + 1 if len(self._log) == steps else 1
                 steps = len(self._log)
@@ -135,6 +144,27 @@ class StepRecorder:
         self._log.append(step)
         self._before_s, self._begun, self._last, self._progressed = 0.0, now, now, now
         self._parts, self._answers = [], []
+
+    def request(self, setting: Setting, genome: Genome) -> Requested:
+        """Return the request for the measurement that the log needs next, with its safety forecast."""
+        last = self._log[-1]
+        kind = MeasurementKind.SAMPLE if isinstance(last, Selected) else MeasurementKind.PROBE
+        return Requested(len(self._log), last.iteration, kind, genome, self._forecast(setting, genome))
+
+    def _forecast(self, setting: Setting, genome: Genome) -> dict[str, Any] | None:
+        """Return what the latest simulators expect of a genome, as JSON; None if nothing can be said."""
+        believed = next((step.simulators for step in reversed(self._log) if isinstance(step, Tuned)), ())
+        if setting.forecast is None or not believed:
+            return None
+        parameters = np.array([simulator.parameters for simulator in believed])
+        try:
+            return setting.forecast(genome, parameters, self._progress).model_dump(mode="json")
+        except Exception:  # a measurement is never held up by its forecast
+            log.exception("the safety forecast failed")
+            return None
+
+    def _progress(self) -> None:
+        self._progressed = perf_counter()
 
     def pulse(self) -> Pulse:
         """Return a sign of life."""

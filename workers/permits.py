@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 
 import ray
 from ray.exceptions import RayError
+from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from gaplab.services.core.arrays import Genome
 from gaplab.services.core.ports import Reality
@@ -34,19 +35,28 @@ Handle: TypeAlias = Any
 class Permits:
     """The permits of one supervisor, in a separate process: they expire even if the supervisor is stopped.
 
+    It runs on the supervisor's node, with which it shares the monotonic clock. So permits that arrive late, because
+    this process or the network stood still, expire in time all the same.
+
     If the process dies, Ray starts another. It permits nothing until the next heartbeat renews the permits.
     """
 
     def __init__(self) -> None:
         self._until: dict[Key, float] = {}
 
-    def renew(self, keys: Sequence[Key], seconds: float) -> None:
-        """Permit these repetitions, and no others, to move hardware for some seconds."""
-        self._until = dict.fromkeys(keys, monotonic() + seconds)
+    def renew(self, keys: Sequence[Key], until: float) -> None:
+        """Permit these repetitions, and no others, to move hardware until a time of the monotonic clock."""
+        self._until = dict.fromkeys(keys, until)
 
     def left(self, key: Key) -> float:
         """Return the seconds for which the repetition may still move hardware; 0 or less if it may not."""
         return self._until.get(key, 0.0) - monotonic()
+
+
+def permits_here() -> Handle:
+    """Start the process of the permits on this process's node."""
+    here = NodeAffinitySchedulingStrategy(ray.get_runtime_context().get_node_id(), soft=False)
+    return Permits.options(scheduling_strategy=here).remote()  # type: ignore[attr-defined]  # Ray adds it
 
 
 def asking(permits: Handle, key: Key) -> Callable[[], float]:

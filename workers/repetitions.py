@@ -1,7 +1,7 @@
 """The repetitions that a supervisor has claimed: it launches them, receives and stores steps, and ends them."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from threading import Event
 from time import monotonic
 
@@ -10,6 +10,7 @@ import ray
 from gaplab.services.core.errors import Conflict, StoreUnavailable
 from gaplab.services.plugins.blame import describe
 from gaplab.services.running import execution
+from gaplab.services.running.silences import Silences
 from gaplab.services.specs.hardware import hardware_of
 from gaplab.services.store.lease import Claim, Failure
 from gaplab.services.store.session import Store
@@ -17,7 +18,7 @@ from gaplab.workers import task
 from gaplab.workers.checkpoints import CHECKPOINT_S
 from gaplab.workers.nodes import Versions
 from gaplab.workers.patience import Patience
-from gaplab.workers.permits import SHARE, Handle, Permits
+from gaplab.workers.permits import SHARE, Handle, permits_here
 from gaplab.workers.plugins import Plugins
 from gaplab.workers.run import Run
 
@@ -61,12 +62,14 @@ class Repetitions:
         self._looked = -WAIT_S
         self._unsure = False
         self._permits: Handle | None = None
+        self._renewed = -lease_s
+        self._silences = Silences()
 
     def launch(self, claim: Claim) -> Run:
         """Give a claimed repetition to a Ray task."""
         hardware = hardware_of(claim.spec) is not None
         if hardware and self._permits is None:
-            self._permits = Permits.remote()  # type: ignore[attr-defined]  # Ray adds it
+            self._permits = permits_here()
         permits = self._permits if hardware else None
         return Run(
             claim, task.run.remote(claim, self._plugins.expected(claim.spec), self._checkpoint_s, permits), permits
@@ -75,12 +78,20 @@ class Repetitions:
     def heartbeat(self) -> None:
         """Renew the claims, stop the runs whose claim is no longer valid, and end those that hang."""
         begun = monotonic()
-        self._drop_all_but(execution.heartbeat(self._store, [run.claim for run in self.runs]))
-        self._permit(begun)
+        held = execution.heartbeat(self._store, [run.claim for run in self.runs])
+        self._renewed = begun
+        self._drop_all_but(held)
+        self._permit()
         for run in self.runs:
             if not run.over and (reason := run.overdue(self._patience)):
                 run.cancel()
                 run.failed = Failure(reason, of_reality=bool(run.pulse and run.pulse.measuring))
+
+    def requeue_lost(self) -> None:
+        """Queue the repetitions of silent supervisors again."""
+        lost = execution.requeue_lost(self._store, stale_after_s=self._lease_s, silences=self._silences)
+        if lost:
+            log.warning("%d repetitions whose supervisor was lost are queued again", lost)
 
     def claim(self, capacity: Callable[[], int]) -> None:
         """Hand back repetitions that should not start now, and claim up to the capacity."""
@@ -151,8 +162,9 @@ class Repetitions:
 
     def hand_back(self, runs: list[Run]) -> None:
         """Stop these runs, and return their leases; without the database, the leases expire."""
-        for run in list(runs):
-            self._stop(run)
+        runs = list(runs)
+        self._stop(runs)
+        for run in runs:
             self.runs.remove(run)
             try:
                 execution.hand_back(self._store, run.claim)
@@ -183,27 +195,27 @@ class Repetitions:
     def _note_measuring(self) -> None:
         """Store for each run, once per measurement, that it waits for reality."""
         noted = [run for run in self.runs if run.pulse and run.pulse.measuring and run.pulse.step != run.measuring]
-        begun = monotonic()
         if noted:
             execution.note_measuring(self._store, [run.claim for run in noted])
         for run in noted:
             run.measuring = run.pulse.step if run.pulse else None
         if noted:
-            self._permit(begun)
+            self._permit()
 
-    def _permit(self, begun: float, but: Run | None = None) -> None:
-        """Permit the runs whose measurement is noted to move their hardware, for a part of the lease since `begun`."""
+    def _permit(self, but: Collection[Run] = ()) -> None:
+        """Permit the runs whose measurement is noted to move hardware, for a part of the lease since its renewal."""
         if self._permits is not None:
             noted = (run for run in self.runs if run.permits is not None and run.measuring is not None)
-            keys = [(run.claim.id, run.claim.epoch) for run in noted if run is not but]
-            self._permits.renew.remote(keys, begun + SHARE * self._lease_s - monotonic())
+            keys = [(run.claim.id, run.claim.epoch) for run in noted if run not in but]
+            self._permits.renew.remote(keys, self._renewed + SHARE * self._lease_s)
 
-    def _stop(self, run: Run) -> None:
-        """End a run's task; a task that moves hardware may stop it first."""
-        if run.permits is not None:
-            self._permit(monotonic(), but=run)
-            run.wait_for_end(STOP_S)
-        run.cancel()
+    def _stop(self, runs: Collection[Run]) -> None:
+        """End the tasks of these runs; one that moves hardware may stop it first."""
+        self._permit(but=runs)
+        for run in runs:
+            if run.permits is not None:
+                run.wait_for_end(STOP_S)
+            run.cancel()
 
     def _complete(self, runs: list[Run]) -> None:
         try:
@@ -219,8 +231,8 @@ class Repetitions:
         """Stop the runs whose claim is no longer valid: cancelled, paused, stopped, handed back, or taken over."""
         claims = set(held)
         dropped = [run for run in self.runs if run.claim not in claims]
+        self._stop(dropped)
         for run in dropped:
-            self._stop(run)
             self.runs.remove(run)
             log.info("dropped: this supervisor no longer holds its lease", extra=run.place)
         if dropped:

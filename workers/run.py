@@ -8,7 +8,7 @@ from ray import ObjectRefGenerator
 from ray.exceptions import RayError, RayTaskError
 
 from gaplab.services.core.errors import ClusterUnusable, PluginDiffers
-from gaplab.services.store.lease import Claim, Delivered, Failure, Pulse
+from gaplab.services.store.lease import Claim, Delivered, Failure, Pulse, Requested
 from gaplab.workers.patience import Patience
 from gaplab.workers.permits import Handle
 from gaplab.workers.task import Batch, told
@@ -24,6 +24,7 @@ class Run:
         permits: actor that gives the permit to move hardware; None if reality is only computed.
         received: deliveries that are not stored yet.
         begun: true once the task has a core.
+        asks: true once it has requested a measurement; the task then ends by itself.
         ended: true once the task has ended.
         failed: reason of a failure: an error of its code, or a limit of time.
         pulse: the last sign of life, if no delivery has followed it.
@@ -38,6 +39,7 @@ class Run:
     permits: Handle | None = None
     received: list[Delivered] = field(default_factory=list)
     begun: bool = False
+    asks: bool = False
     ended: bool = False
     failed: Failure | None = None
     refused: PluginDiffers | None = None
@@ -72,10 +74,12 @@ class Run:
                 self.failed = item
             else:
                 self.received.append(item)
+                self.asks = self.asks or isinstance(item, Requested)
 
     def cancel(self) -> None:
-        """End the task at once."""
-        ray.cancel(self.stream, force=True)
+        """End the task at once; one that ends by itself is left alone, since its process may have begun another."""
+        if not (self.ended or self.asks):
+            ray.cancel(self.stream, force=True)
 
     def wait_for_end(self, longest_s: float) -> None:
         """Wait until the task has ended, and take its last deliveries."""

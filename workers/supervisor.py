@@ -14,6 +14,7 @@ from secrets import token_hex
 from threading import Event
 from time import monotonic
 
+from gaplab.services.bench.taking import open_again
 from gaplab.services.core.errors import RayGone, StoreChanged, StoreUnavailable
 from gaplab.services.running import execution, supervisors
 from gaplab.services.running.pulse import PulsePipe
@@ -143,8 +144,9 @@ class Supervisor:
         self._noted = supervisors.heartbeat(self._store, self._owner, self._noted)
         self._repetitions.heartbeat()
         self._checks.heartbeat()
-        if requeued := execution.requeue_lost(self._store, stale_after_s=self._lease_s):
-            log.warning("%d repetitions whose supervisor was lost are queued again", requeued)
+        self._repetitions.requeue_lost()
+        if opened := open_again(self._store):
+            log.warning("%d requests whose take ran out are open again", opened)
         self._beat = monotonic()
 
     def _wind_down(self) -> None:

@@ -69,7 +69,9 @@ def _prepared(claim: Claim, expected: Versions, permits: Handle | None) -> Setti
 
 
 def _permitted(reality: Reality, claim: Claim, permits: Handle) -> PermittedReality:
-    key, engine = (claim.id, claim.epoch), engine_of(claim.spec.reality.engine)
+    ref = claim.spec.reality.engine
+    assert ref is not None, "permits are for hardware behind an engine"
+    key, engine = (claim.id, claim.epoch), engine_of(ref)
     return PermittedReality(reality, engine.stop, asking(permits, key))
 
 

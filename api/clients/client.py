@@ -14,6 +14,7 @@ from typing import Self
 import httpx2
 
 from gaplab.api.clients.archives import Archives
+from gaplab.api.clients.bench import Bench
 from gaplab.api.clients.connection import PAUSES_S, Connection
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
 from gaplab.api.clients.events import EventLog
@@ -65,6 +66,7 @@ class Client:
         self.figures, self.archives = figures, archives = Figures(connection, records), Archives(connection, records)
         self.reports, self.replays = reports, replays = Reports(connection, records), Replays(connection)
         self.event_log, self.watcher = event_log, watcher = EventLog(connection), Watcher(records, results)
+        self.bench = bench = Bench(connection, records)
 
         self.submit, self.estimate, self.check = submission.submit, submission.estimate, submission.check
         self.find, self.study, self.experiment = records.find, records.study, records.experiment
@@ -80,11 +82,10 @@ class Client:
         self.compare, self.diff, self.curve = results.compare, results.diff, tables.curve
         self.misfit, self.misfit_csv, self.samples = results.misfit, results.misfit_csv, tables.samples
         self.simulators, self.predictions, self.readings = tables.simulators, tables.predictions, tables.readings
-        self.figure, self.figure_kinds = figures.draw, figures.kinds
-        self.verdict, self.report = reports.verdict, reports.save
-        self.replay, self.video = replays.replay, replays.video
+        self.figure, self.figure_kinds, self.verdict = figures.draw, figures.kinds, reports.verdict
+        self.report, self.take_home, self.replay = reports.save, reports.take_home, replays.replay
         self.export, self.import_, self.events = archives.export, archives.import_, event_log.events
-        self.watch, self.wait = watcher.watch, watcher.wait
+        self.watch, self.wait, self.video, self.requests = watcher.watch, watcher.wait, replays.video, bench.requests
 
     def __enter__(self) -> Self:
         return self

@@ -104,9 +104,17 @@ class Connection:
             if (cursor := answer.next) is None:
                 return
 
-    def post(self, kind: type[T], path: str, body: object) -> T:
-        """Return the answer to a POST that may be repeated: with its idempotency key, the service does it only once."""
-        return self.read(kind, self._repeat("POST", path, json=body, headers={"Idempotency-Key": uuid4().hex}))
+    def post(self, kind: type[T], path: str, body: object, *, key: str | None = None) -> T:
+        """Return the answer to a POST that may be repeated: with its idempotency key, the service does it only once.
+
+        Args:
+            kind: type of the answer.
+            path: address.
+            body: JSON.
+            key: the key of an earlier try; left out: a new one.
+        """
+        headers = {"Idempotency-Key": key or uuid4().hex}
+        return self.read(kind, self._repeat("POST", path, json=body, headers=headers))
 
     def change(self, kind: type[T], method: str, path: str, **request: Unpack[Request]) -> T:
         """Return the answer to a request that must not be repeated."""

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from gaplab.api.clients.connection import Connection
+from gaplab.api.clients.connection import Connection, segment
 from gaplab.api.clients.records import Records, path_of
 from gaplab.schemas.reports import VerdictRead
 
@@ -43,6 +43,24 @@ class Reports:
             raise ValueError(f"{path} has no suffix of a report; permitted: {', '.join(FORMATS)}")
         query = {"margin": margin, "margin_of_direct": margin_of_direct}
         content = self._connection.get_bytes(f"{path_of(self._records.find(id))}/report", format=format_, **query)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+        return path
+
+    def take_home(self, id: str, file: str | Path) -> Path:
+        """Write what an experiment found into a file with the suffix .zip, or a page to print into one with .html.
+
+        The zip has the best measured controller with its motion, the tuned simulator with its intervals, the verdict,
+        samples, spec, provenance and the page.
+
+        Args:
+            id: id of the experiment.
+            file: file to write.
+        """
+        path = Path(file)
+        if (format_ := path.suffix.removeprefix(".").lower()) not in ("zip", "html"):
+            raise ValueError(f"{path} has another suffix; permitted: zip, html")
+        content = self._connection.get_bytes(f"/experiments/{segment(id)}/takehome", format=format_)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
         return path

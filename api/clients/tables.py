@@ -47,14 +47,17 @@ class Tables:
     def samples(self, id: str, *, repetition: int | None = None, kind: str | None = None) -> "pandas.DataFrame":
         """Return the real-world evaluations of an experiment, with a column for each gene.
 
+        `repeats` is the number of values whose mean is the fitness. `standard_error` is nan without repeats.
+
         Args:
             id: id of the experiment.
             repetition: only this repetition.
             kind: only "sample" (learned from) or "probe" (only recorded).
         """
         samples = self._samples(id, repetition, kind)
-        columns = ("repetition", "iteration", "kind", "fitness", "measured_by", "measured_at")
-        table = frame([[getattr(sample, name) for name in columns] for sample in samples], columns, ("fitness",))
+        columns = ("repetition", "iteration", "kind", "fitness", "measured_by", "measured_at", "standard_error")
+        rows = [[*(getattr(sample, name) for name in columns), len(sample.repeats or (0,))] for sample in samples]
+        table = frame(rows, (*columns, "repeats"), ("fitness", "standard_error"))
         table["kind"] = table["kind"].astype(str)
         genes = pandas_library().DataFrame([sample.genome for sample in samples], index=table.index)
         return table.join(genes.rename(columns=lambda gene: f"gene_{gene}"))

@@ -21,6 +21,7 @@ app = typer.Typer(
 RUNNING = "Run the service"
 SPECS = "Submit and follow"
 LIFE = "Change what runs"
+BENCH = "Measure a robot on a bench"
 RESULTS = "Read results"
 KEEPING = "Keep and move"
 PLUGINS = "Plug-ins"

@@ -1,4 +1,4 @@
-"""The command that writes reports."""
+"""The commands that write reports, and what one takes home from a bench."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,9 +6,9 @@ from typing import Annotated
 import typer
 
 from gaplab.api.clients.reports import FORMATS
-from gaplab.api.commands.app import RESULTS, AsJson, Id, Url, app, connect
+from gaplab.api.commands.app import BENCH, RESULTS, AsJson, Id, Url, app, connect
 from gaplab.api.commands.comparisons import MarginOption, margins
-from gaplab.api.commands.json_output import print_json
+from gaplab.api.commands.json_output import print_json, print_result
 
 
 @app.command(rich_help_panel=RESULTS)
@@ -39,3 +39,22 @@ def report(
             typer.echo(f"- {sentence}")
     for file in files:
         typer.echo(f"Wrote {file}.", err=as_json)
+
+
+@app.command(rich_help_panel=BENCH)
+def takehome(
+    id: Annotated[str, typer.Argument(metavar="ID", help="an experiment")],
+    file: Annotated[
+        Path | None, typer.Argument(help=".zip, or .html to print; default: gaplab-ID-takehome.zip", show_default=False)
+    ] = None,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Save what one takes home: the best controller, its motion, the tuned simulator, and the verdict."""
+    file = file or Path(f"gaplab-{id}-takehome.zip")
+    if file.suffix.lower() not in {".zip", ".html"}:
+        raise typer.BadParameter(f"{file} has another suffix; permitted: .zip, .html", param_hint="FILE")
+    with connect(url) as client:
+        written = client.take_home(id, file)
+    document = {"file": str(written), "bytes": written.stat().st_size}
+    print_result(document, f"Wrote {written}.", as_json=as_json)

@@ -2,6 +2,8 @@
 /** The page: a bar, and one view at a time, which the address after `#` chooses. */
 
 import { unreachable } from "./lib/api.js";
+import { linkBench } from "./lib/bench/link.js";
+import { keepSending } from "./lib/bench/sender.js";
 import { byId, h } from "./lib/dom.js";
 import { watchHealth } from "./lib/health.js";
 import { empty, failed, loading } from "./lib/placeholders.js";
@@ -14,9 +16,11 @@ const VIEWS = [
   [/^\/compare$/, "compare", []],
   [/^\/replay$/, "replay", []],
   [/^\/toy$/, "toy", []],
+  [/^\/bench$/, "bench", []],
   [/^\/studies\/([\w-]+)$/, "study", ["id"]],
   [/^\/experiments\/([\w-]+)$/, "experiment", ["id"]],
 ];
+const IDS = ["experiment", "request"];
 const ID = /^[\w-]*$/;  // dots and slashes would lead to another path of the service
 
 const AWAY = new Set([0, 502, 503, 504]);
@@ -31,7 +35,7 @@ function viewAtAddress() {
     const match = pattern.exec(path);
     if (!match) continue;
     const parameters = new URLSearchParams(query);
-    if (!ID.test(parameters.get("experiment") ?? "")) return null;
+    if (IDS.some((key) => !ID.test(parameters.get(key) ?? ""))) return null;
     keys.forEach((key, index) => parameters.set(key, match[index + 1]));
     return { name, parameters };
   }
@@ -54,6 +58,7 @@ async function showView() {
     if (view) {
       const { show } = await loadView(view.name);
       if (!signal.aborted) await show(root, view.parameters, signal);
+      linkBench();
     } else showLost(root);
   } catch (error) {
     if (signal.aborted) return;
@@ -114,3 +119,4 @@ addEventListener("hashchange", () => {
 });
 showView();
 watchHealth();
+keepSending();

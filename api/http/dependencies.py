@@ -139,6 +139,11 @@ class Revealing(Parameters):
 def created(once: Once[R], response: Response, location: URLPath) -> R:
     """Return the answer to a submission; headers say where it is, and whether an earlier request submitted it."""
     response.headers["Location"] = str(location)
+    return once_answered(once, response)
+
+
+def once_answered(once: Once[R], response: Response) -> R:
+    """Return the answer; a header says whether an earlier request had it."""
     if once.replayed:
         response.headers["Idempotent-Replayed"] = "true"
     return once.answer

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
-from gaplab.api.http.dependencies import Id, StoreDep
+from gaplab.api.http.dependencies import Id, Parameters, StoreDep
 from gaplab.api.http.figures import in_turn
 from gaplab.api.http.problems import Responses, documented
 from gaplab.api.http.security_headers import page
@@ -18,6 +18,7 @@ from gaplab.services.reports.content import experiment_verdict, study_verdict
 from gaplab.services.reports.document import experiment_report, study_report
 from gaplab.services.reports.html import render_html
 from gaplab.services.reports.pdf import render_pdf
+from gaplab.services.reports.takehome import takehome_page, takehome_zip
 
 router = APIRouter(tags=["reports"])
 
@@ -36,6 +37,25 @@ class ReportQuery(MarginQuery):
     """The format of a report, and the margin of its verdict."""
 
     format: Literal["html", "pdf", "json"] = Field(default="html", description=_FORMATS)
+
+
+_HOME = "a zip with files and a page, or the page alone: one HTML file without scripts, to print"
+_TAKEN_HOME: Responses = {
+    200: {
+        "description": _HOME.capitalize(),
+        "content": {
+            "application/zip": {"schema": {"type": "string", "format": "binary"}, "example": "PK…"},
+            "text/html": _CONTENT["text/html"],
+        },
+    },
+    **documented(404, 409, 422, 429),
+}
+
+
+class TakeHomeQuery(Parameters):
+    """The format of what is taken home."""
+
+    format: Literal["zip", "html"] = Field(default="zip", description=_HOME)
 
 
 @router.get("/studies/{id}/report", summary="Report on a study", response_model=VerdictRead, responses=_RESPONSES)
@@ -58,6 +78,25 @@ def report_experiment(id: Id, store: StoreDep, query: Annotated[ReportQuery, Que
     if query.format == "json":
         return experiment_verdict(store, id, query.chosen())
     return _answer(experiment_report(store, id, query.chosen()), query.format)
+
+
+@router.get(
+    "/experiments/{id}/takehome",
+    summary="Take home what an experiment found",
+    response_class=Response,
+    responses=_TAKEN_HOME,
+)
+def take_home(id: Id, store: StoreDep, query: Annotated[TakeHomeQuery, Query()]) -> Response:
+    """Return the best measured controller, the tuned simulator with its intervals, the verdict, samples and provenance.
+
+    The same results give the same bytes.
+    """
+    if query.format == "html":
+        answer: Response = page(in_turn(lambda: takehome_page(store, id)))
+    else:
+        answer = Response(takehome_zip(store, id, in_turn), media_type="application/zip")
+    answer.headers["Content-Disposition"] = f'inline; filename="gaplab-{id}-takehome.{query.format}"'
+    return answer
 
 
 def _answer(report: Report, format_: Literal["html", "pdf"]) -> Response:

@@ -13,7 +13,7 @@ from gaplab.services.core.space import Space
 from gaplab.services.core.streams import stream
 from gaplab.services.core.tunables import tunables
 from gaplab.services.engines.pybullet import PyBullet
-from gaplab.services.specs.assembly import Simulation
+from gaplab.services.specs.simulation import Simulation
 
 NAMES = ("static_friction", "dynamic_friction", "restitution")
 EPISODE_S = SETTLING_S + COUNTED_S

@@ -24,6 +24,9 @@ EXPORTED = (
     "measurement",
     "simulator",
     "attempt",
+    "request",
+    "answer",
+    "branch",
 )
 """The exported tables, in the order of insertion: each after the tables that it refers to."""
 
@@ -38,6 +41,7 @@ LEFT_OUT: Mapping[str, str] = {
     "notifier": "is a place in the events of one service",
     "deletion": "tells what one service no longer has",
     "view": "is a list of one service",
+    "attachment": "may be large, and private; answers name it by its hash",
     "checkpoint": "is part of an unfinished step, which only its own service continues",
 }
 """Tables that are left out, each with the reason."""
@@ -66,6 +70,13 @@ COLUMNS_LEFT_OUT: Mapping[str, Mapping[str, str]] = {
         "hidden_error": "may name hidden parameters",
     },
     "attempt": {"hidden_reason": "may name hidden parameters"},
+    "request": {
+        "held": "belongs to a take, and an archive has none",
+        "taken_by": "belongs to a take, and an archive has none",
+        "taken_until": "belongs to a take, and an archive has none",
+        "lease_s": "belongs to a take, and an archive has none",
+    },
+    "answer": {"token_id": "names a token of one service"},
 }
 """Columns of exported tables that are left out, each with the reason."""
 

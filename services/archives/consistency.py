@@ -110,8 +110,14 @@ def _checked_spec(row: Row) -> Row:
     if row["iterations"] not in _iterations(spec):
         msg = f"{place} does not fit its experiment, whose repetitions have {row['iterations']:,} iterations"
         raise InvalidArchive(msg)
-    stored = {name: value for name, value in spec.model_dump(mode="json").items() if name in given}
-    return stored | {"reality": stored["reality"] | {"parameters": truth | stored["reality"]["parameters"]}}
+    stored = _fields_of(given, spec.model_dump(mode="json"))
+    reality = _fields_of(given["reality"], stored["reality"])
+    return stored | {"reality": reality | {"parameters": truth | reality["parameters"]}}
+
+
+def _fields_of(given: Row, checked: Row) -> Row:
+    """Return the checked values of the fields that were given, so that an earlier spec does not get later fields."""
+    return {name: value for name, value in checked.items() if name in given}
 
 
 def _iterations(spec: ResolvedSpec) -> set[int]:

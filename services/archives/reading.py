@@ -2,14 +2,15 @@
 
 It is checked in a private database first, and then copied: SQLite has one writer, so the copy must be quick.
 
-An experiment that had not ended is CANCELLED on arrival, since its archive hides the parameters of reality. One that
-had ended arrives unchanged, to the last bit.
+An experiment that had not ended is CANCELLED on arrival, since its archive hides the parameters of reality. Where
+reality is a robot on a bench nothing is hidden, so it goes on. One that had ended arrives unchanged, to the last bit.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
+from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import BoundedSemaphore
@@ -18,6 +19,7 @@ from typing import IO
 from gaplab.schemas.archives import ImportRead
 from gaplab.schemas.events import EventKind
 from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.measurements import RequestState
 from gaplab.services.archives.checking import Row
 from gaplab.services.archives.columns import EXPERIMENT, EXPORTED, columns_of
 from gaplab.services.archives.consistency import check_row, checked_experiments
@@ -33,6 +35,9 @@ from gaplab.services.store.queries import archives
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import new_id
 from gaplab.services.store.session import Session, Store, private_store
+
+_REQUEST_IDS = {"id", "request_id", "same_as", "replaces"}
+"""Columns with the ids of requests and answers."""
 
 AT_ONCE = 4
 """Archives that one process reads at the same time: each takes a core, memory and disk."""
@@ -126,7 +131,9 @@ def _copy(session: Session, checked: CheckedArchive) -> ImportRead:
         study=renamed.get(checked.study, checked.study) if checked.study else None,
         experiments=tuple(ids.values()),
         renamed=renamed | {old: new for old, new in ids.items() if old != new},
-        called_off=tuple(ids[old] for old, row in checked.experiments.items() if not State(row["state"]).ended),
+        called_off=tuple(
+            ids[old] for old, row in checked.experiments.items() if not (State(row["state"]).ended or _is_physical(row))
+        ),
     )
 
 
@@ -148,11 +155,29 @@ def _arriving(table: str, row: Row, experiments: Mapping[str, Row], now: datetim
     row = dict(row)
     if table == "experiment":
         row["spec"] = experiments[row["id"]]["spec"]
+    goes_on = table not in {"study", "provenance"} and _is_physical(experiments[_owner(table, row)])
     if table in {"experiment", "repetition"} and not State(row["state"]).ended:
-        row |= {"state": State.CANCELLED, "ended_at": now}
+        row |= {"state": _resting(State(row["state"]))} if goes_on else {"state": State.CANCELLED, "ended_at": now}
     if table == "attempt" and row.get("ended_at") is None:
-        row |= {"ending": Ending.CANCELLED, "ended_at": now}
+        row |= {"ending": Ending.HANDED_BACK if goes_on else Ending.CANCELLED, "ended_at": now}
+    if table == "request" and row["state"] == RequestState.TAKEN:
+        row |= {"state": RequestState.OPEN}
     return row
+
+
+def _owner(table: str, row: Row) -> str:
+    """Return the id of the experiment that a row belongs to."""
+    owner: str = row["id"] if table == "experiment" else row.get(EXPERIMENT) or row["experiment_id"]
+    return owner
+
+
+def _is_physical(experiment: Row) -> bool:
+    return bool(experiment["spec"]["reality"].get("kind") == "physical")
+
+
+def _resting(state: State) -> State:
+    """Return the state in which open work arrives: none is claimed, and what waited asks again."""
+    return {State.PAUSING: State.PAUSED, State.PAUSED: State.PAUSED}.get(state, State.QUEUED)
 
 
 def _renamed(table: str, row: Row, studies: Mapping[str, str], experiments: Mapping[str, str]) -> Row:
@@ -164,5 +189,12 @@ def _renamed(table: str, row: Row, studies: Mapping[str, str], experiments: Mapp
         row |= {"id": experiments[row["id"]], "study_id": studies.get(study, study)}
         row["hardware"] = hardware_of(spec_of(row["spec"]))
     for name in {EXPERIMENT, "experiment_id"} & set(row):
-        row[name] = experiments[row[name]]
+        before, row[name] = row[name], experiments[row[name]]
+        if table in {"request", "answer"} and before != row[name]:
+            row |= {key: _derived(row[name], row[key]) for key in _REQUEST_IDS & set(row)}
     return row
+
+
+def _derived(experiment: str, id_: str | None) -> str | None:
+    """Return the id of a request or an answer in an experiment whose own id was taken."""
+    return None if id_ is None else sha256(f"{experiment} {id_}".encode()).hexdigest()[:10]

@@ -22,7 +22,6 @@ def curve_points(recorded: FloatArray) -> tuple[CurvePoint, ...]:
     return tuple(curve_point(evaluations, column) for evaluations, column in enumerate(recorded.T))
 
 
-@np.errstate(over="ignore", invalid="ignore")
 def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
     """Return mean, sample standard deviation and 95 % interval of the mean by Student's t, over the finite values.
 
@@ -32,10 +31,7 @@ def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
         evaluations: number of real-world evaluations.
         values: `(r,)` by repetition.
     """
-    there = values[np.isfinite(values)]
-    n = len(there)
-    mean = known(there.mean()) if n else None
-    sd = known(_deviation(there)) if n > 1 else None
+    n, mean, sd = mean_and_deviation(values)
     lower, upper = _interval(mean, sd, n)
     return CurvePoint(
         evaluations=evaluations,
@@ -46,6 +42,17 @@ def curve_point(evaluations: int, values: FloatArray) -> CurvePoint:
         upper=upper,
         values=tuple(float(value) if np.isfinite(value) else None for value in values),
     )
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def mean_and_deviation(values: FloatArray) -> tuple[int, float | None, float | None]:
+    """Return the number of finite values `(r,)`, their mean and their sample standard deviation.
+
+    A statistic is None if there are too few values, or if it overflows.
+    """
+    there = values[np.isfinite(values)]
+    n = len(there)
+    return n, known(there.mean()) if n else None, known(_deviation(there)) if n > 1 else None
 
 
 def _deviation(values: FloatArray) -> float:

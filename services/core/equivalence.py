@@ -12,7 +12,7 @@ from scipy import stats
 from gaplab.schemas.comparisons import Comparison, Equivalence, EquivalenceVerdict, Trusted
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import known
-from gaplab.services.core.statistics import both, constant, constant_difference, finite, holm, moved
+from gaplab.services.core.statistics import both, constant_difference, finite, holm, moved, varies
 
 CONFIDENCE = 0.9
 """Level of the interval that lies within ±margin exactly if both tests have p below 0.05."""
@@ -101,6 +101,6 @@ def _one_test(first: FloatArray, second: FloatArray, shift: float, alternative: 
     if paired:
         fixed = constant_difference(first, second)
         return None if fixed else stats.ttest_1samp(first - second, -shift, alternative=alternative)
-    if constant(first) and constant(second):
+    if not varies(first, second, shift):
         return None
     return stats.ttest_ind(*moved(first, second, shift), equal_var=False, alternative=alternative)

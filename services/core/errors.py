@@ -21,6 +21,7 @@
     ├── PluginBroken         an external plug-in file is unusable, or a plug-in breaks its contract
     ├── PluginDiffers        a process has other versions of plug-ins than the supervisor
     ├── RealityFailed        the code of reality raised an error
+    ├── RealityAwaited       reality is physical, and its answer is not there yet
     ├── TryAgain             a fault that may pass: the step is repeated after a pause
     └── EngineError
         ├── EngineUnavailable    the engine's library is not installed
@@ -33,6 +34,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any
+
+from gaplab.services.core.arrays import FloatArray
 
 
 class GaplabError(Exception):
@@ -163,6 +166,18 @@ class PluginDiffers(GaplabError):
     def __str__(self) -> str:
         """Return the sentences."""
         return "; ".join(self.differences.values())
+
+
+class RealityAwaited(GaplabError):
+    """Reality is physical: the repetition waits for the measurement of a genome.
+
+    Attributes:
+        genome: `(g,)`.
+    """
+
+    def __init__(self, genome: FloatArray) -> None:
+        self.genome = genome
+        super().__init__("a measurement of the physical robot is awaited")
 
 
 class RealityFailed(GaplabError):

@@ -7,8 +7,10 @@ never stopped.
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import reduce
+from math import nan
+from typing import Literal
 
-import numpy as np
 from numpy.random import Generator
 
 from gaplab.services.core.answers import Answers
@@ -20,7 +22,8 @@ from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.held_out import split, tested
 from gaplab.services.core.history import History
 from gaplab.services.core.optimizers.base import Optimizer
-from gaplab.services.core.ports import Reality, Sense, Simulate
+from gaplab.services.core.ports import Forecast, Reality, Sense, Simulate
+from gaplab.services.core.probes import probe_of
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.streams import stream
@@ -66,6 +69,9 @@ class Setting:
         tuner: finds simulators.
         held_out: share of the samples that no tuning sees.
         names: `(p,)`: names of the tunables.
+        probes: iterations whose transferred controller is measured in reality.
+        known_samples: samples from before the experiment, on which the first simulators are tuned.
+        forecast: safety forecast of a controller for a physical robot; None if there is none.
     """
 
     simulate: Simulate
@@ -86,10 +92,17 @@ class Setting:
     tuner: Tuner = field(default_factory=SearchTuner)
     held_out: float = 0.0
     names: tuple[str, ...] = ()
+    probes: Literal["each", "last", "never"] = "each"
+    known_samples: tuple[Sample, ...] = ()
+    forecast: Forecast | None = None
 
     def stream(self, iteration: int, phase: str) -> Generator:
         """Return the random stream of one phase of one iteration."""
         return stream(self.seed, self.strategy.name, self.repetition, iteration, phase)
+
+    def history(self, log: Iterable[Step] = ()) -> History:
+        """Return the result of these steps, which follow the samples from before the experiment."""
+        return reduce(History.after, log, History(samples=self.known_samples))
 
     def answers(self) -> Answers:
         """Return the answers of one step, which count and prefetch its rollouts."""
@@ -105,10 +118,11 @@ def repetition(
         setting: setting of the repetition.
         log: steps so far.
         answers: returns the answers of the next step; default: those of the setting.
+
+    Raises:
+        RealityAwaited: reality is physical; the repetition goes on after a log with the answer.
     """
-    history = History()
-    for step in log:
-        history = history.after(step)
+    history = setting.history(log)
     while (following := next_step(setting, history, (answers or setting.answers)())) is not None:
         yield following
         history = history.after(following)
@@ -117,6 +131,8 @@ def repetition(
 def next_step(setting: Setting, history: History, answers: Answers) -> Step | None:  # noqa: PLR0911 - one a kind of step
     """Return the next step, whose rollouts come from `answers`; None at the end."""
     match history.last:
+        case None if setting.known_samples and setting.strategy.tunes:
+            return _tune(setting, history, 0, answers)
         case None:
             return Tuned(0, _drawn(setting, 0))
         case Tuned(iteration=iteration):
@@ -144,7 +160,7 @@ def _drawn(setting: Setting, iteration: int) -> tuple[Simulator, ...]:
 
 def _keeps(setting: Setting, history: History) -> bool:
     """Return whether simulators and controller stay as they are after the latest sample."""
-    return bool(history.samples) and not setting.strategy.learns(history.samples)
+    return len(history.samples) > len(setting.known_samples) and not setting.strategy.learns(history.samples)
 
 
 def _belief(setting: Setting, history: History) -> Belief:
@@ -188,7 +204,9 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
     strategy, evaluations = setting.strategy, setting.budget.simulator_evaluations
     if not strategy.tunes:
         return Tuned(iteration, history.simulators)
-    seen, unseen = split(history.samples, setting.held_out)
+    known = setting.known_samples
+    seen, unseen = split(history.samples[len(known) :], setting.held_out)
+    seen = known + seen
     ensemble, budget = strategy.ensemble, evaluations * len(seen) + len(unseen)
     if _keeps(setting, history):
         return Tuned(iteration, history.simulators, Cost(saved=budget))
@@ -213,8 +231,7 @@ def _transfer(setting: Setting, history: History, iteration: int, answers: Answe
     """Return the controller that the strategy transfers, from a search if it has one."""
     strategy, evaluations = setting.strategy, setting.budget.controller_evaluations
     allowance = Allowance.of_transfer(strategy, evaluations, setting.parameters.size)
-    if history.transferred is not None and _keeps(setting, history):
-        last = history.transferred
+    if (last := history.transferred) is not None and _keeps(setting, history):
         return Transferred(iteration, last.genome, last.fitness, Cost(saved=allowance.rollouts))
     belief = _belief(setting, history)
     search = _search(setting, belief, answers, allowance, setting.stream(iteration, "transfer"))
@@ -225,19 +242,9 @@ def _transfer(setting: Setting, history: History, iteration: int, answers: Answe
 
 def _probe(setting: Setting, history: History, iteration: int, genome: Genome) -> Probed:
     """Return the probe of the transferred controller; one that was kept is not measured again."""
-    if history.probed is not None and _keeps(setting, history):
-        fitness, readings = history.probed.fitness, history.probed.readings
-    else:
-        fitness, readings = setting.reality(genome)
-    return Probed(iteration, fitness, recorded_fitness(fitness, history.samples), readings)
-
-
-def recorded_fitness(probe: float, samples: Iterable[Sample]) -> float:
-    """Return the larger fitness of the probe and the best sample; nan if every measurement failed.
-
-    It can fall from one iteration to the next. Only its floor, the best sample so far, cannot.
-
-    Source: paper, section 3.
-    """
-    measured = [value for value in (probe, *(each.fitness for each in samples)) if np.isfinite(value)]
-    return max(measured, default=float("nan"))
+    if setting.probes == "never" or (setting.probes == "last" and iteration < setting.iterations):
+        return probe_of(history, iteration, nan, left_out=True)
+    last = history.probed
+    if last is not None and not last.left_out and _keeps(setting, history):
+        return probe_of(history, iteration, last.fitness, last.readings, last.repeats)
+    return probe_of(history, iteration, *setting.reality(genome))

@@ -32,7 +32,7 @@ def compare(first: FloatArray, second: FloatArray) -> tuple[Test, Test, Test]:
     if min(len(first), len(second)) < 2 or constant(np.concatenate([first, second])):
         return UNDEFINED, UNDEFINED, UNDEFINED
     ranks = _test(stats.mannwhitneyu(first, second))
-    if constant(first) and constant(second):
+    if not varies(first, second):
         return UNDEFINED, UNDEFINED, ranks
     first, second = moved(first, second)
     student = stats.ttest_ind(first, second)
@@ -132,16 +132,28 @@ def constant_difference(first: FloatArray, second: FloatArray) -> bool:
     return constant(first - second, np.concatenate([first, second]))
 
 
+def varies(first: FloatArray, second: FloatArray, shift: float = 0.0) -> bool:
+    """Return whether values of a group differ by more than the rounding of `moved` groups."""
+    scale = _scale(first, second, shift)
+    return not (constant(first, scale) and constant(second, scale))
+
+
 def moved(first: FloatArray, second: FloatArray, shift: float = 0.0) -> tuple[FloatArray, FloatArray]:
     """Return groups whose means differ by `shift` more; a constant group becomes 0.
 
-    The variance of equal numbers may differ from 0 by rounding. That of zeros is 0.
+    The variance of equal numbers may differ from 0 by rounding. That of zeros is 0. A group counts as constant if its
+    variation is below the rounding of the largest number that is added or subtracted.
     """
-    if constant(second):
+    scale = _scale(first, second, shift)
+    if constant(second, scale):
         return first - second[0] + shift, np.zeros_like(second)
-    if constant(first):
+    if constant(first, scale):
         return np.zeros_like(first), second - first[0] - shift
     return first + shift, second
+
+
+def _scale(first: FloatArray, second: FloatArray, shift: float) -> FloatArray:
+    return np.concatenate([first, second, [shift]])
 
 
 def _test(result: object, freedom: float | None = None) -> Test:

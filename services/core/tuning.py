@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gaplab.services.core import repeats
 from gaplab.services.core.answers import Answers, Following, nothing
 from gaplab.services.core.arrays import NO_READINGS, Fitnesses, FloatArray, Genomes, Outcomes, Parameters
 from gaplab.services.core.discrepancies.base import Discrepancy
@@ -69,6 +70,8 @@ class Misfit:
         self._times_s = times_s
         self._genomes = np.array([sample.genome for sample in samples])
         self._measured = np.array([self._seen(sample) for sample in samples])
+        self._weights = repeats.weights(samples)
+        self._noise = 0.0 if self.discrepancy.senses else repeats.variance_of_mean(samples)
         self._erred = np.zeros(len(samples))
         self._asked = np.zeros(len(samples))
 
@@ -87,11 +90,11 @@ class Misfit:
     @property
     def noise(self) -> float:
         """Return the variance of a difference of the right simulator, as far as it is known; else 0."""
-        return self.discrepancy.noise(self._measured, self._times_s)
+        return self.discrepancy.noise(self._measured, self._times_s) or self._noise
 
     def of(self, parameters: Parameters) -> FloatArray:
         """Return the whole discrepancy, `(m,)`, of simulators `(m, p)`; inf where the physics failed on a sample."""
-        terms = self._terms(self._outcomes(self._genomes, parameters), self._measured)
+        terms = self._terms(self._outcomes(self._genomes, parameters), slice(None))
         for index, row in enumerate(terms):
             self._learn(index, row)
         return summed(terms)
@@ -100,6 +103,8 @@ class Misfit:
         """Return `(m, r)`: all differences of simulators `(m, p)`, whose squares sum to the discrepancy."""
         outcomes = self._outcomes(self._genomes, parameters)
         found = self.discrepancy.residuals(outcomes, self._measured, self._times_s)
+        if self._weights is not None:
+            found = found * np.sqrt(self._weights)[:, None, None]
         return np.moveaxis(found, 1, 0).reshape(len(parameters), -1)
 
     def _one(self, parameters: Parameters, limit: float) -> float:
@@ -109,7 +114,7 @@ class Misfit:
         genomes, partial = self._genomes[order], 0.0
         for place, index in enumerate(order):
             outcomes = self._outcomes(genomes[place : place + 1], parameters, _first_of(genomes[place + 1 :]))
-            terms[index] = self._terms(outcomes, self._measured[index : index + 1])
+            terms[index] = self._terms(outcomes, slice(index, index + 1))
             partial += self._learn(int(index), terms[index])
             if not partial <= limit * (1.0 + ROUNDING):
                 return -np.inf
@@ -120,8 +125,9 @@ class Misfit:
             return self._answers.sense(genomes, parameters)
         return self._answers(genomes, parameters, following)[..., None]
 
-    def _terms(self, outcomes: Outcomes, measured: FloatArray) -> FloatArray:
-        return self.discrepancy.terms(outcomes, measured, self._times_s)
+    def _terms(self, outcomes: Outcomes, which: slice) -> FloatArray:
+        terms = self.discrepancy.terms(outcomes, self._measured[which], self._times_s)
+        return terms if self._weights is None else terms * self._weights[which, None]
 
     def _seen(self, sample: Sample) -> FloatArray:
         return sample.outcome if self.discrepancy.senses else np.array([sample.fitness])

@@ -32,11 +32,13 @@ class Sample:
         genome: `(g,)`.
         fitness: nan if the measurement failed, which counts but is not learned from.
         readings: `(q,)`: what the sensors said, each divided by its noise; empty if there are none.
+        repeats: `(r,)`: the values whose mean is the fitness; empty if it is one value.
     """
 
     genome: Genome
     fitness: float
     readings: Readings = field(default_factory=no_readings)
+    repeats: FloatArray = field(default_factory=no_readings)
 
     @property
     def outcome(self) -> FloatArray:
@@ -190,12 +192,16 @@ class Probed:
         fitness: fitness in reality; nan if the measurement failed.
         recorded: the larger of this and the best sample's fitness, which the curve shows. Source: section 3.
         readings: `(q,)`: what the sensors said, each divided by its noise; empty if there are none.
+        repeats: `(r,)`: the values whose mean is the fitness; empty if it is one value.
+        left_out: true if the spec asks for no probe of this iteration; its fitness is nan then.
     """
 
     iteration: int
     fitness: float
     recorded: float
     readings: Readings = field(default_factory=no_readings, compare=False)
+    repeats: FloatArray = field(default_factory=no_readings, compare=False)
+    left_out: bool = False
 
 
 Step: TypeAlias = Selected | Measured | Tuned | Transferred | Probed

@@ -151,9 +151,12 @@ class Recording:
         times_s: `(k,)`: times of observation.
         poses: `(k, 7)`: positions and quaternions x, y, z, w of the base's frame; nan where the physics failed.
         angles_rad: `(k, joints)`, in the world's order; None if the engine does not provide them.
+        torques_nm: `(k, joints)`: torques of the motors in the time step before; None if the engine does not provide
+            them.
     """
 
     trajectory: Trajectory
     times_s: FloatArray
     poses: FloatArray
     angles_rad: FloatArray | None
+    torques_nm: FloatArray | None = None

@@ -54,26 +54,37 @@ class SteppedEngine(Engine, Generic[S]):
         return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
 
     def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
-        """Return the same rollout with joint angles."""
+        """Return the same rollout with joint angles and torques."""
         often = replace(motion, observe_s=np.union1d(motion.observe_s, times_s))
         observed, recorded = (np.searchsorted(often.observe_s, times) for times in (motion.observe_s, times_s))
         seen = self._run(world, often, observed, with_angles=True)
-        return recording(motion, times_s, seen[observed, :7], seen[recorded])
+        torques = seen[recorded, 7 + len(world.joints) :]
+        torques[times_s == 0] = 0.0  # no step has ended yet
+        base_and_joints = seen[recorded, : 7 + len(world.joints)]
+        return recording(motion, times_s, seen[observed, :7], base_and_joints, torques)
 
     def close(self) -> None:
         """Close all scenes."""
         self._scenes.close()
 
     def _run(self, world: World, motion: Motion, checked: slice | Rows, *, with_angles: bool) -> FloatArray:
-        """Return `(t, 7)`, or `(t, 7 + joints)` with angles; nan if the poses of the checked rows are implausible."""
+        """Return `(t, 7)`, or `(t, 7 + 2 · joints)` with angles and torques.
+
+        All is nan if the poses of the checked rows are implausible.
+        """
         bare = replace(world, material=Material())
         scene = self._scenes[bare]
-        look = (lambda: np.append(scene.pose(), scene.angles())) if with_angles else scene.pose
+        look = (lambda: _joints_too(scene)) if with_angles else scene.pose
         try:
             seen = watch(scene, self._start(scene, world.material), motion, look)
         except self.failures:
-            seen = np.full((len(motion.observe_s), 7 + with_angles * len(world.joints)), np.nan)
+            seen = np.full((len(motion.observe_s), 7 + with_angles * 2 * len(world.joints)), np.nan)
         if not plausible(seen[checked, :7]):
             self._scenes.drop(bare)  # nan persists in a PhysX scene; Bullet drops bodies that are too far away
             return np.full_like(seen, np.nan)
         return seen
+
+
+def _joints_too(scene: SteppedScene) -> FloatArray:
+    """Return pose, angles and torques of a scene, `(7 + 2 · joints,)`."""
+    return np.concatenate([scene.pose(), scene.angles(), scene.torques()])

@@ -44,6 +44,9 @@ class SteppedScene(Warm, Protocol):
     def angles(self) -> FloatArray:
         """Return the joint angles `(joints,)`, rad, in the world's order."""
 
+    def torques(self) -> FloatArray:
+        """Return the torques of the motors in the last step, `(joints,)`, N·m."""
+
 
 S = TypeVar("S", bound=Warm)
 
@@ -76,12 +79,14 @@ class WarmScenes(Generic[S]):
             self._scenes.popitem()[1].close()
 
 
-def recording(motion: Motion, times_s: FloatArray, poses: FloatArray, seen: FloatArray) -> Recording:
-    """Return a Recording of poses `(t, 7)` and of base and joints `(k, 7 + joints)`; all nan if implausible."""
+def recording(
+    motion: Motion, times_s: FloatArray, poses: FloatArray, seen: FloatArray, torques_nm: FloatArray
+) -> Recording:
+    """Return a Recording of poses `(t, 7)`, base and joints `(k, 7 + joints)`, and torques; all nan if implausible."""
     if not plausible(poses):
         poses, seen = np.full_like(poses, np.nan), np.full_like(seen, np.nan)
     trajectory = Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
-    return Recording(trajectory, times_s, seen[:, :7], seen[:, 7:])
+    return Recording(trajectory, times_s, seen[:, :7], seen[:, 7:], torques_nm)
 
 
 def watch(

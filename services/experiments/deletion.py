@@ -1,7 +1,8 @@
 """Deletion of experiments and studies that have ended, with all of their results.
 
-What they share with others stays: provenances and sensitivity checks, which are about machines and robots. Events stay
-too, because their numbers have no gaps; the last one says that the experiment was deleted.
+What they share with others stays: provenances and sensitivity checks, which are about machines and robots, and files
+that answers of others name. Events stay too, because their numbers have no gaps; the last one says that the experiment
+was deleted.
 """
 
 from collections.abc import Sequence
@@ -14,8 +15,10 @@ from gaplab.schemas.keeping import DeletionRead
 from gaplab.services.core.errors import Conflict, Forbidden
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import (
+    AnswerRow,
     AttemptRow,
     Base,
+    BranchRow,
     CheckpointRow,
     DeletionRow,
     ExperimentProvenanceRow,
@@ -23,15 +26,26 @@ from gaplab.services.store.models import (
     IterationRow,
     MeasurementRow,
     RepetitionRow,
+    RequestRow,
     SimulatorRow,
     StudyRow,
 )
+from gaplab.services.store.queries import attachments
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.queries.experiments import experiments_of, get_experiment, get_study, lock
 from gaplab.services.store.session import Session, transaction
 from gaplab.services.store.statements import storable
 
-_OF_REPETITIONS: tuple[type[Base], ...] = (MeasurementRow, SimulatorRow, IterationRow, CheckpointRow, AttemptRow)
+_OF_REPETITIONS: tuple[type[Base], ...] = (
+    AnswerRow,
+    RequestRow,
+    BranchRow,
+    MeasurementRow,
+    SimulatorRow,
+    IterationRow,
+    CheckpointRow,
+    AttemptRow,
+)
 """Tables of results, each before the tables that it refers to."""
 
 
@@ -113,8 +127,10 @@ def _delete(session: Session, experiments: Sequence[ExperimentRow], by: Deleter,
     if session.scalar(select(row.id).where(row.experiment_id.in_(ids), row.hardware.is_not(None)).limit(1)):
         raise Conflict(f"{what} still holds hardware, whose worker is stopping: delete it in a moment")
     repetitions = select(row.id).where(row.experiment_id.in_(ids)).scalar_subquery()
+    once_named = attachments.named(session, repetitions)
     for table in _OF_REPETITIONS:
         session.execute(delete(table).where(table.__table__.c.repetition_id.in_(repetitions)), execution_options=_SQL)
+    attachments.remove_unnamed(session, once_named)
     for table in (RepetitionRow, ExperimentProvenanceRow):
         session.execute(delete(table).where(table.experiment_id.in_(ids)), execution_options=_SQL)
     session.execute(delete(ExperimentRow).where(ExperimentRow.id.in_(ids)), execution_options=_SQL)

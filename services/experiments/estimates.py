@@ -11,13 +11,8 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import check_extent
 from gaplab.services.settings import Limits
-from gaplab.services.specs.resolution import (
-    expected_rollouts,
-    is_direct,
-    resolve_experiment,
-    resolve_study,
-    takes_samples,
-)
+from gaplab.services.specs.resolution import is_direct, resolve_experiment, resolve_study, takes_samples
+from gaplab.services.specs.rollouts import expected_rollouts
 from gaplab.services.store.queries import costs, supervisors
 from gaplab.services.store.session import Store
 
@@ -77,7 +72,7 @@ def _key(spec: ResolvedSpec) -> Key:
 
 def _engine(spec: ResolvedSpec) -> PluginRef:
     """Return the engine that computes the experiment."""
-    return spec.reality.engine if is_direct(spec) else spec.engine
+    return (spec.reality.engine or spec.engine) if is_direct(spec) else spec.engine
 
 
 def _cost(spec: ResolvedSpec, measured: Mapping[Key, float]) -> EngineCost:

@@ -6,7 +6,7 @@ from sqlalchemy.orm import Session
 
 from gaplab.schemas.records import BestRead, ExperimentRead, FitnessRead, common_count
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.curves import curve_point
+from gaplab.services.core.curves import mean_and_deviation
 from gaplab.services.store.queries.results import last_common, recorded_at
 
 
@@ -23,13 +23,12 @@ def points_at(session: Session, counts: Mapping[str, int]) -> dict[str, FitnessR
         counts: number of real-world evaluations by experiment.
     """
     points = {
-        experiment: curve_point(counts[experiment], frozen(values))
-        for experiment, values in recorded_at(session, counts).items()
+        experiment: mean_and_deviation(frozen(values)) for experiment, values in recorded_at(session, counts).items()
     }
     return {
-        experiment: FitnessRead(evaluations=point.evaluations, n=point.n, mean=point.mean, sd=point.sd)
-        for experiment, point in points.items()
-        if point.mean is not None
+        experiment: FitnessRead(evaluations=counts[experiment], n=n, mean=mean, sd=sd)
+        for experiment, (n, mean, sd) in points.items()
+        if mean is not None
     }
 
 

@@ -9,7 +9,7 @@ from gaplab.schemas.lifecycle import OPEN
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import InvalidSpec, LimitReached, Violation
 from gaplab.services.settings import Limits, variable_of
-from gaplab.services.specs.resolution import expected_rollouts
+from gaplab.services.specs.rollouts import expected_rollouts
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 from gaplab.services.store.session import Session
 

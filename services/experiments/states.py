@@ -1,6 +1,6 @@
 """States. Only this module writes them; the state of an experiment follows from its repetitions."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
 from sqlalchemy import ColumnElement, func, select, update
@@ -11,12 +11,14 @@ from gaplab.schemas.lifecycle import MOVES, State
 from gaplab.services.core.errors import Conflict
 from gaplab.services.store.clock import now
 from gaplab.services.store.models import ExperimentRow, LeasedRow, RepetitionRow
+from gaplab.services.store.queries import requests
 from gaplab.services.store.queries.events import note
 
 _CLAIMABLE = (State.QUEUED, State.RUNNING)
 
 _FOLLOWING_EVENTS = {
     State.RUNNING: EventKind.STARTED,
+    State.WAITING: EventKind.WAITING,
     State.PAUSED: EventKind.PAUSED,
     State.COMPLETED: EventKind.COMPLETED,
     State.FAILED: EventKind.FAILED,
@@ -75,10 +77,10 @@ def _settle(session: Session, experiment: str, requested: State | None) -> None:
         _end_queued(session, experiment)
     counts = _counts(session, experiment)
     queued, running = counts.get(State.QUEUED, 0), counts.get(State.RUNNING, 0)
-    following = _following(state, queued, running, set(counts))
+    following = _following(state, counts)
     claimable = following in _CLAIMABLE and queued > 0 and (limit is None or running < limit)
     values = {"running": running, "claimable": claimable}
-    if following is not state:
+    if following is not state and (state, following) != (State.WAITING, State.RUNNING):
         note(session, _FOLLOWING_EVENTS[following], experiment)
     if following is stored:
         session.execute(update(row).where(row.id == experiment).values(values))
@@ -86,22 +88,25 @@ def _settle(session: Session, experiment: str, requested: State | None) -> None:
         raise Conflict(f"experiment {experiment!r} is {stored} and cannot become {following}")
 
 
-def _following(state: State, queued: int, running: int, states: set[State]) -> State:
+def _following(state: State, repetitions: Collection[State]) -> State:
     """Return the state of an experiment that follows from its repetitions.
 
     Args:
         state: stored or requested state of the experiment.
-        queued: number of queued repetitions.
-        running: number of running repetitions.
-        states: states of all repetitions.
+        repetitions: states of its repetitions.
     """
     if state.ended:
         return state
-    if not queued + running:
-        return next((end for end in (State.COMPLETED, State.FAILED) if end in states), State.CANCELLED)
+    queued, running, waiting = (each in repetitions for each in (State.QUEUED, State.RUNNING, State.WAITING))
+    if not (queued or running or waiting):
+        return next((end for end in (State.COMPLETED, State.FAILED) if end in repetitions), State.CANCELLED)
     if state is State.PAUSING and not running:
         return State.PAUSED
-    return State.RUNNING if state is State.QUEUED and running else state
+    if state in (State.PAUSING, State.PAUSED, State.STOPPING):
+        return state
+    if not (queued or running):
+        return State.WAITING
+    return State.QUEUED if state is State.QUEUED and not running else State.RUNNING
 
 
 def _counts(session: Session, experiment: str) -> dict[State, int]:
@@ -111,8 +116,9 @@ def _counts(session: Session, experiment: str) -> dict[State, int]:
 
 
 def _end_queued(session: Session, experiment: str) -> None:
-    """End the queued repetitions: COMPLETED with a point of the curve, CANCELLED without one."""
+    """End the repetitions that do not run: COMPLETED with a point of the curve, CANCELLED without one."""
     row = RepetitionRow
-    queued = (row.experiment_id == experiment) & (row.state == State.QUEUED)
-    move(session, row, queued & (row.iterations_done > 0), State.COMPLETED, error=None)
-    move(session, row, queued, State.CANCELLED, error=None)
+    queued = (row.experiment_id == experiment) & row.state.in_((State.QUEUED, State.WAITING))
+    ended = move(session, row, queued & (row.iterations_done > 0), State.COMPLETED, error=None)
+    ended += move(session, row, queued, State.CANCELLED, error=None)
+    requests.withdraw(session, ended)

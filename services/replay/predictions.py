@@ -1,6 +1,7 @@
 """Predictions: the fitness of samples in simulation, before and after tuning on them, computed on request."""
 
 from collections.abc import Sequence
+from hashlib import sha256
 from time import monotonic
 
 import numpy as np
@@ -12,8 +13,9 @@ from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.plugins.external import imported_files
 from gaplab.services.plugins.watching import imported
 from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess
-from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, refuse_missing
+from gaplab.services.specs.assembly import edits_of, engine_of, refuse_missing
 from gaplab.services.specs.resolution import unit
+from gaplab.services.specs.simulation import Simulation
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.queries.replays import TunedSample
 from gaplab.services.store.session import Store
@@ -123,7 +125,9 @@ def _items(place: Place, samples: Sequence[TunedSample], answers: AnswerCache) -
 
 
 def _key(place: Place, sample: TunedSample) -> Key:
-    return "prediction", *place, sample.repetition, sample.iteration
+    """Return the key of a prediction; a correction may change the sample of an iteration and its simulators."""
+    computed_from = repr((sample.genome, sample.before, sample.after))
+    return "prediction", *place, sample.repetition, sample.iteration, sha256(computed_from.encode()).hexdigest()
 
 
 def _finite(value: float) -> float | None:

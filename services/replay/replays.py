@@ -1,5 +1,7 @@
 """Replays: the motion of a measured controller in its simulator and in reality, computed on request."""
 
+from hashlib import sha256
+
 from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.replays import ControllerKind, Replay
 from gaplab.schemas.resolved import ResolvedSpec
@@ -10,7 +12,7 @@ from gaplab.services.plugins.external import imported_files
 from gaplab.services.replay.process import Key, RolloutProcess
 from gaplab.services.replay.rollout import ReplayChoice, ReplayRequest, compute_replay
 from gaplab.services.specs.assembly import refuse_missing
-from gaplab.services.specs.hardware import hardware_of
+from gaplab.services.specs.hardware import is_computed
 from gaplab.services.specs.resolution import is_direct, takes_samples
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays
@@ -27,7 +29,8 @@ def replay(store: Store, process: RolloutProcess, experiment_id: str, choice: Re
 def replay_json(store: Store, process: RolloutProcess, experiment_id: str, choice: ReplayChoice) -> bytes:
     """Return a Replay as JSON.
 
-    It shows the motion in reality of a controller that was measured there, and never the parameters of reality.
+    It shows the motion in reality of a controller that was measured there, and never the parameters of reality. A
+    controller that the physical robot is to run next is shown in its simulator alone.
 
     Raises:
         NotFound: the experiment does not exist, or will never have this repetition or iteration.
@@ -42,8 +45,7 @@ def replay_json(store: Store, process: RolloutProcess, experiment_id: str, choic
         spec = spec_of(row.spec)
         _refuse_impossible(row, spec, choice)
         request = _request(session, row, spec, choice)
-    place = row.id, choice.repetition, choice.iteration, choice.kind, request.simulator
-    key: Key = ("replay", *place, imported_files(row.spec))
+    key: Key = ("replay", sha256(repr(request).encode()).hexdigest(), imported_files(row.spec))
     found: bytes | None = process.answers.get(key)
     if found is None:
         refuse_missing(spec, reality=request.known)
@@ -70,7 +72,8 @@ def _refuse_outside(what: str, number: int, first: int, end: int) -> None:
 
 
 def _request(session: Session, row: ExperimentRow, spec: ResolvedSpec, choice: ReplayChoice) -> ReplayRequest:
-    found = replays.measured_controller(session, row.id, choice.repetition, choice.iteration, _MEASURED_AS[choice.kind])
+    which = row.id, choice.repetition, choice.iteration, _MEASURED_AS[choice.kind]
+    found = replays.measured_controller(session, *which) or replays.requested_controller(session, *which)
     if found is None:
         raise Conflict(f"the {_name(choice)} has not been measured in reality yet; try again later")
     own = choice.iteration - (choice.kind is ControllerKind.SAMPLE)
@@ -85,7 +88,7 @@ def _request(session: Session, row: ExperimentRow, spec: ResolvedSpec, choice: R
         simulated=found.simulated if simulator == own and takes_samples(spec) else None,
         real=found.real,
         readings=None if found.readings is None else tuple(found.readings),
-        known=None not in row.spec["reality"]["parameters"].values() and hardware_of(spec) is None,
+        known=None not in row.spec["reality"]["parameters"].values() and is_computed(spec),
     )
 
 

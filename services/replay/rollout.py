@@ -13,7 +13,8 @@ from gaplab.services.core.robots.base import Robot, Sensors
 from gaplab.services.core.world import Recording, World
 from gaplab.services.plugins.watching import imported
 from gaplab.services.replay.shapes import feet_of, labels, shapes_of
-from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, reality_of
+from gaplab.services.specs.assembly import edits_of, engine_of, reality_of
+from gaplab.services.specs.simulation import Simulation
 
 FRAMES_PER_S = 50
 LONGEST_S = 20.0
@@ -88,7 +89,7 @@ def compute_replay(request: ReplayRequest) -> bytes:
         world, recording = simulate.record(genome, np.array(request.parameters), times)
         simulation = _shown(robot, spec.engine.name, world, recording, request.simulated)
         readings = simulate.sense(genome[None, :], np.array([request.parameters]))[0, 0, 1:]
-    if request.known:
+    if request.known and spec.reality.engine is not None:
         truth, real = reality_of(spec, robot)
         world, recording = real.record(genome, truth, times)
         reality = _shown(robot, spec.reality.engine.name, world, recording, request.real)

@@ -31,10 +31,10 @@ def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") 
         found = sorted(
             tunings.best_simulators(session, experiment_id), key=lambda each: (each.repetition, each.iteration)
         )
-        tuned_on = tunings.measured(session, row).tuned_on
+        measured = tunings.measured(session, row)
     spec = spec_of(row.spec)
     space = parameters_of(spec.tunables)
-    samples = [tunings.samples_until(tuned_on, each.repetition, each.iteration) for each in found]
+    samples = [measured.tuned_until(each.repetition, each.iteration) for each in found]
     discrepancy = discrepancy_of(row.spec)
     pairs = zip(found, samples, strict=True)
     errors = tuple(tunings.per_sample(each.squared_error, count, discrepancy) for each, count in pairs)

@@ -3,6 +3,7 @@
 import csv
 import io
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import replace
 from math import inf, nan
 
@@ -14,6 +15,7 @@ from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.identification import Means, overfitting, verdicts
 from gaplab.services.core.misfit import Tuning, misfit_point, remarks
+from gaplab.services.core.repeats import pooled_variance
 from gaplab.services.core.robots import robots
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tuners import tuners
@@ -39,6 +41,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         simulators = tunings.best_simulators(session, experiment_id)
         measured = tunings.measured(session, row)
         members = tunings.posteriors(session, experiment_id)
+        repeated = tunings.repeats(session, experiment_id)
     spec, discrepancy = spec_of(row.spec), discrepancy_of(row.spec)
     posteriors = {place: _deviations(*found) for place, found in members.items()}
     by_iteration: dict[int, list[Tuning]] = defaultdict(list)
@@ -60,6 +63,7 @@ def misfit(store: Store, experiment_id: str) -> MisfitRead:
         points=points,
         remarks=(*remarks(points, unit(spec), error_unit), *([unseen] if unseen else [])),
         held_out=spec.held_out,
+        noise=_noise([*repeated, *(sample.values for sample in spec.reality.samples)]),
         verdicts=verdicts(points, _means(spec)),
     )
 
@@ -85,14 +89,20 @@ def _tuning(best: BestSimulator, measured: MeasuredIterations, posterior: FloatA
     return Tuning(
         parameters=frozen(best.parameters),
         squared_error=inf if best.squared_error is None else best.squared_error,
-        samples=tunings.samples_until(measured.tuned_on, *place),
+        samples=measured.tuned_until(*place),
         simulated=nan if best.simulated is None else best.simulated,
         real=nan if best.real is None else best.real,
         held_out_error=nan if best.held_out_error is None else best.held_out_error,
-        held_out=tunings.samples_until(measured.held_out, *place),
+        held_out=measured.tested_until(*place),
         interval=None if pairs is None else frozen(pairs),
         posterior=posterior,
     )
+
+
+def _noise(measured: Sequence[Sequence[float]]) -> float | None:
+    """Return the standard deviation of one value, pooled over measurements; None if none has repeats."""
+    repeated = [frozen(values) for values in measured if len(values) > 1]
+    return pooled_variance(repeated) ** 0.5 if repeated else None
 
 
 def _deviations(members: list[list[float]], weights: list[float]) -> FloatArray | None:

@@ -14,8 +14,9 @@ from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments import hiding
-from gaplab.services.specs.assembly import Simulation, edits_of, engine_of, reality_of
+from gaplab.services.specs.assembly import edits_of, engine_of, reality_of
 from gaplab.services.specs.resolution import is_direct
+from gaplab.services.specs.simulation import Simulation
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays, results
 from gaplab.services.store.queries.replays import MeasuredController
@@ -78,7 +79,9 @@ def _stored(session: Session, experiment_id: str, repetition: int, iterations: S
         row=row,
         spec=spec,
         robot=robot,
-        shown=row.id not in hiding.hidden(session, [row]) and None not in row.spec["reality"]["parameters"].values(),
+        shown=spec.reality.engine is not None
+        and row.id not in hiding.hidden(session, [row])
+        and None not in row.spec["reality"]["parameters"].values(),
         measured=measured,
         simulators=simulators,
         transferred={

@@ -50,7 +50,7 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
     with store.reading() as session:
         row = experiments.get_experiment(session, experiment_id)
         simulators = tunings.best_simulators(session, experiment_id) if row.iterations > 1 else ()
-        tuned_on = tunings.measured(session, row).tuned_on
+        measured = tunings.measured(session, row)
         hidden = row.id in hiding.hidden(session, [row])
     spec, discrepancy = spec_of(row.spec), discrepancy_of(row.spec)
     errors: dict[int, dict[int, float | None]] = defaultdict(dict)
@@ -58,8 +58,9 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
     for simulator in simulators:
         if at := simulator.iteration:
             errors[at][simulator.repetition] = simulator.squared_error
-            samples[at][simulator.repetition] = tunings.samples_until(tuned_on, simulator.repetition, at)
-    elsewhere = spec.reality.engine.name != spec.engine.name
+            samples[at][simulator.repetition] = measured.tuned_until(simulator.repetition, at)
+    real = spec.reality.engine
+    elsewhere = real is None or real.name != spec.engine.name
     return TunedSimulators(
         unit=unit(spec),
         error=ErrorKind(
@@ -72,7 +73,7 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
         errors=errors,
         samples=samples,
         truth={} if elsewhere else None if hidden else spec.reality.parameters,
-        real_engine=spec.reality.engine.name if elsewhere else None,
+        real_engine=None if real is None or not elsewhere else real.name,
     )
 
 

@@ -23,11 +23,13 @@ from gaplab.services.running.leases import Change
 from gaplab.services.running.repetition_leases import RepetitionLeases, pause
 from gaplab.services.running.turns import FREE_HARDWARE, ahead, next_repetitions
 from gaplab.services.running.versions import provenance as present_provenance
+from gaplab.services.running.waiting import wait
 from gaplab.services.store.clock import now
 from gaplab.services.store.lease import Checkpoint as Checkpoint
 from gaplab.services.store.lease import Claim as Claim
 from gaplab.services.store.lease import Delivered as Delivered
 from gaplab.services.store.lease import Failure as Failure
+from gaplab.services.store.lease import Requested as Requested
 from gaplab.services.store.lease import TimedStep as TimedStep
 from gaplab.services.store.models import AttemptRow, ExperimentRow, RepetitionRow
 from gaplab.services.store.queries import attempts, checkpoints, steps
@@ -108,7 +110,7 @@ def record_all(store: Store, deliveries: Iterable[tuple[Claim, Iterable[Delivere
 
     A second delivery of a step changes nothing. A checkpoint is kept until its step is recorded. Nothing is written for
     a claim that does not hold. A claim whose experiment is being paused or stopped ends with its first new step, which
-    is written.
+    is written. A claim that requests a measurement ends, and its repetition waits.
 
     Raises:
         Conflict: steps before a delivered one are missing; nothing was written.
@@ -199,7 +201,12 @@ def _claims(session: Session, ids: Sequence[int]) -> tuple[Claim, ...]:
 def _record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -> tuple[Claim, ...]:
     requested = _locked_requests(session, deliveries)
     held = steps.record(session, deliveries)
-    leaving = {claim.id for claim, new_steps in held.items() if new_steps and claim.experiment_id in requested}
+    asked = {claim: item for claim in held for item in deliveries[claim] if isinstance(item, Requested)}
+    leaving = {
+        claim.id
+        for claim, new_steps in held.items()
+        if (new_steps or claim in asked) and claim.experiment_id in requested
+    }
     if leaving:
         row = RepetitionRow
         iterations = select(ExperimentRow.iterations).where(ExperimentRow.id == row.experiment_id).correlate(row)
@@ -207,7 +214,8 @@ def _record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) -
         _LEASES.end(session, done, Change(State.COMPLETED, Ending.COMPLETED, values={"owner": None}))
         handed_back = Change(State.QUEUED, Ending.HANDED_BACK, values={"owner": None})
         _LEASES.end(session, row.id.in_(leaving), handed_back)
-    return tuple(claim for claim in held if claim.id not in leaving)
+    waiting = wait(session, {claim: item for claim, item in asked.items() if claim.id not in leaving})
+    return tuple(claim for claim in held if claim.id not in leaving and claim not in waiting)
 
 
 def _locked_requests(session: Session, claims: Iterable[Claim]) -> dict[str, State]:

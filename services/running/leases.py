@@ -12,11 +12,12 @@ from dataclasses import dataclass, field
 from datetime import timedelta
 from typing import Any, ClassVar, Generic, TypeVar
 
-from sqlalchemy import ColumnElement, func, true, tuple_, update
+from sqlalchemy import ColumnElement, false, func, select, tuple_, update
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.lifecycle import Ending, State
 from gaplab.services.experiments.states import move
+from gaplab.services.running.silences import Silences
 from gaplab.services.store.clock import moment, now
 from gaplab.services.store.lease import Lease
 from gaplab.services.store.models import LeasedRow
@@ -102,20 +103,27 @@ class Leases(Generic[L]):
         ids = [lease.id for lease in known]
         return len(store.write(self._hand_back, (self.table.owner == owner) & self.table.id.not_in(ids)))
 
-    def requeue_lost(self, store: Store, *, stale_after_s: float = STALE_AFTER_S) -> int:
+    def requeue_lost(
+        self, store: Store, *, stale_after_s: float = STALE_AFTER_S, silences: Silences | None = None
+    ) -> int:
         """Queue work again whose holder was silent for too long, and return the number of rows.
 
         A heartbeat from the future was sent before the clock was set back, and says nothing about the present.
+
+        Args:
+            store: the database.
+            stale_after_s: seconds of silence.
+            silences: silences of the holders of hardware; left out: the database's clock says how long those are too.
         """
-        return len(store.write(self._requeue_lost, stale_after_s))
+        return len(store.write(self._requeue_lost, stale_after_s, silences))
 
     def release_all(self, store: Store, owner: str, reason: str) -> int:
         """Queue the work of a supervisor again whose process has ended, and return the number of rows."""
-        return len(store.write(self.lose, (self.table.owner == owner) & self.releasable(), storable(reason)))
+        return len(store.write(self.lose, (self.table.owner == owner) & ~self.drives(), storable(reason)))
 
-    def releasable(self) -> ColumnElement[bool]:
-        """Return the SQL condition: the work may go to others before its lease expires; always by default."""
-        return true()
+    def drives(self) -> ColumnElement[bool]:
+        """Return the SQL condition: the work holds hardware, which its worker may still drive; never by default."""
+        return false()
 
     def take(self, session: Session, ids: Sequence[int | str], owner: str) -> list[Any]:
         """Begin a lease on each of these queued rows, and return the ids of those that were still free."""
@@ -170,9 +178,15 @@ class Leases(Generic[L]):
         values = {"owner": None, "attempts": self.table.attempts - 1}
         return self.end(session, which, Change(State.QUEUED, Ending.HANDED_BACK, values=values))
 
-    def _requeue_lost(self, session: Session, stale_after_s: float) -> list[Any]:
+    def _requeue_lost(self, session: Session, stale_after_s: float, silences: Silences | None) -> list[Any]:
         beat, present, patience = self.table.heartbeat_at, moment(session), timedelta(seconds=stale_after_s)
         silent, ahead = beat < present - patience, beat > present + patience
+        if silences is not None:
+            drives = self.drives()
+            held = session.execute(select(self.table.id, beat).where(drives, beat.is_not(None)))
+            quiet = silences.longer_than(stale_after_s, dict(held.all()))
+            silent = (~drives & silent) | (drives & tuple_(self.table.id, beat).in_(quiet.items()))
+            ahead = ~drives & ahead
         self.free_lost(session, silent | ahead)
         lost = self.lose(session, silent, f"its worker was not heard of for {stale_after_s:g} s")
         return lost + self.lose(session, ahead, "the clock was set back since its heartbeat")

@@ -52,16 +52,14 @@ class RepetitionLeases(Leases[Claim]):
                 pause(session, experiment, f"a measurement was cut off {losses} times; the last time {reason}")
         return queued + super().lose(session, which, reason)
 
-    def releasable(self) -> ColumnElement[bool]:
-        """Return the SQL condition: the repetition holds no hardware, which its worker may still drive for a moment."""
-        return self.table.hardware.is_(None)
+    def drives(self) -> ColumnElement[bool]:
+        """Return the SQL condition: the repetition holds hardware, which its worker may still drive for a moment."""
+        return self.table.hardware.is_not(None)
 
     def free_lost(self, session: Session, stale: ColumnElement[bool]) -> None:
         """Free the hardware of ended leases whose supervisor never reported that its worker has stopped."""
         row = self.table
-        session.execute(
-            update(row).where(stale, row.state != State.RUNNING, row.hardware.is_not(None)).values(hardware=None)
-        )
+        session.execute(update(row).where(stale, row.state != State.RUNNING, self.drives()).values(hardware=None))
 
     def end(self, session: Session, which: ColumnElement[bool], change: Change) -> list[int]:
         """End leases as the base does; if the experiment is being paused or stopped, a hand-back is recorded as that.

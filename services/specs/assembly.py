@@ -1,8 +1,7 @@
 """Assembly: from a resolved spec to the simulation and the reality of its repetitions."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
-from functools import cache, lru_cache, partial
+from functools import cache, partial
 from types import ModuleType
 
 import numpy as np
@@ -11,11 +10,12 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked
 from gaplab.services.core import external_plugins
-from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters, frozen
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters, frozen
 from gaplab.services.core.discrepancies import discrepancies
-from gaplab.services.core.errors import PluginBroken, RealityFailed, gather
+from gaplab.services.core.errors import RealityFailed, gather
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.optimizers import optimizers
+from gaplab.services.core.ports import PhysicalReality, Reality, Simulate
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.sensitivity import Subject
@@ -25,76 +25,11 @@ from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.types import Budget, Outcome
-from gaplab.services.core.world import Recording, Trajectory, World
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
-
-WORLDS_KEPT = 4096
-
-
-class Simulation:
-    """A Simulate of one robot on one engine, in worlds that tunables edit."""
-
-    def __init__(self, robot: Robot, engine: Engine, edits: Sequence[Tunable]) -> None:
-        self._robot = robot
-        self._engine = engine
-        self._edits = tuple(edits)
-        self._world = lru_cache(maxsize=WORLDS_KEPT)(self._edited)
-
-    def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
-        """Return the `(n, m)` fitnesses of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed.
-
-        An infinite fitness counts as failed physics.
-        """
-        worlds = [self._world(tuple(row)) for row in parameters.tolist()]
-        motions = [self._robot.motion(genome) for genome in genomes]
-        return self._fitnesses(self._engine.rollouts(worlds, motions), len(genomes), len(parameters))
-
-    def sense(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
-        """Return fitness and readings `(n, m, 1 + q)`: the fitness of a call, then each reading over its noise.
-
-        A robot without sensors has no readings.
-        """
-        sensors = self._robot.sensors
-        worlds = [self._world(tuple(row)) for row in parameters.tolist()]
-        motions = [self._robot.motion(genome) for genome in genomes]
-        observed_s = motions[0].observe_s
-        often_s = np.union1d(observed_s, sensors.times_s)
-        seen = self._engine.rollouts(worlds, [replace(motion, observe_s=often_s) for motion in motions])
-        fitnesses = self._fitnesses(_at(seen, observed_s), len(genomes), len(parameters))
-        if not sensors.size:
-            return fitnesses[..., None]
-        values = self._robot.sense(_at(seen, sensors.times_s))
-        expected = (len(genomes), len(parameters), len(sensors.times_s), len(sensors.names))
-        if np.shape(values) != expected:
-            found = f"robot {self._robot.name!r} returned readings of shape {np.shape(values)}"
-            raise PluginBroken(f"{found}; permitted: {expected}")
-        failed = np.isnan(fitnesses)[..., None]
-        return np.concatenate([fitnesses[..., None], np.where(failed, np.nan, sensors.standardised(values))], axis=-1)
-
-    def _fitnesses(self, seen: Trajectory, genomes: int, simulators: int) -> Fitnesses:
-        fitnesses = self._robot.fitness(seen)
-        if np.shape(fitnesses) != (genomes, simulators):
-            expected = f"the fitness of {genomes} genomes in {simulators} simulators"
-            raise PluginBroken(f"robot {self._robot.name!r} returned {np.shape(fitnesses)} numbers for {expected}")
-        return np.where(np.isfinite(fitnesses), fitnesses, np.nan)
-
-    def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:
-        """Return the world of a simulator `(p,)`, and the rollout of a genome in it, recorded at times `(k,)` too."""
-        world = self._world(tuple(parameters.tolist()))
-        return world, self._engine.record(world, self._robot.motion(genome), times_s)
-
-    def _edited(self, values: tuple[float, ...]) -> World:
-        world = self._robot.world
-        for tunable, value in zip(self._edits, values, strict=True):
-            world = tunable.edit(world, value)
-        return world
-
-
-def _at(seen: Trajectory, times_s: FloatArray) -> Trajectory:
-    """Return the observations at some of the times of a trajectory."""
-    where = np.searchsorted(seen.times_s, times_s)
-    return Trajectory(times_s, seen.positions_m[..., where, :], seen.orientations[..., where, :])
+from gaplab.services.specs.forecasts import forecast_of
+from gaplab.services.specs.measured import samples_of
+from gaplab.services.specs.simulation import Simulation
 
 
 class HiddenReality:
@@ -148,13 +83,13 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
     robot = robots.create(spec.robot)
     strategy = strategies.create(spec.strategy)
     edits = edits_of(ref.name for ref in spec.tunables)
-    truth, real = reality_of(spec, robot)
     engine = engine_of(spec.engine)
     simulation = Simulation(robot, engine, edits)
+    simulate, reality = _realities(spec, robot, simulation, in_reality=strategy.in_reality)
     return Setting(
-        simulate=EvolutionInReality(real, truth) if strategy.in_reality else simulation,
+        simulate=simulate,
         sense=simulation.sense,
-        reality=MeasuredReality(real, truth),
+        reality=reality,
         strategy=strategy,
         optimizer=optimizers.create(spec.optimizer),
         genomes=robot.space,
@@ -170,7 +105,20 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
         held_out=spec.held_out,
         reading_times_s=robot.sensors.reading_times_s,
         names=tuple(ref.name for ref in spec.tunables),
+        probes=spec.reality.probes,
+        known_samples=samples_of(spec),
+        forecast=forecast_of(spec, robot, simulation),
     )
+
+
+def _realities(
+    spec: ResolvedSpec, robot: Robot, simulation: Simulation, *, in_reality: bool
+) -> tuple[Simulate, Reality]:
+    """Return the ways to evaluate a controller in simulation and in reality."""
+    if spec.reality.kind == "physical":
+        return simulation, PhysicalReality()
+    truth, real = reality_of(spec, robot)
+    return EvolutionInReality(real, truth) if in_reality else simulation, MeasuredReality(real, truth)
 
 
 def subject(checked: Checked) -> Subject:
@@ -187,7 +135,8 @@ def subject(checked: Checked) -> Subject:
 
 
 def reality_of(spec: ResolvedSpec, robot: Robot) -> tuple[FloatArray, Simulation]:
-    """Return the hidden parameters `(p,)` of reality, and the simulation on its engine."""
+    """Return the hidden parameters `(p,)` of a simulated reality, and the simulation on its engine."""
+    assert spec.reality.engine is not None, "a physical reality has no engine"
     edits = edits_of(spec.reality.parameters)
     truth = np.array(list(spec.reality.parameters.values()))
     return truth, Simulation(robot, engine_of(spec.reality.engine), edits)
@@ -212,7 +161,9 @@ def refuse_missing(spec: ResolvedSpec, *, reality: bool = False) -> None:
     Raises:
         InvalidSpec: a plug-in is missing; perhaps its file was removed.
     """
-    needed = [(spec.engine, "/engine"), *([(spec.reality.engine, "/reality/engine")] if reality else [])]
+    needed = [(spec.engine, "/engine")]
+    if reality and spec.reality.engine is not None:
+        needed.append((spec.reality.engine, "/reality/engine"))
     names = [*(ref.name for ref in spec.tunables), *(spec.reality.parameters if reality else ())]
     gather(
         lambda: robots.check(spec.robot, "/robot"),

@@ -8,11 +8,9 @@ from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.resolved import ResolvedBudget, ResolvedReality, ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked, SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, SharedSettings, StudySpec
-from gaplab.services.core.controller_search import Allowance
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import InvalidSpec, Violation, gather
-from gaplab.services.core.held_out import is_held_out
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.registry import Registry
@@ -25,6 +23,7 @@ from gaplab.services.core.tuners import tuners
 from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.specs.bench_violations import bench_violations
 from gaplab.services.specs.default_engines import default_engine, runs
 from gaplab.services.specs.presets import PRESETS, Preset
 from gaplab.services.specs.violations import (
@@ -35,6 +34,9 @@ from gaplab.services.specs.violations import (
     tunable_violations,
     tuning_violations,
 )
+
+SIMULATED_PROBES, PHYSICAL_PROBES = "each", "last"
+"""Which transferred controllers are measured by default."""
 
 NEED_NO_OTHERS: tuple[Registry[Any], ...] = (robots, strategies, optimizers, discrepancies, tuners)
 """The kinds of plug-ins of a spec that can be created without others; the field of each has the name of its kind."""
@@ -50,10 +52,11 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     spec = _as_published(spec) if preset.as_published else spec
     robot, strategy, optimizer, discrepancy, tuner = _created(spec)
     simulated = spec.engine or PluginRef(name=default_engine(robot))
-    real = spec.reality.engine or simulated
+    physical = spec.reality.kind == "physical"
+    real = simulated if physical else spec.reality.engine or simulated
     engine, reality_engine = gather(
         lambda: _engine(simulated, robot, "/engine"),
-        lambda: _engine(real, robot, "/reality/engine" if spec.reality.engine else "/engine"),
+        lambda: _engine(real, robot, "/reality/engine" if spec.reality.engine and not physical else "/engine"),
     )
     budget = _budget(spec, preset)
     if violations := [
@@ -61,6 +64,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         *strategy_violations(spec, strategy, robot),
         *tuning_violations(robot, discrepancy, tuner),
         *reality_violations(spec, strategy, engine, reality_engine),
+        *bench_violations(spec, robot),
         *budget_violations(budget, strategy, optimizer, len(spec.tunables)),
     ]:
         raise InvalidSpec(violations)
@@ -74,7 +78,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         engine=_completed(engines, simulated),
         tunables=tuple(_with_bounds(ref) for ref in spec.tunables),
         held_out=spec.held_out,
-        reality=ResolvedReality(engine=_completed(engines, real), parameters=_truth(spec, robot, reality_engine)),
+        reality=_physical(spec, robot) if physical else _simulated(spec, robot, real, reality_engine),
         budget=budget,
         seed=spec.seed,
     )
@@ -165,23 +169,6 @@ def unit(spec: ExperimentSpec | Checked) -> str:
     return robots[spec.robot.name].unit if spec.robot.name in robots else ""
 
 
-def expected_rollouts(spec: ResolvedSpec) -> int:
-    """Return the number of simulated rollouts in one repetition; real-world evaluations do not count.
-
-    The evaluations of the direct baseline would be real ones. They count, because they are its whole cost.
-    """
-    strategy, tunables = strategies.create(spec.strategy), len(spec.tunables)
-    budget, iterations = spec.budget, spec.iterations if strategy.takes_samples else 0
-    selection = Allowance.of_selection(strategy, budget.selection_evaluations, tunables)
-    transfer = Allowance.of_transfer(strategy, budget.controller_evaluations, tunables)
-    tuning = sum(
-        (iterations + 1 - number) * (1 if is_held_out(number, spec.held_out) else budget.simulator_evaluations)
-        for number in range(1, iterations + 1)
-    )
-    tuned = tuning if strategy.tunes else 0
-    return transfer.rollouts * (iterations + 1) + selection.rollouts * iterations + tuned
-
-
 def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
     """Return the engine if it is installed and can run the robot."""
     engine, _ = engines.check(ref, pointer)
@@ -212,6 +199,30 @@ def _label(strategy: Strategy) -> str:
 def _with_bounds(ref: TunableRef) -> ResolvedTunable:
     lower, upper = bounds_of(ref)
     return ResolvedTunable(name=ref.name, lower=lower, upper=upper)
+
+
+def _simulated(spec: ExperimentSpec, robot: Robot, ref: PluginRef, engine: type[Engine]) -> ResolvedReality:
+    """Return a simulated reality with every field."""
+    truth = _truth(spec, robot, engine)
+    return ResolvedReality(
+        engine=_completed(engines, ref), parameters=truth, probes=spec.reality.probes or SIMULATED_PROBES
+    )
+
+
+def _physical(spec: ExperimentSpec, robot: Robot) -> ResolvedReality:
+    """Return a physical reality with every field."""
+    given = spec.reality
+    return ResolvedReality(
+        kind="physical",
+        engine=None,
+        parameters={},
+        bench=given.bench or robot.name,
+        repeats=given.repeats,
+        probes=given.probes or PHYSICAL_PROBES,
+        samples=given.samples,
+        limits=given.limits,
+        beyond=given.beyond,
+    )
 
 
 def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str, float]:

@@ -102,6 +102,14 @@ def reality_violations(
         simulated: engine of the simulators.
         engine: of reality.
     """
+    if spec.reality.kind == "physical":
+        yield from _physical_violations(spec, strategy)
+        return
+    for name in ("bench", "repeats", "samples", "limits", "beyond"):
+        if name in spec.reality.model_fields_set and getattr(spec.reality, name) not in (None, 1, (), "warn"):
+            message = f"{name} is of a physical reality, and this one is simulated"
+            value = spec.reality.model_dump(mode="json")[name]
+            yield Violation(f"/reality/{name}", value, message, "left out, or kind: physical")
     if strategy.in_reality and engine is not simulated and not engine.repeatable:
         message = f"{strategy.name} evolves in reality itself, and the engine {engine.name!r} may move hardware"
         yield Violation("/strategy", strategy.name, message, "another strategy, or an engine with `repeatable = True`")
@@ -112,6 +120,23 @@ def reality_violations(
             continue
         yield from _honour_violations(name, engine, pointer)
         yield from _range_violations(tunables[name], value, pointer)
+
+
+def _physical_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Violation]:
+    """Yield settings that have no sense where reality is a robot on a bench."""
+    reality = spec.reality
+    if strategy.in_reality:
+        message = f"{strategy.name} evolves in reality itself, in thousands of evaluations of the physical robot"
+        yield Violation("/strategy", strategy.name, message, "another strategy, or a simulated reality")
+    if reality.engine is not None:
+        message = "a physical reality has no engine; the engine of the simulators is `/engine`"
+        yield Violation("/reality/engine", reality.engine.name, message, "left out")
+    for name, value in reality.parameters.items():
+        message = "a physical reality has no hidden parameters; what they are is the question"
+        yield Violation(f"/reality/parameters/{name}", value, message, "left out")
+    if reality.probes == "never" and not strategy.takes_samples:
+        message = f"{strategy.name} takes no samples, so without probes nothing would be measured"
+        yield Violation("/reality/probes", reality.probes, message, ["each", "last"])
 
 
 def budget_violations(

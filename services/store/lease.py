@@ -1,10 +1,12 @@
 """Leases of repetitions and sensitivity checks, and the deliveries of a repetition's holder."""
 
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
+from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.sensitivity import Checked
+from gaplab.services.core.arrays import Genome
 from gaplab.services.core.types import Step
 
 
@@ -112,5 +114,24 @@ class Failure:
     of_reality: bool = False
 
 
-Delivered: TypeAlias = TimedStep | Checkpoint
+@dataclass(frozen=True, eq=False)
+class Requested:
+    """A measurement that only the physical world can give; the log goes on with its answer.
+
+    Attributes:
+        place: place of the measurement's step in the log.
+        iteration: iteration of the measurement.
+        kind: sample or probe.
+        genome: `(g,)`: the controller to run.
+        safety: what the believed simulators expect of it, as JSON; None if nothing was asked.
+    """
+
+    place: int
+    iteration: int
+    kind: MeasurementKind
+    genome: Genome
+    safety: dict[str, Any] | None = None
+
+
+Delivered: TypeAlias = TimedStep | Checkpoint | Requested
 """A delivery of a worker, to be stored."""

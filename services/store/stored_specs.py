@@ -15,9 +15,21 @@ LATER = {"discrepancy": {"name": "squared_fitness", "options": {}}, "tuner": {"n
 """Fields that specs have had since readings are stored, with what an earlier spec means without them."""
 
 
+LATER_IN_REALITY: Mapping[str, Any] = {
+    "kind": "simulated",
+    "bench": None,
+    "repeats": 1,
+    "samples": [],
+    "probes": "each",
+    "limits": None,
+    "beyond": "warn",
+}
+"""Fields of reality that specs have had since it may be physical, with what an earlier spec means without them."""
+
+
 def complete(spec: Mapping[str, Any]) -> dict[str, Any]:
     """Return the spec with every field, also if it was stored before a field was added."""
-    return {**LATER, **spec}
+    return {**LATER, **spec, "reality": {**LATER_IN_REALITY, **spec["reality"]}}
 
 
 def without_truth(spec: Mapping[str, Any]) -> dict[str, Any]:

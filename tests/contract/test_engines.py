@@ -93,6 +93,16 @@ def test_a_rollout_is_bit_equal_whatever_the_engine_ran_before(pair: Pair) -> No
     assert np.array_equal(pair.roll(), expected)
 
 
+def test_feet_that_end_near_their_start_leave_nothing_to_the_next_rollout(embodied: Pair) -> None:
+    """A contact point that stays in the engine's memory would push the next robot with its old impulse."""
+    expected = embodied.roll()
+    turned = np.zeros(len(embodied.robot.world.actuators))
+    turned[::3] = 0.4
+    for end_s in (0.3, 0.5):
+        embodied.engine.rollout(embodied.robot.world, Motion(np.array([0.0]), turned[None], np.array([end_s])))
+        assert np.array_equal(embodied.roll(), expected)
+
+
 def test_engines_in_one_process_do_not_disturb_each_other(pair: Pair) -> None:
     expected = pair.roll()
     other = Pair(type(pair.engine)(), pair.robot)

@@ -59,6 +59,26 @@ def thrust(engine: Engine, material: Material, torque_nm: float) -> float:
     return float(x[2] - 2 * x[1] + x[0]) / 0.1**2 / G
 
 
+def test_a_motor_that_holds_an_arm_has_the_torque_of_its_weight(engine: Engine) -> None:
+    arm_kg, reach_m = 0.5, 0.3
+    held = World(
+        bodies=(
+            Body("block", 20.0, Box((1.0, 1.0, 0.2))),
+            Body("arm", arm_kg, Sphere(0.05), (reach_m, 0.0, 0.0), collides=False),
+        ),
+        joints=(Joint("shoulder", "block", "arm", (0.0, 0.0, 0.1), (0.0, 1.0, 0.0), Motor(0.1, 8.0)),),
+        material=Material(0.8, 0.8),
+        start_height_m=0.1,
+        time_step_s=STEP_S,
+    )
+    still = Motion(np.array([0.0]), np.array([[0.0]]), np.array([2.0]))
+    torques = engine.record(held, still, np.array([0.0, 2.0])).torques_nm
+
+    if torques is None:
+        pytest.skip(f"{engine.name} does not tell torques")
+    assert torques[:, 0] == pytest.approx([0.0, -arm_kg * G * reach_m], rel=0.01)
+
+
 def torque(share: float) -> float:
     """That pushes the sledge with this share of its weight, if the wheel grips, and turns the wheel as well."""
     return share * G * (BOARD_KG + WHEEL_KG + SPUN_KG) * RADIUS_M

@@ -26,7 +26,12 @@ def plugins_of_notebooks() -> dict[str, str]:
     return found
 
 
-DOCUMENTS = [ROOT / "docs" / "tutorial.md", ROOT / "docs" / "day.md", *sorted((ROOT / "docs" / "how-to").glob("*.md"))]
+DOCUMENTS = [
+    ROOT / "docs" / "tutorial.md",
+    ROOT / "docs" / "day.md",
+    *sorted((ROOT / "docs" / "tutorials").glob("*.md")),
+    *sorted((ROOT / "docs" / "how-to").glob("*.md")),
+]
 BLOCK = re.compile(
     r"(?:<!-- (?P<mark>not run|run apart): [^\n]+ -->\n)?^```(?P<language>\w+)\n(?P<text>.*?)^```", re.M | re.S
 )

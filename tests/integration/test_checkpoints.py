@@ -46,7 +46,7 @@ def test_what_a_checkpoint_has_is_not_simulated_again() -> None:
     told = list(recorded(small_setting(simulate=first), (), (), 0.0))
     checkpoints = [each for each in told if isinstance(each, Checkpoint) and each.step == 1]
 
-    list(recorded(small_setting(simulate=second, iterations=0), [told[0].step], checkpoints, 3600.0))  # type: ignore[list-item]
+    list(recorded(small_setting(simulate=second, iterations=0), [told[0].step], checkpoints, 3600.0))  # type: ignore[list-item, union-attr]
 
     answered = sum(len(row) for each in checkpoints for _, row in unpack(each.answers))
     assert answered == 40

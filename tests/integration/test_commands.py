@@ -29,6 +29,7 @@ from gaplab.services.running import execution
 from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
+from tests.integration.test_bench import compute
 
 STUDY = {
     "name": "all [of] it",
@@ -38,7 +39,7 @@ STUDY = {
     "repetitions": 3,
     "tunables": ["static_friction", "dynamic_friction"],
 }
-UNTIL_STOPPED = {"serve", "demo"}
+UNTIL_STOPPED = {"serve", "demo", "drive"}
 """They run until they are stopped or for minutes, and what they print is their log."""
 
 
@@ -88,10 +89,11 @@ def ask(gaplab: Gaplab, said: dict[str, Any]) -> Iterator[Callable[..., Any]]:
     external_plugins.set_folders(before)
 
 
-def test_every_command_prints_one_document_and_nothing_else(
+def test_every_command_prints_one_document_and_nothing_else(  # noqa: PLR0917
     ask: Callable[..., Any],
     said: dict[str, Any],
     sqlite_url: str,
+    sqlite_store: Store,
     finish: Callable[[], None],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -102,6 +104,7 @@ def test_every_command_prints_one_document_and_nothing_else(
     look(ask, *(each["id"] for each in said["list"][::-1]))
     keep(ask, said["list"][-1]["id"], tmp_path)
     tidy(ask, said["list"][-1]["id"])
+    measure_on_a_bench(ask, sqlite_store, tmp_path)
     with monkeypatch.context() as patch:
         patch.setenv("GAPLAB_DATABASE_URL", f"sqlite:///{tmp_path / 'restored.db'}")
         assert ask("restore", str(tmp_path / "copy.db"))["file"] == str(tmp_path / "restored.db")
@@ -111,9 +114,24 @@ def test_every_command_prints_one_document_and_nothing_else(
     assert ask("token revoke", token["token"]["id"]) == {"id": token["token"]["id"], "revoked": True}
     assert set(ask("help")) == {str(each.value) for each in Exit}
 
-    # want a body, a worker, an experiment under way, and a failed one
-    elsewhere = {"replay", "sensitivity", "accept-versions", "retry"}
+    # want a body, a worker, an experiment under way, a failed one, recordings, and a request that is stuck
+    elsewhere = {"replay", "sensitivity", "accept-versions", "retry", "traces", "reopen"}
     assert set(said) | elsewhere == set(NAMES) - UNTIL_STOPPED
+
+
+def measure_on_a_bench(ask: Callable[..., Any], store: Store, folder: Path) -> None:
+    spec = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 1, "iterations": 1}
+    id = ask("submit", "-", stdin=json.dumps(spec | {"reality": {"kind": "physical", "probes": "never"}}))["id"]
+    compute(store)
+    (request,) = ask("requests", id)
+    assert ask("motion", request["id"])["times_s"]
+    assert ask("measured", request["id"], "0.3")["state"] == "counted"
+    other = ask("measured", request["id"], "0.4")["id"]
+    assert ask("decide", other, "this", "--reason", "the first was another")["request"] == request["id"]
+    answer = ask("correct", other, "0.5", "--reason", "a slip")["answer"]
+    compute(store)
+    assert ask("takehome", id, str(folder / "home.zip"))["bytes"] > 0
+    assert ask("void", answer, "--reason", "the floor was wet")["iteration"] == 1
 
 
 def tidy(ask: Callable[..., Any], ended: str) -> None:

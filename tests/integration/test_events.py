@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from datetime import timedelta
 from itertools import count
 from typing import Any
 
@@ -27,28 +28,36 @@ from gaplab.api.http import event_feed as feeding
 from gaplab.api.http.event_feed import EventFeed
 from gaplab.api.process.server import Server, listen
 from gaplab.schemas.access import Role
+from gaplab.schemas.corrections import ConflictSpec, CorrectionSpec, VoidSpec
 from gaplab.schemas.editing import Edit
 from gaplab.schemas.events import EventKind, EventPage, EventRead
 from gaplab.schemas.lifecycle import Verb
+from gaplab.schemas.measurements import HolderSpec, TakeSpec
 from gaplab.schemas.notifications import Channel
 from gaplab.schemas.schedule import ExtensionSpec
 from gaplab.services import access, archives, events
+from gaplab.services.bench import corrections, taking
+from gaplab.services.bench.taking import RequestFilter
 from gaplab.services.core.errors import NotFound
 from gaplab.services.events import WantedEvents
 from gaplab.services.experiments import archiving, deletion, editing, extension, lifecycle, submission
 from gaplab.services.experiments.checks import queue_for
 from gaplab.services.experiments.deletion import Deleter
+from gaplab.services.experiments.limits import FREELY
 from gaplab.services.notifications import outbox
 from gaplab.services.running import execution, provenance, sensitivity
 from gaplab.services.running.leases import MAX_LOSSES
 from gaplab.services.running.versions import provenance as own
 from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.clock import moment
 from gaplab.services.store.lease import Failure
-from gaplab.services.store.models import EventCounterRow, EventRow
+from gaplab.services.store.models import EventCounterRow, EventRow, RequestRow
 from gaplab.services.store.queries.events import note, write
 from gaplab.services.store.queries.experiments import insert_experiment
 from gaplab.services.store.session import Store
 from tests.experiments import cancel, run, some_log, toy
+from tests.integration import test_bench_safety
+from tests.integration.test_bench import compute, measure
 
 DEADLINE_S = 180
 OTHER = own().model_copy(update={"architecture": "riscv64"})
@@ -118,6 +127,32 @@ def everything_that_can_happen(store: Store) -> None:
     sensitivity.fail(store, check, "no legs")
     lifecycle.ask_experiment(store, waits.experiment_id, Verb.RETRY)
     kept_and_told_of(store)
+    on_a_bench(store)
+
+
+def on_a_bench(store: Store) -> None:
+    """Takes that end without an answer, answers in conflict, a correction, a void, and a refusal."""
+    reality = {"kind": "physical", "probes": "never"}
+    submission.submit_experiment(store, toy(strategy="random", repetitions=1, priority=10, reality=reality))
+    compute(store, most=1)
+    (request,) = taking.list_requests(store, RequestFilter()).items
+    for _ in range(2):
+        taken = taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY).answer
+        if taken.takes == 1:
+            taking.release(store, request.id, HolderSpec(take=1))
+    with store.transaction() as session:
+        session.execute(update(RequestRow).values(taken_until=moment(session) - timedelta(seconds=1)))
+    assert taking.open_again(store) == 1
+    measure(store, request, 0.4)
+    other = measure(store, request, 0.3)
+    corrections.decide(store, other.id, ConflictSpec(counts="this", reason="the first was another"), FREELY)
+    corrected = corrections.correct(store, other.id, CorrectionSpec(values=(0.2,), reason="a slip"), FREELY).answer
+    corrections.void(store, corrected.answer or "", VoidSpec(reason="the floor was wet"), FREELY)
+    while claims := execution.claim(store, "me", 9):
+        execution.hand_back(store, *claims)
+        cancel(store, claims[0].experiment_id)
+    test_bench_safety.submit(store, "refuse")
+    test_bench_safety.ask(store, safety=test_bench_safety.safety("it tips over"))
 
 
 def kept_and_told_of(store: Store) -> None:

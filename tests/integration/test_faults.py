@@ -1,6 +1,8 @@
 """Faults of plug-ins, of reality and of hardware: each concerns the repetitions that it hits, and nothing else."""
 
 from dataclasses import replace
+from datetime import timedelta
+from functools import partial
 from threading import Event, Lock
 from types import SimpleNamespace
 from typing import Any, ClassVar
@@ -22,6 +24,7 @@ from gaplab.services.experiments import checks, lifecycle, reading, submission
 from gaplab.services.running import execution, sensitivity
 from gaplab.services.running.execution import Failure
 from gaplab.services.running.leases import MAX_LOSSES
+from gaplab.services.running.silences import Silences
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.resolution import resolve_experiment
 from gaplab.services.store.lease import Pulse, TimedStep
@@ -289,6 +292,42 @@ def test_hardware_has_one_holder_at_a_time(store: Store) -> None:
     execution.requeue_lost(store, stale_after_s=-1.0)
     (again,) = execution.claim(store, "next", 1)
     assert (again.id, again.epoch) == (lost.id, lost.epoch + 1)
+
+
+@pytest.mark.parametrize("by_s", [3600.0, -3600.0])
+def test_a_clock_that_was_set_does_not_give_hardware_to_a_second_holder(store: Store, by_s: float) -> None:
+    submission.submit_experiment(store, on_the_bench(repetitions=2))
+    (held,) = execution.claim(store, "me", 9)
+    time = [0.0]
+    silences = Silences(lambda: time[0])
+    look = partial(execution.requeue_lost, store, stale_after_s=30.0, silences=silences)
+
+    assert look() == 0
+    with store.transaction() as session:  # the heartbeat was given by the clock before it was set
+        row = session.get_one(RepetitionRow, held.id)
+        row.heartbeat_at = row.heartbeat_at - timedelta(seconds=by_s)
+    assert look() == 0
+    time[0] = 25.0
+    assert look() == 0
+    assert execution.heartbeat(store, [held]) == (held,)
+    time[0] = 50.0
+    assert look() == 0
+    time[0] = 81.0
+    assert look() == 1
+    (again,) = execution.claim(store, "you", 1)
+    assert (again.id, again.epoch) == (held.id, held.epoch + 1)
+
+
+def test_an_ended_lease_frees_its_hardware_once_its_holder_is_silent(store: Store) -> None:
+    first, _ = (submission.submit_experiment(store, on_the_bench()).id for _ in range(2))
+    execution.claim(store, "me", 9)
+    lifecycle.ask_experiment(store, first, Verb.CANCEL)
+    time = [0.0]
+    silences = Silences(lambda: time[0])
+
+    for time[0], claimed in ((0.0, 0), (20.0, 0), (31.0, 1)):
+        execution.requeue_lost(store, stale_after_s=30.0, silences=silences)
+        assert len(execution.claim(store, "you", 9)) == claimed
 
 
 def test_the_database_itself_refuses_a_second_holder(store: Store) -> None:

@@ -19,6 +19,7 @@ from gaplab.services.store.models import RepetitionRow
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from tests.experiments import run, same, some_log, toy
+from tests.integration.test_bench import compute as supervise
 
 
 def submitted(store: Store, **changes: Any) -> Any:
@@ -214,6 +215,11 @@ def test_cancelling_ends_the_attempts(store: Store) -> None:
 
 def in_state(store: Store, wanted: Any) -> Any:
     """An experiment that has got there by permitted moves."""
+    if wanted is State.WAITING:
+        experiment = submitted(store, strategy="random", reality={"kind": "physical"})
+        supervise(store)
+        assert state(store, experiment) is wanted
+        return experiment
     experiment = submitted(store)
     (claim,) = execution.claim(store, "me", 1) if wanted not in (State.QUEUED, State.PAUSED) else (None,)
     if wanted is State.COMPLETED:

@@ -12,7 +12,7 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, inspect
+from sqlalchemy import Connection, inspect, text
 
 from gaplab import migrations
 from gaplab.services.core.errors import StoreUnavailable
@@ -75,6 +75,9 @@ def test_every_constraint_has_the_name_that_the_models_give_it(store_url: str) -
         ("sensitivity", "ck_sensitivity_state"),
         ("attempt", "ck_attempt_ending"),
         ("token", "ck_token_role"),
+        ("request", "ck_request_kind"),
+        ("request", "ck_request_state"),
+        ("answer", "ck_answer_state"),
     }
 
 
@@ -172,3 +175,21 @@ def test_what_ran_and_waited_before_there_were_turns_has_its_turn(database_url: 
     engine.dispose()
     assert [tuple(each) for each in turns] == [("old", 1, True, 0), ("over", 0, False, 0)]
     assert [tuple(each) for each in attempts] == [(4, "me", None)]
+
+
+def test_a_rebuilt_table_gives_no_id_of_a_deleted_repetition_again(tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path / 'gaplab.db'}"
+    engine = open_engine(url, enforce_foreign_keys=False).execution_options(**{WRITES: True})
+    with engine.begin() as connection:
+        command.upgrade(migrations.configuration(connection), "0013")
+        connection.execute(text("DELETE FROM sqlite_sequence WHERE name = 'repetition'"))
+        connection.execute(text("INSERT INTO sqlite_sequence (name, seq) VALUES ('repetition', 41)"))
+
+    migrations.upgrade(url)
+
+    with engine.connect() as connection:
+        last = connection.execute(text("SELECT seq FROM sqlite_sequence WHERE name = 'repetition'")).scalar_one()
+        made = connection.execute(text("SELECT sql FROM sqlite_master WHERE name = 'repetition'")).scalar_one()
+    engine.dispose()
+    assert last == 41
+    assert "AUTOINCREMENT" in made

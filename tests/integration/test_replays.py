@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
+from sqlalchemy import update
 
 from gaplab.api.app import create_app
+from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.replays import Replay
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import frozen
@@ -26,6 +28,8 @@ from gaplab.services.plugins.folders import VARIABLE
 from gaplab.services.replay.predictions import predictions
 from gaplab.services.running import execution
 from gaplab.services.specs.assembly import setting
+from gaplab.services.store.lease import Requested
+from gaplab.services.store.models import RequestRow
 from gaplab.services.store.queries.experiments import get_experiment
 from gaplab.services.store.session import Store
 from tests.experiments import run, toy
@@ -122,6 +126,27 @@ def test_a_replay_has_what_the_sensors_said_in_both_worlds(sqlite_store: Store, 
     assert np.allclose(found.simulation, sensors.values(simulated).T, atol=1e-6)
     assert figure["caption"].startswith("Noise of the sensors")
     assert [row[0] for row in figure["table"]["rows"]] == list(sensors.names)
+
+
+def test_a_controller_that_a_robot_on_a_bench_is_to_run_walks_in_its_simulator(sqlite_store: Store, api: Any) -> None:
+    bench = quadruped(reality={"kind": "physical", "probes": "each"})
+    experiment = submission.submit_experiment(sqlite_store, bench).id
+    (claim,) = execution.claim(sqlite_store, "me", 1)
+    known = Quadruped().known
+    execution.record(sqlite_store, claim, Tuned(0, (Simulator(frozen(UNTUNED)),)))
+    execution.record(sqlite_store, claim, Transferred(0, known, 0.5))
+    assert api.get(f"/experiments/{experiment}/replay?iteration=0").status_code == 409
+    asked = Requested(2, 0, MeasurementKind.PROBE, known)
+    assert execution.record_all(sqlite_store, [(claim, [asked])]) == ()
+
+    shown = Replay.model_validate_json(api.get(f"/experiments/{experiment}/replay?iteration=0").content)
+
+    assert len(shown.simulation.positions_m) == len(shown.times_s)
+    assert shown.reality is None
+    with sqlite_store.transaction() as session:
+        session.execute(update(RequestRow).values(genome=[0.0] * len(known)))  # a correction led to another controller
+    other = Replay.model_validate_json(api.get(f"/experiments/{experiment}/replay?iteration=0").content)
+    assert other.simulation.positions_m != shown.simulation.positions_m
 
 
 class Lab(PyBullet):

@@ -1,11 +1,13 @@
 import "./fakes.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { isFunction, unitsOf } from "../../api/dashboard/lib/robots.js";
+import { isFunction, isPhysical, unitsOf, worldsText } from "../../api/dashboard/lib/robots.js";
 
 const { refusal } = await import("../../api/dashboard/views/experiment/actions.js");
 const { pastEvents } = await import("../../api/dashboard/views/experiment/event_list.js");
 const { eventText } = await import("../../api/dashboard/views/experiment/event_words.js");
+const { stepText } = await import("../../api/dashboard/views/experiment/branches.js");
+const { waitingText } = await import("../../api/dashboard/views/experiment/waiting.js");
 const { lastIteration } = await import("../../api/dashboard/views/replay.js");
 const { gathered } = await import("../../api/dashboard/views/study/head.js");
 
@@ -20,8 +22,11 @@ test("an action that a state forbids says what would permit it", () => {
 test("events are sentences, and a kind that is newer than the page has its name", () => {
   const event = { kind: "repetition_failed", repetition: 3, body: { reason: "a foot fell off" } };
   assert.equal(eventText(event), "Repetition 3 failed: a foot fell off");
-  assert.equal(eventText({ kind: "measured", repetition: 0, body: { iteration: 2, fitness: null } }), "Repetition 0, iteration 2: the physics failed in reality");
-  assert.equal(eventText({ kind: "probed", repetition: 0, body: { iteration: 2, fitness: null } }), "Repetition 0, iteration 2: the physics failed in reality");
+  assert.equal(eventText({ kind: "measured", repetition: 0, body: { iteration: 2, fitness: null } }), "Repetition 0, iteration 2: failed in reality");
+  assert.equal(eventText({ kind: "probed", repetition: 0, body: { iteration: 2, fitness: null, left_out: true } }), "Repetition 0, iteration 2: the controller is not measured, as the spec says");
+  assert.equal(eventText({ kind: "probed", repetition: 0, body: { iteration: 2, fitness: null } }), "Repetition 0, iteration 2: failed in reality");
+  assert.equal(eventText({ kind: "requested", repetition: 0, body: { iteration: 2, kind: "probe" } }), "Repetition 0, iteration 2: a measurement of the transferred controller is requested");
+  assert.equal(eventText({ kind: "voided", repetition: 0, body: { iteration: 2, operator: "Ada", reason: "the floor was wet" } }), "Repetition 0, iteration 2: the measurement by Ada is void: the floor was wet");
   assert.equal(eventText({ kind: "probed", repetition: 0, body: { iteration: 2, fitness: 0.5 } }), "Repetition 0, iteration 2: the controller reaches 0.5 in reality");
   assert.equal(eventText({ kind: "transferred", repetition: 0, body: { iteration: 2, simulated_fitness: null } }), "Repetition 0, iteration 2: controller evolved, the physics failed in simulation");
   assert.match(eventText({ kind: "tuned", repetition: 0, body: { iteration: 1, squared_error: 0.00001 } }), /sum of squared errors 1\.0e-5$/);
@@ -57,4 +62,23 @@ test("the catalogue tells units, and functions from robots that move", () => {
   const of = (name) => ({ spec: { robot: { name } } });
   assert.deepEqual(["legs", "curve", "gone"].map((name) => isFunction(catalogue, of(name))), [false, true, false]);
   assert.deepEqual([unitsOf(catalogue)(of("legs")), unitsOf(catalogue)(of("gone")), unitsOf(catalogue)(undefined)], ["m/s", "", ""]);
+});
+
+test("an experiment says in a sentence what it waits for", () => {
+  const request = { bench: "leg", repetition: 0, iteration: 3, kind: "sample", state: "taken", taken_by: "Bo", unanswered: 0, busy: false };
+  assert.equal(waitingText([request]), "It waits for a measurement on the bench “leg”: sample of iteration 3, repetition 0 (taken by Bo).");
+  assert.match(waitingText([request, request]), /, and for 1 other\.$/);
+  assert.match(waitingText([request, request, request], true), /, and for more than 2 others\.$/);
+});
+
+test("steps of a closed branch are told as their events, with the repeats", () => {
+  assert.equal(stepText({ kind: "measured", iteration: 2, genome: [1], fitness: 0.5, repeats: [0.4, 0.6] }, 1), "Repetition 1, iteration 2: measured in reality, 0.5 (0.4, 0.6)");
+  assert.equal(stepText({ kind: "tuned", iteration: 2, simulators: [{ parameters: [1], squared_error: 0.25 }] }, 1), "Repetition 1, iteration 2: simulators tuned, sum of squared errors 0.25");
+});
+
+test("worlds are the engines, or the bench", () => {
+  const spec = (reality) => ({ engine: { name: "fast" }, reality });
+  assert.deepEqual([{}, { engine: { name: "fast" } }, { engine: { name: "slow" } }, { kind: "physical", engine: null, bench: "leg" }].map((reality) => worldsText(spec(reality))),
+    ["fast", "fast", "fast, reality in slow", "fast, reality on the bench “leg”"]);
+  assert.deepEqual([isPhysical({ spec: {} }), isPhysical({ spec: { reality: { kind: "physical" } } })], [false, true]);
 });

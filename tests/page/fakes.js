@@ -34,3 +34,22 @@ export class FakeElement {
     this.parent = null;
   }
 }
+
+/** A localStorage; one that is full takes nothing. */
+export class FakeStorage {
+  items = new Map();
+  isFull = false;
+
+  get length() { return this.items.size; }
+
+  key(index) { return [...this.items.keys()][index] ?? null; }
+
+  getItem(name) { return this.items.get(name) ?? null; }
+
+  setItem(name, value) {
+    if (this.isFull) throw new DOMException("full", "QuotaExceededError");
+    this.items.set(name, value);
+  }
+
+  removeItem(name) { this.items.delete(name); }
+}

@@ -1,8 +1,10 @@
+import "./fakes.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { draftOf, specOf, ticked } from "../../api/dashboard/views/new/draft.js";
 import { specIn, studyOf } from "../../api/dashboard/views/new/paste.js";
 import { nearestPlace } from "../../api/dashboard/views/new/fields.js";
+import { exampleOf, hintOf, keptText } from "../../api/dashboard/views/new/samples_field.js";
 import { curlLines, pythonLines } from "../../api/dashboard/views/new/panel.js";
 
 const CATALOGUE = {
@@ -23,6 +25,35 @@ test("a spec goes through the form unchanged", () => {
     iterations: 3, repetitions: 4, direct_repetitions: 8, seed: 18446744073709551615n, priority: -10, max_parallel: 2,
   };
   assert.deepEqual(specOf(draftOf(spec, CATALOGUE)), spec);
+});
+
+test("a physical reality goes through the form unchanged, and one that becomes simulated leaves out what only a bench has", () => {
+  const reality = {
+    kind: "physical", bench: "leg 1", probes: "never", beyond: "refuse", repeats: 3,
+    samples: [{ genome: [0.5], values: [0.4, 0.5] }], limits: { joint_speed: 12.5 },
+  };
+  const draft = draftOf({ reality }, CATALOGUE);
+  assert.deepEqual(specOf(draft).reality, reality);
+  draft.bench.isPhysical = false;
+  assert.deepEqual(specOf(draft).reality, { probes: "never" });
+  draft.bench.isPhysical = true;
+  Object.assign(draft.bench, { bench: "  ", repeats: "three", probes: "", samples: [], beyond: "" });
+  draft.bench.limits.joint_speed = "";
+  assert.deepEqual(specOf(draft).reality, { kind: "physical", repeats: "three" });
+});
+
+test("a resolved reality from before there were benches is simulated", () => {
+  const resolved = { kind: "simulated", engine: { name: "slow", options: {} }, parameters: {}, bench: null, repeats: 1, samples: [], probes: "each", limits: null, beyond: "warn" };
+  assert.deepEqual(specOf(draftOf({ reality: resolved }, CATALOGUE)).reality, { engine: "slow", probes: "each" });
+});
+
+test("a table of samples is described by its columns, and what is used of it in words", () => {
+  assert.match(hintOf(1), /^Columns gene_0, then value,/);
+  assert.match(hintOf(24), /^Columns gene_0 to gene_23, then value,/);
+  assert.equal(exampleOf(1), "gene_0,value_1,value_2\n");
+  assert.equal(exampleOf(24), "gene_0,gene_1,gene_2,…,value_1,value_2\n");
+  const of = (...repeats) => keptText(repeats.map((length) => ({ values: Array(length).fill(0) })));
+  assert.deepEqual([of(1), of(3, 3), of(1, 3)], ["1 sample of 1 value each.", "2 samples of 3 values each.", "2 samples of 1 to 3 values each."]);
 });
 
 test("what a spec leaves out is the catalogue's default, and counts are left to the service", () => {

@@ -12,7 +12,8 @@ from gaplab.schemas.lifecycle import State
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
-from tests.soak.evidence import undisturbed
+from tests.soak.bench_checker import measurements
+from tests.soak.evidence import on_a_bench, undisturbed
 from tests.soak.misbehaviour import at_fault
 
 GIVEN_UP = "lost 5 times without progress"
@@ -35,6 +36,7 @@ def violations(history: Any, evidence: Any, expected: Any = undisturbed) -> Any:
         *results(history, evidence, expected),
         *epochs(evidence),
         *drives(evidence),
+        *measurements(history, evidence),
         *evidence.complaints,
     ]
 
@@ -186,9 +188,11 @@ def results(history: Any, evidence: Any, expected: Any) -> Iterator[Any]:
 def epochs(evidence: Any) -> Iterator[Any]:
     """One winner an epoch, no step by anybody else, and no forbidden move."""
     winners, steps = {}, Counter()  # type: ignore[var-annotated]
+    measured = {each.id for one in evidence.experiments if on_a_bench(one.spec) for each in one.repetitions}
     for move in evidence.moves:
         where = f"move {move.id} of repetition {move.repetition}"
-        yield from (f"{where}: {wrong}" for wrong in (*_of_state(move, winners), *_of_steps(move, winners, steps)))
+        of_steps = _of_steps(move, winners, steps, by_answers=move.repetition in measured)
+        yield from (f"{where}: {wrong}" for wrong in (*_of_state(move, winners), *of_steps))
         steps[move.repetition] = move.steps
     for experiment in evidence.experiments:
         for each in experiment.repetitions:
@@ -218,8 +222,10 @@ def _of_state(move: Any, winners: Any) -> Iterator[Any]:
         winners[move.repetition, move.epoch] = move.owner
 
 
-def _of_steps(move: Any, winners: Any, steps: Any) -> Iterator[Any]:
-    if move.steps_was != steps[move.repetition] or move.steps < move.steps_was:
+def _of_steps(move: Any, winners: Any, steps: Any, by_answers: Any) -> Iterator[Any]:
+    """Steps are added by the winner of the epoch; on a bench also by an answer, and taken away by a correction."""
+    by_answer = by_answers and move.owner is None
+    if move.steps_was != steps[move.repetition] or (move.steps < move.steps_was and not by_answer):
         yield f"from {move.steps_was} to {move.steps} steps, after {steps[move.repetition]}"
-    if move.steps > move.steps_was and winners.get((move.repetition, move.epoch)) != move.owner:
+    if move.steps > move.steps_was and not by_answer and winners.get((move.repetition, move.epoch)) != move.owner:
         yield f"steps by {move.owner}, whose epoch it is not"

@@ -15,6 +15,7 @@ from typing import Any
 import httpx2
 
 from gaplab.schemas.lifecycle import State
+from tests.soak.operators import PHYSICAL, Operator
 
 VERBS = {"cancel": 2, "pause": 3, "resume": 4, "stop": 1, "extend": 2}
 """Those that are used, if the service has them, and how often compared with each other."""
@@ -39,6 +40,8 @@ QUADRUPED = {
     "repetitions": 2,
     "budget": {"controller_evaluations": 25, "selection_evaluations": 20, "simulator_evaluations": 20},
 }
+ON_A_BENCH = TOY | {"iterations": 2, "repetitions": 2, "strategy": "simulated_fit"}
+BENCHES, OPERATORS = 2, 2
 STRATEGIES = ("simulated_fit", "random", "known_fit", "direct")
 TOY_STRATEGIES = (*STRATEGIES, "calm", {"name": "simulated_fit_and_informative", "options": {"simulators": 4}})
 
@@ -47,7 +50,9 @@ def specs(rng: Any) -> Iterator[Any]:
     """Specs without end, of few kinds: what they should come to is computed once for each."""
     for number in count():
         base, strategies = (QUADRUPED, STRATEGIES) if number % 4 == 3 else (TOY, TOY_STRATEGIES)
-        if number % 3 == 2:
+        if number % 5 == 4:
+            yield "/experiments", ON_A_BENCH | {"reality": PHYSICAL | {"bench": f"bench {rng.randrange(BENCHES)}"}}
+        elif number % 3 == 2:
             yield "/studies", base | {"strategies": rng.sample(strategies, 2)}
         else:
             yield "/experiments", base | {"strategy": rng.choice(strategies)}
@@ -70,10 +75,16 @@ class Clients:
         self._known: list[Any] = []
         self._open = 0
         self._verbs: list[Any] = []
-        self._turns = [Lock() for _ in range(number)]
+        self._reserved: set[str] = set()
+        self._operators = [Operator(self._http, history, f"operator {each}") for each in range(OPERATORS)]
+        self._turns = [Lock() for _ in range(number + OPERATORS)]
         self._threads = [
             Thread(target=self._use, args=(name, random.Random(f"{seed}-{name}")), daemon=True)
             for name in range(number)
+        ]
+        self._threads += [
+            Thread(target=self._measure, args=(number + place, operator), daemon=True)
+            for place, operator in enumerate(self._operators)
         ]
 
     def start(self) -> None:
@@ -91,6 +102,15 @@ class Clients:
                 stack.enter_context(turn)
             yield
 
+    @contextmanager
+    def reserved(self, bench: str) -> Iterator[None]:
+        """Let no operator use this bench within the block."""
+        self._reserved.add(bench)
+        try:
+            yield
+        finally:
+            self._reserved.remove(bench)
+
     def stop(self) -> None:
         """Ask for nothing more."""
         self._stopping.set()
@@ -104,7 +124,10 @@ class Clients:
         self._http.close()
 
     def wake(self) -> None:
-        """Resume what is paused, so that it can end."""
+        """Resume what is paused, and measure what is wanted, so that it can end."""
+        for waiting in self._in(State.WAITING):
+            self._operators[0].offer_again(waiting)
+        self._operators[0].work()
         for state in {str(each) for each in State} & {"PAUSING", "PAUSED"}:
             for paused in self._in(state):
                 self._ask("resume", "POST", f"/experiments/{paused}/resume")
@@ -130,6 +153,11 @@ class Clients:
                     self._submit(path, spec | {"name": f"client {name}, number {number}"})
                 if self._known and rng.random() < 0.1:
                     self._move(rng)
+
+    def _measure(self, place: int, operator: Operator) -> None:
+        while not self._stopping.wait(0.5):
+            with self._turns[place]:
+                operator.work(frozenset(self._reserved))
 
     def _look(self, rng: Any) -> None:
         """Read something that exists, and what is under way."""

@@ -13,12 +13,13 @@ from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Probed, Step, Tuned
 from gaplab.services.specs.assembly import setting
-from gaplab.services.store.models import ExperimentRow, RepetitionRow, SensitivityRow, StudyRow
+from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, SensitivityRow, StudyRow
 from gaplab.services.store.queries import step_rows as mapping
 from gaplab.services.store.queries.logs import logs
 from gaplab.services.store.session import Store
 from tests.soak import witness
 from tests.soak.hardware_faults import commands
+from tests.soak.operators import as_simulated
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,14 @@ class Experiment:
 
 
 @dataclass(frozen=True)
+class Answer:
+    """An answer of an operator as it is stored."""
+
+    request: str
+    state: str
+
+
+@dataclass(frozen=True)
 class Evidence:
     """All that is in the database.
 
@@ -57,6 +66,7 @@ class Evidence:
         studies: names by id.
         moves: of all repetitions, as the witness saw them.
         complaints: of the database about itself.
+        answers: of operators, by id.
         commands: that the robot got, in their order: seconds, and the drive that gave it.
     """
 
@@ -66,6 +76,7 @@ class Evidence:
     moves: tuple[witness.Move, ...] = ()
     complaints: tuple[str, ...] = ()
     commands: tuple[tuple[float, str], ...] = ()
+    answers: dict[str, Answer] = field(default_factory=dict)
 
 
 def gather(store: Store, database: Any, journal: Path) -> Evidence:
@@ -74,6 +85,7 @@ def gather(store: Store, database: Any, journal: Path) -> Evidence:
         studies = dict(session.execute(select(StudyRow.id, StudyRow.name)).all())
         checks = dict(session.execute(select(SensitivityRow.id, SensitivityRow.state)).all())
         experiments = tuple(_experiment(session, row) for row in session.scalars(select(ExperimentRow)).all())
+        answers = {row.id: Answer(row.request_id, str(row.state)) for row in session.scalars(select(AnswerRow))}
     return Evidence(
         experiments,
         studies,  # type: ignore[arg-type]
@@ -81,6 +93,7 @@ def gather(store: Store, database: Any, journal: Path) -> Evidence:
         tuple(witness.moves(store)),
         tuple(database.complaints()),
         tuple(commands(journal)),
+        answers,
     )
 
 
@@ -113,9 +126,19 @@ def _experiment(session: Any, row: Any) -> Any:
 
 
 def undisturbed(spec: dict, number: int) -> tuple[str, ...]:
-    """The digests of one repetition's steps, computed here and now with nothing in the way."""
+    """The digests of one repetition's steps, computed here and now with nothing in the way.
+
+    A robot on a bench of the soak has no noise, so a simulated reality gives its steps.
+    """
+    if on_a_bench(spec):
+        spec = spec | {"reality": as_simulated().model_dump(mode="json") | {"probes": spec["reality"]["probes"]}}
     settings = {name: value for name, value in spec.items() if name not in {"name", "repetitions"}}
     return _undisturbed(json.dumps(settings, sort_keys=True), number)
+
+
+def on_a_bench(spec: dict) -> bool:
+    """Whether operators measure its controllers."""
+    return bool(spec["reality"].get("kind") == "physical")
 
 
 @cache

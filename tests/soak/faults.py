@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from gaplab.services.store.session import Store
-from tests.soak import hardware_faults, misbehaviour, plugin_faults, witness
+from tests.soak import bench_faults, hardware_faults, misbehaviour, plugin_faults, witness
 from tests.soak.databases import CLOCK_JUMP
 from tests.soak.stage import PAST_THE_LEASE, send, until
 
@@ -115,6 +115,7 @@ def faults(database: Any, misbehaviours: Any = misbehaviour.HARMLESS) -> Any:
     found += [Fault("clock set back", _set_clock(-CLOCK_JUMP)), Fault("clock set ahead", _set_clock(CLOCK_JUMP))]
     found += [Fault("earlier state restored", _restore, alone=True), Fault("two drivers", hardware_faults.two_drivers)]
     found += [Fault("plug-in edited", plugin_faults.edited), Fault("plug-in broken", plugin_faults.broken)]
+    found += [Fault(kind, bench_faults.inflicting(kind)) for kind in bench_faults.KINDS]
     return found + [Fault(f"plug-in {kind}", plugin_faults.submitting(kind)) for kind in misbehaviours]
 
 

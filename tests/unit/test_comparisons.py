@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.random import default_rng
 from scipy import stats
@@ -227,12 +227,18 @@ values_ = st.lists(st.floats(allow_infinity=False, width=32) | st.just(0.5), max
 )
 
 
-@given(values_, values_, st.booleans())
+VARIES = np.array([[0.5], [0.25]])
+"""A variation that adding 10¹⁴ rounds away."""
+
+
+@given(values_, values_, st.booleans(), st.sampled_from([0.1, 1e14]))
+@example(VARIES, np.array([[1.125e14], [1.125e14]]), False, 0.1)
+@example(VARIES, np.array([[1.125e14], [1.126e14]]), False, 1e14)
 @settings(deadline=None, max_examples=50)
-def test_any_values_have_a_comparison_of_finite_numbers(first: Any, second: Any, shared: bool) -> None:
+def test_any_values_have_a_comparison_of_finite_numbers(first: Any, second: Any, shared: bool, margin: float) -> None:
     experiments = [compared("a", first), compared("b", second, strategy="a" if shared else "b")]
 
-    (pair,) = compare_all(experiments, 0, 0, margin=0.1)
+    (pair,) = compare_all(experiments, 0, 0, margin=margin)
 
     assert len(row(pair)) == len(COLUMNS) == len(set(COLUMNS))
     numbers = dict(zip(COLUMNS, row(pair), strict=True))

@@ -12,7 +12,8 @@ from gaplab.services.core.loop import repetition
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tuners.search import SearchTuner
 from gaplab.services.core.types import Measured, Sample, Tuned
-from gaplab.services.specs.resolution import expected_rollouts, resolve_experiment
+from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.specs.rollouts import expected_rollouts
 from tests.fakes import CountedReality, Recorder, flat, paraboloid, small_setting
 
 

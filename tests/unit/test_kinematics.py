@@ -53,6 +53,7 @@ def test_clearance_is_of_the_lowest_point() -> None:
 
 
 def test_bullet_has_the_bodies_at_the_same_places() -> None:
+    pytest.importorskip("pybullet")
     from gaplab.services.engines.pybullet import PyBullet
 
     robot, engine = Quadruped(), PyBullet()

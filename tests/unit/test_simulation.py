@@ -8,7 +8,8 @@ import pytest
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.robots.toy_function import ToyFunction
 from gaplab.services.engines.analytic import Analytic
-from gaplab.services.specs.assembly import MeasuredReality, Simulation
+from gaplab.services.specs.assembly import MeasuredReality
+from gaplab.services.specs.simulation import Simulation
 
 
 class Endless(ToyFunction):

@@ -7,8 +7,9 @@ import pytest
 
 from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study
-from tests.soak.checker import ends, results, violations
-from tests.soak.evidence import Evidence, Experiment, Repetition, undisturbed
+from tests.soak.bench_checker import measurements
+from tests.soak.checker import ends, epochs, results, violations
+from tests.soak.evidence import Answer, Evidence, Experiment, Repetition, undisturbed
 from tests.soak.history import Record
 from tests.soak.witness import Move
 
@@ -227,3 +228,52 @@ def test_an_experiment_that_was_itself_at_fault_must_end_all_the_same() -> None:
     stuck = [*ends(Evidence((replace(EXPERIMENT, state="RUNNING", spec=spec, repetitions=running),)))]
 
     assert stuck == ["e1 is stuck: RUNNING", "e1/0 is stuck: RUNNING"]
+
+
+TAKE = Record(
+    "take",
+    "/requests/r1/take",
+    {},
+    1.0,
+    2.0,
+    200,
+    {"id": "r1", "experiment": "e1", "repetition": 0, "genome": [0.5], "takes": 1},
+)
+ANSWER = Record(
+    "answer", "/requests/r1/measurements", {}, 3.0, 4.0, 201, {"id": "a1", "request": "r1", "state": "counted"}
+)
+OTHER_TAKE = replace(TAKE, sent_at=5.0, answered_at=6.0, answer=TAKE.answer | {"id": "r2"})
+ANSWERS = {"a1": Answer("r1", "counted")}
+
+
+@pytest.mark.parametrize(
+    ("history", "answers", "violation"),
+    [
+        ([TAKE, ANSWER], ANSWERS, None),
+        ([TAKE, ANSWER], {}, "a1 is not there"),
+        ([TAKE, ANSWER], ANSWERS | {"a2": Answer("r1", "counted")}, "request r1: 2 answers count"),
+        ([TAKE, ANSWER], ANSWERS | {"a2": Answer("r1", "conflict")}, None),
+        ([TAKE, TAKE, ANSWER], ANSWERS, "take 1 of request r1 has 2 holders"),
+        ([TAKE, ANSWER, OTHER_TAKE], ANSWERS, "its controller was measured"),
+        ([TAKE, ANSWER, replace(OTHER_TAKE, answer=OTHER_TAKE.answer | {"genome": [0.6]})], ANSWERS, None),
+        ([replace(ANSWER, verb="nonsense")], ANSWERS, "was accepted"),
+    ],
+)
+def test_measurements_that_are_lost_doubled_or_asked_for_again_are_found(
+    history: Any, answers: Any, violation: Any
+) -> None:
+    (*wrong,) = measurements(history, replace(EVIDENCE, answers=answers))
+
+    assert (violation is None) is not bool(wrong)
+    assert violation is None or violation in wrong[0]
+
+
+def test_an_answer_may_add_steps_of_a_repetition_that_nobody_holds_and_a_correction_may_take_some() -> None:
+    waiting = move(1, "WAITING", "WAITING", owner=None, steps=(0, 3))
+    corrected = move(2, "WAITING", "QUEUED", owner=None, steps=(3, 2))
+    ended = move(3, "QUEUED", "COMPLETED", owner=None, steps=(2, 4))
+    on_bench = replace(EXPERIMENT, spec=SPEC | {"reality": SPEC["reality"] | {"kind": "physical"}})
+    moves = (CLAIMED, waiting, corrected, ended)
+
+    assert list(epochs(replace(EVIDENCE, experiments=(on_bench,), moves=moves))) == []
+    assert len(list(epochs(replace(EVIDENCE, moves=moves)))) == 3

@@ -55,9 +55,22 @@ export const getFile = async (path, query = {}) => (await requestPatiently(path 
  * @param {string} path
  * @param {unknown} [body]
  * @param {Record<string, string>} [headers]
+ * @param {AbortSignal} [signal]
  * @returns {Promise<any>}
  */
-export const post = async (path, body = undefined, headers = {}) => (await send("POST", path, body, headers)).json();
+export const post = async (path, body = undefined, headers = {}, signal = undefined) => (await send("POST", path, body, headers, signal)).json();
+
+/**
+ * Send a file in a POST, and return the JSON of the answer.
+ *
+ * @param {string} path
+ * @param {Page.Query} query
+ * @param {BodyInit} content
+ * @param {string} mediaType
+ * @returns {Promise<any>}
+ */
+export const postFile = async (path, query, content, mediaType) =>
+  (await request(path + queryString(query), { method: "POST", headers: { "Content-Type": mediaType }, body: content })).json();
 
 /**
  * Send a PATCH, and return the JSON of the answer with its tag.
@@ -107,10 +120,11 @@ const tagged = async (answer) => ({ value: parse(await answer.text()), tag: answ
  * @param {string} path
  * @param {unknown} body
  * @param {Record<string, string>} headers
+ * @param {AbortSignal} [signal]
  */
-function send(method, path, body, headers) {
+function send(method, path, body, headers, signal = undefined) {
   const json = body === undefined ? {} : { body: stringify(body) };
-  return request(path, { method, headers: { "Content-Type": "application/json", ...headers }, ...json });
+  return request(path, { method, headers: { "Content-Type": "application/json", ...headers }, ...json, signal });
 }
 
 /**

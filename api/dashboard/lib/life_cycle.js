@@ -11,12 +11,12 @@ import { h } from "./dom.js";
  * @type {Record<Action, Api.State[]>}
  */
 export const PERMITTED = {
-  pause: ["QUEUED", "RUNNING"],
+  pause: ["QUEUED", "RUNNING", "WAITING"],
   resume: ["PAUSING", "PAUSED"],
-  stop: ["QUEUED", "RUNNING", "PAUSING", "PAUSED"],
-  cancel: ["QUEUED", "RUNNING", "PAUSING", "PAUSED", "STOPPING"],
+  stop: ["QUEUED", "RUNNING", "WAITING", "PAUSING", "PAUSED"],
+  cancel: ["QUEUED", "RUNNING", "WAITING", "PAUSING", "PAUSED", "STOPPING"],
   extend: ["COMPLETED"],
-  retry: ["QUEUED", "RUNNING", "PAUSED", "COMPLETED", "FAILED"],
+  retry: ["QUEUED", "RUNNING", "WAITING", "PAUSED", "COMPLETED", "FAILED"],
 };
 
 /** @type {Record<Action, string>} */

@@ -20,3 +20,22 @@ export function unitsOf({ robots }) {
  * @param {Api.ExperimentRead} experiment
  */
 export const isFunction = ({ robots }, { spec }) => robots.some(({ name, details }) => name === spec.robot.name && details.function === true);
+
+/**
+ * Return whether reality is a robot on a bench; a spec from before there were any does not say.
+ *
+ * @param {{ spec: Record<string, any> }} experiment
+ */
+export const isPhysical = ({ spec }) => spec.reality?.kind === "physical";
+
+/**
+ * Return the engine of the simulators, and what reality is if it is something else.
+ *
+ * @param {Record<string, any>} spec resolved
+ */
+export function worldsText({ engine, reality }) {
+  const name = engine?.name ?? "";
+  if (reality?.kind === "physical") return `${name}, reality on the bench “${reality.bench}”`;
+  const real = reality?.engine?.name;
+  return name && real && real !== name ? `${name}, reality in ${real}` : name;
+}

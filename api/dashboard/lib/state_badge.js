@@ -4,7 +4,7 @@
 import { h } from "./dom.js";
 
 /** @type {Record<Api.State, string>} */
-const SIGNS = { QUEUED: "○", RUNNING: "▶", PAUSING: "◐", PAUSED: "‖", STOPPING: "◐", COMPLETED: "✓", FAILED: "✕", CANCELLED: "–" };
+const SIGNS = { QUEUED: "○", RUNNING: "▶", PAUSING: "◐", PAUSED: "‖", STOPPING: "◐", COMPLETED: "✓", FAILED: "✕", CANCELLED: "–", WAITING: "◔" };
 
 /** Every state, in the order of a life cycle. */
 export const STATES = /** @type {Api.State[]} */ (Object.keys(SIGNS));

@@ -1,8 +1,41 @@
 /* Made by `make docs` from the OpenAPI document; what is changed here is lost. */
 
 declare namespace Api {
+  interface AlignedTrace {
+    attachment: string;
+    lag_s: number;
+    match: number | null;
+    times_s: Array<number>;
+    heights_m: Array<number>;
+    distances_m: Array<number>;
+    expected_heights_m: Array<number> | null;
+    expected_distances_m: Array<number> | null;
+  }
   interface Alive {
     status: string;
+  }
+  interface AnswerRead {
+    id: string;
+    request: string;
+    state: AnswerState;
+    values: Array<number> | null;
+    fitness: number | null;
+    readings: Array<Array<Array<number | null>>> | null;
+    failed: string | null;
+    operator: string;
+    note: string | null;
+    attachments: Array<string>;
+    traces: Array<TraceRead>;
+    replaces: string | null;
+    reason: string | null;
+    at: string;
+  }
+  type AnswerState = "counted" | "conflict" | "replaced" | "void" | "dismissed";
+  interface AttachmentRead {
+    id: string;
+    name: string;
+    media_type: string;
+    size: number;
   }
   interface AttemptRead {
     number: number;
@@ -19,6 +52,14 @@ declare namespace Api {
     sd: number | null;
     experiment: string;
     name: string;
+  }
+  interface BranchRead {
+    repetition: number;
+    number: number;
+    iteration: number;
+    reason: string;
+    steps: Array<Record<string, any>>;
+    closed_at: string;
   }
   interface BudgetRead {
     name: string;
@@ -47,6 +88,13 @@ declare namespace Api {
     budgets: Array<BudgetRead>;
     ignored: Array<IgnoredFile>;
     defaults: Record<string, any>;
+  }
+  interface CellError {
+    line: number;
+    column: string | null;
+    value: string | null;
+    message: string;
+    permitted: string | null;
   }
   interface Chart {
     data: Array<Record<string, any>>;
@@ -89,7 +137,30 @@ declare namespace Api {
     equivalence: Equivalence | null;
     pooled: Pooled | null;
   }
+  interface ConflictSpec {
+    counts: "this" | "other";
+    reason: string;
+    operator: string | null;
+  }
+  interface Consequences {
+    answer: string | null;
+    request: string;
+    repetition: number;
+    iteration: number;
+    steps: number;
+    branch: number | null;
+    measurements: number;
+    words: string;
+  }
   type ControllerKind = "sample" | "transfer";
+  interface CorrectionSpec {
+    values: Array<number> | null;
+    readings: Array<Array<Array<number | null>>> | null;
+    unit: string | null;
+    failed: string | null;
+    reason: string;
+    operator: string | null;
+  }
   interface Curve {
     experiment: string;
     name: string;
@@ -134,7 +205,7 @@ declare namespace Api {
     add_tags: Array<string>;
     remove_tags: Array<string>;
   }
-  type Ending = "completed" | "paused" | "stopped" | "cancelled" | "handed back" | "lost" | "failed";
+  type Ending = "completed" | "paused" | "stopped" | "cancelled" | "handed back" | "waiting" | "lost" | "failed";
   interface EngineCost {
     engine: string;
     seconds_per_rollout: number;
@@ -164,7 +235,7 @@ declare namespace Api {
     supervisors: number;
     specs: Array<Record<string, any>>;
   }
-  type EventKind = "submitted" | "imported" | "started" | "pausing" | "paused" | "resumed" | "stopping" | "extended" | "retried" | "completed" | "failed" | "cancelled" | "edited" | "archived" | "unarchived" | "deleted" | "notified" | "notification_failed" | "sensitivity_ended" | "versions_refused" | "versions_accepted" | "repetition_claimed" | "repetition_completed" | "repetition_failed" | "repetition_lost" | "repetition_handed_back" | "repetition_paused" | "repetition_stopped" | "repetition_cancelled" | "selected" | "measured" | "tuned" | "transferred" | "probed";
+  type EventKind = "submitted" | "imported" | "started" | "waiting" | "pausing" | "paused" | "resumed" | "stopping" | "extended" | "retried" | "completed" | "failed" | "cancelled" | "edited" | "archived" | "unarchived" | "deleted" | "notified" | "notification_failed" | "sensitivity_ended" | "versions_refused" | "versions_accepted" | "repetition_claimed" | "repetition_completed" | "repetition_failed" | "repetition_lost" | "repetition_handed_back" | "repetition_waits" | "repetition_paused" | "repetition_stopped" | "repetition_cancelled" | "requested" | "refused" | "taken" | "released" | "take_expired" | "conflicting" | "corrected" | "voided" | "decided" | "selected" | "measured" | "tuned" | "transferred" | "probed";
   interface EventPage {
     items: Array<EventRead>;
     last: number;
@@ -254,6 +325,9 @@ declare namespace Api {
     status: "ok" | "degraded";
     warnings: Array<string>;
   }
+  interface HolderSpec {
+    take: number;
+  }
   type Identification = "identified" | "partly identified" | "not identified" | "unknown";
   interface IgnoredFile {
     file: string;
@@ -265,7 +339,31 @@ declare namespace Api {
     renamed: Record<string, string>;
     called_off: Array<string>;
   }
+  interface KnownSample {
+    values: Array<number>;
+    readings: Array<Array<Array<number | null>>> | null;
+    genome: Array<number>;
+    unit: string | null;
+  }
+  interface LimitsSpec {
+    joint_speed: number | null;
+    torque: number | null;
+    tilt: number | null;
+    height: number | null;
+  }
   type MeasurementKind = "sample" | "probe";
+  interface MeasurementSpec {
+    take: number | null;
+    values: Array<number> | null;
+    readings: Array<Array<Array<number | null>>> | null;
+    traces: Array<string> | null;
+    lags_s: Array<number | null> | null;
+    unit: string | null;
+    failed: string | null;
+    operator: string | null;
+    note: string | null;
+    attachments: Array<string>;
+  }
   interface MisfitPoint {
     iteration: number;
     error: Distribution;
@@ -280,6 +378,7 @@ declare namespace Api {
     points: Array<MisfitPoint>;
     remarks: Array<string>;
     held_out: number;
+    noise: number | null;
     verdicts: Array<TunableVerdict>;
   }
   interface NotesRead {
@@ -287,6 +386,10 @@ declare namespace Api {
   }
   interface Page_ExperimentRead_ {
     items: Array<ExperimentRead>;
+    next: string | null;
+  }
+  interface Page_RequestRead_ {
+    items: Array<RequestRead>;
     next: string | null;
   }
   interface Page_SampleRead_ {
@@ -384,8 +487,15 @@ declare namespace Api {
     provenance: Provenance;
   }
   interface RealitySpec {
+    kind: "simulated" | "physical";
     engine: PluginRef | null;
     parameters: Record<string, number>;
+    bench: string | null;
+    repeats: number;
+    samples: Array<KnownSample>;
+    probes: "each" | "last" | "never" | null;
+    limits: LimitsSpec | null;
+    beyond: "warn" | "refuse";
   }
   interface RepetitionRead {
     number: number;
@@ -433,7 +543,48 @@ declare namespace Api {
     speeds_m_s: Array<number>;
     contacts: Array<Array<[number, number]>>;
   }
+  interface RequestRead {
+    id: string;
+    experiment: string;
+    experiment_name: string;
+    experiment_state: State;
+    repetition: number;
+    iteration: number;
+    kind: MeasurementKind;
+    robot: string;
+    unit: string;
+    bench: string;
+    repeats: number;
+    genome: Array<number>;
+    state: RequestState;
+    takes: number;
+    unanswered: number;
+    taken_by: string | null;
+    taken_until: string | null;
+    busy: boolean;
+    safety: Safety | null;
+    same_as: string | null;
+    branch: number | null;
+    answers: Array<AnswerRead>;
+    created_at: string;
+    ended_at: string | null;
+  }
+  type RequestState = "open" | "taken" | "measured" | "failed" | "withdrawn" | "stuck";
   type ResolvedTunable = string | Record<string, any>;
+  interface Safety {
+    simulators: number;
+    failed: number;
+    joint_speed: number | null;
+    torque: number | null;
+    tilt: number | null;
+    height: number | null;
+    clearance: number | null;
+    falls: number;
+    fitness_low: number | null;
+    fitness_high: number | null;
+    beyond: Array<string>;
+    unknown: Array<string>;
+  }
   interface SampleRead {
     repetition: number;
     iteration: number;
@@ -441,8 +592,15 @@ declare namespace Api {
     genome: Array<number>;
     fitness: number | null;
     readings: Array<number | null> | null;
+    repeats: Array<number> | null;
+    standard_error: number | null;
     measured_by: string;
     measured_at: string;
+  }
+  interface SamplesRead {
+    samples: Array<KnownSample>;
+    errors: Array<CellError>;
+    more: number;
   }
   interface ScheduleChange {
     priority: number;
@@ -529,7 +687,7 @@ declare namespace Api {
     resolved: Array<Record<string, any>>;
     remarks: Array<string>;
   }
-  type State = "QUEUED" | "RUNNING" | "PAUSING" | "PAUSED" | "STOPPING" | "COMPLETED" | "FAILED" | "CANCELLED";
+  type State = "QUEUED" | "RUNNING" | "PAUSING" | "PAUSED" | "STOPPING" | "COMPLETED" | "FAILED" | "CANCELLED" | "WAITING";
   interface StudyRead {
     id: string;
     name: string;
@@ -573,6 +731,10 @@ declare namespace Api {
     head: Array<string>;
     rows: Array<Array<string>>;
   }
+  interface TakeSpec {
+    operator: string;
+    lease_s: number;
+  }
   interface Test {
     statistic: number | null;
     degrees_of_freedom: number | null;
@@ -582,6 +744,21 @@ declare namespace Api {
   interface TimeLeft {
     low_s: number;
     high_s: number;
+  }
+  interface TraceRead {
+    attachment: string;
+    lag_s: number;
+    match: number | null;
+  }
+  interface TracesRead {
+    values: Array<number>;
+    unit: string;
+    readings: Array<Array<Array<number | null>>> | null;
+    traces: Array<AlignedTrace>;
+  }
+  interface TracesSpec {
+    traces: Array<string>;
+    lags_s: Array<number | null> | null;
   }
   type Trend = "rising" | "flat" | "falling" | "unclear" | "too_few";
   interface TrendRead {
@@ -644,6 +821,10 @@ declare namespace Api {
     shows: "all" | "studies" | "experiments";
     query: string | null;
     sort: "created_at" | "-created_at" | "name" | "-name" | "strategy" | "-strategy" | "state" | "-state";
+  }
+  interface VoidSpec {
+    reason: string;
+    operator: string | null;
   }
   interface WebhookRead {
     host: string | null;

@@ -65,6 +65,21 @@ declare namespace Page {
     unit(experiment: Api.ExperimentRead | undefined): string;
   }
 
+  /** What the parts of the view of a bench share. */
+  interface BenchView {
+    signal: AbortSignal;
+    /** Robots that are functions and have no motion. */
+    functions: Set<string>;
+    requests: Api.RequestRead[];
+    conflicts: Api.RequestRead[];
+    chosen: string | null;
+    form: { id: string; element: HTMLFormElement } | null;
+    take: import("../views/bench/take.js").Take;
+    choose(id: string): void;
+    answered(id: string): void;
+    refresh(): void;
+  }
+
   /** What the address of a comparison says. */
   interface Comparison {
     experiments: string[];
@@ -113,6 +128,17 @@ declare namespace Page {
     upper: string | number;
   }
 
+  /** A physical reality in the form; what a simulated one has not is kept while the reader changes the kind. */
+  interface BenchDraft {
+    isPhysical: boolean;
+    bench: string;
+    repeats: string | number;
+    probes: string;
+    samples: Pick<Api.KnownSample, "genome" | "values">[];
+    limits: Record<string, any>;
+    beyond: string;
+  }
+
   /** The content of the form for a new study; the empty text stands for a value that is left out. */
   interface Draft {
     [count: string]: any;
@@ -126,6 +152,7 @@ declare namespace Page {
     tunables: TunableDraft[];
     realityEngine: PluginDraft;
     realityParameters: Record<string, any>;
+    bench: BenchDraft;
     budget: { [evaluations: string]: any; preset: string; reuse_transfer: boolean };
   }
 

@@ -6,10 +6,13 @@ import { h } from "../lib/dom.js";
 import { follow, reloadEvery } from "../lib/live.js";
 import { sections } from "../lib/sections.js";
 import { tabs } from "../lib/tabs.js";
-import { isFunction, unitsOf } from "../lib/robots.js";
+import { showBenchLink } from "../lib/bench/link.js";
+import { isFunction, isPhysical, unitsOf } from "../lib/robots.js";
+import { branches } from "./experiment/branches.js";
 import { eventList } from "./experiment/event_list.js";
 import { curve, otherFigures } from "./experiment/figures.js";
 import { head } from "./experiment/head.js";
+import { measurements } from "./experiment/measurements.js";
 import { misfit } from "./experiment/misfit.js";
 import { provenance } from "./experiment/provenance.js";
 import { repetitions } from "./experiment/repetitions.js";
@@ -39,6 +42,7 @@ export async function show(root, parameters, signal) {
     reload: async () => page.take(await getTagged(`/experiments/${id}`, signal)),
   };
   const top = head(page);
+  if (isPhysical(page.experiment)) showBenchLink();
   const rememberTab = (/** @type {string} */ name) => history.replaceState(null, "", `#/experiments/${id}?tab=${name}`);
   root.replaceChildren(
     top.element,
@@ -55,9 +59,12 @@ export async function show(root, parameters, signal) {
  */
 function panels(page) {
   const misfitPanel = page.experiment.level ? [] : [/** @type {[string, string, Page.Child]} */ (["misfit", "Misfit", misfit(page)])];
+  /** @type {Parameters<typeof tabs>[1]} */
+  const real = isPhysical(page.experiment) ? [["samples", "Measurements", measurements(page)], ["branches", "Closed branches", branches(page)]]
+    : [["samples", "Real-world samples", samples(page)]];
   return [
     ["repetitions", "Repetitions", repetitions(page)],
-    ["samples", "Real-world samples", samples(page)],
+    ...real,
     ...misfitPanel,
     ["provenance", "Provenance", provenance(page)],
     ["spec", "Spec", spec(page)],

@@ -6,7 +6,8 @@ import { h } from "../lib/dom.js";
 import { stringify } from "../lib/json.js";
 import { draftOf, specOf } from "./new/draft.js";
 import { ErrorPlaces } from "./new/fields.js";
-import { budgetPart, realityPart, simulationPart, strategiesPart, studyPart, tunablesPart } from "./new/form_parts.js";
+import { budgetPart, simulationPart, strategiesPart, studyPart, tunablesPart } from "./new/form_parts.js";
+import { realityPart } from "./new/reality_part.js";
 import { panel } from "./new/panel.js";
 import { pasteField } from "./new/paste.js";
 

@@ -7,6 +7,7 @@ import { downloadLink, figureDownloads } from "../lib/downloads.js";
 import { number, readableName } from "../lib/format.js";
 import { empty, failed, loading } from "../lib/placeholders.js";
 import { plot } from "../lib/plot.js";
+import { isPhysical } from "../lib/robots.js";
 import { choices } from "./replay/choices.js";
 import { gait } from "./replay/gait.js";
 import { player } from "./replay/player.js";
@@ -39,12 +40,12 @@ export async function show(root, parameters, signal) {
     const loading = shown = new AbortController();
     signal.addEventListener("abort", () => loading.abort(), { once: true });
     history.replaceState(null, "", `#/replay${queryString(choice)}`);
-    await fill(place, choice, loading.signal);
+    await fill(place, choice, isPhysical(experiment), loading.signal);
   };
   root.replaceChildren(
     h("h1", {}, "Replay"),
     h("p", { class: "note" }, h("a", { href: `#/experiments/${id}` }, experiment.name),
-      ` · ${readableName(experiment.strategy)} · one controller in two worlds, from the same start`),
+      ` · ${readableName(experiment.strategy)} · ${isPhysical(experiment) ? "one controller in its simulator" : "one controller in two worlds, from the same start"}`),
     choices(experiment, choice, load), place,
   );
   await load();
@@ -81,16 +82,17 @@ export function lastIteration({ level, progress, spec }) {
 /**
  * @param {HTMLElement} place
  * @param {Page.ReplayChoice} choice
+ * @param {boolean} isOnBench whether reality is a robot on a bench
  * @param {AbortSignal} signal
  */
-async function fill(place, choice, signal) {
+async function fill(place, choice, isOnBench, signal) {
   place.replaceChildren(loading("Computing the physics again…"));
   try {
     const { experiment, ...query } = choice;
     /** @type {Api.Replay} */
     const replay = await get(`/experiments/${experiment}/replay`, query, signal);
     if (signal.aborted) return;
-    const stages = worlds(replay, signal);
+    const stages = worlds(replay, isOnBench, signal);
     const showTime = (/** @type {number} */ time) => {
       stages.draw(time);
       figure.moveCursor(time);
@@ -102,7 +104,7 @@ async function fill(place, choice, signal) {
     timeline.begin();
   } catch (error) {
     if (signal.aborted) return;
-    const again = () => fill(place, choice, signal);
+    const again = () => fill(place, choice, isOnBench, signal);
     const button = h("button", { type: "button", class: "quiet", onclick: again }, "Try again");
     place.replaceChildren(error.status === 409 ? empty(`${error.message[0].toUpperCase()}${error.message.slice(1)}.`, button) : failed(error, again, "h2"));
   }

@@ -110,11 +110,12 @@ class Quadruped(Robot):
 
     def sense(self, trajectory: Trajectory) -> FloatArray:
         """Return `(..., r, 5)`: roll and pitch of the trunk, its height, and its place on the ground from the start."""
-        x, y, z, w = np.moveaxis(trajectory.orientations, -1, 0)
-        roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x**2 + y**2))
-        pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
-        place = trajectory.positions_m
-        return np.stack([roll, pitch, place[..., 2], place[..., 0], place[..., 1]], axis=-1)
+        x, y, z, w = (trajectory.orientations[..., part] for part in range(4))
+        values = np.empty((*x.shape, 5))
+        values[..., 0] = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x**2 + y**2))
+        values[..., 1] = np.arcsin(np.minimum(np.maximum(2 * (w * y - z * x), -1.0), 1.0))
+        values[..., 2], values[..., 3:] = trajectory.positions_m[..., 2], trajectory.positions_m[..., :2]
+        return values
 
 
 def _world() -> World:

@@ -11,6 +11,7 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Parameters
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.registry import Plugin
+from gaplab.services.core.repeats import variance_of_mean
 from gaplab.services.core.scoring import NO_FLOOR
 from gaplab.services.core.space import Space
 from gaplab.services.core.types import Belief, Sample
@@ -188,11 +189,12 @@ class DiverseOptions(Frozen):
     )
 
     def floor(self, belief: Belief) -> float:
-        """Return the floor under the discrepancies of simulators, above 0."""
+        """Return the floor under the discrepancies of simulators, above 0, and at least the noise of repeats."""
         error, discrepancy = self.least_error, belief.discrepancy
         if error is None:
             error = discrepancy.least_error(self.least_share * belief.scale)
-        return max(discrepancy.floor(error), NO_FLOOR)
+        noise = 0.0 if discrepancy.senses else variance_of_mean(belief.learnable) ** 0.5
+        return max(discrepancy.floor(max(error, noise)), NO_FLOOR)
 
 
 class EnsembleOptions(Frozen):

@@ -76,7 +76,7 @@ class MuJoCo(Engine):
         return Trajectory(motions[0].observe_s, poses[..., :3], poses[..., 3:])
 
     def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
-        """Return the same rollout with joint angles."""
+        """Return the same rollout with joint angles and torques."""
         return recording(motion, times_s, *self._scene(_kind(world)).record(world.material, motion, times_s))
 
     def close(self) -> None:

@@ -78,6 +78,33 @@ def drive(known: Any, forces: Any, angles: Any, speeds: Any, accelerations: Any)
         forces[dof] = np.minimum(np.maximum(asked, min(0.0, took) - strongest), max(0.0, took) + strongest)
 
 
+def drive_torques(known: FloatArray, targets: FloatArray, angles: FloatArray, speeds: FloatArray) -> FloatArray:
+    """Return the torques that motors gave their hinges in each step of a rollout, within their limits.
+
+    What the rotor takes is not the hinge's. In an impact the rotor passes on more than its motor can; the motor's limit
+    counts.
+
+    Args:
+        known: settings.
+        targets: `(s, 6 + hinges)`: targets, rad.
+        angles: `(s + 1, 7 + hinges)`: before each step, and at the end.
+        speeds: `(s + 1, 6 + hinges)`, likewise.
+
+    Returns:
+        `(s, 6 + hinges)`, N·m; 0 without a motor.
+    """
+    accelerations = np.diff(speeds, axis=0) / known[STEP]
+    before = np.vstack([np.zeros_like(accelerations[:1]), accelerations[:-1]])
+    found = np.array(targets)
+    for step, forces in enumerate(found):
+        drive(known, forces, angles[step], speeds[step], before[step])
+    for motor in range(int(known[MOTORS])):
+        at = FIRST + EACH * motor
+        dof, strongest = int(known[at + DOF]), known[at + STRONGEST]
+        found[:, dof] = np.clip(found[:, dof] - known[at + ROTOR] * accelerations[:, dof], -strongest, strongest)
+    return found
+
+
 def coast(step: float, jacobian: Any, before: Any, accelerations: Any, excess: Any, impulses: Any) -> None:
     """Compute the speeds of the contacts' rows at the end of the step without contact forces.
 

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.world import Material, Motion, World
 from gaplab.services.engines.mujoco.callback import callbacks
-from gaplab.services.engines.mujoco.law import settings
+from gaplab.services.engines.mujoco.law import drive_torques, settings
 from gaplab.services.engines.mujoco.model import compiled, driven, drives, paint
 from gaplab.services.engines.stepping import plausible
 
 ROWS = 64
 """Rollouts per thread in one call of MuJoCo; more would only take memory, 0.1 MB each for the quadruped."""
 
-TIME, POSE = 0, slice(1, 8)
-"""Indices into a state."""
+TIME, ANGLES, POSE = 0, 1, slice(1, 8)
+"""Indices into a state: time; positions, then speeds; the base's among the positions."""
 
 TURNED = np.array((0, 1, 2, 4, 5, 6, 3))
 """Order of a pose: MuJoCo's quaternions have w first, a Trajectory's last."""
@@ -69,14 +69,22 @@ class MuJoCoScene:
                     found[down, across] = self._seen(states, steps).reshape(-1, len(models), len(steps), 7)
         return found
 
-    def record(self, material: Material, motion: Motion, times_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the result of `poses`, `(t, 7)`, and base and joints at other times, `(k, 7 + joints)`."""
-        observed = self._steps(motion.observe_s)
+    def record(
+        self, material: Material, motion: Motion, times_s: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the result of `poses`, `(t, 7)`; base and joints at other times, `(k, 7 + joints)`; and torques.
+
+        The torques `(k, joints)`, N·m, are the motors' in the step before; zeros at time 0.
+        """
+        observed, chosen = self._steps(motion.observe_s), self._steps(times_s)
         with _in_force(self._mujoco, *self._callbacks):
             controls = self._controls([motion], max(1, int(observed[-1])))
             states = self._rolled(self._painted([material]), controls)
-        looked = np.vstack([self._start, states[0]])[self._steps(times_s)]
-        return self._seen(states, observed)[0], np.hstack([looked[:, POSE][:, TURNED], looked[:, self._angles]])
+        states_with_start = np.vstack([self._start, states[0]])
+        looked = states_with_start[chosen]
+        torques = self._torques(controls[0], states_with_start)[chosen]
+        seen = np.hstack([looked[:, POSE][:, TURNED], looked[:, self._angles]])
+        return self._seen(states, observed)[0], seen, torques
 
     def close(self) -> None:
         """End the threads."""
@@ -119,6 +127,14 @@ class MuJoCoScene:
         poses[:, steps == 0] = self._start[POSE]
         poses[~(complete & plausible(poses))] = np.nan
         return poses[..., TURNED]
+
+    def _torques(self, controls: FloatArray, states: FloatArray) -> FloatArray:
+        """Return `(steps + 1, joints)`: torques of the motors before each state; zeros before the first."""
+        angles = states[:, ANGLES : ANGLES + self.model.nq]
+        speeds = states[:, ANGLES + self.model.nq : ANGLES + self.model.nq + self.model.nv]
+        torques = drive_torques(self._datas[0].userdata, controls, angles, speeds)
+        dofs = [int(self.model.joint(each.name).dofadr[0]) for each in self.world.joints]
+        return np.vstack([np.zeros((1, len(dofs))), torques[:, dofs]])
 
     def _room(self, count: int, steps: int) -> FloatArray:
         """Return an array `(count, steps, state)`, in the memory of the last call if it is large enough."""

@@ -11,6 +11,9 @@ from gaplab.services.engines.physx.robot import Handle, build_robot, set_offsets
 BOUNCE_THRESHOLD_M_S = 0.2
 """Impacts slower than this do not bounce, as in Bullet. PhysX's default, 2 m/s, is faster than walking feet."""
 
+ABOUT_AXIS = 3
+"""Index of the torque about a hinge's axis: forces, then torques, in the joint's frame, whose x is the axis."""
+
 LARGEST = float(np.finfo(np.float32).max)
 """Largest number in single precision, in which PhysX computes."""
 
@@ -39,6 +42,7 @@ class PhysXScene:
         self.articulation = self.robot.articulation
         active = self.articulation.active_joints
         self._places = [active.index(self.robot.links[joint.child].joint) for joint in world.joints]
+        self._links = [self.articulation.links.index(self.robot.links[joint.child]) for joint in world.joints]
         self._initial: bytes = self._system.pack()
 
     def start(self, material: Material) -> None:
@@ -68,6 +72,10 @@ class PhysXScene:
     def angles(self) -> FloatArray:
         """Return the joint angles `(joints,)`, rad, in the world's order, which is not PhysX's."""
         return np.asarray(self.articulation.qpos, dtype=float)[self._places]
+
+    def torques(self) -> FloatArray:
+        """Return the torques of the motors in the last step, `(joints,)`, N·m: all that acts about a hinge's axis."""
+        return np.asarray(self.articulation.link_incoming_joint_forces, dtype=float)[self._links, ABOUT_AXIS]
 
     def close(self) -> None:
         """Close the scene; PhysX frees it with the last reference."""

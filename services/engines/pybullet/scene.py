@@ -9,6 +9,9 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.world import Body, Box, Joint, Material, World
 
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
+FAR_AWAY = (0.0, 0.0, 1e4)
+"""Position of the base, m, in which nothing touches the ground."""
+
 BASE = -1
 """Bullet's index of the base. Links count from 0, and link i belongs to joint i."""
 
@@ -41,7 +44,13 @@ class PyBulletScene:
         self._initial: int = bullet.saveState(physicsClientId=self.client)
 
     def start(self, material: Material, friction: float) -> None:
-        """Reset to time 0, with a material and the initial coefficient of friction of its contacts."""
+        """Reset to time 0, with a material and the initial coefficient of friction of its contacts.
+
+        `restoreState` keeps contact points of the last rollout, with their impulses, where a foot ended near its start.
+        Far from the ground they are dropped.
+        """
+        self.bullet.resetBasePositionAndOrientation(self.robot, FAR_AWAY, UNTURNED, physicsClientId=self.client)
+        self.bullet.performCollisionDetection(physicsClientId=self.client)
         self.bullet.restoreState(self._initial, physicsClientId=self.client)
         bounce, client = material.restitution, self.client
         for link in self.colliding:
@@ -81,13 +90,21 @@ class PyBulletScene:
 
     def angles(self) -> FloatArray:
         """Return the joint angles `(joints,)`, rad."""
-        joints = range(len(self.world.joints))
-        states = self.bullet.getJointStates(self.robot, joints, physicsClientId=self.client) if joints else ()
-        return np.array([state[0] for state in states], dtype=float)
+        return self._states(0)
+
+    def torques(self) -> FloatArray:
+        """Return the torques of the motors in the last step, `(joints,)`, N·m."""
+        return self._states(3)
 
     def close(self) -> None:
         """Close the server."""
         self.bullet.disconnect(physicsClientId=self.client)
+
+    def _states(self, place: int) -> FloatArray:
+        """Return one of Bullet's numbers about each joint, `(joints,)`."""
+        joints = range(len(self.world.joints))
+        states = self.bullet.getJointStates(self.robot, joints, physicsClientId=self.client) if joints else ()
+        return np.array([state[place] for state in states], dtype=float)
 
     def _set_up_physics(self) -> None:
         bullet, client = self.bullet, self.client

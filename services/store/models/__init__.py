@@ -3,6 +3,7 @@
     study ──< experiment ──< repetition ──< iteration ──< measurement
                                     │                └──< simulator
                                     ├──< attempt
+                                    ├──< request ──< answer;  branch, of closed steps
                                     └──< checkpoint, of the current step
     sensitivity, shared by experiments with the same subject, whose hash is its id
     provenance, shared by experiments through experiment_provenance; its id is a hash of its facts
@@ -10,6 +11,7 @@
     supervisor
     notification, of an event; notifier, which finds them
     deletion, of a study or an experiment;  view, a saved query
+    attachment, of answers
     token, of a caller;  idempotency, a request with its answer
 
 Values that are plotted or filtered are columns; vectors are JSON arrays, in which floats round-trip exactly. Neither a
@@ -27,6 +29,10 @@ from gaplab.services.store.models.base import SPEC_VERSION as SPEC_VERSION
 from gaplab.services.store.models.base import Base as Base
 from gaplab.services.store.models.base import Number as Number
 from gaplab.services.store.models.base import Reason as Reason
+from gaplab.services.store.models.bench import AnswerRow as AnswerRow
+from gaplab.services.store.models.bench import AttachmentRow as AttachmentRow
+from gaplab.services.store.models.bench import BranchRow as BranchRow
+from gaplab.services.store.models.bench import RequestRow as RequestRow
 from gaplab.services.store.models.checkpoints import CheckpointRow as CheckpointRow
 from gaplab.services.store.models.events import EventCounterRow as EventCounterRow
 from gaplab.services.store.models.events import EventRow as EventRow

@@ -8,11 +8,12 @@ from sqlalchemy import JSON, Dialect, Double, Enum, MetaData, Text, TypeDecorato
 from sqlalchemy.orm import DeclarativeBase
 
 from gaplab.schemas.lifecycle import Ending, State
+from gaplab.schemas.measurements import AnswerState, RequestState
 from gaplab.schemas.records import MeasurementKind
 from gaplab.services.store.clock import UtcDateTime
 from gaplab.services.store.texts import brief, storable
 
-REVISION = "0013"
+REVISION = "0014"
 """The revision with these tables; a database at any other revision is refused."""
 
 SPEC_VERSION = 1
@@ -75,8 +76,12 @@ class Base(DeclarativeBase):
         list[float]: JSON(none_as_null=True),
         list[float | None]: JSON(none_as_null=True),
         list[dict[str, Any]]: JSON(none_as_null=True),
+        list[str]: JSON(none_as_null=True),
+        list[list[list[float | None]]]: JSON(none_as_null=True),
         dict[str, Any]: JSON(none_as_null=True),
         State: Enum(State, native_enum=False, create_constraint=True, length=16, name="state"),
         MeasurementKind: _words(MeasurementKind, "kind"),
         Ending: _words(Ending, "ending"),
+        RequestState: _words(RequestState, "state"),
+        AnswerState: _words(AnswerState, "state"),
     }

@@ -43,7 +43,12 @@ class IterationRow(Base):
 
 
 class MeasurementRow(Base):
-    """One real-world evaluation. Readings are NULL if the robot has no sensors; one of them, if its sensor failed."""
+    """One real-world evaluation. Readings are NULL if the robot has no sensors; one of them, if its sensor failed.
+
+    Attributes:
+        repeats: the values whose mean is the fitness; NULL if it is a single value.
+        left_out: true for a probe that the spec does not ask for.
+    """
 
     __tablename__ = "measurement"
     __table_args__ = (
@@ -56,6 +61,8 @@ class MeasurementRow(Base):
     genome: Mapped[list[float]]
     fitness: Mapped[float | None]
     readings: Mapped[list[float | None] | None]
+    repeats: Mapped[list[float] | None]
+    left_out: Mapped[bool] = mapped_column(default=False, server_default="0")
     measured_by: Mapped[str] = mapped_column(String(100))
     measured_at: Mapped[datetime] = mapped_column(default=now())
 

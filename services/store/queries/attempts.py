@@ -16,6 +16,7 @@ from gaplab.services.store.queries.events import note
 
 _EVENTS = {
     Ending.COMPLETED: EventKind.REPETITION_COMPLETED,
+    Ending.WAITING: EventKind.REPETITION_WAITS,
     Ending.PAUSED: EventKind.REPETITION_PAUSED,
     Ending.STOPPED: EventKind.REPETITION_STOPPED,
     Ending.CANCELLED: EventKind.REPETITION_CANCELLED,

@@ -50,7 +50,7 @@ def work_of(session: Session, experiments: Sequence[str]) -> dict[str, Work]:
     run, row = RepetitionRow, MeasurementRow
     seconds = select(run.experiment_id, func.sum(run.seconds)).where(run.experiment_id.in_(experiments))
     measured = select(run.experiment_id, row.kind, func.count()).join(run, run.id == row.repetition_id)
-    measured = measured.where(run.experiment_id.in_(experiments)).group_by(run.experiment_id, row.kind)
+    measured = measured.where(run.experiment_id.in_(experiments), ~row.left_out).group_by(run.experiment_id, row.kind)
     counts = {(id_, kind): count for id_, kind, count in session.execute(measured)}
     return {
         id_: Work(

@@ -57,8 +57,13 @@ def note_steps(session: Session, deliveries: Mapping[Claim, Sequence[TimedStep]]
     """Add an event for each of these steps."""
     for claim, steps in deliveries.items():
         for each in steps:
-            kind, body = _event_of(each.step)
-            note(session, kind, claim.experiment_id, claim.number, iteration=each.step.iteration, **body)
+            note_step(session, each.step, claim.experiment_id, claim.number)
+
+
+def note_step(session: Session, step: Step, experiment: str, repetition: int) -> None:
+    """Add the event of a step."""
+    kind, body = _event_of(step)
+    note(session, kind, experiment, repetition, iteration=step.iteration, **body)
 
 
 def write(session: Session) -> None:
@@ -97,4 +102,6 @@ def _event_of(step: Step) -> tuple[EventKind, dict[str, Any]]:
         case Transferred():
             return EventKind.TRANSFERRED, {"simulated_fitness": finite(step.fitness)}
         case Probed():
-            return EventKind.PROBED, {"fitness": finite(step.fitness), "recorded_fitness": finite(step.recorded)}
+            left_out = {"left_out": True} if step.left_out else {}
+            recorded = finite(step.recorded)
+            return EventKind.PROBED, {"fitness": finite(step.fitness), "recorded_fitness": recorded} | left_out

@@ -9,7 +9,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from gaplab.schemas.records import MeasurementKind
-from gaplab.services.core.arrays import NO_READINGS, Readings, frozen
+from gaplab.services.core.arrays import NO_READINGS, FloatArray, Readings, frozen
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
 from gaplab.services.store.models import IterationRow, MeasurementRow, SimulatorRow
 
@@ -73,7 +73,8 @@ def _selected(row: IterationRow) -> Selected | None:
 def _measured(row: MeasurementRow | None) -> Measured | None:
     if row is None:
         return None
-    return Measured(row.iteration, Sample(frozen(row.genome), _or(nan, row.fitness), _readings(row)))
+    sample = Sample(frozen(row.genome), _or(nan, row.fitness), _readings(row), _repeats(row))
+    return Measured(row.iteration, sample)
 
 
 def _tuned(row: IterationRow, simulators: Sequence[SimulatorRow]) -> Tuned | None:
@@ -98,11 +99,16 @@ def _transferred(row: IterationRow) -> Transferred | None:
 def _probed(row: IterationRow, probe: MeasurementRow | None) -> Probed | None:
     if probe is None:
         return None
-    return Probed(row.number, _or(nan, probe.fitness), _or(nan, row.recorded_fitness), _readings(probe))
+    fitnesses = _or(nan, probe.fitness), _or(nan, row.recorded_fitness)
+    return Probed(row.number, *fitnesses, _readings(probe), _repeats(probe), probe.left_out)
 
 
 def _readings(row: MeasurementRow) -> Readings:
     return frozen([_or(nan, each) for each in row.readings]) if row.readings else NO_READINGS
+
+
+def _repeats(row: MeasurementRow) -> FloatArray:
+    return frozen(row.repeats) if row.repeats else NO_READINGS
 
 
 def _cost(rollouts: int | None, failures: int | None, saved: int | None) -> Cost:

@@ -2,14 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import cache
+from typing import Any
 
-from sqlalchemy import ColumnElement, case, func, select
+from sqlalchemy import ColumnElement, Select, bindparam, case, func, select
 from sqlalchemy.orm import Session
 
-from gaplab.schemas.lifecycle import State
+from gaplab.schemas.lifecycle import PENDING, State
 from gaplab.services.store.models import ExperimentRow, RepetitionRow
 
-_OPEN = (State.QUEUED, State.RUNNING)
+_OPEN = PENDING
 
 _STOPPED = (State.COMPLETED, State.CANCELLED)
 
@@ -49,9 +51,16 @@ class Tally:
 
 def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
     """Return the tally of each experiment."""
+    found = session.execute(_all_tallies(), {"experiments": experiments})
+    return {experiment: _tally(*counts, seconds=float(seconds)) for experiment, *counts, seconds in found}
+
+
+@cache
+def _all_tallies() -> Select[*tuple[Any, ...]]:
+    """Return the query for the tallies of `experiments`; cached, because every list asks it and it is long."""
     row = RepetitionRow
     left = ExperimentRow.rollouts - row.rollouts_done - row.rollouts_saved
-    found = session.execute(
+    return (
         select(
             row.experiment_id,
             func.count(),
@@ -72,10 +81,9 @@ def tallies(session: Session, experiments: Sequence[str]) -> dict[str, Tally]:
             func.sum(row.seconds),
         )
         .join(ExperimentRow, ExperimentRow.id == row.experiment_id)
-        .where(row.experiment_id.in_(experiments))
+        .where(row.experiment_id.in_(bindparam("experiments", expanding=True)))
         .group_by(row.experiment_id)
     )
-    return {experiment: _tally(*counts, seconds=float(seconds)) for experiment, *counts, seconds in found}
 
 
 def reasons(session: Session, experiments: Sequence[str]) -> dict[str, tuple[str, ...]]:

@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 
+from sqlalchemy import select
 from sqlalchemy.orm import Session, aliased
 
 from gaplab.schemas.records import MeasurementKind
-from gaplab.services.store.models import IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
+from gaplab.services.store.models import IterationRow, MeasurementRow, RepetitionRow, RequestRow, SimulatorRow
 from gaplab.services.store.queries.repetition_rows import of_experiments
 
 
@@ -70,6 +71,18 @@ def measured_controller(
         return None
     genome, real, simulated, readings = found
     return MeasuredController(genome, real, simulated if kind is MeasurementKind.PROBE else None, readings)
+
+
+def requested_controller(
+    session: Session, experiment: str, repetition: int, iteration: int, kind: MeasurementKind
+) -> MeasuredController | None:
+    """Return the controller of an iteration whose measurement is requested; None if there is none."""
+    row = RequestRow
+    of_it = (row.iteration == iteration) & (row.kind == kind) & row.branch.is_(None)
+    query = select(row.genome).join(RepetitionRow, RepetitionRow.id == row.repetition_id).where(of_it)
+    query = query.where(RepetitionRow.experiment_id == experiment, RepetitionRow.number == repetition)
+    genome = session.scalar(query.order_by(row.created_at.desc(), row.id.desc()).limit(1))
+    return None if genome is None else MeasuredController(genome, None, None)
 
 
 def tuned_parameters(session: Session, experiment: str, repetition: int, iteration: int) -> list[list[float]]:

@@ -1,22 +1,28 @@
 """Results: samples, simulators, recorded fitnesses and costs of iterations."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from typing import Any
 
-from sqlalchemy import ColumnElement, Select, case, func, select, tuple_
+from sqlalchemy import ColumnElement, Select, bindparam, case, func, select, tuple_
 from sqlalchemy.orm import Session
 
-from gaplab.schemas.lifecycle import State
+from gaplab.schemas.lifecycle import PENDING, State
 from gaplab.schemas.records import MeasurementKind, SampleRead, SimulatorRead
+from gaplab.services.core.arrays import frozen
 from gaplab.services.core.discrepancies.base import Discrepancy
+from gaplab.services.core.repeats import standard_error
 from gaplab.services.core.stored_specs import discrepancy_of
 from gaplab.services.store.cursor import decode, encode
 from gaplab.services.store.models import ExperimentRow, IterationRow, MeasurementRow, RepetitionRow, SimulatorRow
 from gaplab.services.store.queries.repetition_rows import of_experiments
-from gaplab.services.store.queries.tunings import measured, per_sample, samples_until
+from gaplab.services.store.queries.tunings import measured, per_sample
 
 _TURN = case((MeasurementRow.kind == MeasurementKind.SAMPLE, 0), else_=1)
 """Within an iteration the sample comes before the probe."""
+
+_ASKED = RepetitionRow.experiment_id.in_(bindparam("experiments", expanding=True))
+"""Condition of statements that are built once: building and hashing one takes longer than SQLite needs for it."""
 
 
 def _page(
@@ -49,13 +55,18 @@ def page_of_samples(
         InvalidSpec: the cursor is invalid.
     """
     row = MeasurementRow
-    columns = row.iteration, row.kind, row.genome, row.fitness, row.readings, row.measured_by, row.measured_at
-    query = of_experiments(row, [experiment], RepetitionRow.number, *columns)
+    columns = row.iteration, row.kind, row.genome, row.fitness, row.readings, row.repeats
+    query = of_experiments(row, [experiment], RepetitionRow.number, *columns, row.measured_by, row.measured_at)
+    query = query.where(~row.left_out)
     key, wanted = (RepetitionRow.number, row.iteration, _TURN), {RepetitionRow.number: repetition, row.kind: kind}
-    names = tuple(SampleRead.model_fields)
-    return tuple(
-        SampleRead(**dict(zip(names, each, strict=True))) for each in _page(session, query, key, wanted, limit, cursor)
-    )
+    return tuple(_sample(found._mapping) for found in _page(session, query, key, wanted, limit, cursor))
+
+
+def _sample(found: Mapping[str, Any]) -> SampleRead:
+    values = dict(found)
+    values["repetition"] = values.pop("number")
+    values["standard_error"] = standard_error(frozen(values["repeats"] or ()))
+    return SampleRead(**values)
 
 
 def page_of_simulators(
@@ -77,10 +88,10 @@ def page_of_simulators(
     query = of_experiments(row, [experiment.id], *key, row)
     wanted = {RepetitionRow.number: repetition, row.iteration: iteration}
     names = [each["name"] for each in experiment.spec["tunables"]]
-    tuned_on = measured(session, experiment).tuned_on
+    tuned = measured(session, experiment)
     discrepancy = discrepancy_of(experiment.spec)
     return tuple(
-        _simulator(number, found, names, samples_until(tuned_on, number, found.iteration), discrepancy)
+        _simulator(number, found, names, tuned.tuned_until(number, found.iteration), discrepancy)
         for number, *_, found in _page(session, query, key, wanted, limit, cursor)
     )
 
@@ -118,17 +129,18 @@ def recorded(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str
 
 def best_recorded(session: Session, experiments: Sequence[str]) -> dict[str, list[float]]:
     """Return the best recorded fitness of each repetition so far, by experiment."""
-    of_one = (
-        select(func.max(IterationRow.recorded_fitness))
-        .where(IterationRow.repetition_id == RepetitionRow.id)
-        .scalar_subquery()
-    )
-    query = select(RepetitionRow.experiment_id, of_one).where(RepetitionRow.experiment_id.in_(experiments))
     found: dict[str, list[float]] = {}
-    for experiment, best in session.execute(query):
+    for experiment, best in session.execute(_best_recorded(), {"experiments": list(experiments)}):
         if best is not None:
             found.setdefault(experiment, []).append(best)
     return found
+
+
+@cache
+def _best_recorded() -> Select[Any]:
+    row = IterationRow
+    of_one = select(func.max(row.recorded_fitness)).where(row.repetition_id == RepetitionRow.id).scalar_subquery()
+    return select(RepetitionRow.experiment_id, of_one).where(_ASKED)
 
 
 def last_common(session: Session, experiments: Sequence[str]) -> dict[str, int]:
@@ -137,10 +149,16 @@ def last_common(session: Session, experiments: Sequence[str]) -> dict[str, int]:
     The COMPLETED repetitions count. Without any, those that have begun and may go on count; without any of those, all
     that have begun. An experiment without a point of its curve is missing.
     """
-    counted = session.execute(last_common_of_all().where(RepetitionRow.experiment_id.in_(experiments)))
+    counted = session.execute(_last_common(), {"experiments": list(experiments)})
     return {experiment: done - 1 for experiment, done in counted if done is not None}
 
 
+@cache
+def _last_common() -> Select[Any]:
+    return last_common_of_all().where(_ASKED)
+
+
+@cache
 def last_common_of_all() -> Select[Any, Any]:
     """Return the query for the iterations that the repetitions of each experiment share, number 0 included."""
     row = RepetitionRow
@@ -148,7 +166,7 @@ def last_common_of_all() -> Select[Any, Any]:
     def least(*states: State) -> ColumnElement[int | None]:
         return func.min(case((row.state.in_(states), row.iterations_done)))
 
-    begun = func.coalesce(least(State.COMPLETED), least(State.QUEUED, State.RUNNING), func.min(row.iterations_done))
+    begun = func.coalesce(least(State.COMPLETED), least(*PENDING), func.min(row.iterations_done))
     query = select(row.experiment_id, begun.label("done")).where(row.iterations_done > 0)
     return query.group_by(row.experiment_id)
 
@@ -157,13 +175,21 @@ def recorded_at(session: Session, counts: Mapping[str, int]) -> dict[str, list[f
     """Return the recorded fitness of repetitions, by number, after one number of evaluations for each experiment."""
     if not counts:
         return {}
-    row, found = IterationRow, dict[str, list[float]]()
-    query = of_experiments(row, list(counts), RepetitionRow.experiment_id, row.recorded_fitness)
-    query = query.where(row.number == case(dict(counts), value=RepetitionRow.experiment_id))
-    query = query.where(row.recorded_fitness.is_not(None)).order_by(RepetitionRow.experiment_id, RepetitionRow.number)
-    for experiment, fitness in session.execute(query):
-        found.setdefault(experiment, []).append(fitness)
+    found = dict[str, list[float]]()
+    asked = {"experiments": list(counts), "numbers": list(set(counts.values()))}
+    for experiment, number, fitness in session.execute(_recorded_at(), asked):
+        if number == counts[experiment]:
+            found.setdefault(experiment, []).append(fitness)
     return found
+
+
+@cache
+def _recorded_at() -> Select[Any, Any, Any]:
+    row = IterationRow
+    query = select(RepetitionRow.experiment_id, row.number, row.recorded_fitness)
+    query = query.join(RepetitionRow, RepetitionRow.id == row.repetition_id).where(_ASKED)
+    query = query.where(row.number.in_(bindparam("numbers", expanding=True)), row.recorded_fitness.is_not(None))
+    return query.order_by(RepetitionRow.experiment_id, RepetitionRow.number)
 
 
 def iteration_costs(session: Session, experiments: Sequence[str]) -> Sequence[tuple[str, int, int, int, float, bool]]:

@@ -13,7 +13,7 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.types import Cost, Measured, Probed, Selected, Step, Transferred, Tuned
 from gaplab.services.store.clock import now
-from gaplab.services.store.lease import Claim, TimedStep
+from gaplab.services.store.lease import TimedStep
 from gaplab.services.store.models import IterationRow, MeasurementRow, SimulatorRow
 
 _ITERATION, _MEASUREMENT, _SIMULATOR = (
@@ -40,9 +40,15 @@ class StepRows:
         self._simulators: list[Row] = []
         self._measurements: dict[tuple[Key, MeasurementKind], Row] = {}
 
-    def add(self, claim: Claim, timed: TimedStep) -> None:
-        """Add a step of the claim's repetition."""
-        step, key = timed.step, (claim.id, timed.step.iteration)
+    def add(self, repetition: int, timed: TimedStep, measured_by: str) -> None:
+        """Add a step of a repetition.
+
+        Args:
+            repetition: its id.
+            timed: the step.
+            measured_by: engine or operator of its measurement, if it is one.
+        """
+        step, key = timed.step, (repetition, timed.step.iteration)
         columns = self._columns[key]
         columns.update(iteration_columns(step))
         columns["seconds"] += timed.seconds
@@ -53,7 +59,7 @@ class StepRows:
         if isinstance(step, Tuned):
             self._simulators += [_named(key) | each for each in simulator_columns(step)]
         if isinstance(step, Measured | Probed):
-            self._measurements[key, _kind(step)] = measurement_columns(step, _measured_by(claim))
+            self._measurements[key, _kind(step)] = measurement_columns(step, measured_by)
 
     def write(self, session: Session) -> None:
         """Store all rows in the session's transaction."""
@@ -141,7 +147,13 @@ def simulator_columns(step: Tuned) -> list[dict[str, Any]]:
 def measurement_columns(step: Measured | Probed, measured_by: str) -> dict[str, Any]:
     """Return the row of a measurement; a probe's step does not repeat the transferred genome."""
     seen = step if isinstance(step, Probed) else step.sample
-    columns = {"fitness": finite(seen.fitness), "readings": _readings(seen.readings), "measured_by": measured_by}
+    columns = {
+        "fitness": finite(seen.fitness),
+        "readings": _readings(seen.readings),
+        "repeats": vector(seen.repeats) if len(seen.repeats) else None,
+        "left_out": isinstance(step, Probed) and step.left_out,
+        "measured_by": measured_by,
+    }
     return columns if isinstance(step, Probed) else {"genome": vector(step.sample.genome)} | columns
 
 
@@ -165,11 +177,6 @@ def _named(key: Key, number: str = "iteration") -> Row:
 
 def _kind(step: Step) -> MeasurementKind:
     return MeasurementKind.SAMPLE if isinstance(step, Measured) else MeasurementKind.PROBE
-
-
-def _measured_by(claim: Claim) -> str:
-    engine = claim.spec.reality.engine
-    return engine.name if engine else "unknown"
 
 
 @cache

@@ -58,7 +58,7 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
     batch = StepRows()
     for claim, steps in fresh.items():
         for each in steps:
-            batch.add(claim, each)
+            batch.add(claim.id, each, _measured_by(claim))
     batch.write(session)
     checkpoints.forget(session, [claim.id for claim, steps in fresh.items() if steps and lengths[claim][1]])
     checkpoints.write(
@@ -66,6 +66,24 @@ def record(session: Session, deliveries: Mapping[Claim, Sequence[Delivered]]) ->
     )
     events.note_steps(session, fresh)
     return {claim: len(steps) for claim, steps in fresh.items()}
+
+
+def append(session: Session, repetition: RepetitionRow, timed: TimedStep, measured_by: str) -> None:
+    """Append the next step to the log of a repetition that no worker holds.
+
+    Raises:
+        Conflict: a worker holds it, it has ended, or the step is not the next one.
+    """
+    if repetition.state not in (State.WAITING, State.QUEUED) or position(timed.step) != repetition.steps:
+        msg = f"step {position(timed.step)} cannot be recorded: repetition {repetition.number} is {repetition.state} "
+        raise Conflict(msg + f"after {repetition.steps} steps")
+    batch = StepRows()
+    batch.add(repetition.id, timed, measured_by)
+    batch.write(session)
+    row, ends = RepetitionRow, isinstance(timed.step, Probed)
+    values = {"steps": row.steps + 1, "iterations_done": row.iterations_done + int(ends), "losses": 0, "error": None}
+    session.execute(update(row).where(row.id == repetition.id).values(values))
+    events.note_step(session, timed.step, repetition.experiment_id, repetition.number)
 
 
 def _lengths(session: Session, claims: Iterable[Claim]) -> dict[Claim, tuple[int, int]]:
@@ -85,7 +103,7 @@ def _new(claim: Claim, length: int, delivered: Iterable[Delivered]) -> list[Time
     """Return the delivered steps that follow the first `length` of the log."""
     found: list[TimedStep] = []
     for each in delivered:
-        if isinstance(each, Checkpoint):
+        if not isinstance(each, TimedStep):
             continue
         place, following = position(each.step), length + len(found)
         if place > following:
@@ -100,6 +118,11 @@ def _parts(delivered: Iterable[Delivered], length: int, parts: int, new: int) ->
     """Return the delivered checkpoints of the step that follows the new steps."""
     found = [each for each in delivered if isinstance(each, Checkpoint)]
     return checkpoints.fresh(found, length + new, 0 if new else parts)
+
+
+def _measured_by(claim: Claim) -> str:
+    engine = claim.spec.reality.engine
+    return engine.name if engine else "nobody"
 
 
 def _move(claim: Claim, length: int, steps: Sequence[TimedStep]) -> dict[str, Any]:

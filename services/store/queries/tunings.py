@@ -55,10 +55,20 @@ class MeasuredIterations:
     Attributes:
         tuned_on: those of the samples that tuning sees.
         held_out: those of the samples that it does not see.
+        known: number of samples from before the experiment; every tuning sees them.
     """
 
     tuned_on: Mapping[int, Sequence[int]]
     held_out: Mapping[int, Sequence[int]]
+    known: int = 0
+
+    def tuned_until(self, repetition: int, iteration: int) -> int:
+        """Return the number of samples that the simulators of an iteration were tuned on."""
+        return self.known + _until(self.tuned_on, repetition, iteration)
+
+    def tested_until(self, repetition: int, iteration: int) -> int:
+        """Return the number of held-out samples that the simulators of an iteration were tested on."""
+        return _until(self.held_out, repetition, iteration)
 
 
 def measured(session: Session, experiment: ExperimentRow) -> MeasuredIterations:
@@ -70,7 +80,15 @@ def measured(session: Session, experiment: ExperimentRow) -> MeasuredIterations:
         query.where(row.kind == MeasurementKind.SAMPLE, row.fitness.is_not(None))
     ):
         (held_out if is_held_out(iteration, share) else tuned_on).setdefault(repetition, []).append(iteration)
-    return MeasuredIterations(tuned_on, held_out)
+    tunes = experiment.iterations > 1  # a strategy without samples has iteration 0 only, and tunes nothing
+    known = len(experiment.spec["reality"].get("samples", ())) if tunes else 0
+    return MeasuredIterations(tuned_on, held_out, known)
+
+
+def repeats(session: Session, experiment: str) -> list[list[float]]:
+    """Return the values of each sample and probe that was measured several times."""
+    row = MeasurementRow
+    return list(session.scalars(of_experiments(row, [experiment], row.repeats).where(row.repeats.is_not(None))))
 
 
 def posteriors(session: Session, experiment: str) -> dict[tuple[int, int], tuple[list[list[float]], list[float]]]:
@@ -85,17 +103,10 @@ def posteriors(session: Session, experiment: str) -> dict[tuple[int, int], tuple
     return found
 
 
-def samples_until(iterations: Mapping[int, Sequence[int]], repetition: int, iteration: int) -> int:
-    """Return the number of samples until an iteration: those that its simulators were tuned or tested on.
-
-    Args:
-        iterations: iterations of these samples, by repetition.
-        repetition: number of the repetition.
-        iteration: number of the iteration.
-    """
-    return sum(each <= iteration for each in iterations.get(repetition, ()))
-
-
 def per_sample(squared_error: float | None, samples: int, discrepancy: Discrepancy) -> float | None:
     """Return the error per sample; None without samples, or if the physics failed on one."""
     return discrepancy.error(squared_error / samples) if squared_error is not None and samples else None
+
+
+def _until(iterations: Mapping[int, Sequence[int]], repetition: int, iteration: int) -> int:
+    return sum(each <= iteration for each in iterations.get(repetition, ()))

@@ -7,6 +7,9 @@ import { letter } from "./ranges.js";
 /** @type {Record<string, string>} */
 const SETTINGS = { engine: "engine", tunables: "tunables", budget: "budget", optimizer: "optimizer", discrepancy: "discrepancy", tuner: "tuner", iterations: "number of iterations" };
 
+/** How reality is measured, which does not make it another one; with the defaults, which an older spec leaves out. @type {[key: string, words: string, otherwise: unknown][]} */
+const MEASURING = [["probes", "probes", "each"], ["repeats", "repeats of a measurement", 1], ["samples", "samples from before", []]];
+
 /** @typedef {{ id: string, study: string | null, direct: boolean, level: boolean, spec: Record<string, any> }} Experiment */
 /** @typedef {[letter: string, experiment: Experiment]} Lettered */
 /** @typedef {{ name: string, options?: Record<string, unknown> }} Plugin */
@@ -66,7 +69,8 @@ export function warnings(experiments) {
 export function differentSettings(experiments) {
   const counts = (/** @type {string} */ setting, /** @type {Experiment} */ { direct, level }) => !direct && !(level && setting === "iterations");
   const differ = (/** @type {string} */ setting) => groups(experiments.filter(([, experiment]) => counts(setting, experiment)), ({ spec }) => canonicalText(spec[setting])).length > 1;
-  return Object.keys(SETTINGS).filter(differ).map((setting) => SETTINGS[setting]);
+  const measuring = MEASURING.filter(([key, , otherwise]) => groups(experiments, ({ spec }) => canonicalText(spec.reality?.[key] ?? otherwise)).length > 1);
+  return [...Object.keys(SETTINGS).filter(differ).map((setting) => SETTINGS[setting]), ...measuring.map(([, words]) => words)];
 }
 
 /**
@@ -92,13 +96,16 @@ function groups(experiments, keyOf) {
  */
 function realityKeys(experiments) {
   const shown = experiments.map(([, experiment]) => experiment).filter((experiment) => experiment.study && !isHidden(experiment));
-  const byStudy = new Map(shown.map(({ study, spec }) => [study, canonicalText(spec.reality)]));
+  const byStudy = new Map(shown.map(({ study, spec }) => [study, realityKey(spec.reality)]));
   return (/** @type {Experiment} */ experiment) => {
     const { id, study, spec } = experiment;
-    if (!isHidden(experiment)) return canonicalText(spec.reality);
+    if (!isHidden(experiment)) return realityKey(spec.reality);
     return byStudy.get(study) ?? `hidden ${study ?? id} ${canonicalText(spec.reality.engine)}`;
   };
 }
+
+/** @param {Record<string, any>} reality */
+const realityKey = ({ kind = "simulated", engine, parameters, bench = null }) => canonicalText({ kind, engine, parameters, bench });
 
 /** @param {Experiment} experiment */
 const isHidden = ({ spec }) => !spec.reality.parameters || Object.values(spec.reality.parameters).includes(null);
@@ -107,7 +114,8 @@ const isHidden = ({ spec }) => !spec.reality.parameters || Object.values(spec.re
  * @param {Experiment} experiment
  * @param {Lettered[]} experiments
  */
-function realityText({ spec: { reality: { engine, parameters } } }, experiments) {
+function realityText({ spec: { reality: { kind, engine, parameters, bench } } }, experiments) {
+  if (kind === "physical") return `the robot on the bench “${bench}”`;
   const engines = experiments.map(([, { spec }]) => spec.reality.engine).filter(Boolean);
   return [engine && pluginText(engine, engines), ...Object.entries(parameters).map(optionText)].filter(Boolean).join(", ");
 }

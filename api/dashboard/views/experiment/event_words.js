@@ -23,11 +23,15 @@ const reason = ({ body }) => (body.reason ? `: ${body.reason}` : "");
  */
 const reaching = (words, value, where = "") => (value === null || value === undefined ? `the physics failed${where}` : `${words} ${number(value)}${where}`);
 
+/** @type {(words: string, value: number | null | undefined, where?: string) => string} a robot on a bench fails for other reasons than physics */
+const inReality = (words, value, where = "") => (value === null || value === undefined ? "failed in reality" : `${words} ${number(value)}${where}`);
+
 /** @type {Record<string, Words>} */
 const WORDS = {
   submitted: ({ body }) => `Submitted, with ${count(body.repetitions)} repetitions`,
   imported: () => "Imported from an archive",
   started: () => "Started",
+  waiting: () => "Waiting for measurements of the robot on the bench",
   pausing: ({ body }) => `Pausing: ${body.reason ?? "running repetitions finish their step"}`,
   paused: () => "Paused",
   resumed: () => "Resumed",
@@ -55,14 +59,24 @@ const WORDS = {
   repetition_failed: (event) => `${which(event)} failed${reason(event)}`,
   repetition_lost: (event) => `${which(event)} lost its worker, and is queued again${reason(event)}`,
   repetition_handed_back: (event) => `${which(event)} was handed back${reason(event)}`,
+  repetition_waits: (event) => `${which(event)} waits for a measurement`,
   repetition_paused: (event) => `${which(event)} paused`,
   repetition_stopped: (event) => `${which(event)} stopped`,
   repetition_cancelled: (event) => `${which(event)} cancelled`,
+  requested: (event) => `${step(event)}: a measurement of the ${event.body.kind === "probe" ? "transferred controller" : "sample"} is requested`,
+  refused: (event) => `${step(event)}: refused before it was offered${reason(event)}`,
+  taken: (event) => `${step(event)}: taken by ${event.body.operator}`,
+  released: (event) => `${step(event)}: given back by ${event.body.operator} without an answer`,
+  take_expired: (event) => `${step(event)}: ${event.body.operator} gave no sign of life, so the measurement is open again`,
+  conflicting: (event) => `${step(event)}: an answer by ${event.body.operator} is in conflict, to be decided`,
+  corrected: (event) => `${step(event)}: the measurement by ${event.body.operator} was corrected${reason(event)}`,
+  voided: (event) => `${step(event)}: the measurement by ${event.body.operator} is void${reason(event)}`,
+  decided: (event) => `${step(event)}: decided about the answer by ${event.body.operator}${reason(event)}`,
   selected: (event) => `${step(event)}: selected a controller to try in reality`,
-  measured: (event) => `${step(event)}: ${reaching("measured in reality,", event.body.fitness, event.body.fitness === null ? " in reality" : "")}`,
+  measured: (event) => `${step(event)}: ${inReality("measured in reality,", event.body.fitness)}`,
   tuned: (event) => `${step(event)}: simulators tuned, sum of squared errors ${squaredError(event.body.squared_error)}`,
   transferred: (event) => `${step(event)}: controller evolved, ${reaching("reaching", event.body.simulated_fitness, " in simulation")}`,
-  probed: (event) => `${step(event)}: ${reaching("the controller reaches", event.body.fitness, " in reality")}`,
+  probed: (event) => event.body.left_out ? `${step(event)}: the controller is not measured, as the spec says` : `${step(event)}: ${inReality("the controller reaches", event.body.fitness, " in reality")}`,
 };
 
 /** @param {{ channel?: string }} body */
@@ -73,6 +87,9 @@ function squaredError(value) {
   if (value === null || value === undefined) return "unknown";
   return value && value < 0.001 ? value.toExponential(1) : number(value);
 }
+
+/** The kinds of events that take steps out of a log. */
+export const REWRITES = ["corrected", "voided", "decided"];
 
 /** Every kind of event that has words here. */
 export const KINDS = Object.keys(WORDS);

@@ -6,8 +6,9 @@ import { curveOptions } from "../../lib/curve_options.js";
 import { h } from "../../lib/dom.js";
 import { figureDownloads } from "../../lib/downloads.js";
 import { plot } from "../../lib/plot.js";
+import { REWRITES } from "./event_words.js";
 
-const ENDS = ["completed", "failed", "cancelled", "stopped", "extended"];
+const ENDS = ["completed", "failed", "cancelled", "stopped", "extended", ...REWRITES];
 
 /**
  * @typedef {object} Figure

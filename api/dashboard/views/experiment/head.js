@@ -9,11 +9,13 @@ import { age, count, evaluationsText, fixed, percent, readableName, timeBetween 
 import { factItems, remarkBlocks } from "../../lib/head_parts.js";
 import { keepingButtons } from "../../lib/keeping.js";
 import { notesBlock } from "../../lib/markdown.js";
+import { isPhysical, worldsText } from "../../lib/robots.js";
 import { newFromThis } from "../../lib/new_from_this.js";
 import { fraction, iterationsDone, repetitionsDone, rolloutsDone, timeLeftFact } from "../../lib/progress.js";
 import { ENDED, stateBadge } from "../../lib/state_badge.js";
 import { tagList } from "../../lib/tags.js";
 import { actions } from "./actions.js";
+import { waitingRemark } from "./waiting.js";
 
 /** @typedef {import("../../lib/head_parts.js").Fact} Fact */
 
@@ -54,7 +56,7 @@ export function head(page) {
   const editButton = h("button", { type: "button", class: "quiet small", onclick: edit }, "Edit name, notes and tags");
   update();
   const element = h("header", { class: "experiment-head" }, trail(page), h("div", { class: "titled" }, title, state, tags.element, editButton, newFromThis(`/experiments/${page.id}`)),
-    h("p", { class: "what" }, summary(page.experiment)), notes.element, bar, facts, remarks, buttons.element, links(page), keeping.element);
+    h("p", { class: "what" }, summary(page.experiment)), notes.element, bar, facts, isPhysical(page.experiment) ? waitingRemark(page) : null, remarks, buttons.element, links(page), keeping.element);
   return { element, update };
 }
 
@@ -64,9 +66,7 @@ export function head(page) {
  * @param {Api.ExperimentRead} experiment
  */
 function summary({ strategy, direct, level, spec }) {
-  const engine = spec.engine?.name;
-  const realEngine = spec.reality?.engine?.name;
-  const engines = engine && realEngine && engine !== realEngine ? `${engine}, reality in ${realEngine}` : engine;
+  const engines = worldsText(spec);
   const tunables = (/** @type {{ name: string }[]} */ (spec.tunables ?? [])).map(({ name }) => name.replaceAll("_", " ")).join(", ");
   const tunes = tunables && !direct ? `${level ? "varies" : "tunes"} ${tunables}` : null;
   return [readableName(strategy), spec.robot?.name.replaceAll("_", " "), engines, tunes].filter(Boolean).join(" · ");

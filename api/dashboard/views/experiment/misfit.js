@@ -6,8 +6,9 @@ import { h } from "../../lib/dom.js";
 import { readableName } from "../../lib/format.js";
 import { empty } from "../../lib/placeholders.js";
 import { table } from "../../lib/table.js";
+import { REWRITES } from "./event_words.js";
 
-const KINDS = ["tuned", "probed"];
+const KINDS = ["tuned", "probed", ...REWRITES];
 const NOTE = "Mean ± SD over repetitions. ⊣ and ⊢ give the share of repetitions whose value is at the lower or the upper bound. Iteration 0 is not tuned.";
 
 const VERDICT_NOTE = "100 % is as uncertain as before any sample. The largest counts of the spread over repetitions, the tuner’s 95 % intervals, and its posterior. Agreement is not truth: simulators that lack an effect agree on a value that makes up for it.";

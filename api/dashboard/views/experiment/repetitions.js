@@ -6,9 +6,10 @@ import { h } from "../../lib/dom.js";
 import { age, count, timeBetween } from "../../lib/format.js";
 import { stateBadge } from "../../lib/state_badge.js";
 import { table } from "../../lib/table.js";
+import { REWRITES } from "./event_words.js";
 
-const KINDS = ["transferred", "probed", "extended", "cancelled", "paused", "completed",
-  ...["claimed", "completed", "failed", "lost", "handed_back", "paused", "stopped", "cancelled"].map((kind) => `repetition_${kind}`)];
+const KINDS = ["transferred", "probed", "extended", "cancelled", "paused", "completed", ...REWRITES,
+  ...["claimed", "completed", "failed", "lost", "handed_back", "waits", "paused", "stopped", "cancelled"].map((kind) => `repetition_${kind}`)];
 const COLUMNS = ["Repetition", "State", "Iterations", "Rollouts", "Attempts", "Began", "Took", "Why it failed"];
 const ATTEMPT_COLUMNS = ["Attempt", "Supervisor", "Began", "Took", "How it ended", "Reason"];
 

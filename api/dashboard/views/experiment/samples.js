@@ -1,11 +1,12 @@
 // @ts-check
 /** Every real-world evaluation of an experiment, page by page, each with a link to its replay. */
 
-import { get, queryString } from "../../lib/api.js";
+import { queryString } from "../../lib/api.js";
 import { h } from "../../lib/dom.js";
 import { number } from "../../lib/format.js";
 import { empty } from "../../lib/placeholders.js";
 import { table } from "../../lib/table.js";
+import { pagedList } from "./paged.js";
 
 const PAGE_SIZE = 25;
 const CHOICES = [["", "samples and probes"], ["sample", "samples, which are learned from"], ["probe", "probes, which are only looked at"]];
@@ -18,62 +19,36 @@ const COLUMNS = ["Repetition", "Iteration", "Kind", "Fitness in reality", "Measu
  * @param {Page.ExperimentPage} page
  */
 export function samples(page) {
-  const place = h("div");
   const kind = h("select", {}, ...CHOICES.map(([value, label]) => h("option", { value }, label)));
   const repetition = h("input", { type: "number", min: 0, max: 1000000, step: 1, placeholder: "all", class: "short" });
-  /** @type {(string | null)[]} */
-  let cursors = [null];  // of this page and of those before it
-  /** @type {string | null} */
-  let next = null;
-  let requests = 0;
-  let isTurning = false;
-  const load = async () => {
-    const query = { limit: PAGE_SIZE, cursor: cursors.at(-1), kind: kind.value, repetition: repetition.value };
-    const request = ++requests;
-    const loaded = await get(`/experiments/${page.id}/samples`, query, page.signal);
-    if (request !== requests) return;  // a later request has replaced this one
-    next = loaded.next;
-    const rows = (/** @type {Api.SampleRead[]} */ (loaded.items)).map((sample) => row(page, sample));
-    place.replaceChildren(rows.length ? table("Real-world evaluations", COLUMNS, rows) : empty("Nothing was tried in reality yet."));
-    back.disabled = cursors.length < 2;
-    forward.disabled = !next;
-    status.textContent = `Page ${cursors.length}`;
-  };
-  const showError = (/** @type {Error} */ error) => { status.textContent = error.message; };
-  const turnTo = async (/** @type {(string | null)[]} */ newCursors) => {
-    if (isTurning) return;
-    const before = cursors;
-    isTurning = true;
-    cursors = newCursors;
-    try {
-      await load();
-    } catch (error) {
-      if (cursors === newCursors) cursors = before;
-      showError(error);
-    }
-    isTurning = false;
-  };
-  const filter = () => {
-    cursors = [null];
-    load().catch(showError);
-  };
-  const back = h("button", { type: "button", class: "quiet small", disabled: true, onclick: () => turnTo(cursors.slice(0, -1)) }, "Previous");
-  const forward = h("button", { type: "button", class: "quiet small", disabled: true, onclick: () => turnTo([...cursors, next]) }, "Next");
-  const status = h("span", { role: "status" });
-  const filters = h("p", { class: "options", onchange: filter }, h("label", {}, "Show ", kind), h("label", {}, "Repetition ", repetition));
-  page.sections.add(place, KINDS, load);
-  return [filters, place, h("p", { class: "pages" }, back, status, forward)];
+  const render = (/** @type {Api.SampleRead[]} */ items) =>
+    [items.length ? table("Real-world evaluations", COLUMNS, items.map((sample) => row(page, sample))) : empty("Nothing was tried in reality yet.")];
+  return pagedList(page, {
+    path: `/experiments/${page.id}/samples`, size: PAGE_SIZE, kinds: KINDS, render,
+    filters: h("p", { class: "options" }, h("label", {}, "Show ", kind), h("label", {}, "Repetition ", repetition)),
+    query: () => ({ kind: kind.value, repetition: repetition.value }),
+  });
+}
+
+/**
+ * Return a link to the replay of a controller; a function is stepped through instead.
+ *
+ * @param {Page.ExperimentPage} page
+ * @param {{ repetition: number, iteration: number, kind: Api.MeasurementKind }} measured
+ */
+export function replayLink({ id, isFunction }, { repetition, iteration, kind }) {
+  const query = { experiment: id, repetition, iteration };
+  const address = isFunction ? `#/toy${queryString(query)}` : `#/replay${queryString({ ...query, kind: kind === "sample" ? "sample" : "transfer" })}`;
+  const label = isFunction ? "Step" : "Replay";
+  return h("a", { href: address, "aria-label": `${label}, repetition ${repetition}, iteration ${iteration}` }, label);
 }
 
 /**
  * @param {Page.ExperimentPage} page
  * @param {Api.SampleRead} sample
  */
-function row({ id, isFunction }, { repetition, iteration, kind, ...sample }) {
-  const query = { experiment: id, repetition, iteration };
-  const address = isFunction ? `#/toy${queryString(query)}` : `#/replay${queryString({ ...query, kind: kind === "sample" ? "sample" : "transfer" })}`;
-  const label = isFunction ? "Step" : "Replay";
-  const link = h("a", { href: address, "aria-label": `${label}, repetition ${repetition}, iteration ${iteration}` }, label);
-  return [repetition, iteration, kind, sample.fitness === null ? "physics failed" : number(sample.fitness),
-    sample.measured_by, new Date(sample.measured_at).toLocaleString(), link];
+function row(page, sample) {
+  const { repetition, iteration, kind, fitness } = sample;
+  return [repetition, iteration, kind, fitness === null ? "physics failed" : number(fitness),
+    sample.measured_by, new Date(sample.measured_at).toLocaleString(), replayLink(page, sample)];
 }

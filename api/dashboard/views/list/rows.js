@@ -4,6 +4,7 @@
 import { h, refill, setText } from "../../lib/dom.js";
 import { age, evaluationsText, fixed, readableName } from "../../lib/format.js";
 import { progressBar, timeLeft } from "../../lib/progress.js";
+import { worldsText } from "../../lib/robots.js";
 import { stateBadge } from "../../lib/state_badge.js";
 import { tagList } from "../../lib/tags.js";
 import { tickBox } from "./selection.js";
@@ -145,7 +146,5 @@ export function experimentRow({ value: first, isNested = false }, list) {
  */
 function worlds(experiment) {
   if (!experiment) return "";
-  const { robot, engine, reality } = experiment.spec;
-  const realEngine = reality?.engine?.name;
-  return ` · ${readableName(robot.name)} · ${engine.name}${realEngine && realEngine !== engine.name ? `, reality in ${realEngine}` : ""}`;
+  return ` · ${readableName(experiment.spec.robot.name)} · ${worldsText(experiment.spec)}`;
 }

@@ -39,8 +39,7 @@ export function draftOf(spec, catalogue) {
     discrepancy: pluginDraft(spec.discrepancy ?? defaults.discrepancy),
     tuner: pluginDraft(spec.tuner ?? defaults.tuner),
     tunables: tunableDrafts(spec.tunables ?? defaults.tunables, catalogue),
-    realityEngine: pluginDraft(spec.reality?.engine),
-    realityParameters: { ...spec.reality?.parameters },
+    ...realityDraft(spec.reality ?? {}),
     budget: {
       preset: budget.preset ?? defaults.budget.preset,
       reuse_transfer: budget.reuse_transfer ?? defaults.budget.reuse_transfer,
@@ -48,6 +47,18 @@ export function draftOf(spec, catalogue) {
     },
   };
 }
+
+export const LIMITS = ["joint_speed", "torque", "tilt", "height"];
+
+/** @param {Spec} reality */
+const realityDraft = ({ kind, engine, parameters, bench, repeats, probes, samples, limits, beyond }) => ({
+  realityEngine: pluginDraft(engine ?? ""),
+  realityParameters: { ...parameters },
+  bench: {
+    isPhysical: kind === "physical", bench: bench ?? "", repeats: repeats ?? "", probes: probes ?? "", samples: samples ?? [],
+    limits: Object.fromEntries(LIMITS.map((name) => [name, limits?.[name] ?? ""])), beyond: beyond === "refuse" ? beyond : "",
+  },
+});
 
 /**
  * Return the named strategies, ticked and in their order, then the others of the catalogue.
@@ -91,7 +102,7 @@ export const ticked = (list) => list.filter(({ on }) => on);
  * @returns {Spec}
  */
 export function specOf(draft) {
-  const { strategies, robot, engine, optimizer, discrepancy, tuner, tunables, realityEngine, realityParameters, budget } = draft;
+  const { strategies, robot, engine, optimizer, discrepancy, tuner, tunables, budget } = draft;
   return withoutEmpty({
     name: draft.name.trim(),
     strategies: ticked(strategies).map(pluginName),
@@ -101,10 +112,24 @@ export function specOf(draft) {
     discrepancy: pluginName(discrepancy),
     tuner: pluginName(tuner),
     tunables: ticked(tunables).map(({ name, lower, upper }) => shortest({ name, ...withoutEmpty(typedValues({ lower, upper })) })),
-    reality: withoutEmpty({ engine: realityEngine.name ? pluginName(realityEngine) : "", parameters: withoutEmpty(typedValues(realityParameters)) }),
+    reality: realityOf(draft),
     budget: budgetOf(budget),
     ...typedValues(Object.fromEntries(COUNTS.map((name) => [name, draft[name]]))),
   }, ["strategies", "tunables"]);
+}
+
+/**
+ * Return reality without what its kind does not have; the form keeps that while the reader changes the kind.
+ *
+ * @param {Page.Draft} draft
+ */
+function realityOf({ realityEngine, realityParameters, bench: { isPhysical, limits, samples, repeats, ...bench } }) {
+  if (!isPhysical) {
+    const { probes } = bench;
+    return withoutEmpty({ engine: realityEngine.name ? pluginName(realityEngine) : "", parameters: withoutEmpty(typedValues(realityParameters)), probes });
+  }
+  const words = { ...bench, bench: bench.bench.trim() };
+  return withoutEmpty({ kind: "physical", ...words, ...typedValues({ repeats }), samples, limits: withoutEmpty(typedValues(limits)) });
 }
 
 /** @param {Page.Draft["budget"]} budget */
@@ -113,8 +138,12 @@ function budgetOf({ preset, reuse_transfer: isReused, ...evaluations }) {
   return Object.keys(changes).length ? { preset, ...changes } : preset;
 }
 
-/** @param {Page.PluginDraft} plugin */
-const pluginName = ({ name, options }) => shortest({ name, ...withoutEmpty({ options: withoutEmpty(typedValues(options)) }) });
+/**
+ * Return a plug-in as a spec has it.
+ *
+ * @param {Page.PluginDraft} plugin
+ */
+export const pluginName = ({ name, options }) => shortest({ name, ...withoutEmpty({ options: withoutEmpty(typedValues(options)) }) });
 
 /** @param {Spec} plugin a bare name stands for a plug-in that has nothing but its name */
 const shortest = (plugin) => (Object.keys(plugin).length === 1 ? plugin.name : plugin);

@@ -9,6 +9,8 @@ import { readableName } from "../../lib/format.js";
 /** @typedef {{ pointer: string, message: string }} FieldError */
 /** @typedef {[value: string, label: string, disabled?: boolean][]} Choices */
 
+const MOST_MESSAGES = 5;  // a table of samples may have thousands of errors
+
 let rooms = 0;
 
 /** The places of a form at which an error can stand. */
@@ -40,7 +42,8 @@ export class ErrorPlaces {
     const nearest = errors.map((error) => nearestPlace(error.pointer, pointers));
     this.places.forEach(({ element, room }, index) => {
       const messages = errors.filter((_, error) => nearest[error] === index).map(({ message }) => message);
-      setText(room, messages.join(" "));
+      const rest = messages.length - MOST_MESSAGES;
+      setText(room, [...messages.slice(0, MOST_MESSAGES), ...(rest > 0 ? [`and ${rest} more errors`] : [])].join(" "));
       if (messages.length) element.setAttribute("aria-invalid", "true");
       else element.removeAttribute("aria-invalid");
     });

@@ -13,7 +13,7 @@ import { errorRoom, field, numberField, optionFields, tickField } from "./fields
  * @param {string} title
  * @param {...Page.Child} content
  */
-const part = (title, ...content) => h("fieldset", { class: "part" }, h("legend", {}, title), ...content);
+export const part = (title, ...content) => h("fieldset", { class: "part" }, h("legend", {}, title), ...content);
 
 /**
  * Return the name, the sizes and the schedule of the study.
@@ -119,7 +119,7 @@ export function simulationPart(form) {
  * @param {string} pointer
  * @param {string | null} [none] label of the choice of none
  */
-function pluginField(form, label, draft, plugins, pointer, none = null) {
+export function pluginField(form, label, draft, plugins, pointer, none = null) {
   const chosen = plugins.find(({ name }) => name === draft.name);
   /** @type {Choices} */
   const choices = plugins.map(({ name, available }) => [name, `${readableName(name)}${available ? "" : ": not available"}`, !available]);
@@ -180,22 +180,6 @@ function tunableField(form, tunable) {
   const unit = plugin?.details.unit === "1" ? "" : plugin?.details.unit;
   const bounds = on ? h("div", { class: "bounds" }, bound("lower", "From"), bound("upper", "To"), h("span", { class: "note" }, unit)) : null;
   return h("div", { class: "tunable" }, element, whyUnavailable(plugin), bounds, room);
-}
-
-/**
- * Return the engine and the hidden parameters of reality.
- *
- * @param {Form} form
- */
-export function realityPart(form) {
-  const { draft: { realityEngine, realityParameters }, places, catalogue } = form;
-  const fields = catalogue.tunables.filter(({ available }) => available).map(({ name, details }) => numberField({
-    label: readableName(name), value: realityParameters[name], set: form.setter(realityParameters, name), places, placeholder: "the robot’s own",
-    pointer: `/reality/parameters/${name}`, hint: `${details.least} to ${details.greatest}` }));
-  return part("Reality",
-    h("p", { class: "note" }, "Hidden from the strategies, and from everybody until the study has ended."),
-    pluginField(form, "Engine of reality", realityEngine, catalogue.engines, "/reality/engine", "The engine of the simulators"),
-    h("div", { class: "fields" }, ...fields));
 }
 
 const SEARCHES = ["Search for the transferred controller", "Search for the next sample", "Search for a simulator"];

@@ -15,9 +15,10 @@ const TARGET_HEIGHT_M = 0.12;
  * Return both stages in one element, and `draw(time)` for both.
  *
  * @param {Api.Replay} replay
+ * @param {boolean} isPhysical whether reality is a robot on a bench
  * @param {AbortSignal} signal
  */
-export function worlds(replay, signal) {
+export function worlds(replay, isPhysical, signal) {
   const moving = [replay.simulation, replay.reality].filter((world) => world !== null && world.positions_m.length > 0);
   const paths = moving.map((world) => smoothed(/** @type {Api.ReplayWorld} */ (world).positions_m));
   /** @type {ReturnType<typeof stage>[]} */
@@ -36,7 +37,8 @@ export function worlds(replay, signal) {
   const simulated = replay.simulator === null ? "In its simulator" : `In the simulator of iteration ${replay.simulator}`;
   const element = h("div", { class: "worlds" },
     worldPanel(replay.simulation, simulated, "This controller evolved in reality itself."),
-    worldPanel(replay.reality, "In reality", "The archive of this experiment does not contain reality's parameters."));
+    worldPanel(replay.reality, "In reality", isPhysical ? "Reality is a robot on a bench, whose motion is measured, not computed."
+      : "The archive of this experiment does not contain reality's parameters."));
   return { element, draw };
 }
 

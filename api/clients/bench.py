@@ -1,0 +1,200 @@
+"""Measurements of a robot on a bench: requests, answers, corrections, and the loop of a driver."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal, TypedDict, Unpack
+
+from gaplab.api.clients.connection import Connection, segment
+from gaplab.api.clients.driving import Driving, Task
+from gaplab.api.clients.journal import Journal
+from gaplab.api.clients.mcap_traces import mcap_to_csv
+from gaplab.api.clients.records import Records
+from gaplab.schemas.corrections import BranchRead, Consequences
+from gaplab.schemas.measurements import AnswerRead, AttachmentRead, RequestRead
+from gaplab.schemas.records import Page
+from gaplab.schemas.samples import SamplesRead
+from gaplab.schemas.traces import TracesRead
+
+
+class Details(TypedDict, total=False):
+    """Optional parts of an answer or a correction."""
+
+    failed: str
+    readings: Sequence[Any]
+    unit: str
+    operator: str
+    note: str
+    attachments: Sequence[str]
+    traces: Sequence[str]
+    lags_s: Sequence[float | None]
+    take: int
+
+
+class Bench:
+    """A robot on a bench: what is to be measured, and what was."""
+
+    def __init__(self, connection: Connection, records: Records) -> None:
+        self._connection, self._records = connection, records
+
+    def requests(
+        self,
+        experiment: str | None = None,
+        *,
+        bench: str | None = None,
+        operator: str | None = None,
+        lease_s: float = 60.0,
+        journal: str | Path | None = None,
+    ) -> Iterator[Task]:
+        """Yield the requests one after the other, each taken, until the experiment has ended.
+
+            for request in client.requests(experiment, journal="journal.jsonl"):
+                request.tell(run(request.motion))
+
+        A request that is neither told nor failed is released. Heartbeats keep it while its turn lasts; answers are sent
+        again until the service has them.
+
+        Args:
+            experiment: id of the experiment; left out: all of them, without end.
+            bench: only requests of this bench.
+            operator: name of the driver; left out: this machine's name.
+            lease_s: seconds without a heartbeat after which others may take a request.
+            journal: file that keeps each answer until the service has it; answers of an earlier run are sent first.
+        """
+        with Journal(journal) as kept:
+            driving = Driving(self._connection, self._records, kept, lease_s, operator)
+            yield from driving.tasks(experiment, bench)
+
+    def pending(
+        self, experiment: str | None = None, *, bench: str | None = None, wait_s: float = 0.0
+    ) -> tuple[RequestRead, ...]:
+        """Return the requests that are still wanted, the oldest first; wait for so long if there is none."""
+        parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": wait_s}
+        return self._connection.get(Page[RequestRead], "/requests", **parameters).items
+
+    def request(self, id: str) -> RequestRead:
+        """Return a request with its answers."""
+        return self._connection.get(RequestRead, f"/requests/{segment(id)}")
+
+    def motion(self, id: str, form: Literal["csv", "json", "ros2"] = "csv") -> str:
+        """Return the motion that a request asks for: CSV, JSON, or a ROS 2 JointTrajectory in YAML."""
+        return self._connection.get_bytes(f"/requests/{segment(id)}/motion", format=form).decode()
+
+    def answer(self, id: str, values: Sequence[float] | None = None, **details: Unpack[Details]) -> AnswerRead:
+        """Answer a request by hand: with the values of all repeats, or the reason why it `failed`.
+
+        Args:
+            id: id of the request.
+            values: fitness of each repeat; None if it failed, or has `traces`.
+            details: `failed`, `readings`, `unit`, `operator`, `note`, `attachments` (hashes) and `take`; in place of
+                values, `traces` (hashes, one for each repeat) and perhaps their `lags_s`.
+        """
+        body = {"values": None if values is None else list(values)} | dict(details)
+        return self._connection.post(AnswerRead, f"/requests/{segment(id)}/measurements", _without_none(body))
+
+    def correct(
+        self,
+        answer: str,
+        values: Sequence[float] | None = None,
+        *,
+        reason: str,
+        dry_run: bool = False,
+        **details: Unpack[Details],
+    ) -> Consequences:
+        """Replace the values of a measurement; return what follows. A dry run only says it.
+
+        Args:
+            answer: id of the answer that counts.
+            values: the right values; None if it `failed`.
+            reason: why it is corrected.
+            dry_run: change nothing.
+            details: `failed`, `readings`, `unit` and `operator`.
+        """
+        body = {"values": None if values is None else list(values), "reason": reason} | dict(details)
+        return self._after(answer, "corrections", body, dry_run=dry_run)
+
+    def void(self, answer: str, *, reason: str, operator: str | None = None, dry_run: bool = False) -> Consequences:
+        """Say that a measurement is worth nothing; its controller is asked for again. A dry run only says it."""
+        return self._after(answer, "void", {"reason": reason, "operator": operator}, dry_run=dry_run)
+
+    def decide(
+        self, answer: str, counts: Literal["this", "other"], *, reason: str, operator: str | None = None
+    ) -> Consequences:
+        """Let an answer in conflict count, or the other one."""
+        body = _without_none({"counts": counts, "reason": reason, "operator": operator})
+        return self._connection.post(Consequences, f"/measurements/{segment(answer)}/decision", body)
+
+    def reopen(self, id: str) -> RequestRead:
+        """Offer a request again that was taken too often without an answer."""
+        return self._connection.change(RequestRead, "POST", f"/requests/{segment(id)}/reopen")
+
+    def attach(self, file: str | Path, media_type: str = "application/octet-stream") -> AttachmentRead:
+        """Store a file, and return its hash, by which answers name it."""
+        path = Path(file)
+        return self._attach(path.name, path.read_bytes(), media_type)
+
+    def attach_trace(self, file: str | Path, topic: str | None = None) -> AttachmentRead:
+        """Store a trace, CSV or MCAP, and return its hash; a recording in MCAP is stored as CSV.
+
+        Args:
+            file: the recording; with the suffix .mcap, the extra `gaplab[mcap]` reads it.
+            topic: topic of the base's pose in MCAP; left out: the only one that has poses.
+
+        Raises:
+            ExtraMissing: the libraries for MCAP are not installed.
+            ValueError: the recording has no such topic, or several.
+        """
+        path = Path(file)
+        if path.suffix.lower() != ".mcap":
+            return self.attach(path, "text/csv")
+        return self._attach(path.with_suffix(".csv").name, mcap_to_csv(path, topic).encode(), "text/csv")
+
+    def traces(self, id: str, traces: Sequence[str], lags_s: Sequence[float | None] | None = None) -> TracesRead:
+        """Return fitness and readings that traces of a request say, and how their clocks were aligned.
+
+        Args:
+            id: id of the request.
+            traces: hashes of attachments, one for each repeat; CSV with `time_s`, `x`, `y`, `z`, `qx`, `qy`, `qz` and
+                `qw`.
+            lags_s: when the motion began on the clock of each trace; None: found by cross-correlation.
+        """
+        body = {"traces": list(traces), "lags_s": None if lags_s is None else list(lags_s)}
+        return self._connection.post(TracesRead, f"/requests/{segment(id)}/traces", _without_none(body))
+
+    def check_samples(self, file: str | Path, robot: str, options: Mapping[str, Any] | None = None) -> SamplesRead:
+        """Return the samples of a CSV file, for `reality.samples` of a spec, or everything that is wrong with it.
+
+        Args:
+            file: table with the columns `gene_0`, `gene_1` and so on, and `value`, or `value_1`, `value_2` and so on.
+            robot: name of the robot that was measured.
+            options: its options; left out: their defaults.
+        """
+        return self._connection.change(
+            SamplesRead,
+            "POST",
+            f"/samples/check?robot={segment(robot)}&options={segment(json.dumps(dict(options or {})))}",
+            content=[Path(file).read_bytes()],
+            headers={"Content-Type": "text/csv"},
+        )
+
+    def branches(self, experiment: str) -> tuple[BranchRead, ...]:
+        """Return the steps that corrections closed."""
+        return self._connection.get(tuple[BranchRead, ...], f"/experiments/{segment(experiment)}/branches")
+
+    def _attach(self, name: str, content: bytes, media_type: str) -> AttachmentRead:
+        return self._connection.change(
+            AttachmentRead,
+            "POST",
+            f"/attachments?name={segment(name)}",
+            content=[content],
+            headers={"Content-Type": media_type},
+        )
+
+    def _after(self, answer: str, what: str, body: dict[str, Any], *, dry_run: bool) -> Consequences:
+        path = f"/measurements/{segment(answer)}/{what}{'?dry_run=true' if dry_run else ''}"
+        return self._connection.post(Consequences, path, _without_none(body))
+
+
+def _without_none(body: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(json.dumps({name: value for name, value in body.items() if value is not None}))
+    return found

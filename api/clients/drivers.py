@@ -1,0 +1,137 @@
+"""Drivers: a Python file with the class `Driver`, which runs a motion on a robot and returns its fitness.
+
+    class Driver:
+        def connect(self): ...            # once, before the first run
+        def run(self, motion): ...        # return the fitness, or (fitness, readings); raise MeasurementFailed
+        def stop(self): ...               # at once, from any thread: the robot must stand still
+
+`gaplab drive EXPERIMENT --driver FILE` asks for requests and calls it.
+"""
+
+import importlib.util
+from collections.abc import Callable
+from math import isfinite
+from pathlib import Path
+from threading import Thread
+from typing import Any, Protocol
+
+from gaplab.api.clients.driving import DriverMotion, Task
+
+
+class MeasurementFailed(Exception):
+    """Raised by a driver whose robot could not be measured: the controller counts as tried, and teaches nothing."""
+
+
+class DriverBroken(Exception):
+    """A driver that cannot be loaded, returns what is no fitness, or hangs; nothing wrong is sent."""
+
+
+class Driver(Protocol):
+    """What drives a robot."""
+
+    def connect(self) -> None:
+        """Connect to the robot."""
+
+    def run(self, motion: DriverMotion) -> float | tuple[float, Any]:
+        """Run a motion once; return the fitness in the robot's unit, or fitness and readings (times × sensors)."""
+
+    def stop(self) -> None:
+        """Stop the robot at once; called from another thread if a run takes too long."""
+
+
+def load(file: Path) -> Driver:
+    """Return the driver of a file.
+
+    Raises:
+        DriverBroken: the file cannot be imported, or has no complete class `Driver`.
+    """
+    spec = importlib.util.spec_from_file_location(file.stem, file)
+    if spec is None or spec.loader is None or not file.exists():
+        raise DriverBroken(f"{file} is not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+        driver: Driver = module.Driver()
+    except AttributeError as error:
+        raise DriverBroken(f"{file} has no class `Driver` that can be created without arguments: {error}") from error
+    except Exception as error:
+        raise DriverBroken(f"{file} cannot be used: {type(error).__name__}: {error}") from error
+    if missing := [name for name in ("connect", "run", "stop") if not callable(getattr(driver, name, None))]:
+        raise DriverBroken(f"the driver in {file} lacks {', '.join(missing)}; it needs connect, run and stop")
+    return driver
+
+
+def measure(task: Task, driver: Driver, limit_s: float | None, tell: Callable[[str], None]) -> None:
+    """Run a taken request to its end: all repeats that an earlier run did not measure, then the answer.
+
+    Args:
+        task: the taken request.
+        driver: what runs its motion.
+        limit_s: longest time of one run; None: a minute more than ten times the motion.
+        tell: is told what happens.
+
+    Raises:
+        DriverBroken: the driver hangs or answers nonsense; the request is released.
+    """
+    limit_s = limit_s or 60.0 + 10.0 * task.motion.observe_s[-1]
+    found = list(task.known)
+    if found:
+        tell(f"{len(found)} of {task.repeats} repeats are in the journal already")
+    try:
+        while len(found) < task.repeats:
+            value, readings = _checked(_limited(driver, task.motion, limit_s))
+            task.note(value, readings)
+            found.append((value, readings))
+            tell(f"repeat {len(found)} of {task.repeats}: {value:.6g} {task.request.unit}")
+    except MeasurementFailed as failure:
+        task.fail(str(failure) or "the driver could not measure it")
+        tell(f"failed: {failure}")
+        return
+    tables = [readings for _, readings in found]
+    task.tell([value for value, _ in found], None if None in tables else tables)
+
+
+def _limited(driver: Driver, motion: DriverMotion, limit_s: float) -> Any:  # noqa: ANN401 - whatever a driver returns
+    """Return what a run returns, or stop the robot if it takes too long.
+
+    Raises:
+        DriverBroken: it took too long, or raised an error that is no MeasurementFailed.
+    """
+    answers: list[Any] = []
+    errors: list[BaseException] = []
+
+    def work() -> None:
+        try:
+            answers.append(driver.run(motion))
+        except BaseException as error:  # noqa: BLE001 - it is raised again in the caller
+            errors.append(error)
+
+    thread = Thread(target=work, name="driver", daemon=True)
+    thread.start()
+    thread.join(limit_s)
+    if thread.is_alive():
+        driver.stop()
+        msg = f"the driver's run took more than {limit_s:g} s, so the robot was stopped; `--limit-s` permits more"
+        raise DriverBroken(msg)
+    if errors:
+        if isinstance(errors[0], MeasurementFailed):
+            raise errors[0]
+        driver.stop()
+        raise DriverBroken(f"the driver's run raised {type(errors[0]).__name__}: {errors[0]}") from errors[0]
+    return answers[0]
+
+
+def _checked(answer: Any) -> tuple[float, Any]:  # noqa: ANN401 - whatever a driver returns
+    """Return fitness and readings.
+
+    Raises:
+        DriverBroken: the fitness is not a finite number.
+    """
+    readings: Any
+    fitness, readings = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, None)
+    if isinstance(fitness, bool) or (not isinstance(fitness, int | float) and not hasattr(fitness, "__float__")):
+        raise DriverBroken(f"the driver's run returned {answer!r:.100}; it must return the fitness, a number")
+    value = float(fitness)
+    if not isfinite(value):
+        raise DriverBroken(f"the driver's run returned {value}; raise MeasurementFailed if nothing was measured")
+    return value, readings.tolist() if hasattr(readings, "tolist") else readings

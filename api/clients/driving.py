@@ -1,0 +1,223 @@
+"""The loop of a driver: requests are taken one after the other, kept by heartbeats, and answered once."""
+
+import json
+import logging
+import socket
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from threading import Event, Thread
+from typing import Any
+
+from gaplab.api.clients.connection import Connection, segment
+from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
+from gaplab.api.clients.journal import Journal
+from gaplab.api.clients.records import Records
+from gaplab.schemas.measurements import AnswerRead, RequestRead, RequestState
+from gaplab.schemas.records import Page
+
+WAIT_S = 20.0
+"""Longest wait of the service for a request; the driver then asks again."""
+
+PAUSE_S = 2.0
+"""Pause after a request that the service could not serve."""
+
+log = logging.getLogger("gaplab.driver")
+
+
+@dataclass(frozen=True)
+class DriverMotion:
+    """Targets of actuators over time, constant between changes.
+
+    Attributes:
+        actuators: their names.
+        times_s: times at which targets change.
+        targets_rad: a row of targets for each time.
+        observe_s: times of observation; the last one ends the run.
+    """
+
+    actuators: tuple[str, ...]
+    times_s: tuple[float, ...]
+    targets_rad: tuple[tuple[float, ...], ...]
+    observe_s: tuple[float, ...]
+
+
+class Task:
+    """A taken request.
+
+    Attributes:
+        request: the request, as it was taken.
+        motion: the motion to run.
+        answered: the service's answer, once it is told.
+    """
+
+    def __init__(self, driving: "Driving", request: RequestRead, motion: DriverMotion) -> None:
+        self.request, self.motion = request, motion
+        self.answered: AnswerRead | None = None
+        self._driving = driving
+
+    @property
+    def id(self) -> str:
+        """Id of the request."""
+        return self.request.id
+
+    @property
+    def genome(self) -> tuple[float, ...]:
+        """Genome of the controller."""
+        return self.request.genome
+
+    @property
+    def repeats(self) -> int:
+        """Number of values that are asked for."""
+        return self.request.repeats
+
+    @property
+    def known(self) -> list[tuple[float, Any]]:
+        """Repeats that an earlier run of the driver measured and journalled, with their readings."""
+        return self._driving.journal.repeats(self.id)[: self.repeats]
+
+    def note(self, value: float, readings: Any = None) -> None:  # noqa: ANN401 - JSON
+        """Journal one repeat, so that a power cut before the last one loses nothing."""
+        self._driving.journal.repeat(self.id, float(value), readings)
+
+    def tell(self, values: float | Sequence[float], readings: Any = None, note: str | None = None) -> AnswerRead:  # noqa: ANN401 - JSON
+        """Answer with the value, or the values of all repeats."""
+        told = [float(values)] if isinstance(values, int | float) else [float(value) for value in values]
+        return self._answer({"values": told, "readings": readings, "note": note})
+
+    def fail(self, reason: str) -> AnswerRead:
+        """Answer that the measurement failed: the controller counts as tried, and teaches nothing."""
+        return self._answer({"failed": reason})
+
+    def _answer(self, answer: dict[str, Any]) -> AnswerRead:
+        given = {name: value for name, value in answer.items() if value is not None}
+        self.answered = self._driving.send(self.request, given | {"take": self.request.takes})
+        return self.answered
+
+
+class Driving:
+    """The requests of a driver.
+
+    Args:
+        connection: to the service.
+        records: of experiments.
+        journal: what was measured and perhaps not sent.
+        lease_s: seconds without a heartbeat after which others may take a request.
+        operator: name of the driver; None: this machine's name.
+    """
+
+    def __init__(
+        self, connection: Connection, records: Records, journal: Journal, lease_s: float, operator: str | None
+    ) -> None:
+        self.journal = journal
+        self._connection, self._records = connection, records
+        self._lease_s, self._operator = lease_s, operator or socket.gethostname()
+
+    def tasks(self, experiment: str | None, bench: str | None) -> Iterator[Task]:
+        """Yield taken requests until the experiment has ended."""
+        for id_, answer, key in self.journal.unsent():
+            self._deliver(id_, answer, key)
+        while True:
+            request = self._next(experiment, bench)
+            if request is None:
+                if experiment is not None and self._ended(experiment):
+                    return
+                continue
+            with self._held(request):
+                task = None
+                try:
+                    task = Task(self, request, self._motion(request))
+                    yield task
+                finally:
+                    if task is None or task.answered is None:
+                        self._release(request)
+
+    def send(self, request: RequestRead, answer: dict[str, Any]) -> AnswerRead:
+        """Journal an answer, and send it until the service has it.
+
+        Raises:
+            ServiceError: the service refuses it.
+        """
+        return self._deliver(request.id, answer, self.journal.answer(request.id, answer))
+
+    def _deliver(self, request: str, answer: dict[str, Any], key: str) -> AnswerRead:
+        path = f"/requests/{segment(request)}/measurements"
+        while True:
+            try:
+                given = self._connection.post(AnswerRead, path, answer | {"operator": self._operator}, key=key)
+            except ServiceUnreachable as error:
+                log.warning("not sent yet: %s", error)
+                time.sleep(PAUSE_S)
+            except ServiceError as error:
+                if error.problem.status < 500 and error.problem.status != 429:
+                    self.journal.sent(key)
+                    raise
+                log.warning("not taken yet: %s", error)
+                time.sleep(PAUSE_S)
+            else:
+                self.journal.sent(key)
+                return given
+
+    def _next(self, experiment: str | None, bench: str | None) -> RequestRead | None:
+        """Take the oldest open request; None if there is none, or others have the bench."""
+        try:
+            parameters: dict[str, Any] = {"experiment": experiment, "bench": bench, "wait_s": WAIT_S}
+            found = self._connection.get(Page[RequestRead], "/requests", **parameters).items
+        except (ServiceUnreachable, ServiceError) as error:
+            if isinstance(error, ServiceError) and error.problem.status < 500:
+                raise
+            log.warning("no answer: %s", error)
+            time.sleep(PAUSE_S)
+            return None
+        for request in found:
+            if request.state is RequestState.OPEN and not request.busy:
+                with suppress(ServiceError):
+                    return self._take(request)
+        if found:
+            time.sleep(PAUSE_S)
+        return None
+
+    def _take(self, request: RequestRead) -> RequestRead:
+        body = {"operator": self._operator, "lease_s": self._lease_s}
+        return self._connection.post(RequestRead, f"/requests/{segment(request.id)}/take", body)
+
+    def _motion(self, request: RequestRead) -> DriverMotion:
+        found = json.loads(self._connection.get_bytes(f"/requests/{segment(request.id)}/motion", format="json"))
+        return DriverMotion(
+            actuators=tuple(found["actuators"]),
+            times_s=tuple(found["times_s"]),
+            targets_rad=tuple(map(tuple, found["targets_rad"])),
+            observe_s=tuple(found["observe_s"]),
+        )
+
+    def _release(self, request: RequestRead) -> None:
+        with suppress(ServiceError, ServiceUnreachable):
+            path = f"/requests/{segment(request.id)}/release"
+            self._connection.change(RequestRead, "POST", path, json={"take": request.takes})
+
+    def _ended(self, experiment: str) -> bool:
+        try:
+            return self._records.experiment(experiment).state.ended
+        except (ServiceError, ServiceUnreachable):
+            return False
+
+    @contextmanager
+    def _held(self, request: RequestRead) -> Iterator[None]:
+        """Show signs of life for a request from another thread."""
+        over = Event()
+        thread = Thread(target=self._beat, args=(request, over), name="heartbeat", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+    def _beat(self, request: RequestRead, over: Event) -> None:
+        path = f"/requests/{segment(request.id)}/heartbeat"
+        while not over.wait(self._lease_s / 3):
+            try:
+                self._connection.change(RequestRead, "POST", path, json={"take": request.takes})
+            except (ServiceError, ServiceUnreachable) as error:
+                log.warning("no heartbeat: %s", error)

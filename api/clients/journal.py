@@ -1,0 +1,82 @@
+"""The journal of a driver: what was measured is on its own disk before it is sent, and until the service has it."""
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Self
+from uuid import uuid4
+
+
+class Journal:
+    """Lines of JSON in a file, each on disk when its method returns; without a file, they are in memory.
+
+    A line is a repeat of a request, an answer with its idempotency key, or the note that the service has an answer. A
+    last line that a power cut left half-written is ignored.
+
+    Args:
+        file: created if it does not exist; None: no file.
+    """
+
+    def __init__(self, file: str | Path | None = None) -> None:
+        self._lines: list[dict[str, Any]] = []
+        self._file = None
+        if file is not None:
+            path = Path(file)
+            content = path.read_bytes() if path.exists() else b""
+            self._lines = list(_lines(content))
+            self._file = path.open("ab")
+            if content and not content.endswith(b"\n"):
+                self._file.write(b"\n")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._file is not None:
+            self._file.close()
+
+    def repeat(self, request: str, value: float, readings: Any = None) -> None:  # noqa: ANN401 - JSON
+        """Keep the value of one repeat."""
+        self._write({"request": request, "repeat": value, "readings": readings})
+
+    def repeats(self, request: str) -> list[tuple[float, Any]]:
+        """Return the repeats of a request that has no answer yet; those of an answered one were used."""
+        found: list[tuple[float, Any]] = []
+        for line in self._lines:
+            if line.get("request") == request:
+                found = [] if "answer" in line else [*found, (line["repeat"], line.get("readings"))]
+        return found
+
+    def answer(self, request: str, answer: dict[str, Any]) -> str:
+        """Keep an answer, and return the idempotency key with which to send it."""
+        key = uuid4().hex
+        self._write({"request": request, "answer": answer, "key": key})
+        return key
+
+    def sent(self, key: str) -> None:
+        """Note that the service has an answer, or has refused it for good."""
+        self._write({"sent": key})
+
+    def unsent(self) -> list[tuple[str, dict[str, Any], str]]:
+        """Return the requests, answers and keys that the service may not have."""
+        sent = {line["sent"] for line in self._lines if "sent" in line}
+        kept = (line for line in self._lines if "answer" in line and line["key"] not in sent)
+        return [(line["request"], line["answer"], line["key"]) for line in kept]
+
+    def _write(self, line: dict[str, Any]) -> None:
+        self._lines.append(line)
+        if self._file is not None:
+            self._file.write(json.dumps(line).encode() + b"\n")
+            self._file.flush()
+            os.fsync(self._file.fileno())
+
+
+def _lines(content: bytes) -> Iterator[dict[str, Any]]:
+    for text in content.splitlines():
+        try:
+            line = json.loads(text)
+        except ValueError:
+            continue
+        if isinstance(line, dict):
+            yield line

@@ -1,0 +1,99 @@
+"""Traces in MCAP, as ROS 2 and Foxglove record them: read here, so that the service parses CSV alone."""
+
+import csv
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from gaplab.api.clients.errors import ExtraMissing
+
+COLUMNS = ("time_s", "x", "y", "z", "qx", "qy", "qz", "qw")
+
+POSES = {
+    "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "geometry_msgs/msg/TransformStamped",
+    "nav_msgs/msg/Odometry",
+    "foxglove.PoseInFrame",
+}
+"""Messages that have the pose of one frame: in ROS 2's encoding, or as JSON."""
+
+_NESTED = ("pose", "transform")
+_PLACES, _TURNS = ("position", "translation"), ("orientation", "rotation")
+_STAMPS, _NANOSECONDS = ("timestamp", "stamp"), ("nsec", "nanosec")
+
+
+def mcap_to_csv(file: Path, topic: str | None = None) -> str:
+    """Return the trace of an MCAP file as CSV.
+
+    Args:
+        file: the recording.
+        topic: topic of the base's pose; None if the recording has a single topic of poses.
+
+    Raises:
+        ExtraMissing: the libraries for MCAP are not installed.
+        ValueError: the recording has no such topic, or several.
+    """
+    try:
+        from mcap.exceptions import McapError
+        from mcap.reader import make_reader
+        from mcap_ros2.decoder import DecoderFactory
+    except ImportError as error:
+        raise ExtraMissing("mcap", "mcap") from error
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    try:
+        with file.open("rb") as stream:
+            factories: list[Any] = [DecoderFactory(), _Json()]
+            reader = make_reader(stream, decoder_factories=factories)
+            chosen = _chosen(reader.get_summary(), topic, file)
+            for _, _, message, decoded in reader.iter_decoded_messages(topics=[chosen]):
+                writer.writerow(_pose(decoded, message.log_time))
+    except McapError as error:
+        raise ValueError(f"{file.name} is no MCAP file that can be read: {error}") from error
+    return text.getvalue()
+
+
+class _Json:
+    """Decodes messages in JSON."""
+
+    def decoder_for(self, message_encoding: str, schema: Any) -> Any:  # noqa: ANN401, ARG002 - mcap's interface
+        """Return the decoder of JSON, or None for another encoding."""
+        if message_encoding != "json":
+            return None
+        return lambda data: json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
+
+
+def _chosen(summary: Any, topic: str | None, file: Path) -> str:  # noqa: ANN401 - of mcap
+    """Return the topic of poses."""
+    if summary is None:
+        raise ValueError(f"{file.name} has no summary, perhaps because its recording was cut off; repair it first")
+    schemas = {id_: schema.name for id_, schema in summary.schemas.items()}
+    found = {each.topic for each in summary.channels.values() if schemas.get(each.schema_id) in POSES}
+    if topic in found or (topic is None and len(found) == 1):
+        return topic or found.pop()
+    wrong = "topics of poses" if topic is None else f"poses on {topic!r}"
+    permitted = ", ".join(sorted(found)) or f"none: no topic has one of {', '.join(sorted(POSES))}"
+    raise ValueError(
+        f"{file.name} has {'several' if topic is None and found else 'no'} {wrong}; permitted: {permitted}"
+    )
+
+
+def _pose(message: Any, log_time_ns: int) -> list[float]:  # noqa: ANN401 - of any schema
+    """Return the row of a message; its time is that of its stamp, or else that of the recording."""
+    inner = message
+    while (deeper := next(_parts(inner, _NESTED), None)) is not None:
+        inner = deeper
+    place, turn = next(_parts(inner, _PLACES)), next(_parts(inner, _TURNS))
+    stamp = next(_parts(getattr(message, "header", message), _STAMPS), None)
+    nanoseconds = 0 if stamp is None else round(stamp.sec * 10**9 + next(_parts(stamp, _NANOSECONDS), 0))
+    time_s = (nanoseconds or log_time_ns) / 1e9
+    return [time_s, place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]
+
+
+def _parts(message: Any, names: tuple[str, ...]) -> Iterator[Any]:  # noqa: ANN401 - of any schema
+    yield from (getattr(message, name) for name in names if hasattr(message, name))

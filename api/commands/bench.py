@@ -1,0 +1,201 @@
+"""Commands for a robot on a bench: what to measure, answers by hand, and corrections."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from gaplab.api.clients.errors import ServiceError
+from gaplab.api.commands.app import BENCH, AsJson, Url, app, connect
+from gaplab.api.commands.json_output import print_json, print_result
+from gaplab.api.commands.tables import table
+from gaplab.schemas.corrections import Consequences
+from gaplab.schemas.measurements import RequestRead
+from gaplab.schemas.traces import TracesRead
+
+RequestId = Annotated[str, typer.Argument(metavar="REQUEST", help="a request, as `gaplab requests` lists it")]
+AnswerId = Annotated[str, typer.Argument(metavar="MEASUREMENT", help="a measurement, as `gaplab requests ID` lists it")]
+_VALUES = typer.Argument(metavar="VALUE", help="fitness of each repeat", show_default=False)
+Numbers = Annotated[list[float] | None, _VALUES]
+Failed = Annotated[str | None, typer.Option("--failed", help="why there are no values", show_default=False)]
+Reason = Annotated[str, typer.Option("--reason", help="why")]
+_STORED = "Measurement {0.id} is stored: {0.state.value}."
+DryRun = Annotated[bool, typer.Option("--dry-run", help="only say what would follow")]
+
+
+@app.command(rich_help_panel=BENCH)
+def requests(
+    id: Annotated[
+        str | None,
+        typer.Argument(metavar="ID", help="an experiment, or a request to read whole", show_default=False),
+    ] = None,
+    bench: Annotated[
+        str | None, typer.Option("--bench", help="only requests of this bench", show_default=False)
+    ] = None,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """List the measurements that experiments wait for, or read one request with its answers."""
+    with connect(url) as client:
+        if id is not None and (found := _one(client.bench.request, id)) is not None:
+            _print_request(found, as_json=as_json)
+            return
+        items = client.bench.pending(id, bench=bench)
+    if as_json:
+        print_json([each.model_dump(mode="json") for each in items])
+    elif not items:
+        typer.echo("Nothing is to be measured.")
+    else:
+        rows = [
+            (
+                each.id,
+                escape(each.experiment_name),
+                f"{each.repetition}",
+                f"{each.iteration} ({each.kind.value})",
+                f"{each.repeats}",
+                escape(each.bench),
+                each.state.value + (f" by {escape(each.taken_by)}" if each.taken_by else ""),
+            )
+            for each in items
+        ]
+        Console().print(table(("request", "experiment", "repetition", "iteration", "repeats", "bench", "state"), rows))
+
+
+@app.command(rich_help_panel=BENCH)
+def motion(
+    id: RequestId,
+    form: Annotated[Literal["csv", "json", "ros2"], typer.Option("--format", help="ros2: a JointTrajectory")] = "csv",
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Print the motion that a request asks for."""
+    with connect(url) as client:
+        typer.echo(client.bench.motion(id, "json" if as_json else form), nl=False)
+
+
+@app.command("measured", rich_help_panel=BENCH)
+def measured(
+    id: RequestId,
+    values: Numbers = None,
+    failed: Failed = None,
+    note: Annotated[str | None, typer.Option("--note", show_default=False)] = None,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Answer a request by hand: with the fitness of each repeat, or --failed and why."""
+    details = {"failed": failed, "note": note}
+    with connect(url) as client:
+        found = client.bench.answer(id, values or None, **{name: each for name, each in details.items() if each})  # type: ignore[arg-type]
+    print_result(found, _STORED.format(found), as_json=as_json)
+
+
+@app.command("traces", rich_help_panel=BENCH)
+def traces(
+    id: RequestId,
+    files: Annotated[list[Path], typer.Argument(help="recorded motion of the base, CSV or MCAP; one for each repeat")],
+    topic: Annotated[
+        str | None, typer.Option("--topic", help="topic of the base's pose in MCAP", show_default=False)
+    ] = None,
+    answer: Annotated[bool, typer.Option("--answer", help="answer the request with them")] = False,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Compute fitness and readings from recordings of a motion, and answer its request with --answer."""
+    with connect(url) as client:
+        stored = [client.bench.attach_trace(file, topic).id for file in files]
+        said = client.bench.traces(id, stored)
+        if not answer:
+            print_result(said, _words_of(said), as_json=as_json)
+            return
+        found = client.bench.answer(id, traces=stored)
+    print_result(found, f"{_words_of(said)}\n{_STORED.format(found)}", as_json=as_json)
+
+
+@app.command("correct", rich_help_panel=BENCH)
+def correct(  # noqa: PLR0913, PLR0917 - each is an option of the command
+    id: AnswerId,
+    values: Numbers = None,
+    reason: Reason = "",
+    failed: Failed = None,
+    dry_run: DryRun = False,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Replace the values of a measurement; what was computed from them is computed again."""
+    kept = {"failed": failed} if failed else {}
+    with connect(url) as client:
+        found = client.bench.correct(id, values or None, reason=reason, dry_run=dry_run, **kept)  # type: ignore[arg-type]
+    _print_consequences(found, dry_run=dry_run, as_json=as_json)
+
+
+@app.command("void", rich_help_panel=BENCH)
+def void(
+    id: AnswerId,
+    reason: Reason = "",
+    dry_run: DryRun = False,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Say that a measurement is worth nothing; its controller is asked for again."""
+    with connect(url) as client:
+        found = client.bench.void(id, reason=reason, dry_run=dry_run)
+    _print_consequences(found, dry_run=dry_run, as_json=as_json)
+
+
+@app.command("decide", rich_help_panel=BENCH)
+def decide(
+    id: AnswerId,
+    counts: Annotated[Literal["this", "other"], typer.Argument(help="which of the two measurements counts")],
+    reason: Reason = "",
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Decide about a measurement in conflict: let it count in place of the other, or dismiss it."""
+    with connect(url) as client:
+        found = client.bench.decide(id, counts, reason=reason)
+    _print_consequences(found, dry_run=False, as_json=as_json)
+
+
+@app.command("reopen", rich_help_panel=BENCH)
+def reopen(id: RequestId, as_json: AsJson = False, url: Url = None) -> None:
+    """Offer a request again that was taken too often without an answer."""
+    with connect(url) as client:
+        found = client.bench.reopen(id)
+    print_result(found, f"Request {found.id} is {found.state.value}.", as_json=as_json)
+
+
+def _words_of(found: TracesRead) -> str:
+    """Return what traces say, and how well their clocks were aligned."""
+    return "\n".join(
+        f"{value:.6g} {found.unit}; the motion begins at {trace.lag_s:.3f} s"
+        + ("" if trace.match is None else f" (match {trace.match:.2f})")
+        for value, trace in zip(found.values, found.traces, strict=True)
+    )
+
+
+def _one(read: Callable[[str], RequestRead], id: str) -> RequestRead | None:
+    """Return the request with this id; None if there is none."""
+    try:
+        return read(id)
+    except ServiceError as error:
+        if error.problem.status != 404:
+            raise
+        return None
+
+
+def _print_request(found: RequestRead, *, as_json: bool) -> None:
+    if as_json:
+        print_json(found)
+        return
+    place = f"{found.kind.value} of iteration {found.iteration}, repetition {found.repetition}"
+    typer.echo(f"{found.id} is {found.state.value}: {place} of {found.experiment_name} ({found.experiment})")
+    for answer in found.answers:
+        values = ", ".join(f"{value:.6g}" for value in answer.values or ()) or f"failed: {answer.failed}"
+        typer.echo(f"  {answer.id} {answer.state.value}: {values} {found.unit} by {answer.operator}")
+
+
+def _print_consequences(found: Consequences, *, dry_run: bool, as_json: bool) -> None:
+    print_result(found, f"{'It would be done' if dry_run else 'Done'}: {found.words}.", as_json=as_json)

@@ -1,0 +1,137 @@
+// @ts-check
+/** Dialogs that correct or void a measurement; each first says what follows. */
+
+import { post, Problem } from "../api.js";
+import { openDialog } from "../dialog.js";
+import { h } from "../dom.js";
+import { browserStore } from "./browser_store.js";
+import { newKey } from "./outbox.js";
+import { answerText, typedValues } from "./values.js";
+
+/**
+ * @typedef {object} Measurement a measurement that counts
+ * @property {Api.AnswerRead} answer
+ * @property {number} repeats
+ * @property {string} unit
+ * @property {string} words which one it is
+ */
+
+const REASON = { name: "reason", label: "Why?", value: "", required: true, maxlength: 2000, autocomplete: "off", hint: "it is stored with the measurement" };
+
+/** The name of the person at this browser. */
+export const operatorName = () => /** @type {string} */ (browserStore("operator").read("name") ?? "");
+
+/**
+ * Return buttons that correct and void a measurement, with room for an error.
+ *
+ * @param {Measurement} measurement
+ * @param {AbortSignal} signal
+ * @param {() => unknown} done called after a change
+ */
+export function undoButtons(measurement, signal, done) {
+  const error = h("span", { role: "alert", class: "failed" });
+  const press = (/** @type {typeof correct} */ open) => async () => {
+    error.textContent = "";
+    try {
+      await open(measurement, signal, done);
+    } catch (problem) {
+      error.textContent = ` ${problem.message}`;
+    }
+  };
+  const button = (/** @type {string} */ label, /** @type {typeof correct} */ open) =>
+    h("button", { type: "button", class: "quiet small", "aria-label": `${label} ${measurement.words}`, onclick: press(open) }, label);
+  return h("span", { class: "undo" }, button("Correct…", correct), " ", button("Void…", voidIt), error);
+}
+
+/**
+ * Ask for the right values.
+ *
+ * @param {Measurement} measurement
+ * @param {AbortSignal} signal
+ * @param {() => unknown} done
+ */
+async function correct({ answer, repeats, unit, words }, signal, done) {
+  const path = `/measurements/${answer.id}/corrections`;
+  const now = answer.values ? { values: answer.values } : { failed: answer.failed };
+  const follows = await whatFollows(path, now);
+  const fields = Array.from({ length: repeats }, (_, index) => ({
+    name: `value_${index + 1}`, label: repeats > 1 ? `Repeat ${index + 1}${unit && ` (${unit})`}` : `Value${unit && ` (${unit})`}`,
+    value: answer.values?.[index] ?? "", inputmode: "decimal", autocomplete: "off",
+  }));
+  const send = keyed(path);
+  openDialog({
+    title: "Correct this measurement",
+    text: `${capital(words)}: ${answerText(answer, unit)}. If it is corrected: ${follows}.${answer.readings ? " Its readings are dropped." : ""}`,
+    fields: [...fields, { name: "failed", label: "Or why it failed", value: answer.failed ?? "", maxlength: 2000, autocomplete: "off" }, REASON],
+    action: "Correct it",
+    act: async (given) => {
+      await send({ ...correctionOf(given, repeats), ...(unit && !given.failed.trim() ? { unit } : {}), reason: given.reason, ...byOperator() });
+      done();
+    },
+  }, signal);
+}
+
+/**
+ * Return the body of a correction from the fields of its dialog.
+ *
+ * @param {Record<string, string>} given
+ * @param {number} repeats
+ */
+export function correctionOf(given, repeats) {
+  if (given.failed.trim()) return { failed: given.failed.trim() };
+  const { values, mistakes } = typedValues(Array.from({ length: repeats }, (_, index) => given[`value_${index + 1}`]));
+  const told = mistakes.flatMap((mistake, index) => (mistake ? [`Repeat ${index + 1}: ${mistake}.`] : []));
+  if (told.length) throw new Problem({ title: "Not all values are numbers", detail: told.join(" ") });
+  return { values };
+}
+
+/**
+ * Ask why a measurement is worth nothing.
+ *
+ * @param {Measurement} measurement
+ * @param {AbortSignal} signal
+ * @param {() => unknown} done
+ */
+async function voidIt({ answer, unit, words }, signal, done) {
+  const path = `/measurements/${answer.id}/void`;
+  const follows = await whatFollows(path, {});
+  const send = keyed(path);
+  openDialog({
+    title: "Void this measurement?",
+    text: `${capital(words)}: ${answerText(answer, unit)}. If it is void: ${follows}.`,
+    fields: [REASON], action: "Void it", danger: true,
+    act: async ({ reason }) => {
+      await send({ reason, ...byOperator() });
+      done();
+    },
+  }, signal);
+}
+
+/**
+ * Return what would follow from a change, in the service's words.
+ *
+ * @param {string} path
+ * @param {Record<string, unknown>} body
+ * @returns {Promise<string>}
+ */
+export const whatFollows = async (path, body) => (await post(`${path}?dry_run=true`, { ...body, reason: "dry run" })).words;
+
+/**
+ * Return a function that posts, under the same key for the same body: a second press after a lost answer does nothing twice.
+ *
+ * @param {string} path
+ */
+export function keyed(path) {
+  let last = { text: "", key: "" };
+  return (/** @type {unknown} */ body) => {
+    const text = JSON.stringify(body);
+    if (last.text !== text) last = { text, key: newKey() };
+    return post(path, body, { "Idempotency-Key": last.key });
+  };
+}
+
+/** Return the part of a body that says who did it. */
+export const byOperator = () => (operatorName() ? { operator: operatorName() } : {});
+
+/** @param {string} words */
+const capital = (words) => words[0].toUpperCase() + words.slice(1);

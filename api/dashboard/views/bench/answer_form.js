@@ -1,0 +1,123 @@
+// @ts-check
+/** The form for an answer: a number for each repeat, or why there are none. What is typed is kept until it is sent. */
+
+import { browserStore } from "../../lib/bench/browser_store.js";
+import { isMine } from "../../lib/bench/choosing.js";
+import { operatorName } from "../../lib/bench/corrections.js";
+import { answers } from "../../lib/bench/sender.js";
+import { requestWords, typedValues, withOtherSign } from "../../lib/bench/values.js";
+import { h, setText } from "../../lib/dom.js";
+import { readableName } from "../../lib/format.js";
+import { filesField } from "./files_field.js";
+
+/** @typedef {{ values: string[], note: string, failed: string, files?: import("./files_field.js").Kept[] }} Draft */
+
+/**
+ * Return the form. A request keeps its form when its card is made again, so that nobody who types is interrupted.
+ *
+ * @param {Api.RequestRead} request
+ * @param {Page.BenchView} view
+ */
+export function answerForm(request, view) {
+  if (view.form?.id !== request.id) view.form = { id: request.id, element: make(request, view) };
+  return view.form.element;
+}
+
+/**
+ * Fill the form of a request with an answer that was refused.
+ *
+ * @param {Page.BenchView} view
+ * @param {string} id
+ * @param {Record<string, any>} body
+ */
+export function reviseAnswer(view, id, { values, note, failed, attachments = [] }) {
+  browserStore("draft").write(id, { values: (values ?? []).map(String), note: note ?? "", failed: failed ?? "", files: attachments.map((/** @type {string} */ hash) => ({ id: hash, name: "file" })) });
+  view.form = null;
+}
+
+/**
+ * @param {Api.RequestRead} request
+ * @param {Page.BenchView} view
+ */
+function make(request, view) {
+  const { id, repeats, unit } = request;
+  const drafts = browserStore("draft");
+  const draft = /** @type {Draft} */ (drafts.read(id) ?? { values: [], note: "", failed: "" });
+  const fields = Array.from({ length: repeats }, (_, index) => valueField(index, repeats, unit, draft.values[index] ?? ""));
+  const note = h("textarea", { id: "note", rows: 2, maxlength: 20000 });
+  const why = h("input", { id: "failed", maxlength: 2000, autocomplete: "off" });
+  Object.assign(note, { value: draft.note });
+  Object.assign(why, { value: draft.failed });
+  const trouble = h("p", { class: "failed", role: "alert" });
+  const keep = () => drafts.write(id, { values: fields.map(({ input }) => input.value), note: note.value, failed: why.value, files: files.kept() });
+  const files = filesField(draft.files ?? [], keep);
+
+  /** @param {Record<string, unknown>} answer */
+  function give(answer) {
+    const { holding } = view.take;
+    const now = view.requests.find((other) => other.id === id) ?? request;
+    const take = holding && isMine(now, holding) ? { take: holding.take, operator: holding.operator } : {};
+    const by = operatorName() ? { operator: operatorName() } : {};
+    answers.add({
+      request: id, words: `${readableName(request.robot)}, ${requestWords(request)}`,
+      body: { ...by, ...take, ...answer, ...(unit ? { unit } : {}), ...(note.value.trim() ? { note: note.value.trim() } : {}),
+        ...(files.kept().length ? { attachments: files.kept().map((file) => file.id) } : {}) },
+    });
+    drafts.remove(id);
+    view.form = null;
+    view.answered(id);
+  }
+
+  const submit = (/** @type {SubmitEvent} */ event) => {
+    event.preventDefault();
+    const { values, mistakes } = typedValues(fields.map(({ input }) => input.value));
+    fields.forEach((field, index) => field.mark(mistakes[index]));
+    const first = mistakes.findIndex(Boolean);
+    if (first < 0) give({ values });
+    else fields[first].input.focus();
+  };
+  const fail = () => {
+    setText(trouble, why.value.trim() ? "" : "Enter why it failed.");
+    if (why.value.trim()) give({ failed: why.value.trim() });
+    else why.focus();
+  };
+  why.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter") return;
+    event.preventDefault();  // Enter would send the values
+    fail();
+  });
+  return h("form", { class: "answer", novalidate: true, oninput: keep, onsubmit: submit },
+    ...fields.map(({ element }) => element),
+    h("p", { class: "field" }, h("label", { for: "note" }, "Note"), note), files.element,
+    h("button", { type: "submit", class: "big" }, repeats === 1 ? "Send the value" : `Send ${repeats} values`),
+    h("details", { open: Boolean(draft.failed) }, h("summary", {}, "It failed…"),
+      h("p", { class: "field" }, h("label", { for: "failed" }, "Why?"), why,
+        h("small", {}, "The controller counts as tried and teaches nothing. If the measurement itself was wrong, measure again instead.")),
+      trouble, h("button", { type: "button", class: "quiet", onclick: fail }, "Send that it failed")));
+}
+
+/**
+ * @param {number} index
+ * @param {number} repeats
+ * @param {string} unit
+ * @param {string} value
+ */
+function valueField(index, repeats, unit, value) {
+  const id = `value-${index + 1}`;
+  const input = h("input", { id, inputmode: "decimal", autocomplete: "off", "aria-describedby": `${id}-mistake`, enterkeyhint: index + 1 < repeats ? "next" : "send" });
+  input.value = value;
+  const room = h("span", { class: "trouble", id: `${id}-mistake`, "aria-live": "polite" });
+  const label = `${repeats === 1 ? "Value" : `Repeat ${index + 1}`}${unit ? ` (${unit})` : ""}`;
+  const mark = (/** @type {string | null} */ mistake) => {
+    setText(room, mistake ?? "");
+    if (mistake) input.setAttribute("aria-invalid", "true");
+    else input.removeAttribute("aria-invalid");
+  };
+  const changeSign = () => {
+    input.value = withOtherSign(input.value);
+    input.dispatchEvent(new Event("input", { bubbles: true }));
+    input.focus();
+  };
+  const sign = h("button", { type: "button", class: "quiet", "aria-label": `Change the sign of ${label}`, onclick: changeSign }, "±");
+  return { input, mark, element: h("div", { class: "field value" }, h("label", { for: id }, label), h("div", {}, input, sign), room) };
+}

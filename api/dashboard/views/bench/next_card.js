@@ -1,0 +1,136 @@
+// @ts-check
+/** What to do next, in large type: the request, what is expected of it, its motion, who has it, and the form for its answer. */
+
+import { post, queryString } from "../../lib/api.js";
+import { operatorName } from "../../lib/bench/corrections.js";
+import { browserStore } from "../../lib/bench/browser_store.js";
+import { isMine } from "../../lib/bench/choosing.js";
+import { expectations } from "../../lib/bench/expectations.js";
+import { copyButton } from "../../lib/copy.js";
+import { h } from "../../lib/dom.js";
+import { downloadLink } from "../../lib/downloads.js";
+import { age, count, readableName } from "../../lib/format.js";
+import { empty } from "../../lib/placeholders.js";
+import { answerForm } from "./answer_form.js";
+
+const MOTIONS = [["csv", "CSV", "csv"], ["json", "JSON", "json"], ["ros2", "ROS 2", "yaml"]];
+
+/**
+ * Return that nothing is asked now.
+ *
+ * @param {{ bench: string | null, experiment: string | null }} query
+ * @param {boolean} isWaiting whether an answer waits to be sent
+ */
+export function nothingToDo({ bench, experiment }, isWaiting) {
+  const all = bench || experiment ? h("a", { class: "button quiet", href: "#/bench" }, "Show all benches") : h("a", { class: "button quiet", href: "#/" }, "To the experiments");
+  const text = isWaiting ? "Nothing else is asked until your answer is stored." : "Nothing is to be measured now. This page shows the next request by itself.";
+  return h("div", { class: "card" }, empty(text, all));
+}
+
+/**
+ * Return the card of a request.
+ *
+ * @param {Api.RequestRead} request
+ * @param {Page.BenchView} view
+ */
+export function nextCard(request, view) {
+  const { robot, bench, repeats, unit, experiment, experiment_name: name } = request;
+  const values = `${repeats === 1 ? "1 value" : `${count(repeats)} repeats`}${unit ? ` in ${unit}` : ""}`;
+  return h("section", { class: "card next", "aria-labelledby": "next-title" },
+    h("p", { class: "kicker" }, bench === robot ? "Measure next" : `Measure next on ${bench}`),
+    h("h2", { id: "next-title", tabindex: "-1" }, `${readableName(robot)}: ${request.kind} of iteration ${request.iteration}`),
+    h("p", { class: "large" }, `Repetition ${request.repetition} · `, h("strong", {}, values)),
+    h("p", { class: "note" }, h("a", { href: `#/experiments/${experiment}` }, name), ` · asked ${age(request.created_at)}`),
+    safety(request), files(request, view), holder(request, view));
+}
+
+/** @param {Api.RequestRead} request */
+function safety({ safety: expected, unit }) {
+  if (!expected) return null;
+  const lines = expectations(expected, unit);
+  return [
+    expected.beyond.length ? h("div", { class: "remark broken" }, h("strong", {}, "Beyond the limits of the robot"), h("ul", {}, ...expected.beyond.map((words) => h("li", {}, words)))) : null,
+    lines.length ? h("ul", { class: "expected", "aria-label": "What simulators expect" }, ...lines.map((line) => h("li", {}, line))) : null,
+  ];
+}
+
+/**
+ * Return the motion to save, the replay in the simulators, and the genome.
+ *
+ * @param {Api.RequestRead} request
+ * @param {Page.BenchView} view
+ */
+function files(request, { functions }) {
+  const { id, experiment, repetition, iteration, kind, genome } = request;
+  const query = queryString({ experiment, repetition, iteration, kind: kind === "sample" ? "sample" : "transfer" });
+  const links = MOTIONS.flatMap(([format, label, ending]) =>
+    [downloadLink(label, `/requests/${id}/motion`, { format }, `motion-${id}.${ending}`, "Writing the motion"), " "]);
+  const text = genome.join(", ");
+  const shown = h("details", { class: "genome" }, h("summary", {}, `Genome: ${genome.length === 1 ? "1 gene" : `${genome.length} genes`}`),
+    h("p", {}, h("code", {}, text)), copyButton("Copy the genome", () => JSON.stringify(genome)));
+  if (functions.has(request.robot)) return [h("p", { class: "files large" }, "Run the controller with ", h("strong", {}, text)), shown];
+  return [h("p", { class: "files large" }, "Motion: ", ...links), h("p", { class: "files" }, h("a", { href: `#/replay${query}` }, "Watch what the simulator expects")), shown];
+}
+
+/**
+ * Return who has the request, what can be done about that, and the form.
+ *
+ * @param {Api.RequestRead} request
+ * @param {Page.BenchView} view
+ */
+function holder(request, view) {
+  const { id, state, taken_by: by, unanswered } = request;
+  const form = answerForm(request, view);
+  const failure = h("p", { class: "failed", role: "alert" });
+  const press = (/** @type {() => Promise<void>} */ act) => async () => {
+    failure.textContent = "";
+    try {
+      await act();
+      view.refresh();
+    } catch (error) {
+      failure.textContent = error.message;
+    }
+  };
+  const button = (/** @type {string} */ label, /** @type {() => Promise<void>} */ act, cssClass = "big") =>
+    h("button", { type: "button", class: cssClass, onclick: press(act) }, label);
+  if (isMine(request, view.take.holding)) {
+    return [h("p", { class: "held" }, `You have it, as ${by}. `, button("Give it back", () => view.take.release(), "quiet small")), failure, form];
+  }
+  if (state === "taken") {
+    return [h("p", { class: "remark warned" }, `${by} has taken it until ${timeOf(request)}.`), failure,
+      h("details", {}, h("summary", {}, "Answer it all the same"), h("p", { class: "note" }, "A person then decides which answer counts."), form)];
+  }
+  if (state === "stuck") {
+    const again = async () => { await post(`/requests/${id}/reopen`); };
+    return [h("p", { class: "remark warned" }, `It was taken ${unanswered} times in a row without an answer. Look at the robot and its driver first.`),
+      button("Open it again", again), failure];
+  }
+  return [takeForm(request, view, failure, press), failure, h("details", { open: !request.busy }, h("summary", {}, "Answer without taking it"), form)];
+}
+
+/**
+ * Return the name of the operator, and the button that takes the request.
+ *
+ * @param {Api.RequestRead} request
+ * @param {Page.BenchView} view
+ * @param {HTMLElement} failure
+ * @param {(act: () => Promise<void>) => () => Promise<void>} press
+ */
+function takeForm(request, view, failure, press) {
+  const name = h("input", { id: "operator", autocomplete: "name", maxlength: 200, required: true });
+  name.value = operatorName();
+  const take = press(() => view.take.take(request.id, name.value.trim()));
+  const submit = (/** @type {SubmitEvent} */ event) => {
+    event.preventDefault();
+    if (name.value.trim()) {
+      browserStore("operator").write("name", name.value.trim());
+      take();
+    } else failure.textContent = "Enter your name: it is stored with the measurement.";
+  };
+  return h("form", { class: "take", onsubmit: submit },
+    request.busy ? h("p", { class: "remark warned" }, "Another request of this bench is taken now; one is taken at a time.") : null,
+    h("p", { class: "field" }, h("label", { for: "operator" }, "Your name"), name), h("button", { type: "submit", class: "big" }, "Take it"));
+}
+
+/** @param {Api.RequestRead} request */
+const timeOf = ({ taken_until: until }) => (until ? new Date(until).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" }) : "later");

@@ -1,0 +1,82 @@
+// @ts-check
+/** The measurements of a robot on a bench: repeats, operators, what was corrected, and the way to take one back. */
+
+import { undoButtons } from "../../lib/bench/corrections.js";
+import { answerText, requestWords } from "../../lib/bench/values.js";
+import { h } from "../../lib/dom.js";
+import { downloadLink } from "../../lib/downloads.js";
+import { number } from "../../lib/format.js";
+import { empty } from "../../lib/placeholders.js";
+import { table } from "../../lib/table.js";
+import { conflictList } from "../bench/conflicts.js";
+import { stateText } from "../bench/others.js";
+import { pagedList } from "./paged.js";
+import { replayLink } from "./samples.js";
+
+const PAGE_SIZE = 50;
+const CHOICES = [["", "all measurements"], ["pending", "those that wait"], ["conflicts", "those in conflict"]];
+
+/** The events of a bench. */
+export const BENCH_KINDS = ["requested", "refused", "taken", "released", "take_expired", "measured", "probed", "conflicting", "corrected", "voided", "decided", "cancelled", "completed"];
+
+/** @type {Record<Api.AnswerState, string>} */
+const HISTORY = { counted: "counts", conflict: "in conflict", replaced: "replaced", void: "void", dismissed: "dismissed" };
+
+/** @type {Record<string, string>} */
+const ENDED = { failed: "✕ failed", withdrawn: "– wanted no more", measured: "✓ measured" };
+
+/**
+ * Return the table, with its filter above and the way to its other pages below.
+ *
+ * @param {Page.ExperimentPage} page
+ */
+export function measurements(page) {
+  const show = h("select", {}, ...CHOICES.map(([value, label]) => h("option", { value }, label)));
+  const reload = () => page.reload().then(() => page.sections.reload([]));
+  const render = (/** @type {Api.RequestRead[]} */ items) => {
+    if (!items.length) return [empty(show.value ? "There are none." : "No measurement was requested yet.")];
+    const unit = items[0].unit;
+    const columns = ["Repetition", "Iteration", "Kind", `Repeats${unit && ` (${unit})`}`, "Mean", "State", "Operator", "When", "Replay", "Take back"];
+    const conflicts = items.filter(({ answers }) => answers.some(({ state }) => state === "conflict"));
+    return [conflictList(conflicts, { signal: page.signal, refresh: reload }), table("Measurements", columns, items.map((request) => row(page, request, reload)))];
+  };
+  return pagedList(page, {
+    path: "/requests", size: PAGE_SIZE, kinds: BENCH_KINDS, render,
+    filters: h("p", { class: "options" }, h("label", {}, "Show ", show)),
+    query: () => ({ experiment: page.id, pending: show.value === "pending", conflicts: show.value === "conflicts" || null }),
+  });
+}
+
+/**
+ * @param {Page.ExperimentPage} page
+ * @param {Api.RequestRead} request
+ * @param {() => unknown} reload
+ */
+function row(page, request, reload) {
+  const { repetition, iteration, kind, unit, repeats, answers, branch, same_as: same } = request;
+  const answer = answers.find(({ state }) => state === "counted") ?? null;
+  const words = requestWords(request);
+  const isPending = ["open", "taken", "stuck"].includes(request.state);
+  const state = [ENDED[request.state] ?? stateText(request), branch === null ? null : `, in closed branch ${branch}`, same ? ", same controller as before" : null];
+  const undo = answer && branch === null ? undoButtons({ answer, repeats, unit, words }, page.signal, reload)
+    : isPending ? h("a", { href: `#/bench?experiment=${page.id}&request=${request.id}`, "aria-label": `To the bench: ${words}` }, "To the bench") : "";
+  return [repetition, iteration, kind, answer ? [answerText(answer), ...history(request)] : history(request),
+    answer?.values ? number(answer.fitness) : "–", state, answer?.operator ?? "–", answer ? new Date(answer.at).toLocaleString() : "–",
+    replayLink(page, request), undo];
+}
+
+/**
+ * Return the note and the files of the answer that counts, and the answers that do not.
+ *
+ * @param {Api.RequestRead} request
+ */
+function history({ id, answers, unit }) {
+  const notes = answers.filter(({ state, note }) => state === "counted" && note).map(({ note }) => h("li", {}, `Note: ${note}`));
+  const others = answers.filter(({ state }) => state !== "counted").map((answer) =>
+    h("li", {}, `${answerText(answer, unit)}, by ${answer.operator}: ${HISTORY[answer.state]}${answer.reason ? ` (${answer.reason})` : ""}`));
+  const files = answers.filter(({ state }) => state === "counted").flatMap(({ attachments }) => attachments)
+    .map((hash, index) => h("li", {}, downloadLink(`File ${index + 1}`, `/attachments/${hash}`, {}, `measurement-${id}-${index + 1}`)));
+  const items = [...notes, ...files, ...others];
+  const label = [notes.length ? "note" : "", files.length ? `${files.length} ${files.length === 1 ? "file" : "files"}` : "", others.length ? `${others.length} other ${others.length === 1 ? "answer" : "answers"}` : ""].filter(Boolean).join(", ");
+  return items.length ? [h("details", { dataset: { id } }, h("summary", {}, label), h("ul", { class: "helps" }, ...items))] : [];
+}

@@ -1,0 +1,187 @@
+"""Measurements of a robot on a bench: requests, takes, answers."""
+
+from time import monotonic
+from typing import Annotated, Literal
+
+import anyio
+from anyio.to_thread import run_sync
+from fastapi import APIRouter, Body, Query, Request, Response
+from pydantic import Field
+
+from gaplab.api.http.attachments import attachment
+from gaplab.api.http.dependencies import (
+    AdmissionDep,
+    Id,
+    Paging,
+    Parameters,
+    RolloutProcessDep,
+    StoreDep,
+    created,
+    once_answered,
+)
+from gaplab.api.http.problems import Responses, documented
+from gaplab.schemas.measurements import (
+    AnswerRead,
+    HolderSpec,
+    MeasurementSpec,
+    RequestRead,
+    TakeSpec,
+)
+from gaplab.schemas.records import Page
+from gaplab.schemas.traces import TracesRead, TracesSpec
+from gaplab.services.bench import answering, motions, taking
+from gaplab.services.bench.taking import RequestFilter
+from gaplab.services.replay import traces
+from gaplab.services.replay.traces import measured_by_traces
+
+router = APIRouter(prefix="/requests", tags=["bench"])
+
+LOOK_S = 0.5
+"""Seconds between two looks for a request that somebody waits for."""
+
+_MOTIONS = {"csv": ("text/csv", "csv"), "json": ("application/json", "json"), "ros2": ("application/yaml", "yaml")}
+
+_MOTION: Responses = {
+    200: {
+        "content": {
+            "text/csv": {"schema": {"type": "string"}, "example": "time_s,front_left_knee\n0.0,0.12\n"},
+            "application/json": {
+                "schema": {"type": "object"},
+                "example": {
+                    "actuators": ["front_left_knee"],
+                    "times_s": [0.0],
+                    "targets_rad": [[0.12]],
+                    "observe_s": [0.75],
+                },
+            },
+            "application/yaml": {"schema": {"type": "string"}, "example": "joint_names: [front_left_knee]\n"},
+        }
+    }
+}
+
+
+class RequestQuery(Paging):
+    """The requests to list."""
+
+    experiment: Id | None = Field(default=None, description="only requests of this experiment")
+    bench: str | None = Field(default=None, max_length=200, description="only requests of this bench")
+    pending: bool = Field(
+        default=True, description="only requests that are still wanted, of experiments that are not paused"
+    )
+    conflicts: bool = Field(default=False, description="only requests with an answer in conflict, to be decided")
+    wait_s: float = Field(default=0.0, ge=0, le=60, description="wait for so long if there is none")
+
+
+class MotionQuery(Parameters):
+    """The format of a motion."""
+
+    format: Literal["csv", "json", "ros2"] = Field(
+        default="csv", description="ros2: a trajectory_msgs/JointTrajectory in YAML"
+    )
+
+
+@router.get("", summary="List the requests for measurements", responses=documented(404, 422))
+async def list_requests(query: Annotated[RequestQuery, Query()], store: StoreDep) -> Page[RequestRead]:
+    """List what experiments wait for, the oldest first."""
+    wanted, until = _filter_of(query), monotonic() + query.wait_s
+    while True:
+        page = await run_sync(taking.list_requests, store, wanted, query.limit, query.cursor)
+        if page.items or monotonic() >= until or await run_sync(taking.none_will_follow, store, wanted):
+            return page
+        await anyio.sleep(min(LOOK_S, max(0.0, until - monotonic())))
+
+
+@router.get("/{id}", summary="Read a request", responses=documented(404))
+def read_request(id: Id, store: StoreDep) -> RequestRead:
+    """Return a request with its answers."""
+    return taking.read_request(store, id)
+
+
+@router.get(
+    "/{id}/motion",
+    summary="Read the motion to run",
+    response_class=Response,
+    responses={**_MOTION, **documented(404, 422)},
+)
+def read_motion(id: Id, query: Annotated[MotionQuery, Query()], store: StoreDep) -> Response:
+    """Return the targets of the actuators over time."""
+    media_type, ending = _MOTIONS[query.format]
+    return attachment(motions.request_motion(store, id, query.format), media_type, f"motion-{id}.{ending}")
+
+
+@router.post("/{id}/take", summary="Take a request", responses=documented(404, 409, 413, 415, 422))
+def take_request(
+    id: Id,
+    spec: Annotated[TakeSpec, Body(openapi_examples=TakeSpec.EXAMPLES)],
+    store: StoreDep,
+    admitted: AdmissionDep,
+    response: Response,
+) -> RequestRead:
+    """Take a request: nobody else can take it, or another of its bench, until the take ends or runs out."""
+    return once_answered(taking.take(store, id, spec, admitted), response)
+
+
+@router.post("/{id}/heartbeat", summary="Keep a request", responses=documented(404, 409, 413, 415, 422))
+def keep_request(
+    id: Id, holder: Annotated[HolderSpec, Body(openapi_examples=HolderSpec.EXAMPLES)], store: StoreDep
+) -> RequestRead:
+    """Extend a take by its lease."""
+    return taking.heartbeat(store, id, holder)
+
+
+@router.post("/{id}/release", summary="Release a request", responses=documented(404, 409, 413, 415, 422))
+def release_request(
+    id: Id, holder: Annotated[HolderSpec, Body(openapi_examples=HolderSpec.EXAMPLES)], store: StoreDep
+) -> RequestRead:
+    """End a take without an answer."""
+    return taking.release(store, id, holder)
+
+
+@router.post("/{id}/reopen", summary="Offer a stuck request again", responses=documented(404, 409))
+def reopen_request(id: Id, store: StoreDep) -> RequestRead:
+    """Offer a request again that was taken too often without an answer."""
+    return taking.reopen(store, id)
+
+
+@router.post(
+    "/{id}/measurements",
+    status_code=201,
+    summary="Answer a request",
+    response_description="Stored; its `state` says whether it counts",
+    responses=documented(404, 409, 413, 415, 422, 429),
+)
+def answer_request(
+    id: Id,
+    spec: Annotated[MeasurementSpec, Body(openapi_examples=MeasurementSpec.EXAMPLES)],
+    store: StoreDep,
+    admitted: AdmissionDep,
+    request: Request,
+    response: Response,
+) -> AnswerRead:
+    """Store what was measured, or why nothing could be. An answer that is in conflict with another one is kept too.
+
+    In place of values, an answer may name traces that are stored as attachments: see `POST /requests/{id}/traces`.
+    """
+    found = measured_by_traces(store, request.app.state.rollout_process, id, spec)
+    done = answering.answer(store, id, spec, admitted, found)
+    return created(done, response, request.app.url_path_for("read_request", id=done.answer.request))
+
+
+@router.post("/{id}/traces", summary="Evaluate traces", responses=documented(404, 409, 413, 415, 422, 429))
+def evaluate_traces(
+    id: Id,
+    spec: Annotated[TracesSpec, Body(openapi_examples=TracesSpec.EXAMPLES)],
+    store: StoreDep,
+    process: RolloutProcessDep,
+) -> TracesRead:
+    """Compute fitness and readings from the recorded motion of the base, and store nothing.
+
+    A trace is a CSV file with the columns `time_s`, `x`, `y`, `z` (metres, z upwards from the ground) and `qx`, `qy`,
+    `qz`, `qw`, stored as an attachment. It contains the whole motion; its clock, origin and heading do not matter. The
+    clock is aligned by cross-correlation with the motion that the best simulator expects.
+    """
+    return traces.evaluate_traces(store, process, id, spec)
+
+
+def _filter_of(query: RequestQuery) -> RequestFilter:
+    return RequestFilter(query.experiment, query.bench, query.pending, query.conflicts)

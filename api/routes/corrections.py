@@ -1,0 +1,67 @@
+"""Corrections of measurements of a robot on a bench, and the branches that they closed."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Query, Response
+from pydantic import Field
+
+from gaplab.api.http.dependencies import AdmissionDep, Id, Parameters, StoreDep, once_answered
+from gaplab.api.http.problems import documented
+from gaplab.schemas.corrections import BranchRead, ConflictSpec, Consequences, CorrectionSpec, VoidSpec
+from gaplab.services.bench import branches, corrections
+
+router = APIRouter(tags=["bench"])
+
+
+class Rehearsal(Parameters):
+    """Whether to do it."""
+
+    dry_run: bool = Field(default=False, description="only say what would follow")
+
+
+@router.post(
+    "/measurements/{id}/corrections", summary="Correct a measurement", responses=documented(404, 409, 413, 415, 422)
+)
+def correct_measurement(
+    id: Id,
+    spec: Annotated[CorrectionSpec, Body(openapi_examples=CorrectionSpec.EXAMPLES)],
+    query: Annotated[Rehearsal, Query()],
+    store: StoreDep,
+    admitted: AdmissionDep,
+    response: Response,
+) -> Consequences:
+    """Replace the values that count. What was computed from them is computed again; the old steps stay readable."""
+    return once_answered(corrections.correct(store, id, spec, admitted, dry_run=query.dry_run), response)
+
+
+@router.post("/measurements/{id}/void", summary="Void a measurement", responses=documented(404, 409, 413, 415, 422))
+def void_measurement(
+    id: Id,
+    spec: Annotated[VoidSpec, Body(openapi_examples=VoidSpec.EXAMPLES)],
+    query: Annotated[Rehearsal, Query()],
+    store: StoreDep,
+    admitted: AdmissionDep,
+    response: Response,
+) -> Consequences:
+    """Say that the values are worth nothing, and ask for the controller again."""
+    return once_answered(corrections.void(store, id, spec, admitted, dry_run=query.dry_run), response)
+
+
+@router.post(
+    "/measurements/{id}/decision", summary="Decide about a conflict", responses=documented(404, 409, 413, 415, 422)
+)
+def decide_measurement(
+    id: Id,
+    spec: Annotated[ConflictSpec, Body(openapi_examples=ConflictSpec.EXAMPLES)],
+    store: StoreDep,
+    admitted: AdmissionDep,
+    response: Response,
+) -> Consequences:
+    """Let an answer in conflict count in place of the other, or dismiss it."""
+    return once_answered(corrections.decide(store, id, spec, admitted), response)
+
+
+@router.get("/experiments/{id}/branches", summary="List the closed branches", responses=documented(404))
+def list_branches(id: Id, store: StoreDep) -> tuple[BranchRead, ...]:
+    """List the steps that corrections closed; they count nowhere."""
+    return branches.list_branches(store, id)

@@ -1,0 +1,187 @@
+"""Measurements of a physical robot: requests for them, takes, answers, corrections, and what is known beforehand.
+
+A request is `open`; an operator or a driver takes it for a while, and answers. `measured` and `failed` end it, and the
+repetition goes on; `void` says that the answer is worth nothing, and asks again. A correction replaces an answer; what
+was computed from it is computed again, and the old steps stay readable as a closed branch.
+"""
+
+from enum import StrEnum
+from typing import Annotated, ClassVar
+
+from pydantic import Field, model_validator
+
+from gaplab.schemas.base import Examples, Frozen, Id, Label, Moment, Real, RobotName, Statistic, Unit
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.records import MeasurementKind
+from gaplab.schemas.safety import Safety as Safety
+from gaplab.schemas.traces import AttachmentRead as AttachmentRead
+from gaplab.schemas.traces import Hash, Lags, TraceRead, Traces
+
+MOST_VALUES = 1_000
+"""Most values of one measurement."""
+
+Values = Annotated[tuple[Real, ...], Field(min_length=1, max_length=MOST_VALUES, examples=[(0.41, 0.44, 0.4)])]
+
+Table = tuple[tuple[Real | None, ...], ...]
+"""`(r, s)`: a row for each time of reading, a column for each sensor, in its unit; null where it failed."""
+
+
+class Measured(Frozen):
+    """What was measured of one controller.
+
+    Attributes:
+        values: fitness of each repeat, in the robot's unit.
+        readings: of each repeat, what the sensors said.
+    """
+
+    values: Values = Field(description="fitness of each repeat, in the robot's unit")
+    readings: tuple[Table, ...] | None = Field(
+        default=None,
+        max_length=MOST_VALUES,
+        description="what the sensors said in each repeat: a row for each time, a column for each sensor, in its unit; "
+        "null where a sensor failed",
+        examples=[[[[0.02, None]]]],
+    )
+
+    @model_validator(mode="after")
+    def _check_the_readings(self) -> "Measured":
+        if self.readings is not None and len(self.readings) != len(self.values):
+            raise ValueError(f"readings have one table for each value: {len(self.values)}, not {len(self.readings)}")
+        return self
+
+
+class KnownSample(Measured):
+    """A controller that was measured before the experiment; the first simulators are tuned on it."""
+
+    genome: tuple[Real, ...] = Field(min_length=1, max_length=100_000, examples=[(0.12, 0.55, 0.83, 0.31)])
+    unit: Unit | None = Field(default=None, description="unit of the values, which must be the robot's; null: it is")
+
+
+class RequestState(StrEnum):
+    """State of a request."""
+
+    OPEN = "open"
+    TAKEN = "taken"
+    MEASURED = "measured"
+    FAILED = "failed"
+    WITHDRAWN = "withdrawn"
+    """It is wanted no more: its experiment ended, or a correction closed its branch."""
+    STUCK = "stuck"
+    """It was taken too often without an answer; a person opens it again."""
+
+
+class TakeSpec(Frozen):
+    """Who takes a request, and for how long without a sign of life."""
+
+    EXAMPLES: ClassVar[Examples] = {"by hand": {"summary": "A person takes it", "value": {"operator": "Ada"}}}
+
+    operator: Label = Field(description="person or driver", examples=["Ada"])
+    lease_s: Annotated[Real, Field(ge=1, le=86_400)] = Field(
+        default=600.0, description="seconds without a heartbeat after which the request is open again"
+    )
+
+
+class HolderSpec(Frozen):
+    """The take that a heartbeat, an answer or a release is of."""
+
+    EXAMPLES: ClassVar[Examples] = {"the first take": {"value": {"take": 1}}}
+
+    take: int = Field(ge=1, description="number of the take, as it was answered")
+
+
+class MeasurementSpec(Frozen):
+    """An answer to a request: its values, or why there are none."""
+
+    EXAMPLES: ClassVar[Examples] = {
+        "measured": {"summary": "Three repeats", "value": {"take": 1, "values": [0.41, 0.44, 0.4], "unit": "m/s"}},
+        "failed": {"summary": "Nothing to learn from", "value": {"take": 1, "failed": "a leg slipped off"}},
+    }
+
+    take: int | None = Field(default=None, ge=1, description="number of the take; null: nobody took the request")
+    values: Values | None = Field(default=None, description="fitness of each repeat; null if the measurement failed")
+    readings: tuple[Table, ...] | None = Field(default=None, max_length=MOST_VALUES)
+    traces: Traces | None = Field(
+        default=None,
+        description="in place of values: a trace of each repeat, from which the robot's code computes them",
+    )
+    lags_s: Lags | None = None
+    unit: Unit | None = Field(default=None, description="unit of the values, which must be the robot's; null: it is")
+    failed: Annotated[str, Field(min_length=1, max_length=2_000)] | None = Field(
+        default=None, description="why there are no values: the controller counts as tried, and teaches nothing"
+    )
+    operator: Label | None = Field(default=None, description="default: who took the request")
+    note: Annotated[str, Field(max_length=20_000)] | None = None
+    attachments: tuple[Hash, ...] = Field(
+        default=(), max_length=20, description="hashes of stored attachments: a trace, a photograph"
+    )
+
+    @model_validator(mode="after")
+    def _check_that_it_is_one(self) -> "MeasurementSpec":
+        if sum(part is not None for part in (self.values, self.traces, self.failed)) != 1:
+            raise ValueError("an answer has either `values`, or `traces`, or the reason `failed`")
+        if self.traces is not None and self.readings is not None:
+            raise ValueError("readings are computed from `traces`, so leave them out")
+        return self
+
+
+class AnswerState(StrEnum):
+    """What became of an answer."""
+
+    COUNTED = "counted"
+    CONFLICT = "conflict"
+    """It came late, or second; a person decides which one counts."""
+    REPLACED = "replaced"
+    VOID = "void"
+    DISMISSED = "dismissed"
+
+
+class AnswerRead(Frozen):
+    """An answer to a request, as it was given. Answers are never changed; others replace them."""
+
+    id: Id
+    request: Id
+    state: AnswerState
+    values: tuple[float, ...] | None = Field(default=None, examples=[(0.41, 0.44, 0.4)])
+    fitness: Statistic = Field(default=None, description="mean of the values; null if the measurement failed")
+    readings: tuple[Table, ...] | None = Field(default=None, examples=[[[[0.02, None]]]])
+    failed: str | None = Field(default=None, examples=["a leg slipped off"])
+    operator: str = Field(examples=["Ada"])
+    note: str | None = Field(default=None, examples=["on the new carpet"])
+    attachments: tuple[str, ...] = ()
+    traces: tuple[TraceRead, ...] = Field(default=(), description="the traces that the values were computed from")
+    replaces: Id | None = Field(default=None, description="the answer that it corrects")
+    reason: str | None = Field(
+        default=None, description="why it was corrected, voided or dismissed", examples=["4.4 was 0.44"]
+    )
+    at: Moment
+
+
+class RequestRead(Frozen):
+    """A measurement that an experiment waits for."""
+
+    id: Id
+    experiment: Id
+    experiment_name: str = Field(examples=["gait"])
+    experiment_state: State
+    repetition: int
+    iteration: int
+    kind: MeasurementKind
+    robot: RobotName
+    unit: Unit
+    bench: str = Field(examples=["lab 1"])
+    repeats: int
+    genome: tuple[float, ...] = Field(examples=[(0.12, 0.55, 0.83, 0.31)])
+    state: RequestState
+    takes: int = Field(description="number of times that it was taken; the number of the latest take")
+    unanswered: int = Field(description="takes in a row that ended without an answer")
+    taken_by: str | None = Field(default=None, examples=["Ada"])
+    taken_until: Moment | None = Field(default=None, description="when the take ends without a heartbeat")
+    busy: bool = Field(default=False, description="whether another request of the same bench is taken")
+    safety: Safety | None = None
+    same_as: Id | None = Field(
+        default=None, description="an earlier request for the same controller, whose answer is this one's too"
+    )
+    branch: int | None = Field(default=None, description="number of the closed branch that it belongs to; null: none")
+    answers: tuple[AnswerRead, ...] = ()
+    created_at: Moment
+    ended_at: Moment | None = None

@@ -1,0 +1,142 @@
+"""Answers to requests. Each is kept: it counts, or it is a conflict that a person decides."""
+
+from typing import Any
+
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.measurements import (
+    AnswerRead,
+    AnswerState,
+    MeasurementSpec,
+    RequestState,
+)
+from gaplab.schemas.traces import AlignedTrace, TraceRead, TracesRead
+from gaplab.services.bench.checking import check_attachments, check_values
+from gaplab.services.bench.taking import locked
+from gaplab.services.bench.views import view_answer
+from gaplab.services.core.errors import Conflict
+from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.experiments.idempotency import Once, once
+from gaplab.services.experiments.limits import Admission
+from gaplab.services.running.waiting import record_answer
+from gaplab.services.store.clock import moment
+from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
+from gaplab.services.store.queries import requests
+from gaplab.services.store.queries.events import note
+from gaplab.services.store.queries.experiments import new_id
+from gaplab.services.store.queries.request_states import become
+from gaplab.services.store.session import Session, Store
+from gaplab.services.store.statements import storable
+
+
+class Addressed(MeasurementSpec):
+    """An answer with the request that it is of, so that an idempotency key fits this request alone."""
+
+    request: str
+
+
+def answer(
+    store: Store, id_: str, spec: MeasurementSpec, admitted: Admission, traces: TracesRead | None = None
+) -> Once[AnswerRead]:
+    """Store an answer to a request; it counts if the request is still wanted and nobody else holds it.
+
+    An answer that came late counts unless somebody else took or answered the request meanwhile. Then it is kept as a
+    conflict. The answer that counts, sent twice, is stored once.
+
+    Args:
+        store: the database.
+        id_: id of the request.
+        spec: the answer.
+        admitted: with the idempotency key.
+        traces: values and readings of its traces, if it has any.
+
+    Raises:
+        NotFound: the request does not exist.
+        InvalidSpec: the values do not fit the request; every violation is named.
+        Conflict: the request is wanted no more.
+    """
+    asked = Addressed(request=id_, **spec.model_dump())
+    return once(store, admitted, asked, AnswerRead, lambda session: _answer(session, id_, spec, traces, admitted.token))
+
+
+def _answer(
+    session: Session, id_: str, spec: MeasurementSpec, traces: TracesRead | None, token: str | None
+) -> AnswerRead:
+    spec = spec if traces is None else _with_values(spec, traces)
+    row, repetition = locked(session, id_)
+    experiment = session.get_one(ExperimentRow, repetition.experiment_id)
+    check_values(spec_of(experiment.spec), spec.values, spec.readings, spec.unit)
+    check_attachments(session, spec.attachments)
+    requests.expire(session, RequestRow.id == row.id)
+    session.refresh(row)
+    if row.state is RequestState.WITHDRAWN:
+        msg = f"request {row.id} is wanted no more: its experiment has ended, or a correction closed its branch"
+        raise Conflict(msg)
+    counted = requests.counted_answer(session, row) if row.state in requests.ANSWERED else None
+    if counted is not None and _says_the_same(counted, spec):
+        return view_answer(counted)
+    counts = counted is None and (row.state is not RequestState.TAKEN or spec.take == row.takes)
+    given = insert_answer(session, row, spec, AnswerState.COUNTED if counts else AnswerState.CONFLICT, token)
+    given.traces = None if traces is None else [_stored(trace) for trace in traces.traces]
+    if counts:
+        settle_request(session, row, given)
+        record_answer(session, row, given)
+    else:
+        note_answer(session, EventKind.CONFLICTING, row, repetition, given)
+    return view_answer(given)
+
+
+def _with_values(spec: MeasurementSpec, traces: TracesRead) -> MeasurementSpec:
+    """Return an answer with the values and readings of its traces."""
+    named = dict.fromkeys((*spec.attachments, *(trace.attachment for trace in traces.traces)))
+    return spec.model_copy(update={"values": traces.values, "readings": traces.readings, "attachments": tuple(named)})
+
+
+def _stored(trace: AlignedTrace) -> dict[str, Any]:
+    return TraceRead.model_validate(trace.model_dump(include=set(TraceRead.model_fields))).model_dump(mode="json")
+
+
+def insert_answer(
+    session: Session, row: RequestRow, spec: MeasurementSpec, state: AnswerState, token: str | None
+) -> AnswerRow:
+    """Store an answer as it was given."""
+    given = AnswerRow(
+        id=new_id(),
+        repetition_id=row.repetition_id,
+        request_id=row.id,
+        take=spec.take,
+        state=state,
+        values=None if spec.values is None else list(spec.values),
+        readings=None if spec.readings is None else [[list(each) for each in table] for table in spec.readings],
+        failed=spec.failed,
+        operator=storable(spec.operator or row.taken_by or "unknown"),
+        note=None if spec.note is None else storable(spec.note),
+        attachments=list(spec.attachments) or None,
+        token_id=token,
+        at=moment(session),
+    )
+    session.add(given)
+    session.flush()
+    return given
+
+
+def settle_request(session: Session, row: RequestRow, given: AnswerRow) -> None:
+    """End a request with the answer that counts."""
+    to = RequestState.MEASURED if given.values is not None else RequestState.FAILED
+    become(session, row, to, held=None, unanswered=0, taken_until=None, ended_at=moment(session))
+
+
+def note_answer(
+    session: Session, kind: EventKind, row: RequestRow, repetition: RepetitionRow, given: AnswerRow
+) -> None:
+    """Add the event of an answer that does not count by itself, or no longer."""
+    body = {"iteration": row.iteration, "request": row.id, "answer": given.id, "operator": given.operator}
+    if given.reason:
+        body["reason"] = given.reason
+    note(session, kind, repetition.experiment_id, repetition.number, **body)
+
+
+def _says_the_same(counted: AnswerRow, spec: MeasurementSpec) -> bool:
+    """Return whether an answer that was sent again is the one that counts."""
+    values = None if spec.values is None else list(spec.values)
+    same_take = spec.take is None or counted.take == spec.take
+    return same_take and counted.values == values and counted.failed == spec.failed

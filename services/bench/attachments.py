@@ -1,0 +1,47 @@
+"""Files that belong to answers, like a trace or a photograph: stored once each, under the hash of their content."""
+
+from hashlib import sha256
+
+from sqlalchemy import update
+
+from gaplab.schemas.measurements import AttachmentRead
+from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
+from gaplab.services.store.clock import now
+from gaplab.services.store.models import AttachmentRow
+from gaplab.services.store.session import Session, snapshot, transaction
+from gaplab.services.store.statements import insert_new, storable
+
+MOST_BYTES = 20_000_000
+"""Largest attachment."""
+
+
+@transaction
+def store_attachment(session: Session, content: bytes, name: str, media_type: str) -> AttachmentRead:
+    """Store a file, unless it is stored already, and return its hash.
+
+    Sending it again keeps it as long as a new one, until an answer names it.
+
+    Raises:
+        InvalidSpec: it is empty or too large.
+    """
+    if not 0 < len(content) <= MOST_BYTES:
+        message = f"an attachment has 1 to {MOST_BYTES:,} bytes, not {len(content):,}"
+        raise InvalidSpec([Violation("", f"{len(content):,} bytes", message, f"at most {MOST_BYTES:,} bytes")])
+    digest = sha256(content).hexdigest()
+    values = {"id": digest, "name": storable(name), "media_type": storable(media_type), "content": content}
+    session.execute(insert_new(session, AttachmentRow).values(**values, created_at=now()))
+    session.execute(update(AttachmentRow).where(AttachmentRow.id == digest).values(created_at=now()))
+    return AttachmentRead(id=digest, name=name, media_type=media_type, size=len(content))
+
+
+@snapshot
+def read_attachment(session: Session, digest: str) -> tuple[AttachmentRead, bytes]:
+    """Return a stored file.
+
+    Raises:
+        NotFound: none has this hash.
+    """
+    row = session.get(AttachmentRow, storable(digest))
+    if row is None:
+        raise NotFound(f"there is no attachment {digest!r}")
+    return AttachmentRead(id=row.id, name=row.name, media_type=row.media_type, size=len(row.content)), row.content

@@ -1,0 +1,175 @@
+"""Closed branches: the steps after a corrected measurement leave the log, and stay readable."""
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+from sqlalchemy import delete, func, insert, select, update
+
+from gaplab.schemas.corrections import BranchRead
+from gaplab.schemas.lifecycle import Ending, State
+from gaplab.services.core.types import Cost, Measured, Probed, Selected, Step, Transferred, Tuned
+from gaplab.services.running.leases import Change
+from gaplab.services.running.repetition_leases import RepetitionLeases
+from gaplab.services.store.clock import now
+from gaplab.services.store.models import (
+    BranchRow,
+    IterationRow,
+    MeasurementRow,
+    RepetitionRow,
+    RequestRow,
+    SimulatorRow,
+)
+from gaplab.services.store.queries import checkpoints, request_states
+from gaplab.services.store.queries.experiments import get_experiment
+from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.queries.step_rows import finite, position, vector
+from gaplab.services.store.session import Session, snapshot
+
+_LEASES = RepetitionLeases()
+
+_KINDS: dict[type[Step], str] = {
+    Selected: "selected",
+    Measured: "measured",
+    Tuned: "tuned",
+    Transferred: "transferred",
+    Probed: "probed",
+}
+
+_COLUMNS: dict[type[Step], tuple[str, ...]] = {
+    Tuned: ("tuning_rollouts", "tuning_failures", "tuning_saved"),
+    Transferred: (
+        "transferred_genome",
+        "simulated_fitness",
+        "transfer_rollouts",
+        "transfer_failures",
+        "transfer_saved",
+    ),
+    Probed: ("recorded_fitness", "ended_at"),
+}
+"""Columns of an iteration that a step fills."""
+
+
+def close(session: Session, repetition: RepetitionRow, place: int, iteration: int, reason: str) -> int | None:
+    """Take the steps from a place on out of the log of a repetition, and return the number of their branch.
+
+    A worker that computes further steps loses its lease. The caller settles the experiment.
+
+    Args:
+        session: session of a transaction that has locked the experiment.
+        repetition: the repetition.
+        place: place of the first step to close.
+        iteration: iteration of the measurement that was corrected.
+        reason: why.
+
+    Returns:
+        None if no step is closed.
+    """
+    if repetition.state is State.RUNNING:
+        given_up = Change(State.QUEUED, Ending.HANDED_BACK, "a measurement was corrected", {"owner": None})
+        _LEASES.end(session, RepetitionRow.id == repetition.id, given_up)
+        session.refresh(repetition)
+    (log,) = logs(session, [repetition.id]).values()
+    closed = log[place:]
+    checkpoints.forget(session, [repetition.id])
+    if not closed:
+        session.execute(update(RepetitionRow).where(RepetitionRow.id == repetition.id).values(checkpoints=0))
+        _withdraw(session, repetition.id, place, None)
+        return None
+    of_it = select(func.max(BranchRow.number)).where(BranchRow.repetition_id == repetition.id)
+    number = 1 + (session.scalar(of_it) or 0)
+    values = {"repetition_id": repetition.id, "number": number, "iteration": iteration, "reason": reason}
+    session.execute(insert(BranchRow).values(**values, steps=[plain(step) for step in closed], closed_at=now()))
+    _withdraw(session, repetition.id, place, number)
+    _remove(session, repetition.id, closed)
+    _count_down(session, repetition.id, place, closed)
+    session.refresh(repetition)
+    return number
+
+
+def plain(step: Step) -> dict[str, Any]:
+    """Return a step as JSON."""
+    found: dict[str, Any] = {"kind": _KINDS[type(step)], "iteration": step.iteration}
+    match step:
+        case Selected():
+            found["genome"] = vector(step.genome)
+        case Measured():
+            sample = step.sample
+            found |= {"genome": vector(sample.genome), "fitness": finite(sample.fitness)}
+            found["repeats"] = vector(sample.repeats)
+        case Tuned():
+            found["simulators"] = [
+                {"parameters": vector(each.parameters), "squared_error": finite(each.squared_error)}
+                for each in step.simulators
+            ]
+        case Transferred():
+            found |= {"genome": vector(step.genome), "simulated_fitness": finite(step.fitness)}
+        case Probed():
+            found |= {"fitness": finite(step.fitness), "recorded_fitness": finite(step.recorded)}
+            found["repeats"] = vector(step.repeats)
+    return found
+
+
+@snapshot
+def list_branches(session: Session, experiment: str) -> tuple[BranchRead, ...]:
+    """Return the closed branches of an experiment, by repetition and number.
+
+    Raises:
+        NotFound: the experiment does not exist.
+    """
+    get_experiment(session, experiment)
+    row, repetition = BranchRow, RepetitionRow
+    query = select(row, repetition.number).join(repetition, repetition.id == row.repetition_id)
+    found = session.execute(query.where(repetition.experiment_id == experiment).order_by(repetition.number, row.number))
+    return tuple(
+        BranchRead(
+            repetition=number,
+            number=each.number,
+            iteration=each.iteration,
+            reason=each.reason,
+            steps=tuple(each.steps),
+            closed_at=each.closed_at,
+        )
+        for each, number in found
+    )
+
+
+def _withdraw(session: Session, repetition: int, place: int, branch: int | None) -> None:
+    """Withdraw what the closed steps still wait for, and say of the answered requests that they are of the branch."""
+    row = RequestRow
+    later = (row.repetition_id == repetition) & (row.place >= place) & row.branch.is_(None)
+    request_states.withdraw(session, later)
+    session.execute(update(row).where(later).values(branch=branch))
+
+
+def _remove(session: Session, repetition: int, closed: Sequence[Step]) -> None:
+    """Delete the rows of closed steps, and empty the columns of iterations that keep earlier steps."""
+    measurement, simulator, iteration = MeasurementRow, SimulatorRow, IterationRow
+    opened = {step.iteration for step in closed if isinstance(step, Selected) or position(step) == 0}
+    for step in closed:
+        number = step.iteration
+        if isinstance(step, Measured | Probed):
+            kind = "sample" if isinstance(step, Measured) else "probe"
+            of_it = (measurement.repetition_id == repetition) & (measurement.iteration == number)
+            session.execute(delete(measurement).where(of_it, measurement.kind == kind))
+        if isinstance(step, Tuned):
+            of_it = (simulator.repetition_id == repetition) & (simulator.iteration == number)
+            session.execute(delete(simulator).where(of_it))
+        if number not in opened and (columns := _COLUMNS.get(type(step))):
+            of_it = (iteration.repetition_id == repetition) & (iteration.number == number)
+            session.execute(update(iteration).where(of_it).values(dict.fromkeys(columns)))
+    if opened:
+        session.execute(delete(iteration).where(iteration.repetition_id == repetition, iteration.number.in_(opened)))
+
+
+def _count_down(session: Session, repetition: int, place: int, closed: Sequence[Step]) -> None:
+    """Take closed steps out of the tallies of their repetition."""
+    row, costs = RepetitionRow, [cast("Cost", getattr(step, "cost", Cost())) for step in closed]
+    values = {
+        "steps": place,
+        "checkpoints": 0,
+        "iterations_done": row.iterations_done - sum(isinstance(step, Probed) for step in closed),
+        "rollouts_done": row.rollouts_done - sum(int(cost.rollouts) for cost in costs),
+        "rollouts_failed": row.rollouts_failed - sum(int(cost.failures) for cost in costs),
+        "rollouts_saved": row.rollouts_saved - sum(int(cost.saved) for cost in costs),
+    }
+    session.execute(update(row).where(row.id == repetition).values(values))

@@ -1,0 +1,54 @@
+"""Checks of measured values against the robot and the spec; all violations are raised together."""
+
+from collections.abc import Iterator, Sequence
+
+from gaplab.schemas.measurements import Table
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.bench.robots import robot_of
+from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.core.measured_values import readings_violations, unit_violations
+from gaplab.services.store.queries import attachments
+from gaplab.services.store.session import Session
+
+
+def check_values(
+    spec: ResolvedSpec,
+    values: Sequence[float] | None,
+    readings: Sequence[Table] | None,
+    unit: str | None,
+) -> None:
+    """Refuse values of another unit or number than the experiment asks for, and readings of another shape.
+
+    Raises:
+        InvalidSpec: with every violation.
+    """
+    robot = robot_of(spec)
+    violations = list(_violations(spec, values, unit, robot.unit))
+    if readings is not None:
+        violations += readings_violations(readings, None if values is None else len(values), robot.sensors)
+    if violations:
+        raise InvalidSpec(violations)
+
+
+def check_attachments(session: Session, hashes: Sequence[str]) -> None:
+    """Refuse attachments that are not stored.
+
+    Raises:
+        InvalidSpec: with each that is missing.
+    """
+    stored = attachments.present(session, hashes)
+    missing = [
+        Violation(f"/attachments/{place}", name, "no attachment with this hash is stored; send the file first")
+        for place, name in enumerate(hashes)
+        if name not in stored
+    ]
+    if missing:
+        raise InvalidSpec(missing)
+
+
+def _violations(spec: ResolvedSpec, values: Sequence[float] | None, unit: str | None, own: str) -> Iterator[Violation]:
+    yield from unit_violations(spec.robot.name, unit, own)
+    if values is not None and len(values) != spec.reality.repeats:
+        wanted = spec.reality.repeats
+        message = f"the experiment asks for {wanted} value{'' if wanted == 1 else 's'} a measurement, not {len(values)}"
+        yield Violation("/values", list(values), message, f"exactly {wanted}")

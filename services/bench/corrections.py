@@ -1,0 +1,191 @@
+"""Corrections of measurements: what follows from one is computed again, and nothing that was measured is lost."""
+
+from gaplab.schemas.corrections import (
+    ConflictSpec,
+    Consequences,
+    CorrectionSpec,
+    VoidSpec,
+)
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.measurements import AnswerState, MeasurementSpec
+from gaplab.services.bench import branches
+from gaplab.services.bench.answering import insert_answer, note_answer, settle_request
+from gaplab.services.bench.checking import check_values
+from gaplab.services.bench.consequences import consequences, nothing_follows, places_of
+from gaplab.services.bench.rewriting import apply, ask_again
+from gaplab.services.bench.taking import locked
+from gaplab.services.core.errors import Conflict
+from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.experiments.idempotency import Once, once
+from gaplab.services.experiments.limits import Admission
+from gaplab.services.running.waiting import record_answer
+from gaplab.services.store.models import (
+    AnswerRow,
+    ExperimentRow,
+    RepetitionRow,
+    RequestRow,
+)
+from gaplab.services.store.queries import requests
+from gaplab.services.store.queries.request_states import judge
+from gaplab.services.store.session import Session, Store
+
+
+class AddressedCorrection(CorrectionSpec):
+    """A correction with the answer that it is of."""
+
+    answer: str
+
+
+class AddressedVoid(VoidSpec):
+    """A void with the answer that it is of."""
+
+    answer: str
+
+
+class AddressedDecision(ConflictSpec):
+    """A decision with the answer that it is of."""
+
+    answer: str
+
+
+def correct(
+    store: Store, id_: str, spec: CorrectionSpec, admitted: Admission, *, dry_run: bool = False
+) -> Once[Consequences]:
+    """Replace the answer that counts; the repetition goes on from it.
+
+    Raises:
+        NotFound: there is no such answer.
+        InvalidSpec: the values do not fit the request.
+        Conflict: it does not count.
+    """
+    if dry_run:
+        with store.reading() as session:
+            _, request, repetition = _counted(session, id_)
+            _check(session, repetition, spec)
+            return Once(consequences(session, request, repetition, "correct"))
+    asked = AddressedCorrection(answer=id_, **spec.model_dump())
+
+    def work(session: Session) -> Consequences:
+        return _correct(session, id_, spec, admitted.token)
+
+    return once(store, admitted, asked, Consequences, work)
+
+
+def void(store: Store, id_: str, spec: VoidSpec, admitted: Admission, *, dry_run: bool = False) -> Once[Consequences]:
+    """Say that the answer that counts is worth nothing; its controller is asked for again.
+
+    Raises:
+        NotFound: there is no such answer.
+        Conflict: it does not count.
+    """
+    if dry_run:
+        with store.reading() as session:
+            return Once(consequences(session, *_counted(session, id_)[1:], "void"))
+    asked = AddressedVoid(answer=id_, **spec.model_dump())
+    return once(store, admitted, asked, Consequences, lambda session: _void(session, id_, spec))
+
+
+def decide(store: Store, id_: str, spec: ConflictSpec, admitted: Admission) -> Once[Consequences]:
+    """Decide about an answer that is in conflict with the one that counts, or with whoever holds the request.
+
+    Raises:
+        NotFound: there is no such answer.
+        Conflict: it is not in conflict, or the request is wanted no more.
+    """
+    asked = AddressedDecision(answer=id_, **spec.model_dump())
+    return once(store, admitted, asked, Consequences, lambda session: _decide(session, id_, spec))
+
+
+def _correct(session: Session, id_: str, spec: CorrectionSpec, token: str | None) -> Consequences:
+    row, request, repetition = _locked_and_counted(session, id_)
+    _check(session, repetition, spec)
+    found = consequences(session, request, repetition, "correct")
+    answer = MeasurementSpec(
+        values=spec.values, readings=spec.readings, failed=spec.failed, operator=spec.operator or row.operator
+    )
+    judge(session, row, AnswerState.REPLACED, spec.reason)
+    new = insert_answer(session, request, answer, AnswerState.COUNTED, token)
+    new.replaces, new.attachments, new.note = row.id, row.attachments, row.note
+    settle_request(session, request, new)
+    note_answer(session, EventKind.CORRECTED, request, repetition, row)
+    branch = apply(session, request, repetition, new, spec.reason)
+    return found.model_copy(update={"answer": new.id, "branch": branch})
+
+
+def _void(session: Session, id_: str, spec: VoidSpec) -> Consequences:
+    row, request, repetition = _locked_and_counted(session, id_)
+    found = consequences(session, request, repetition, "void")
+    judge(session, row, AnswerState.VOID, spec.reason)
+    note_answer(session, EventKind.VOIDED, request, repetition, row)
+    branch = None
+    if places := places_of(session, request, repetition):
+        first = min(places, key=lambda place: place.number)
+        request.place, request.iteration, request.kind = (
+            first.request.place,
+            first.request.iteration,
+            first.request.kind,
+        )
+        session.flush()
+        branch = branches.close(session, repetition, first.number, first.request.iteration, spec.reason)
+        ask_again(session, request, repetition)
+    return found.model_copy(update={"branch": branch})
+
+
+def _decide(session: Session, id_: str, spec: ConflictSpec) -> Consequences:
+    row = requests.get_answer(session, id_)
+    request, repetition = locked(session, row.request_id)
+    session.refresh(row)
+    if row.state is not AnswerState.CONFLICT:
+        raise Conflict(f"measurement {row.id} is {row.state.value}, not in conflict, so nothing is to be decided")
+    counted = requests.counted_answer(session, request)
+    if spec.counts == "other":
+        judge(session, row, AnswerState.DISMISSED, spec.reason)
+        note_answer(session, EventKind.DECIDED, request, repetition, row)
+        return nothing_follows(request, repetition, "the answer is dismissed; what counted still counts")
+    if counted is not None:
+        found = consequences(session, request, repetition, "correct")
+        judge(session, counted, AnswerState.REPLACED, spec.reason)
+        row.replaces = counted.id
+        judge(session, row, AnswerState.COUNTED, spec.reason)
+        note_answer(session, EventKind.DECIDED, request, repetition, row)
+        settle_request(session, request, row)
+        branch = apply(session, request, repetition, row, spec.reason)
+        return found.model_copy(update={"answer": row.id, "branch": branch})
+    if request.state not in requests.PENDING:
+        raise Conflict(f"request {request.id} is wanted no more")
+    judge(session, row, AnswerState.COUNTED, spec.reason)
+    settle_request(session, request, row)
+    note_answer(session, EventKind.DECIDED, request, repetition, row)
+    record_answer(session, request, row)
+    return nothing_follows(request, repetition, "the answer counts, and the repetition goes on").model_copy(
+        update={"answer": row.id}
+    )
+
+
+def _counted(session: Session, id_: str) -> tuple[AnswerRow, RequestRow, RepetitionRow]:
+    row = requests.get_answer(session, id_)
+    _refuse_unless_counted(row)
+    return row, *requests.get(session, row.request_id)
+
+
+def _locked_and_counted(session: Session, id_: str) -> tuple[AnswerRow, RequestRow, RepetitionRow]:
+    row = requests.get_answer(session, id_)
+    request, repetition = locked(session, row.request_id)
+    session.refresh(row)
+    _refuse_unless_counted(row)
+    return row, request, repetition
+
+
+def _refuse_unless_counted(row: AnswerRow) -> None:
+    if row.state is not AnswerState.COUNTED:
+        why = {
+            AnswerState.CONFLICT: "it is in conflict; decide about it instead",
+            AnswerState.REPLACED: "a correction has replaced it; correct that one",
+            AnswerState.VOID: "it is void",
+        }.get(row.state, "it is dismissed")
+        raise Conflict(f"measurement {row.id} does not count: {why}")
+
+
+def _check(session: Session, repetition: RepetitionRow, spec: CorrectionSpec) -> None:
+    experiment = session.get_one(ExperimentRow, repetition.experiment_id)
+    check_values(spec_of(experiment.spec), spec.values, spec.readings, spec.unit)

@@ -1,0 +1,90 @@
+"""The motion of a controller as files that a robot's own software reads."""
+
+import csv
+import io
+import json
+from typing import Any, Literal
+
+import yaml
+
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.bench.robots import robot_of
+from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.core.world import Motion
+from gaplab.services.store.models import ExperimentRow
+from gaplab.services.store.queries import requests
+from gaplab.services.store.session import Session, snapshot
+
+MotionFormat = Literal["csv", "json", "ros2"]
+
+BEFORE_NS = 1_000_000
+"""Nanoseconds before a step at which a JointTrajectory, which is interpolated, has a second point."""
+
+
+@snapshot
+def request_motion(session: Session, id_: str, form: MotionFormat) -> str:
+    """Return the motion that a request asks for, as text.
+
+    Raises:
+        NotFound: the request does not exist.
+        InvalidSpec: the robot is not installed here.
+    """
+    row, repetition = requests.get(session, id_)
+    experiment = session.get_one(ExperimentRow, repetition.experiment_id)
+    return written(spec_of(experiment.spec), frozen(row.genome), form)
+
+
+def written(spec: ResolvedSpec, genome: FloatArray, form: MotionFormat) -> str:
+    """Return the motion of a genome `(g,)` as text."""
+    robot = robot_of(spec)
+    motion, names = robot.motion(genome), [joint.name for joint in robot.world.actuators]
+    if form == "csv":
+        return _csv(motion, names)
+    if form == "json":
+        return json.dumps(_plain(motion, names), indent=1) + "\n"
+    return _ros2(motion, names)
+
+
+def _plain(motion: Motion, names: list[str]) -> dict[str, Any]:
+    return {
+        "actuators": names,
+        "times_s": motion.times_s.tolist(),
+        "targets_rad": motion.targets.tolist(),
+        "observe_s": motion.observe_s.tolist(),
+    }
+
+
+def _csv(motion: Motion, names: list[str]) -> str:
+    """Return a line for each change of targets, and a last one at the end."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["time_s", *names])
+    writer.writerows([time, *targets] for time, targets in _points(motion))
+    return text.getvalue()
+
+
+def _ros2(motion: Motion, names: list[str]) -> str:
+    """Return a trajectory_msgs/JointTrajectory in YAML, in which each step of a target is a steep line."""
+    at: dict[int, list[float]] = {}
+    before, last = 0, None
+    for time, targets in _points(motion):
+        now = round(time * 1e9)
+        if last is not None and now - before > 1:
+            at[now - min(BEFORE_NS, (now - before) // 2)] = last
+        at[now] = last = targets
+        before = now
+    points = [{"positions": targets, "time_from_start": _time(place)} for place, targets in at.items()]
+    return str(yaml.safe_dump({"joint_names": names, "points": points}, sort_keys=False, default_flow_style=None))
+
+
+def _points(motion: Motion) -> list[tuple[float, list[float]]]:
+    """Return the times of changes with the targets from then on, to the last observation."""
+    points = list(zip(motion.times_s.tolist(), motion.targets.tolist(), strict=True))
+    end = float(motion.observe_s[-1])
+    kept = [(time, targets) for time, targets in points if time < end]
+    return [*kept, (end, kept[-1][1])] if kept else []
+
+
+def _time(nanoseconds: int) -> dict[str, int]:
+    return {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9}

@@ -1,0 +1,109 @@
+"""Logs with a corrected measurement: its steps are rewritten, what follows is closed, and the repetition goes on."""
+
+from sqlalchemy import update
+
+from gaplab.schemas.lifecycle import State
+from gaplab.schemas.measurements import RequestState
+from gaplab.schemas.records import MeasurementKind
+from gaplab.services.bench import branches
+from gaplab.services.bench.consequences import places_of
+from gaplab.services.core.history import History
+from gaplab.services.core.probes import recorded_fitness
+from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.core.types import Measured, Probed
+from gaplab.services.experiments.archiving import show_again
+from gaplab.services.experiments.states import move, settle
+from gaplab.services.running.waiting import step_of
+from gaplab.services.specs.measured import samples_of
+from gaplab.services.store.models import (
+    AnswerRow,
+    ExperimentRow,
+    IterationRow,
+    MeasurementRow,
+    RepetitionRow,
+    RequestRow,
+)
+from gaplab.services.store.queries import requests
+from gaplab.services.store.queries.experiments import repetitions_of
+from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.queries.request_states import become
+from gaplab.services.store.queries.step_rows import finite, measurement_columns
+from gaplab.services.store.session import Session
+
+
+def apply(
+    session: Session, request: RequestRow, repetition: RepetitionRow, answer: AnswerRow, reason: str
+) -> int | None:
+    """Write the new values into the steps that the answer is, and close what follows from the first sample."""
+    places = places_of(session, request, repetition)
+    samples = [place for place in places if place.request.kind is MeasurementKind.SAMPLE]
+    branch = None
+    if samples:
+        first = min(samples, key=lambda place: place.number)
+        branch = branches.close(session, repetition, first.number + 1, first.request.iteration, reason)
+    for place in places_of(session, request, repetition):
+        _rewrite(session, place.request, repetition, answer)
+    _rewrite_records(session, repetition)
+    _continue(session, repetition)
+    return branch
+
+
+def _rewrite(session: Session, request: RequestRow, repetition: RepetitionRow, answer: AnswerRow) -> None:
+    """Write an answer into the measurement of a step."""
+    experiment, row = session.get_one(ExperimentRow, repetition.experiment_id), MeasurementRow
+    step = step_of(session, experiment, request, answer)
+    assert isinstance(step, Measured | Probed)
+    of_it = (row.repetition_id == repetition.id) & (row.iteration == request.iteration) & (row.kind == request.kind)
+    columns = measurement_columns(step, answer.operator)
+    columns.pop("genome", None)
+    session.execute(update(row).where(of_it).values(columns))
+
+
+def _rewrite_records(session: Session, repetition: RepetitionRow) -> None:
+    """Compute the recorded fitness of every iteration again from its probe and the samples so far."""
+    experiment, row = session.get_one(ExperimentRow, repetition.experiment_id), IterationRow
+    history = History(samples=samples_of(spec_of(experiment.spec)))
+    (log,) = logs(session, [repetition.id]).values()
+    for step in log:
+        if isinstance(step, Probed):
+            recorded = finite(recorded_fitness(step.fitness, history.samples))
+            of_it = (row.repetition_id == repetition.id) & (row.number == step.iteration)
+            session.execute(update(row).where(of_it).values(recorded_fitness=recorded))
+        history = history.after(step)
+
+
+def _continue(session: Session, repetition: RepetitionRow) -> None:
+    """Queue a repetition whose log ends early, unless it failed or was cancelled; and bring its experiment back."""
+    experiment = session.get_one(ExperimentRow, repetition.experiment_id)
+    session.refresh(repetition)
+    if repetition.state in (State.COMPLETED, State.WAITING) and repetition.iterations_done < experiment.iterations:
+        pending = [each for each in requests.requests_of(session, repetition.id) if each.state in requests.PENDING]
+        if not pending:
+            move(session, RepetitionRow, RepetitionRow.id == repetition.id, State.QUEUED, losses=0)
+    _settle(session, experiment)
+
+
+def ask_again(session: Session, request: RequestRow, repetition: RepetitionRow) -> None:
+    """Open a request again whose answer is void."""
+    experiment = session.get_one(ExperimentRow, repetition.experiment_id)
+    session.refresh(repetition)
+    if repetition.state in (State.FAILED, State.CANCELLED):
+        become(session, request, RequestState.WITHDRAWN)
+    else:
+        fresh = dict.fromkeys(("branch", "ended_at", "held", "taken_until"))
+        become(session, request, RequestState.OPEN, unanswered=0, **fresh)
+        of_it = RepetitionRow.id == repetition.id
+        move(session, RepetitionRow, of_it, State.QUEUED, losses=0)
+        move(session, RepetitionRow, of_it, State.WAITING)
+    session.flush()
+    _settle(session, experiment)
+
+
+def _settle(session: Session, experiment: ExperimentRow) -> None:
+    """Update the state of an experiment, which a correction may bring back to life."""
+    session.refresh(experiment)
+    alive = any(not each.state.ended for each in repetitions_of(session, experiment.id))
+    revived = experiment.state is State.COMPLETED and alive
+    if revived:
+        show_again(session, experiment)
+    settle(session, [experiment.id], State.QUEUED if revived else None)

@@ -1,0 +1,104 @@
+"""Requests and answers as people see them."""
+
+from collections.abc import Sequence
+from datetime import datetime
+
+from sqlalchemy import select
+
+from gaplab.schemas.measurements import (
+    AnswerRead,
+    RequestRead,
+    RequestState,
+    Safety,
+)
+from gaplab.schemas.traces import TraceRead
+from gaplab.services.bench.robots import robot_of
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.repeats import mean
+from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.store.clock import moment
+from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
+from gaplab.services.store.queries import requests
+from gaplab.services.store.session import Session
+
+
+def view_requests(session: Session, rows: Sequence[RequestRow]) -> tuple[RequestRead, ...]:
+    """Return requests with their answers; a take that has run out counts as open again."""
+    repetition, experiment = RepetitionRow, ExperimentRow
+    ids = {row.repetition_id for row in rows}
+    owners = {
+        id_: (number, found)
+        for id_, number, found in session.execute(
+            select(repetition.id, repetition.number, experiment)
+            .join(experiment, experiment.id == repetition.experiment_id)
+            .where(repetition.id.in_(ids))
+        )
+    }
+    answers = requests.answers_of(session, {row.same_as or row.id for row in rows})
+    held = set(session.scalars(select(RequestRow.held).where(RequestRow.held.in_({row.bench for row in rows}))))
+    at = moment(session)
+    return tuple(
+        _view(row, owners[row.repetition_id], answers.get(row.same_as or row.id, ()), row.bench in held, at)
+        for row in rows
+    )
+
+
+def _view(
+    row: RequestRow,
+    owner: tuple[int, ExperimentRow],
+    answers: Sequence[AnswerRow],
+    held: bool,
+    at: datetime,
+) -> RequestRead:
+    number, experiment = owner
+    spec, state, unanswered = spec_of(experiment.spec), row.state, row.unanswered
+    if requests.is_expired(row, at):
+        unanswered += 1
+        state = RequestState.STUCK if unanswered >= requests.MOST_UNANSWERED else RequestState.OPEN
+    taken = state is RequestState.TAKEN
+    return RequestRead(
+        id=row.id,
+        experiment=experiment.id,
+        experiment_name=experiment.name,
+        experiment_state=experiment.state,
+        repetition=number,
+        iteration=row.iteration,
+        kind=row.kind,
+        robot=spec.robot.name,
+        unit=robot_of(spec).unit,
+        bench=row.bench,
+        repeats=spec.reality.repeats,
+        genome=tuple(row.genome),
+        state=state,
+        takes=row.takes,
+        unanswered=unanswered,
+        taken_by=row.taken_by if taken else None,
+        taken_until=row.taken_until if taken else None,
+        busy=held and not taken,
+        safety=None if row.safety is None else Safety.model_validate(row.safety),
+        same_as=row.same_as,
+        branch=row.branch,
+        answers=tuple(map(view_answer, answers)),
+        created_at=row.created_at,
+        ended_at=row.ended_at,
+    )
+
+
+def view_answer(row: AnswerRow) -> AnswerRead:
+    """Return an answer."""
+    return AnswerRead(
+        id=row.id,
+        request=row.request_id,
+        state=row.state,
+        values=None if row.values is None else tuple(row.values),
+        fitness=None if row.values is None else mean(frozen(row.values)),
+        readings=row.readings,
+        failed=row.failed,
+        operator=row.operator,
+        note=row.note,
+        attachments=tuple(row.attachments or ()),
+        traces=tuple(TraceRead.model_validate(trace) for trace in row.traces or ()),
+        replaces=row.replaces,
+        reason=row.reason,
+        at=row.at,
+    )

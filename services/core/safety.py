@@ -1,0 +1,169 @@
+"""The safety forecast: extremes of recorded rollouts, and whether they exceed the limits of a physical robot."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import nan, pi
+from operator import attrgetter
+
+import numpy as np
+
+from gaplab.schemas.safety import LimitsSpec, Safety
+from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.kinematics import clearances_m
+from gaplab.services.core.world import Motion, Recording, World
+
+MOST_SIMULATORS = 20
+"""Largest number of believed simulators that a forecast asks, the best first."""
+
+FALL_RAD = pi / 2
+"""Tilt beyond which a robot has fallen."""
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """The worst of one rollout; nan where the engine does not tell it, and everywhere if the physics failed.
+
+    Attributes:
+        joint_speed: greatest speed of a joint, rad/s.
+        torque: greatest torque of a joint, N·m.
+        tilt: greatest tilt of the base from upright, rad.
+        height: least height of the base's frame, m.
+        clearance: least height of the lowest point of the base's body, m.
+        fitness: fitness of the rollout.
+    """
+
+    joint_speed: float = nan
+    torque: float = nan
+    tilt: float = nan
+    height: float = nan
+    clearance: float = nan
+    fitness: float = nan
+
+
+@dataclass(frozen=True)
+class Limit:
+    """How a limit of a spec is checked.
+
+    Attributes:
+        name: name of the limit, and of its extreme.
+        words: what it limits.
+        unit: its unit.
+        least: true if values below the limit exceed it.
+    """
+
+    name: str
+    words: str
+    unit: str
+    least: bool = False
+
+    def exceeds(self, value: float, limit: float) -> bool:
+        """Return whether a value exceeds the limit; nan does not."""
+        return value < limit if self.least else value > limit
+
+
+LIMITS = (
+    Limit("joint_speed", "the speed of a joint", "rad/s"),
+    Limit("torque", "the torque of a joint", "N·m"),
+    Limit("tilt", "the tilt of the base", "rad"),
+    Limit("height", "the height of the base", "m", least=True),
+)
+
+
+def recording_times(motion: Motion, world: World) -> FloatArray:
+    """Return the times `(k,)` of all time steps of a motion: between them, nothing moves."""
+    steps = int(motion.observe_s[-1] / world.time_step_s + 1e-6)
+    return frozen(np.arange(steps + 1) * world.time_step_s)
+
+
+def extremes(world: World, recording: Recording, fitness: float) -> Extremes:
+    """Return the extremes of a rollout.
+
+    Args:
+        world: world of the rollout; its first body is the base.
+        recording: rollout, recorded at every time step.
+        fitness: its fitness.
+    """
+    poses = recording.poses
+    if not (np.isfinite(fitness) and np.all(np.isfinite(poses))):
+        return Extremes()
+    x, y = poses[:, 3], poses[:, 4]
+    tilts = np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0))
+    return Extremes(
+        joint_speed=_joint_speed(recording),
+        torque=_largest(recording.torques_nm),
+        tilt=float(tilts.max()),
+        height=float(poses[:, 2].min()),
+        clearance=float(clearances_m(world.bodies[0], poses[:, :3], poses[:, 3:]).min()),
+        fitness=fitness,
+    )
+
+
+def safety(rollouts: Sequence[Extremes], limits: LimitsSpec | None, engine: str) -> Safety:
+    """Return the worst of the rollouts of a controller in all simulators.
+
+    Args:
+        rollouts: extremes in each simulator.
+        limits: limits of the robot; None if the spec has none.
+        engine: name of the engine, for the words.
+    """
+    ran = [rollout for rollout in rollouts if np.isfinite(rollout.fitness)]
+    worst = {limit.name: _worst(ran, limit.name, min if limit.least else max) for limit in LIMITS}
+    return Safety(
+        simulators=len(rollouts),
+        failed=len(rollouts) - len(ran),
+        **worst,
+        clearance=_worst(ran, "clearance", min),
+        falls=sum(rollout.tilt > FALL_RAD for rollout in ran),
+        fitness_low=_worst(ran, "fitness", min),
+        fitness_high=_worst(ran, "fitness", max),
+        beyond=tuple(_beyond(ran, limits)),
+        unknown=tuple(_unknown(len(rollouts) - len(ran), len(rollouts), worst, limits, engine)),
+    )
+
+
+def _beyond(ran: Sequence[Extremes], limits: LimitsSpec | None) -> list[str]:
+    """Return a sentence for each limit that a rollout exceeds."""
+    found = []
+    for limit in LIMITS:
+        permitted = getattr(limits, limit.name, None)
+        if permitted is None:
+            continue
+        beyond = [value for value in map(attrgetter(limit.name), ran) if limit.exceeds(value, permitted)]
+        if beyond:
+            worst, side = (min(beyond), "at least") if limit.least else (max(beyond), "at most")
+            found.append(
+                f"{limit.words} reaches {worst:.3g} {limit.unit} in {len(beyond)} of {len(ran)} simulators; permitted: "
+                f"{side} {permitted:g} {limit.unit}"
+            )
+    return found
+
+
+def _unknown(
+    failed: int, asked: int, worst: dict[str, float | None], limits: LimitsSpec | None, engine: str
+) -> list[str]:
+    """Return a sentence for whatever the rollouts do not tell."""
+    found = [f"the physics failed in {failed} of {asked} simulators"] if failed else []
+    for limit in LIMITS if failed < asked else ():
+        if worst[limit.name] is None:
+            permitted = getattr(limits, limit.name, None)
+            unchecked = "" if permitted is None else f", so its limit of {permitted:g} {limit.unit} is not checked"
+            found.append(f"the engine {engine} does not tell {limit.words}{unchecked}")
+    return found
+
+
+def _worst(ran: Sequence[Extremes], name: str, worse: Callable[..., float]) -> float | None:
+    values = [value for value in map(attrgetter(name), ran) if np.isfinite(value)]
+    return worse(values) if values else None
+
+
+def _joint_speed(recording: Recording) -> float:
+    """Return the greatest speed of a joint between two observations; nan if the engine does not tell angles."""
+    if recording.angles_rad is None or len(recording.times_s) < 2:
+        return nan
+    turned = np.abs(np.diff(np.unwrap(recording.angles_rad, axis=0), axis=0))
+    return _largest(turned / np.diff(recording.times_s)[:, None])
+
+
+def _largest(values: FloatArray | None) -> float:
+    """Return the largest size of a value; nan without values."""
+    return nan if values is None or not values.size else float(np.abs(values).max())

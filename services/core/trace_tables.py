@@ -1,0 +1,86 @@
+"""Traces in CSV: a line for each moment, with the pose of the base."""
+
+import csv
+from collections.abc import Iterator, Sequence
+from math import isfinite
+
+import numpy as np
+
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.errors import InvalidSpec, Violation
+from gaplab.services.core.traces import Trace
+
+COLUMNS = ("time_s", "x", "y", "z", "qx", "qy", "qz", "qw")
+"""Columns of a trace: seconds on a clock of its own, metres, and a quaternion; more columns do not matter."""
+
+MOST_LINES = 500_000
+"""Most lines of a trace: 500 s at a kilohertz."""
+
+LONGEST_S = 3_600.0
+"""Longest trace."""
+
+MOST_ERRORS = 100
+"""Most errors that are told of one trace."""
+
+
+def read_trace(text: str, pointer: str) -> Trace:
+    """Return the trace of a CSV file.
+
+    Args:
+        text: content of the file.
+        pointer: where the request names the file, for errors.
+
+    Raises:
+        InvalidSpec: with every error, each with its line and column.
+    """
+    lines = text.removeprefix("\ufeff").splitlines()
+    if len(lines) > MOST_LINES:
+        message = f"the trace has {len(lines):,} lines"
+        raise InvalidSpec([Violation(pointer, f"{len(lines):,} lines", message, f"at most {MOST_LINES:,}")])
+    first = next((line for line in lines if line.strip()), "")
+    rows = csv.reader(lines, delimiter=max(",;\t", key=first.count), skipinitialspace=True)
+    filled = ((rows.line_num, [cell.strip() for cell in row]) for row in rows if any(cell.strip() for cell in row))
+    line, headings = next(filled, (1, []))
+    names = [heading.partition("[")[0].strip() for heading in headings]
+    if missing := [name for name in COLUMNS if names.count(name) != 1]:
+        message = f"line {line}: the trace needs one column each of {', '.join(missing)}"
+        raise InvalidSpec([Violation(pointer, first[:200], message, ", ".join(COLUMNS))])
+    places, errors, numbers = [names.index(name) for name in COLUMNS], list[str](), list[list[float]]()
+    for line, cells in filled:
+        found = list(_numbers(line, cells, places, errors))
+        numbers += [found] if len(found) == len(COLUMNS) else ()
+    errors += [] if errors else _nonsense(numbers)
+    if errors:
+        raise InvalidSpec([Violation(pointer, None, message) for message in errors[:MOST_ERRORS]])
+    table = np.array(numbers)
+    return Trace(frozen(table[:, 0]), frozen(table[:, 1:4]), frozen(table[:, 4:]))
+
+
+def _numbers(line: int, cells: Sequence[str], places: Sequence[int], errors: list[str]) -> Iterator[float]:
+    for name, place in zip(COLUMNS, places, strict=True):
+        cell = cells[place] if place < len(cells) else ""
+        try:
+            number = float(cell)
+        except ValueError:
+            number = float("nan")
+        if isfinite(number):
+            yield number
+        else:
+            errors.append(f"line {line}, {name}: {cell[:50]!r} is no finite number")
+
+
+def _nonsense(numbers: Sequence[Sequence[float]]) -> Iterator[str]:
+    """Yield what is wrong with the poses of a trace: too few, times that do not ascend, quaternions of another size."""
+    if len(numbers) < 2:
+        yield f"the trace has {len(numbers)} poses; at least 2 are needed"
+        return
+    table = np.array(numbers)
+    backwards = np.nonzero(np.diff(table[:, 0]) <= 0)[0]
+    for place in backwards[:3]:
+        yield f"pose {place + 2}: time_s must ascend, and {table[place + 1, 0]:g} follows {table[place, 0]:g}"
+    duration = table[-1, 0] - table[0, 0]
+    if duration > LONGEST_S:
+        yield f"the trace lasts {duration:g} s; at most {LONGEST_S:g} s are permitted"
+    sizes = np.linalg.norm(table[:, 4:], axis=1)
+    for place in np.nonzero(np.abs(sizes - 1.0) > 0.01)[0][:3]:
+        yield f"pose {place + 1}: qx, qy, qz, qw have size {sizes[place]:.3g}; permitted: 1, as of a rotation"

@@ -1,0 +1,140 @@
+"""Traces: the recorded motion of a physical robot's base, from which the robot's code computes fitness and readings.
+
+A trace has its own clock and its own place on the ground. The clock is aligned with the motion by cross-correlation
+with the motion that a simulator expects, and the place by the pose at the start of the motion. Heights are above the
+ground, and z points up.
+
+Source: gaplab.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+from scipy.spatial.transform import Rotation, Slerp
+
+from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.world import Trajectory
+
+STEP_S = 0.005
+"""Resolution of the alignment."""
+
+LEAST_CHANGE = 1e-9
+"""Standard deviation of a feature below which it says nothing about time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """The recorded motion of a base.
+
+    Attributes:
+        times_s: `(k,)`, ascending, on a clock of its own.
+        positions_m: `(k, 3)`.
+        orientations: `(k, 4)`: quaternions x, y, z, w.
+    """
+
+    times_s: FloatArray
+    positions_m: FloatArray
+    orientations: FloatArray
+
+    def at(self, times_s: FloatArray) -> Trajectory:
+        """Return the poses at times `(t,)` within the trace, interpolated."""
+        position = [np.interp(times_s, self.times_s, column) for column in self.positions_m.T]
+        turns = Slerp(self.times_s, Rotation.from_quat(self.orientations))(times_s)
+        return Trajectory(times_s, np.stack(position, axis=-1), turns.as_quat())
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """When a motion began on the clock of a trace.
+
+    Attributes:
+        lag_s: time on that clock.
+        match: correlation with the expected motion, at most 1; None if nothing was correlated.
+    """
+
+    lag_s: float
+    match: float | None = None
+
+
+class TooShort(ValueError):
+    """A trace does not contain the whole motion."""
+
+
+def align(trace: Trace, expected: Trace, lag_s: float | None = None) -> Alignment:
+    """Return when the motion began on the clock of a trace, which must contain the whole motion.
+
+    Args:
+        trace: as recorded.
+        expected: what a simulator expects, from the start of the motion to its last observation; nan if its physics
+            failed.
+        lag_s: the lag if it is known; None: it is found. If the expected motion does not change, the trace begins with
+            the motion.
+
+    Raises:
+        TooShort: the trace does not contain the whole motion.
+    """
+    first, last = trace.times_s[0], trace.times_s[-1]
+    duration = float(expected.times_s[-1])
+    latest = last - duration
+    if lag_s is not None:
+        if not first - STEP_S <= lag_s <= latest + STEP_S:
+            when = f"it begins at {first:.10g} s and ends at {last:.10g} s"
+            raise TooShort(f"{when}; the motion of {duration:g} s would begin at {lag_s:.10g} s")
+        return Alignment(float(np.clip(lag_s, first, max(first, latest))))
+    if latest < first - STEP_S:
+        raise TooShort(f"it lasts {last - first:g} s, and the motion {duration:g} s")
+    count = int((last - first) / STEP_S + 1e-6) + 1
+    moving = _features(trace, frozen(first + np.arange(count) * STEP_S))
+    length = min(count, int(duration / STEP_S + 1e-6) + 1)
+    template = _features(expected, frozen(np.arange(length) * STEP_S))
+    scores = _correlations(moving, template)
+    if scores is None:
+        return Alignment(float(first))
+    best = int(np.argmax(scores))
+    return Alignment(float(min(first + best * STEP_S, max(first, latest))), float(min(scores[best], 1.0)))
+
+
+def from_start(trace: Trace, lag_s: float, times_s: FloatArray) -> Trajectory:
+    """Return the poses of a trace at times `(t,)` of the motion, placed and turned as if it began at the origin.
+
+    Args:
+        trace: as recorded.
+        lag_s: when the motion began.
+        times_s: seconds since then.
+    """
+    seen = trace.at(np.clip(times_s + lag_s, trace.times_s[0], trace.times_s[-1]))
+    start = trace.at(frozen([lag_s]))
+    heading = Rotation.from_quat(start.orientations[0]).apply([1.0, 0.0, 0.0])
+    back = Rotation.from_rotvec([0.0, 0.0, -np.arctan2(heading[1], heading[0])])
+    moved = seen.positions_m - start.positions_m[0] * [1.0, 1.0, 0.0]
+    turned = (back * Rotation.from_quat(seen.orientations)).as_quat()
+    return Trajectory(times_s, back.apply(moved), turned)
+
+
+def _features(trace: Trace, times_s: FloatArray) -> FloatArray:
+    """Return features `(3, t)` that depend on no place and no heading: speed over ground, vertical speed, and tilt."""
+    if not np.all(np.isfinite(trace.positions_m)):
+        return np.zeros((3, len(times_s)))
+    seen = trace.at(np.clip(times_s, trace.times_s[0], trace.times_s[-1]))
+    speeds = np.gradient(seen.positions_m, axis=0) if len(times_s) > 1 else np.zeros_like(seen.positions_m)
+    x, y = seen.orientations[:, 0], seen.orientations[:, 1]
+    tilts = np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0))
+    return np.stack([np.linalg.norm(speeds[:, :2], axis=1), speeds[:, 2], tilts])
+
+
+def _correlations(moving: FloatArray, template: FloatArray) -> FloatArray | None:
+    """Return the mean Pearson correlation of features at each shift, `(shifts,)`; None if no feature changes."""
+    found, length = [], template.shape[1]
+    for recorded, wanted in zip(moving, template, strict=True):
+        if wanted.std() < LEAST_CHANGE or recorded.std() < LEAST_CHANGE:
+            continue
+        centred, recorded_too = wanted - wanted.mean(), recorded - recorded.mean()
+        shared = signal.correlate(recorded_too, centred, mode="valid")
+        sums = np.concatenate([[0.0], np.cumsum(recorded_too)])
+        squares = np.concatenate([[0.0], np.cumsum(recorded_too**2)])
+        inside = squares[length:] - squares[:-length] - (sums[length:] - sums[:-length]) ** 2 / length
+        size = np.sqrt(np.maximum(inside, 0.0) * (centred**2).sum())
+        floor = 1e-6 * np.sqrt((recorded_too**2).sum() * (centred**2).sum())
+        found.append(np.where(size > floor, shared / np.maximum(size, floor), 0.0))
+    return np.mean(found, axis=0) if found else None

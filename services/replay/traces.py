@@ -1,0 +1,179 @@
+"""Evaluation of traces: fitness and readings of a physical robot, computed by its code from its recorded motion."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+
+from gaplab.schemas.measurements import MeasurementSpec
+from gaplab.schemas.records import MeasurementKind
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.traces import AlignedTrace, TracesRead, TracesSpec
+from gaplab.services.core.arrays import FloatArray, frozen
+from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
+from gaplab.services.core.robots import robots
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.core.trace_tables import read_trace
+from gaplab.services.core.traces import TooShort, Trace, align, from_start
+from gaplab.services.core.world import Trajectory
+from gaplab.services.plugins.watching import imported
+from gaplab.services.replay.process import RolloutProcess
+from gaplab.services.specs.assembly import edits_of, engine_of
+from gaplab.services.specs.simulation import Simulation
+from gaplab.services.store.models import AttachmentRow, ExperimentRow
+from gaplab.services.store.queries import replays, requests
+from gaplab.services.store.session import Session, Store
+
+FRAMES_PER_S = 50
+"""Frames of the expected motion."""
+
+LONGEST_PLOT_S = 20.0
+"""Longest part of a motion whose alignment is shown."""
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What a subprocess needs to compute an expected motion, in plain values.
+
+    Attributes:
+        spec: resolved spec, as JSON.
+        genome: genome of the controller.
+        parameters: parameters of the simulator.
+        until_s: length of the motion.
+    """
+
+    spec: str
+    genome: tuple[float, ...]
+    parameters: tuple[float, ...]
+    until_s: float
+
+
+def evaluate_traces(store: Store, process: RolloutProcess, request: str, spec: TracesSpec) -> TracesRead:
+    """Return what traces say about the controller of a request; nothing is stored.
+
+    Raises:
+        NotFound: the request does not exist.
+        Conflict: the request belongs to a closed branch.
+        InvalidSpec: a trace is not stored, is no trace, or does not contain the motion; all errors are named.
+        EngineUnavailable: the library of the engine is not installed.
+        EngineInterrupted: the physics ended its process.
+        LimitReached: earlier requests took too long.
+    """
+    with store.reading() as session:
+        row, repetition = requests.get(session, request)
+        experiment = session.get_one(ExperimentRow, repetition.experiment_id)
+        resolved = spec_of(experiment.spec)
+        tables = _tables(session, spec, resolved.reality.repeats)
+        tuned = row.iteration - (row.kind is MeasurementKind.SAMPLE)
+        simulators = replays.tuned_parameters(session, experiment.id, repetition.number, tuned)
+        genome = tuple(row.genome)
+    if not simulators:
+        raise Conflict(f"request {request} is wanted no more: the simulators that it was asked with are closed")
+    robot, traces = robots.create(resolved.robot, "/robot"), [read_trace(*table) for table in tables]
+    until_s = max([float(robot.motion(frozen(genome)).observe_s[-1]), *robot.sensors.times_s.tolist()])
+    wanted = Expected(resolved.model_dump_json(), genome, tuple(simulators[0]), until_s)
+    expected = _trace_of(*process.call(expected_motion, wanted))
+    return _evaluated(robot, frozen(genome), traces, expected, spec)
+
+
+def measured_by_traces(store: Store, process: RolloutProcess, request: str, spec: MeasurementSpec) -> TracesRead | None:
+    """Return what the traces of an answer say; None if it has none. Errors are those of `evaluate_traces`."""
+    if spec.traces is None:
+        return None
+    return evaluate_traces(store, process, request, TracesSpec(traces=spec.traces, lags_s=spec.lags_s))
+
+
+def expected_motion(wanted: Expected) -> tuple[FloatArray, FloatArray]:
+    """Return times `(k,)` and poses `(k, 7)` of a controller in a simulator; nan if the physics failed."""
+    imported.renewed()
+    spec, genome = ResolvedSpec.model_validate_json(wanted.spec), np.array(wanted.genome)
+    robot = robots.create(spec.robot)
+    end_s = min(wanted.until_s, float(robot.motion(genome).observe_s[-1]))
+    times = np.unique(np.append(np.arange(int(end_s * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S, end_s))
+    simulation = Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))
+    _, recording = simulation.record(genome, np.array(wanted.parameters), times)
+    return times, recording.poses
+
+
+def _trace_of(times_s: FloatArray, poses: FloatArray) -> Trace:
+    return Trace(times_s, poses[:, :3], poses[:, 3:])
+
+
+def _tables(session: Session, spec: TracesSpec, repeats: int) -> list[tuple[str, str]]:
+    """Return the text and the pointer of each trace."""
+    violations = []
+    if len(spec.traces) != repeats:
+        message = f"an answer has one trace for each repeat: {repeats}, not {len(spec.traces)}"
+        violations.append(Violation("/traces", f"traces: {len(spec.traces)}", message, f"exactly {repeats}"))
+    if spec.lags_s is not None and len(spec.lags_s) != len(spec.traces):
+        message = f"there is one lag for each trace: {len(spec.traces)}, not {len(spec.lags_s)}"
+        violations.append(Violation("/lags_s", f"lags: {len(spec.lags_s)}", message, f"exactly {len(spec.traces)}"))
+    found = []
+    for place, digest in enumerate(spec.traces):
+        row, pointer = session.get(AttachmentRow, digest), f"/traces/{place}"
+        if row is None:
+            message = "no attachment with this hash is stored; send the file first"
+            violations.append(Violation(pointer, digest, message))
+        else:
+            found.append((row.content.decode("utf-8", "replace"), pointer))
+    if violations:
+        raise InvalidSpec(violations)
+    return found
+
+
+def _evaluated(
+    robot: Robot, genome: FloatArray, traces: Sequence[Trace], expected: Trace, spec: TracesSpec
+) -> TracesRead:
+    aligned, values, readings, violations = [], list[float](), [], list[Violation]()
+    lags = spec.lags_s or (None,) * len(traces)
+    observe_s, sensors = robot.motion(genome).observe_s, robot.sensors
+    for place, (digest, trace) in enumerate(zip(spec.traces, traces, strict=True)):
+        try:
+            found = align(trace, expected, lags[place])
+        except TooShort as error:
+            violations.append(Violation(f"/traces/{place}", digest, f"the trace does not contain the motion: {error}"))
+            continue
+        values.append(float(robot.fitness(from_start(trace, found.lag_s, observe_s))))
+        if not isfinite(values[-1]):
+            message = f"the {robot.name} computes no finite fitness from this trace"
+            violations.append(Violation(f"/traces/{place}", digest, message))
+        if sensors.size:
+            seen = robot.sense(from_start(trace, found.lag_s, sensors.times_s))
+            readings.append(_told(seen))
+        aligned.append(_beside(digest, trace, expected, found.lag_s, found.match))
+    if violations:
+        raise InvalidSpec(violations)
+    return TracesRead(
+        values=tuple(values), unit=robot.unit, readings=tuple(readings) if sensors.size else None, traces=tuple(aligned)
+    )
+
+
+def _told(seen: FloatArray) -> tuple[tuple[float | None, ...], ...]:
+    return tuple(tuple(value if isfinite(value) else None for value in row) for row in seen.tolist())
+
+
+def _beside(digest: str, trace: Trace, expected: Trace, lag_s: float, match: float | None) -> AlignedTrace:
+    """Return a trace beside the expected motion."""
+    times = expected.times_s[expected.times_s <= LONGEST_PLOT_S]
+    seen, known = from_start(trace, lag_s, times), bool(np.all(np.isfinite(expected.positions_m)))
+    wanted = from_start(expected, 0.0, times) if known else None
+    return AlignedTrace(
+        attachment=digest,
+        lag_s=lag_s,
+        match=match,
+        times_s=tuple(times.tolist()),
+        heights_m=_heights(seen),
+        distances_m=_distances(seen),
+        expected_heights_m=None if wanted is None else _heights(wanted),
+        expected_distances_m=None if wanted is None else _distances(wanted),
+    )
+
+
+def _heights(seen: Trajectory) -> tuple[float, ...]:
+    return tuple(np.round(seen.positions_m[:, 2], 4).tolist())
+
+
+def _distances(seen: Trajectory) -> tuple[float, ...]:
+    return tuple(np.round(np.linalg.norm(seen.positions_m[:, :2], axis=1), 4).tolist())

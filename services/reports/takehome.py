@@ -1,0 +1,166 @@
+"""The files that a person takes home from an experiment; the same results give the same bytes."""
+
+import csv
+import io
+import json
+from collections.abc import Callable, Iterator
+from importlib.metadata import version
+from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+from gaplab.schemas.records import SampleRead
+from gaplab.services.bench import motions
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.tunables import tunables
+from gaplab.services.reports.html import render_html
+from gaplab.services.reports.outcome import Outcome, outcome_of
+from gaplab.services.reports.outcome_page import outcome_report, verdict_sentences
+from gaplab.services.reports.reproduction import spec_text
+from gaplab.services.store.session import Store
+
+_MOMENT = (1980, 1, 1, 0, 0, 0)
+"""Date of every file, the earliest of the zip format, so that the same content gives the same bytes."""
+
+_FILE = 0o644 << 16
+
+MOTIONS: dict[str, motions.MotionFormat] = {"motion.csv": "csv", "motion.json": "json", "motion.ros2.yaml": "ros2"}
+
+README = """What experiment {id} ({name}) found, by gaplab {version}.
+
+page.html          all of this on a page to print
+controller.json    genome and fitness of the best measured controller
+motion.*           its motion as CSV, JSON and a ROS 2 JointTrajectory
+simulator.json     the tuned simulator with its intervals, and the rest of the ensemble
+verdict.txt        what can be concluded, in sentences
+samples.csv        all measurements, as gaplab.read_samples reads them for `reality.samples` of another spec
+samples.json       the same with repetition, iteration, operator and time
+spec.json          the spec; `gaplab submit spec.json` runs it again
+provenance.json    versions of everything that computed it
+
+Files that would be empty are left out.
+"""
+
+
+def takehome_page(store: Store, experiment_id: str) -> str:
+    """Return the outcome of an experiment as one HTML page to print.
+
+    Raises:
+        NotFound: no such experiment.
+        Conflict: nothing has been measured or tuned yet.
+        InvalidSpec: its robot is not installed here.
+    """
+    return _page(outcome_of(store, experiment_id))
+
+
+def takehome_zip(store: Store, experiment_id: str, draw: Callable[[Callable[[], str]], str]) -> bytes:
+    """Return the outcome of an experiment as a zip.
+
+    Args:
+        store: the database.
+        experiment_id: id of the experiment.
+        draw: calls what draws figures, perhaps after waiting for a turn.
+
+    Raises:
+        NotFound: no such experiment.
+        Conflict: nothing has been measured or tuned yet.
+        InvalidSpec: its robot is not installed here.
+    """
+    outcome, content = outcome_of(store, experiment_id), io.BytesIO()
+    with ZipFile(content, "w") as archive:
+        archive.writestr(_info("page.html"), draw(lambda: _page(outcome)))
+        for name, text in _files(outcome):
+            archive.writestr(_info(name), text)
+    return content.getvalue()
+
+
+def _page(outcome: Outcome) -> str:
+    return render_html(outcome_report(outcome), f"Made by gaplab {version('gaplab')}.")
+
+
+def _files(outcome: Outcome) -> Iterator[tuple[str, str]]:
+    """Yield name and text of each file beside the page."""
+    experiment, best = outcome.experiment, outcome.best
+    yield "README.txt", README.format(id=experiment.id, name=experiment.name, version=version("gaplab"))
+    yield "verdict.txt", "\n\n".join((outcome.facts.verdict.headline, *verdict_sentences(outcome))) + "\n"
+    yield "spec.json", spec_text(outcome.facts.experiments, outcome.facts.name) + "\n"
+    yield "provenance.json", outcome.facts.provenance[experiment.id].model_dump_json(indent=1) + "\n"
+    if best is not None:
+        yield "controller.json", _json(best.model_dump(mode="json") | {"unit": outcome.robot.unit})
+        yield "samples.csv", samples_csv(outcome)
+        yield "samples.json", _json([sample.model_dump(mode="json") for sample in outcome.measured])
+        if outcome.robot.world.actuators:
+            for name, form in MOTIONS.items():
+                yield name, motions.written(outcome.spec, frozen(best.genome), form)
+    if outcome.simulators:
+        yield "simulator.json", _json(_simulator(outcome))
+
+
+def samples_csv(outcome: Outcome) -> str:
+    """Return the measurements as a table of samples; equal ones once, since a sample may also be a probe.
+
+    Readings are in it unless measurements have repeats, since the mean of readings is all that is stored.
+    """
+    samples = list({(each.genome, each.repeats, each.fitness): each for each in outcome.measured}.values())
+    repeats = max(len(each.repeats or (0,)) for each in samples)
+    sensors = outcome.robot.sensors
+    names = [f"{name}@{time!r}" for time in sensors.times_s.tolist() for name in sensors.names]
+    names = names if repeats == 1 and any(each.readings for each in samples) else []
+    values = ["value"] if repeats == 1 else [f"value_{number}" for number in range(1, repeats + 1)]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*(f"gene_{place}" for place in range(outcome.robot.space.size)), *values, *names])
+    for each in samples:
+        measured = each.repeats or (each.fitness,)
+        blanks = [""] * (repeats - len(measured))
+        writer.writerow([*each.genome, *measured, *blanks, *(_readings(each, outcome) if names else [])])
+    return text.getvalue()
+
+
+def _readings(sample: SampleRead, outcome: Outcome) -> list[float | None]:
+    """Return the readings of a measurement in the sensors' units, empty where one failed."""
+    size = outcome.robot.sensors.size
+    if sample.readings is None or len(sample.readings) != size:
+        return [None] * size
+    told = outcome.robot.sensors.values(frozen([float("nan") if each is None else each for each in sample.readings]))
+    return [None if value != value else value for value in told.ravel().tolist()]  # noqa: PLR0124 - nan
+
+
+def _simulator(outcome: Outcome) -> dict[str, Any]:
+    best, misfit = outcome.simulators[0], outcome.misfit
+    return {
+        "experiment": outcome.experiment.id,
+        "robot": outcome.spec.robot.model_dump(mode="json"),
+        "engine": outcome.spec.engine.model_dump(mode="json"),
+        "repetition": best.repetition,
+        "iteration": best.iteration,
+        "samples": outcome.samples,
+        "error": best.error,
+        "error_unit": misfit.error_unit if misfit else "",
+        "held_out_error": best.held_out_error,
+        "tunables": [
+            {
+                "name": ref.name,
+                "unit": tunables[ref.name].unit if ref.name in tunables else "",
+                "value": best.parameters[ref.name],
+                "interval": (best.intervals or {}).get(ref.name),
+                "bounds": [ref.lower, ref.upper],
+                "verdict": outcome.identified[ref.name].verdict if ref.name in outcome.identified else None,
+                "sentence": outcome.identified[ref.name].sentence if ref.name in outcome.identified else None,
+            }
+            for ref in outcome.spec.tunables
+        ],
+        "ensemble": [
+            {"parameters": each.parameters, "squared_error": each.squared_error, "weight": each.weight}
+            for each in outcome.simulators
+        ],
+    }
+
+
+def _json(value: Any) -> str:  # noqa: ANN401 - JSON
+    return json.dumps(value, indent=1, ensure_ascii=False) + "\n"
+
+
+def _info(name: str) -> ZipInfo:
+    info = ZipInfo(name, _MOMENT)
+    info.compress_type, info.external_attr, info.create_system = ZIP_DEFLATED, _FILE, 3
+    return info

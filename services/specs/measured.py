@@ -1,0 +1,57 @@
+"""Measured values as the core takes them: the mean of repeats, and readings over the noise of their sensors."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.services.core.arrays import NO_READINGS, FloatArray, Readings, frozen
+from gaplab.services.core.repeats import mean
+from gaplab.services.core.robots import robots
+from gaplab.services.core.robots.base import Sensors
+from gaplab.services.core.types import Outcome, Sample
+
+
+def outcome_of(
+    robot: PluginRef, values: Sequence[float] | None, readings: Sequence[Any] | None
+) -> tuple[Outcome, FloatArray]:
+    """Return the outcome of measured values, and the repeats `(r,)` if there are several.
+
+    Args:
+        robot: the robot, whose sensors have units and noises.
+        values: fitness of each repeat; None if the measurement failed.
+        readings: `(r, times, sensors)`, in the sensors' units; None or null where a sensor failed.
+    """
+    if values is None:
+        return Outcome(float("nan")), NO_READINGS
+    repeats = frozen(values) if len(values) > 1 else NO_READINGS
+    fitness = values[0] if len(values) == 1 else mean(repeats)
+    return Outcome(fitness, _standardised(robots.create(robot).sensors, readings)), repeats
+
+
+def _standardised(sensors: Sensors, readings: Sequence[Any] | None) -> Readings:
+    """Return the mean over repeats of readings `(q,)`, each over its noise; nan where every repeat lacks it.
+
+    Of equal readings, the mean is exactly that reading.
+    """
+    if readings is None or not sensors.size:
+        return frozen(np.full(sensors.size, np.nan)) if sensors.size else NO_READINGS
+    tables = sensors.standardised(np.array(readings, dtype=np.float64))
+    if len(tables) == 1:
+        return frozen(tables[0])
+    known = ~np.isnan(tables)
+    count = known.sum(axis=0)
+    first = np.take_along_axis(tables, known.argmax(axis=0)[None, :], axis=0)
+    beyond_first = np.where(known, tables - first, 0.0).sum(axis=0)
+    return frozen(np.where(count > 0, first[0] + beyond_first / np.maximum(count, 1), np.nan))
+
+
+def samples_of(spec: ResolvedSpec) -> tuple[Sample, ...]:
+    """Return the samples that a spec knows from before the experiment."""
+    found = []
+    for known in spec.reality.samples:
+        outcome, repeats = outcome_of(spec.robot, known.values, known.readings)
+        found.append(Sample(frozen(known.genome), *outcome, repeats))
+    return tuple(found)

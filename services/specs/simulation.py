@@ -1,0 +1,110 @@
+"""The simulation of a robot on an engine, in worlds that tunables edit."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters, frozen
+from gaplab.services.core.errors import PluginBroken
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.core.world import Recording, Trajectory, World
+from gaplab.services.engines.base import Engine
+
+WORLDS_KEPT = 4096
+
+Places: TypeAlias = slice | NDArray[np.int_]
+"""Indices into the times of a trajectory."""
+
+
+class Simulation:
+    """A Simulate of one robot on one engine, in worlds that tunables edit."""
+
+    def __init__(self, robot: Robot, engine: Engine, edits: Sequence[Tunable]) -> None:
+        self._robot = robot
+        self._engine = engine
+        self._edits = tuple(edits)
+        self._world = lru_cache(maxsize=WORLDS_KEPT)(self._edited)
+
+    def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
+        """Return the `(n, m)` fitnesses of genomes `(n, g)` in simulators `(m, p)`; nan where the physics failed.
+
+        An infinite fitness counts as failed physics.
+        """
+        worlds = [self._world(tuple(row)) for row in parameters.tolist()]
+        motions = [self._robot.motion(genome) for genome in genomes]
+        return self._fitnesses(self._engine.rollouts(worlds, motions), len(genomes), len(parameters))
+
+    def sense(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
+        """Return fitness and readings `(n, m, 1 + q)`: the fitness of a call, then each reading over its noise.
+
+        A robot without sensors has no readings.
+        """
+        sensors = self._robot.sensors
+        worlds = [self._world(tuple(row)) for row in parameters.tolist()]
+        motions = [self._robot.motion(genome) for genome in genomes]
+        times = _all_times(motions[0].observe_s.tobytes(), sensors.times_s.tobytes())
+        seen = self._engine.rollouts(worlds, [replace(motion, observe_s=times.all_s) for motion in motions])
+        fitnesses = self._fitnesses(_at(seen, times.observed), len(genomes), len(parameters))
+        if not sensors.size:
+            return fitnesses[..., None]
+        values = self._robot.sense(_at(seen, times.sensed))
+        expected = (len(genomes), len(parameters), len(sensors.times_s), len(sensors.names))
+        if np.shape(values) != expected:
+            found = f"robot {self._robot.name!r} returned readings of shape {np.shape(values)}"
+            raise PluginBroken(f"{found}; permitted: {expected}")
+        outcomes = np.empty((len(genomes), len(parameters), 1 + sensors.size))
+        outcomes[..., 0], outcomes[..., 1:] = fitnesses, sensors.standardised(values)
+        outcomes[np.isnan(fitnesses)] = np.nan
+        return outcomes
+
+    def _fitnesses(self, seen: Trajectory, genomes: int, simulators: int) -> Fitnesses:
+        fitnesses = self._robot.fitness(seen)
+        if np.shape(fitnesses) != (genomes, simulators):
+            expected = f"the fitness of {genomes} genomes in {simulators} simulators"
+            raise PluginBroken(f"robot {self._robot.name!r} returned {np.shape(fitnesses)} numbers for {expected}")
+        return np.where(np.isfinite(fitnesses), fitnesses, np.nan)
+
+    def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:
+        """Return the world of a simulator `(p,)`, and the rollout of a genome in it, recorded at times `(k,)` too."""
+        world = self._world(tuple(parameters.tolist()))
+        return world, self._engine.record(world, self._robot.motion(genome), times_s)
+
+    def _edited(self, values: tuple[float, ...]) -> World:
+        world = self._robot.world
+        for tunable, value in zip(self._edits, values, strict=True):
+            world = tunable.edit(world, value)
+        return world
+
+
+class _Times(NamedTuple):
+    """Times of a rollout, and the places among them of the motion's observations and of the sensors' readings."""
+
+    all_s: FloatArray
+    observed: Places
+    sensed: Places
+
+
+@lru_cache
+def _all_times(observed: bytes, sensed: bytes) -> _Times:
+    """Return all times of observation, from the bytes of ascending times in seconds."""
+    observed_s, sensed_s = np.frombuffer(observed), np.frombuffer(sensed)
+    all_s = np.union1d(observed_s, sensed_s)
+    return _Times(frozen(all_s), _places(all_s, observed_s), _places(all_s, sensed_s))
+
+
+def _places(all_s: FloatArray, times_s: FloatArray) -> Places:
+    """Return the places of some of the times; a slice where they follow each other, which copies nothing."""
+    places = np.searchsorted(all_s, times_s)
+    if len(places) and places[-1] - places[0] == len(places) - 1:
+        return slice(int(places[0]), int(places[-1]) + 1)
+    return places
+
+
+def _at(seen: Trajectory, places: Places) -> Trajectory:
+    """Return the observations at some places of a trajectory."""
+    return Trajectory(seen.times_s[places], seen.positions_m[..., places, :], seen.orientations[..., places, :])

@@ -1,0 +1,172 @@
+"""Rows of requests for physical measurements, and of their answers."""
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from datetime import datetime, timedelta
+
+from sqlalchemy import ColumnElement, select, union_all
+from sqlalchemy.orm import Session
+
+from gaplab.schemas.events import EventKind
+from gaplab.schemas.measurements import AnswerState, RequestState
+from gaplab.services.core.errors import NotFound
+from gaplab.services.store.clock import moment
+from gaplab.services.store.lease import Claim, Requested
+from gaplab.services.store.models import AnswerRow, RepetitionRow, RequestRow
+from gaplab.services.store.queries import request_states
+from gaplab.services.store.queries.events import note
+from gaplab.services.store.queries.experiments import new_id
+from gaplab.services.store.queries.request_states import ANSWERED as ANSWERED
+from gaplab.services.store.queries.request_states import PENDING as PENDING
+from gaplab.services.store.queries.step_rows import vector
+from gaplab.services.store.statements import storable
+
+MOST_UNANSWERED = 5
+"""Takes in a row without an answer, after which a request is not offered until a person opens it again."""
+
+
+def insert(session: Session, asked: Mapping[Claim, Requested]) -> dict[Claim, RequestRow]:
+    """Store a request for each claim; the same request is stored once, even if it is asked for again.
+
+    If an earlier request of the repetition for the same controller has an answer that counts, this one refers to it.
+    """
+    found = {}
+    for claim, wanted in asked.items():
+        genome, repetition = vector(wanted.genome), claim.id
+        earlier = requests_of(session, repetition)
+        same = [row for row in earlier if row.genome == genome]
+        pending = [row for row in same if row.place == wanted.place and row.state in PENDING]
+        answered = [row for row in same if row.state in ANSWERED and counted_answer(session, row) is not None]
+        found[claim] = pending[0] if pending else _new(session, claim, wanted, answered[0] if answered else None)
+    return found
+
+
+def _new(session: Session, claim: Claim, wanted: Requested, same: RequestRow | None) -> RequestRow:
+    row = RequestRow(
+        id=new_id(),
+        repetition_id=claim.id,
+        place=wanted.place,
+        iteration=wanted.iteration,
+        kind=wanted.kind,
+        genome=vector(wanted.genome),
+        bench=storable(claim.spec.reality.bench or ""),
+        state=RequestState.OPEN if same is None else same.state,
+        safety=wanted.safety,
+        same_as=None if same is None else same.same_as or same.id,
+        created_at=moment(session),
+        ended_at=None if same is None else moment(session),
+    )
+    session.add(row)
+    session.flush()
+    body = {"iteration": wanted.iteration, "request": row.id, "kind": wanted.kind.value}
+    note(session, EventKind.REQUESTED, claim.experiment_id, claim.number, **body)
+    return row
+
+
+def requests_of(session: Session, repetition: int) -> Sequence[RequestRow]:
+    """Return the requests of a repetition, by place in its log."""
+    row = RequestRow
+    return session.scalars(
+        select(row).where(row.repetition_id == repetition).order_by(row.place, row.created_at, row.id)
+    ).all()
+
+
+def oldest(
+    session: Session,
+    conditions: Sequence[ColumnElement[bool]],
+    limit: int,
+    states: Collection[RequestState] | None = None,
+) -> Sequence[RequestRow]:
+    """Return the oldest requests that fulfil conditions.
+
+    Each state is asked for by itself: an index has the order within a state, so that nothing is sorted but the result.
+
+    Args:
+        session: session of a transaction.
+        conditions: which requests.
+        limit: most requests.
+        states: only requests in these states; None for any.
+    """
+    row, key = RequestRow, (RequestRow.created_at, RequestRow.id)
+    query = select(row).where(*conditions)
+    if states is not None:
+        each = [select(row.id).where(row.state == state, *conditions).order_by(*key).limit(limit) for state in states]
+        query = select(row).where(row.id.in_(union_all(*(select(one.subquery()) for one in each))))
+    return session.scalars(query.order_by(*key).limit(limit)).all()
+
+
+def counted_answer(session: Session, request: RequestRow) -> AnswerRow | None:
+    """Return the answer to a request that counts, which may be of an earlier request for the same controller."""
+    row = AnswerRow
+    of_it = (row.request_id == (request.same_as or request.id)) & (row.state == AnswerState.COUNTED)
+    return session.scalars(select(row).where(of_it)).first()
+
+
+def get(session: Session, id_: str) -> tuple[RequestRow, RepetitionRow]:
+    """Return a request with its repetition.
+
+    Raises:
+        NotFound: there is none.
+    """
+    row = session.get(RequestRow, storable(id_))
+    if row is None:
+        raise NotFound(f"there is no request {id_!r}")
+    repetition = session.get(RepetitionRow, row.repetition_id)
+    assert repetition is not None, "a request belongs to a repetition"
+    return row, repetition
+
+
+def get_answer(session: Session, id_: str) -> AnswerRow:
+    """Return an answer.
+
+    Raises:
+        NotFound: there is none.
+    """
+    if (row := session.get(AnswerRow, storable(id_))) is None:
+        raise NotFound(f"there is no measurement {id_!r}")
+    return row
+
+
+def withdraw(session: Session, repetitions: Sequence[int]) -> None:
+    """Withdraw what these repetitions still wait for."""
+    request_states.withdraw(session, RequestRow.repetition_id.in_(repetitions))
+
+
+def is_expired(row: RequestRow, at: datetime) -> bool:
+    """Return whether a take has ended without an answer.
+
+    A take that ends later than a heartbeat could have set was set before the clock was set back, and says nothing.
+    """
+    if row.state is not RequestState.TAKEN or row.taken_until is None:
+        return False
+    return not at < row.taken_until <= at + timedelta(seconds=row.lease_s or 0.0) + timedelta(seconds=1)
+
+
+def expire(session: Session, which: ColumnElement[bool] | None = None) -> int:
+    """Open the requests again whose take has ended, and return their number."""
+    row, at = RequestRow, moment(session)
+    taken = select(row).where(row.state == RequestState.TAKEN)
+    taken = taken if which is None else taken.where(which)
+    expired = [each for each in session.scalars(taken.with_for_update()) if is_expired(each, at)]
+    for each in expired:
+        give_up(session, each, EventKind.TAKE_EXPIRED)
+    session.flush()
+    return len(expired)
+
+
+def give_up(session: Session, row: RequestRow, kind: EventKind) -> None:
+    """End the take of a request that got no answer."""
+    unanswered = row.unanswered + (kind is EventKind.TAKE_EXPIRED)
+    to = RequestState.STUCK if unanswered >= MOST_UNANSWERED else RequestState.OPEN
+    request_states.become(session, row, to, held=None, unanswered=unanswered)
+    repetition = session.get(RepetitionRow, row.repetition_id)
+    if repetition is not None:
+        body = {"iteration": row.iteration, "request": row.id, "operator": row.taken_by}
+        note(session, kind, repetition.experiment_id, repetition.number, **body)
+
+
+def answers_of(session: Session, requests: Iterable[str]) -> dict[str, list[AnswerRow]]:
+    """Return the answers to each of these requests, in the order in which they came."""
+    row, found = AnswerRow, dict[str, list[AnswerRow]]()
+    for each in session.scalars(select(row).where(row.request_id.in_(list(requests))).order_by(row.at, row.id)):
+        found.setdefault(each.request_id, []).append(each)
+    return found

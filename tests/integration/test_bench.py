@@ -1,0 +1,499 @@
+"""A robot on a bench: repetitions wait for measurements, and go on from them."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import select, update
+
+from gaplab.api.app import create_app
+from gaplab.schemas.corrections import ConflictSpec, CorrectionSpec, VoidSpec
+from gaplab.schemas.lifecycle import State, Verb
+from gaplab.schemas.measurements import HolderSpec, MeasurementSpec, TakeSpec
+from gaplab.schemas.records import ExperimentRead
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.archives import export_experiment, import_archive
+from gaplab.services.bench import answering, attachments, corrections, taking
+from gaplab.services.bench.branches import list_branches
+from gaplab.services.bench.taking import RequestFilter
+from gaplab.services.core.errors import Conflict, InvalidSpec, KeyReused, NotFound
+from gaplab.services.core.loop import repetition
+from gaplab.services.core.stored_specs import spec_to_run
+from gaplab.services.experiments import lifecycle
+from gaplab.services.experiments.deletion import Deleter, delete_experiment
+from gaplab.services.experiments.limits import FREELY, Admission
+from gaplab.services.experiments.reading import list_samples, read_experiment
+from gaplab.services.experiments.submission import submit_experiment
+from gaplab.services.running import execution
+from gaplab.services.specs.assembly import setting
+from gaplab.services.specs.resolution import resolve_experiment
+from gaplab.services.store.lease import Pulse
+from gaplab.services.store.models import AttachmentRow
+from gaplab.services.store.queries.costs import work_of
+from gaplab.services.store.queries.logs import logs
+from gaplab.services.store.session import Store
+from gaplab.workers.checkpoints import recorded
+from tests.experiments import same, toy
+from tests.integration.test_archives import exported
+
+PHYSICAL = {"kind": "physical", "probes": "each"}
+
+
+def bench(**changes: Any) -> ExperimentSpec:
+    """An experiment on the toy function whose reality is on a bench."""
+    reality = PHYSICAL | changes.pop("reality", {})
+    return toy(**{"repetitions": 1, "reality": reality} | changes)
+
+
+def compute(store: Store, owner: str = "here", most: int = 1_000) -> int:
+    """Let a supervisor do all that can be done without an answer; return the number of claims."""
+    count = 0
+    while count < most and (claims := execution.claim(store, owner, 1)):
+        (claim,) = claims
+        count += 1
+        held: tuple[Any, ...] = claims
+        for item in recorded(setting(claim.spec, claim.number), claim.log, claim.checkpoints):
+            if not isinstance(item, Pulse):
+                held = execution.record_all(store, [(claim, [item])])
+        if held:
+            execution.complete(store, claim)
+    return count
+
+
+def pending(store: Store) -> Any:
+    return taking.list_requests(store, RequestFilter()).items
+
+
+def undecided(store: Store) -> Any:
+    """Requests with an answer in conflict, also if they are answered."""
+    return taking.list_requests(store, RequestFilter(pending=False, conflicts=True)).items
+
+
+def truth(spec: ExperimentSpec) -> Callable[[Any], float]:
+    """The fitness in a simulated reality with the robot's own parameters."""
+    simulated = spec.model_copy(
+        update={"reality": spec.reality.model_copy(update={"kind": "simulated", "bench": None})}
+    )
+    real = setting(resolve_experiment(simulated), 0).reality
+    return lambda genome: real(np.array(genome)).fitness
+
+
+def measure(store: Store, request: Any, *values: float, **changes: Any) -> Any:
+    spec = MeasurementSpec(values=values, operator="Ada", **changes)
+    return answering.answer(store, request.id, spec, FREELY).answer
+
+
+def finish(store: Store, fitness: Callable[[Any], float]) -> list[Any]:
+    """Answer everything to the end, and return the requests in order."""
+    asked = []
+    compute(store)
+    while items := pending(store):
+        asked.append(items[0])
+        assert len(asked) < 100
+        measure(store, items[0], *[fitness(items[0].genome)] * items[0].repeats)
+        compute(store)
+    return asked
+
+
+@pytest.fixture
+def other(request: pytest.FixtureRequest, store: Store) -> Any:
+    """A database of the other kind."""
+    with store.reading() as session:
+        kind = session.get_bind().dialect.name
+    return request.getfixturevalue("postgres_store" if kind == "sqlite" else "sqlite_store")
+
+
+def log_of(store: Store, experiment: ExperimentRead) -> Any:
+    with store.reading() as session:
+        from gaplab.services.store.queries.experiments import repetitions_of
+
+        ids = [row.id for row in repetitions_of(session, experiment.id)]
+        return [logs(session, [id_])[id_] for id_ in ids]
+
+
+def test_without_noise_the_steps_equal_those_of_a_simulated_reality_to_the_bit(store: Store) -> None:
+    spec = bench(strategy="simulated_fit_and_informative", repetitions=2)
+    experiment = submit_experiment(store, spec)
+    finish(store, truth(spec))
+
+    simulated = spec.model_copy(update={"reality": spec.reality.model_copy(update={"kind": "simulated"})})
+    resolved = resolve_experiment(simulated)
+    expected = [tuple(repetition(setting(resolved, number))) for number in range(2)]
+    assert read_experiment(store, experiment.id).state is State.COMPLETED
+    found = log_of(store, experiment)
+    for mine, theirs in zip(found, expected, strict=True):
+        assert [type(step) for step in mine] == [type(step) for step in theirs]
+        assert all(map(same, mine, theirs))
+
+
+def test_a_repetition_that_waits_holds_nothing_and_its_experiment_says_so(store: Store) -> None:
+    experiment = submit_experiment(store, bench())
+    assert compute(store) == 1
+
+    (request,) = pending(store)
+    assert (request.state, request.iteration, request.kind) == ("open", 0, "probe")
+    assert read_experiment(store, experiment.id).state is State.WAITING
+    assert compute(store) == 0
+    assert execution.requeue_lost(store, stale_after_s=0.0) == 0
+
+    measure(store, request, 0.5)
+    assert read_experiment(store, experiment.id).state is State.RUNNING
+    assert compute(store) == 1
+    assert [each.iteration for each in pending(store)] == [1]
+
+
+def test_probes_that_are_left_out_are_not_asked_for(store: Store) -> None:
+    experiment = submit_experiment(store, bench(reality={"probes": "last"}))
+    asked = finish(store, lambda _: 0.5)
+    assert [(each.iteration, each.kind) for each in asked] == [(1, "sample"), (2, "sample"), (2, "probe")]
+    (log,) = log_of(store, experiment)
+    assert [step.left_out for step in log if hasattr(step, "left_out")] == [True, True, False]
+    assert [step.recorded for step in log if hasattr(step, "recorded")][1:] == [0.5, 0.5]
+    with store.reading() as session:
+        assert work_of(session, [experiment.id])[experiment.id].probes == 1
+    measured = list_samples(store, experiment.id, limit=100, cursor=None).items
+    assert [(each.iteration, each.kind) for each in measured] == [(1, "sample"), (2, "sample"), (2, "probe")]
+
+
+def test_a_controller_is_measured_once_even_if_it_is_probe_and_sample(store: Store) -> None:
+    spec = bench(budget={"preset": "smoke", "reuse_transfer": True})
+    submit_experiment(store, spec)
+    asked = finish(store, truth(spec))
+    genomes = [each.genome for each in asked]
+    assert len(genomes) == len(set(genomes))
+    assert {each.kind for each in asked} == {"probe"}
+
+
+def test_a_take_has_one_holder_and_runs_out(store: Store) -> None:
+    submit_experiment(store, bench(repetitions=2))
+    compute(store)
+    first, second = pending(store)
+    taken = taking.take(store, first.id, TakeSpec(operator="Ada", lease_s=1.0), FREELY).answer
+    assert (taken.state, taken.takes, taken.taken_by) == ("taken", 1, "Ada")
+    with pytest.raises(Conflict, match="Ada has taken it"):
+        taking.take(store, first.id, TakeSpec(operator="Bo"), FREELY)
+    with pytest.raises(Conflict, match="one is taken at a time"):
+        taking.take(store, second.id, TakeSpec(operator="Bo"), FREELY)
+    with pytest.raises(Conflict, match="take 2"):
+        taking.heartbeat(store, first.id, HolderSpec(take=2))
+    assert taking.heartbeat(store, first.id, HolderSpec(take=1)).state == "taken"
+    assert taking.release(store, first.id, HolderSpec(take=1)).state == "open"
+    assert taking.take(store, second.id, TakeSpec(operator="Bo"), FREELY).answer.taken_by == "Bo"
+
+
+@pytest.mark.parametrize("by_s", [-3600, 3600])
+def test_a_take_ends_with_its_lease_also_if_the_clock_was_set(store: Store, by_s: float) -> None:
+    """`taken_until` in the past is over; so is one that no heartbeat could have set."""
+    from datetime import timedelta
+
+    from sqlalchemy import update
+
+    from gaplab.services.store.models import RequestRow
+
+    submit_experiment(store, bench())
+    compute(store)
+    (request,) = pending(store)
+    for count in range(1, 6):
+        taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
+        with store.transaction() as session:
+            until = session.get_one(RequestRow, request.id).taken_until
+            assert until is not None
+            session.execute(update(RequestRow).values(taken_until=until + timedelta(seconds=by_s)))
+        assert pending(store)[0].state == ("open" if count < 5 else "stuck")
+    with pytest.raises(Conflict, match="5 times in a row"):
+        taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
+    assert taking.reopen(store, request.id).state == "open"
+
+
+def test_the_same_answer_twice_counts_once_and_another_is_a_conflict(store: Store) -> None:
+    submit_experiment(store, bench())
+    compute(store)
+    (request,) = pending(store)
+    taking.take(store, request.id, TakeSpec(operator="Ada"), FREELY)
+    other = measure(store, request, 0.3)
+    assert other.state == "conflict"
+    once = Admission(key="one")
+    spec = MeasurementSpec(take=1, values=(0.5,))
+    first = answering.answer(store, request.id, spec, once)
+    again = answering.answer(store, request.id, spec, once)
+    assert (first.answer.state, again.answer, again.replayed) == ("counted", first.answer, True)
+    assert answering.answer(store, request.id, spec, FREELY).answer.id == first.answer.id
+    with pytest.raises(KeyReused):
+        answering.answer(store, request.id, MeasurementSpec(take=1, values=(0.6,)), once)
+    late = measure(store, request, 0.6)
+    assert late.state == "conflict"
+
+    assert [each.id for each in undecided(store)] == [request.id]
+
+    corrections.decide(store, other.id, ConflictSpec(counts="other", reason="Bo was on the wrong robot"), FREELY)
+    corrections.decide(store, late.id, ConflictSpec(counts="this", reason="Ada misread"), FREELY)
+    states = {each.id: each.state for each in taking.read_request(store, request.id).answers}
+    assert states == {other.id: "dismissed", first.answer.id: "replaced", late.id: "counted"}
+    assert undecided(store) == ()
+
+
+def test_bad_values_are_refused_with_their_place(store: Store) -> None:
+    submit_experiment(store, bench(reality={"repeats": 3}))
+    compute(store)
+    (request,) = pending(store)
+    with pytest.raises(InvalidSpec) as refused:
+        measure(store, request, 0.5, unit="km/h", readings=(((1.0,),),))
+    assert {each.pointer for each in refused.value.violations} >= {"/unit", "/values", "/readings/0"}
+    assert pending(store)[0].answers == ()
+
+
+def test_a_correction_closes_what_followed_and_measurements_are_reused(store: Store) -> None:
+    spec = bench(iterations=3)
+    experiment = submit_experiment(store, spec)
+    real = truth(spec)
+    asked = finish(store, real)
+    wrong = next(each for each in asked if (each.iteration, each.kind) == (1, "sample"))
+    answer = taking.read_request(store, wrong.id).answers[0]
+    (before,) = log_of(store, experiment)
+
+    change = CorrectionSpec(values=(0.123,), reason="a slip")
+    told = corrections.correct(store, answer.id, change, FREELY, dry_run=True).answer
+    assert (told.steps, told.branch) == (len(before) - 5, None)
+    assert len(log_of(store, experiment)[0]) == len(before)
+
+    done = corrections.correct(store, answer.id, change, FREELY).answer
+    assert (done.steps, done.branch) == (told.steps, 1)
+    assert read_experiment(store, experiment.id).state is State.QUEUED
+    (cut,) = log_of(store, experiment)
+    assert len(cut) == 5
+    assert cut[-1].sample.fitness == 0.123
+    (branch,) = list_branches(store, experiment.id)
+    assert len(branch.steps) == told.steps
+
+    back = CorrectionSpec(values=answer.values, reason="it was right after all")
+    corrections.correct(store, done.answer, back, FREELY)
+    assert finish(store, lambda _: pytest.fail("a measurement was asked for twice")) == []
+    (after,) = log_of(store, experiment)
+    assert all(map(same, after, before))
+    assert read_experiment(store, experiment.id).state is State.COMPLETED
+
+
+def test_a_void_measurement_is_asked_for_again(store: Store) -> None:
+    spec = bench()
+    experiment = submit_experiment(store, spec)
+    asked = finish(store, truth(spec))
+    (before,) = log_of(store, experiment)
+    sample = next(each for each in asked if each.kind == "sample")
+    answer = taking.read_request(store, sample.id).answers[0]
+    corrections.void(store, answer.id, VoidSpec(reason="the floor was wet"), FREELY)
+    assert read_experiment(store, experiment.id).state is State.WAITING
+    (again,) = pending(store)
+    assert again.id == sample.id
+    with pytest.raises(Conflict, match="it is void"):
+        corrections.void(store, answer.id, VoidSpec(reason="once more"), FREELY)
+    measure(store, again, truth(spec)(again.genome))
+    assert finish(store, lambda _: pytest.fail("a measurement was asked for twice")) == []
+    (after,) = log_of(store, experiment)
+    assert all(map(same, after, before))
+
+
+def test_a_correction_of_a_probe_changes_its_point_alone(store: Store) -> None:
+    experiment = submit_experiment(store, bench())
+    asked = finish(store, lambda _: 0.5)
+    answer = taking.read_request(store, asked[0].id).answers[0]
+    told = corrections.correct(store, answer.id, CorrectionSpec(values=(0.9,), reason="a slip"), FREELY).answer
+    assert (told.steps, told.branch) == (0, None)
+    (log,) = log_of(store, experiment)
+    assert [step.recorded for step in log if hasattr(step, "recorded")] == [0.9, 0.5, 0.5]
+    assert read_experiment(store, experiment.id).state is State.COMPLETED
+
+
+def test_a_correction_while_the_repetition_is_computed_fences_its_worker(store: Store) -> None:
+    experiment = submit_experiment(store, bench())
+    compute(store)
+    measure(store, pending(store)[0], 0.5)
+    compute(store)
+    sample = pending(store)[0]
+    given = measure(store, sample, 0.4)
+    (claim,) = execution.claim(store, "slow", 1)
+    steps: Any = recorded(setting(claim.spec, claim.number), claim.log, claim.checkpoints)
+    first = next(steps)
+    corrections.correct(store, given.id, CorrectionSpec(values=(0.3,), reason="a slip"), FREELY)
+    assert execution.record_all(store, [(claim, [first])]) == ()
+    steps.close()
+    finish(store, lambda _: 0.5)
+    (log,) = log_of(store, experiment)
+    assert next(step for step in log if hasattr(step, "sample")).sample.fitness == 0.3
+
+
+def test_pause_stop_and_cancel_of_what_waits(store: Store) -> None:
+    one, two, three = (submit_experiment(store, bench(reality={"bench": name})) for name in "abc")
+    compute(store)
+    requests = {each.experiment: each for each in pending(store)}
+    assert lifecycle.ask_experiment(store, one.id, Verb.PAUSE).state is State.PAUSED
+    assert {each.experiment for each in pending(store)} == {two.id, three.id}
+    with pytest.raises(Conflict, match="PAUSED"):
+        taking.take(store, requests[one.id].id, TakeSpec(operator="Ada"), FREELY)
+    measure(store, requests[one.id], 0.4)  # whoever measured it nevertheless is not sent away
+    assert lifecycle.ask_experiment(store, one.id, Verb.RESUME).state is State.QUEUED
+    assert lifecycle.ask_experiment(store, two.id, Verb.STOP).state is State.CANCELLED
+    assert lifecycle.ask_experiment(store, three.id, Verb.CANCEL).state is State.CANCELLED
+    with pytest.raises(Conflict, match="wanted no more"):
+        measure(store, requests[three.id], 0.4)
+
+
+def test_known_samples_tune_the_first_simulators(store: Store) -> None:
+    spec = bench()
+    real = truth(spec)
+    genomes = [[0.2], [0.7]]
+    known = [{"genome": genome, "values": [real(genome)]} for genome in genomes]
+    experiment = submit_experiment(store, bench(reality={"samples": known}))
+    compute(store)
+    (log,) = log_of(store, experiment)
+    assert log[0].cost.rollouts > 0
+    assert log[0].simulators[0].squared_error < 1e-2
+
+
+def test_repeats_weigh_samples_and_put_a_floor_under_weights(store: Store) -> None:
+    experiment = submit_experiment(store, bench(reality={"repeats": 3}, strategy="simulated_fit_and_informative"))
+    compute(store)
+    while items := pending(store):
+        measure(store, items[0], 0.4, 0.5, 0.6)
+        compute(store)
+    (log,) = log_of(store, experiment)
+    samples = [step.sample for step in log if hasattr(step, "sample")]
+    assert [list(each.repeats) for each in samples] == [[0.4, 0.5, 0.6]] * 2
+    assert [each.fitness for each in samples] == [0.5, 0.5]
+
+
+def test_specs_that_make_no_sense_on_a_bench_are_refused() -> None:
+    physical = {"kind": "physical", "engine": "pybullet", "parameters": {"restitution": 0.1}}
+    with pytest.raises(InvalidSpec) as refused:
+        resolve_experiment(toy(strategy="direct", reality=physical))
+    pointers = {each.pointer for each in refused.value.violations}
+    assert pointers == {"/strategy", "/reality/engine", "/reality/parameters/restitution"}
+    with pytest.raises(InvalidSpec, match="physical reality"):
+        resolve_experiment(toy(reality={"repeats": 3}))
+
+
+def test_a_resolved_physical_spec_resolves_to_itself() -> None:
+    resolved = resolve_experiment(bench(reality={"repeats": 3}))
+    again = resolve_experiment(ExperimentSpec.model_validate(resolved.model_dump(mode="json")))
+    assert again == resolved == spec_to_run(resolved.model_dump(mode="json"))
+    assert replace(setting(resolved, 0)).reality is not None
+
+
+def test_an_archive_of_what_waits_goes_on_elsewhere(store: Store, other: Store) -> None:
+    spec = bench(iterations=3)
+    experiment = submit_experiment(store, spec)
+    real = truth(spec)
+    compute(store)
+    measure(store, pending(store)[0], real(pending(store)[0].genome))
+    compute(store)
+    (sample,) = pending(store)
+    given = measure(store, sample, 0.1)
+    compute(store)
+    corrections.correct(store, given.id, CorrectionSpec(values=(real(sample.genome),), reason="a slip"), FREELY)
+    compute(store)
+    taken = taking.take(store, pending(store)[0].id, TakeSpec(operator="Ada"), FREELY).answer
+    archive = exported(export_experiment(store, experiment.id))
+    taking.release(store, taken.id, HolderSpec(take=1))
+
+    for _ in range(2):  # the second time under other ids
+        there = import_archive(other, BytesIO(archive))
+    assert there.called_off == ()
+    first, second = (read_experiment(other, id_) for id_ in (experiment.id, there.experiments[0]))
+    assert (first.state, second.state) == (State.QUEUED, State.QUEUED)
+    for each in (first, second):
+        assert len(list_branches(other, each.id)) == 1
+    finish(other, real)
+    finish(store, real)
+    (expected,) = log_of(store, experiment)
+    for each in (first, second):
+        (found,) = log_of(other, each)
+        assert all(map(same, found, expected))
+
+
+def test_a_deleted_experiment_leaves_no_requests(store: Store) -> None:
+    experiment = submit_experiment(store, bench())
+    finish(store, lambda _: 0.5)
+    delete_experiment(store, experiment.id, Deleter(None))
+    assert taking.list_requests(store, RequestFilter(pending=False)).items == ()
+
+
+def sent(store: Store, name: str) -> str:
+    return attachments.store_attachment(store, name.encode(), name, "text/plain").id
+
+
+def test_a_file_goes_with_the_last_answer_that_names_it(store: Store) -> None:
+    shared, own, waits, old, again = (sent(store, name) for name in ("shared", "own", "waits", "old", "again"))
+    first, second = (submit_experiment(store, bench(iterations=1, reality={"probes": "never"})) for _ in range(2))
+    compute(store)
+    for request in pending(store):
+        named = [shared, own] if request.experiment == first.id else [shared]
+        measure(store, request, 0.5, attachments=named)
+    compute(store)
+    long_ago = update(AttachmentRow).where(AttachmentRow.id.in_([shared, old, again]))
+    store.write(lambda session: session.execute(long_ago.values(created_at=datetime.now(UTC) - timedelta(days=8))))
+    sent(store, "again")
+
+    delete_experiment(store, first.id, Deleter(None))
+
+    assert set(store.write(lambda session: session.scalars(select(AttachmentRow.id)).all())) == {shared, waits, again}
+    delete_experiment(store, second.id, Deleter(None))
+    with pytest.raises(NotFound, match="no attachment"):
+        attachments.read_attachment(store, shared)
+
+
+def test_every_result_of_a_bench_is_served(store: Store) -> None:
+    experiment = submit_experiment(store, bench(reality={"repeats": 2, "probes": "last"}))
+    finish(store, lambda genome: genome[0])
+    api = TestClient(create_app(store))
+    of_it = f"/experiments/{experiment.id}"
+    figures = ("curves", "predictions", "squared-error", "simulators", "coordinates", "toy")
+    paths = [f"{of_it}{each}" for each in ("", "/curve", "/samples", "/misfit", "/simulators", "/spec", "/repetitions")]
+    paths += [f"/figures/{kind}?experiment={experiment.id}&format=json" for kind in figures]
+
+    refused = {path: answer.text for path in paths if (answer := api.get(path)).status_code != 200}
+
+    assert refused == {}
+
+
+def test_fifty_operators_at_once_get_one_request_each_or_none(store: Store) -> None:
+    submit_experiment(store, bench(repetitions=3, reality={"bench": "one"}))
+    submit_experiment(store, bench(repetitions=2, reality={"bench": "two"}))
+    submit_experiment(store, bench(repetitions=1, reality={"bench": "one"}))
+    compute(store)
+    wanted = [each.id for each in pending(store)]
+    assert len(wanted) == 6
+
+    def take(number: int) -> Any:
+        try:
+            spec = TakeSpec(operator=f"operator {number}")
+            return taking.take(store, wanted[number % 6], spec, FREELY).answer
+        except Conflict:
+            return None
+
+    with ThreadPoolExecutor(50) as pool:
+        taken = [each for each in pool.map(take, range(50)) if each]
+    assert {each.bench for each in taken} == {"one", "two"}
+    assert len(taken) == 2
+    held = {each.id: each.taken_by for each in pending(store) if each.state == "taken"}
+    assert held == {each.id: each.taken_by for each in taken}
+
+
+@pytest.mark.parametrize("claimed", [False, True])
+def test_an_answer_counts_also_while_a_repetition_is_on_its_way_to_the_request(
+    store: Store, other: Store, claimed: bool
+) -> None:
+    experiment = submit_experiment(store, bench())
+    compute(store)
+    import_archive(other, BytesIO(exported(export_experiment(store, experiment.id))))
+    claims = execution.claim(other, "slow", 1) if claimed else ()
+    assert measure(other, pending(other)[0], 0.5).state == "counted"
+    for claim in claims:
+        items = [each for each in recorded(setting(claim.spec, 0), claim.log, ()) if not isinstance(each, Pulse)]
+        assert execution.record_all(other, [(claim, items)]) == ()
+    compute(other)
+    assert [each.iteration for each in pending(other)] == [1]

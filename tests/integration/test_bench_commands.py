@@ -1,0 +1,85 @@
+"""The commands for a robot on a bench, on a service in a thread."""
+
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gaplab.services.experiments.submission import submit_experiment
+from gaplab.services.store.session import Store
+from tests.commands import Gaplab
+from tests.experiments import toy
+from tests.integration.test_bench import compute, measure, pending
+from tests.integration.test_bench_http import traces_of
+
+PHYSICAL = {"kind": "physical", "probes": "never"}
+
+
+def asked(store: Store, **changes: Any) -> Any:
+    """The request of a new experiment."""
+    submit_experiment(store, toy(**{"strategy": "random", "repetitions": 1, "reality": PHYSICAL} | changes))
+    compute(store)
+    return pending(store)[0]
+
+
+def test_a_request_is_read_moved_answered_and_corrected(sqlite_store: Store, gaplab: Gaplab) -> None:
+    request = asked(sqlite_store, iterations=1)
+
+    assert request.id in gaplab("requests").out
+    assert f"{request.id} is open" in gaplab("requests", request.id).out
+    assert gaplab("motion", request.id, "--format", "json").out.startswith("{")
+    said = gaplab("measured", request.id, "4.4", "--note", "cold", "--json")
+    answer = json.loads(said.out)["id"]
+    assert "would be done" in gaplab("correct", answer, "0.44", "--reason", "4.4 was 0.44", "--dry-run").out
+    assert "Done" in gaplab("correct", answer, "0.44", "--reason", "4.4 was 0.44").out
+    read = gaplab("requests", request.id).out
+    assert f"{answer} replaced: 4.4" in read
+    assert "counted: 0.44" in read
+
+
+def test_a_measurement_is_voided_and_one_in_conflict_is_decided_about(sqlite_store: Store, gaplab: Gaplab) -> None:
+    request = asked(sqlite_store, iterations=2)
+    measure(sqlite_store, request, 0.3)
+    other = measure(sqlite_store, request, 0.4)
+
+    assert "Done" in gaplab("decide", other.id, "this", "--reason", "the first was of another robot").out
+    assert "Done" in gaplab("void", other.id, "--reason", "the floor was wet").out
+    assert gaplab("decide", other.id, "that").code == 2
+    assert pending(sqlite_store)[0].id == request.id
+
+
+def test_a_request_that_is_not_stuck_cannot_be_offered_again(sqlite_store: Store, gaplab: Gaplab) -> None:
+    request = asked(sqlite_store, iterations=1)
+
+    said = gaplab("reopen", request.id)
+
+    assert said.code != 0
+    assert "open" in said.err
+
+
+def test_traces_are_computed_and_stored_as_an_answer(sqlite_store: Store, gaplab: Gaplab, tmp_path: Path) -> None:
+    pytest.importorskip("pybullet")
+    robot = {"robot": "quadruped", "engine": "pybullet", "budget": "smoke", "iterations": 1}
+    request = asked(sqlite_store, **robot, reality=PHYSICAL | {"repeats": 2})
+    files = [str(file) for file in traces_of(request.genome, tmp_path)]
+
+    computed = gaplab("traces", request.id, *files).out
+    assert computed.count("m/s; the motion begins at") == 2
+    assert pending(sqlite_store)[0].answers == ()
+    assert "is stored: counted" in gaplab("traces", request.id, *files, "--answer").out
+
+
+def test_what_one_takes_home_is_saved_as_a_zip_or_a_page(sqlite_store: Store, gaplab: Gaplab, tmp_path: Path) -> None:
+    request = asked(sqlite_store, iterations=1)
+    measure(sqlite_store, request, 0.4)
+    compute(sqlite_store)
+
+    said = gaplab("takehome", request.experiment, str(tmp_path / "home.zip"))
+    page = gaplab("takehome", request.experiment, str(tmp_path / "home.html"))
+
+    assert (said.code, page.code) == (0, 0), said.err
+    assert "controller.json" in zipfile.ZipFile(tmp_path / "home.zip").namelist()
+    assert "<!doctype html>" in (tmp_path / "home.html").read_text().lower()
+    assert "permitted: .zip, .html" in gaplab("takehome", request.experiment, "home.pdf").err

@@ -1,0 +1,302 @@
+"""A robot on a bench over HTTP: what an operator, a driver and their mistakes get."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+import pytest
+import yaml
+
+from gaplab import Client, ServiceError
+from gaplab.api.clients.journal import Journal
+from gaplab.services.store.session import Store
+from tests.experiments import toy
+from tests.integration.test_bench import compute, truth
+from tests.integration.test_client import InProcess
+
+SPEC = {"strategy": "random", "robot": "toy_function", "budget": "smoke", "repetitions": 1, "iterations": 2}
+REALITY = {"kind": "physical", "probes": "each"}
+
+
+@pytest.fixture
+def network(store: Store) -> Iterator[InProcess]:
+    network = InProcess(store)
+    yield network
+    network.close()
+
+
+@pytest.fixture
+def client(network: InProcess) -> Client:
+    return Client("http://test", transport=network, pauses_s=(0.0, 0.0, 0.0))
+
+
+@pytest.fixture
+def computing(store: Store) -> Iterator[None]:
+    """A supervisor that does what can be done."""
+    over = Event()
+
+    def work() -> None:
+        while not over.wait(0.02):
+            compute(store)
+
+    thread = Thread(target=work)
+    thread.start()
+    yield
+    over.set()
+    thread.join()
+
+
+def submitted(client: Client, **reality: Any) -> Any:
+    return client.submit(SPEC | {"reality": REALITY | reality})
+
+
+def fitness(task: Any) -> float:
+    return truth(toy(strategy="random", reality=REALITY))(task.genome)
+
+
+@pytest.mark.usefixtures("computing")
+def test_a_driver_is_a_loop_of_one_line(client: Client) -> None:
+    experiment = submitted(client)
+    asked = []
+    for request in client.requests(experiment.id):
+        asked.append((request.request.iteration, request.request.kind.value))
+        assert request.motion.observe_s == (0.0, 1.0) or request.motion.observe_s
+        request.tell(fitness(request))
+    assert asked == [(0, "probe"), (1, "sample"), (1, "probe"), (2, "sample"), (2, "probe")]
+    assert client.experiment(experiment.id).state == "COMPLETED"
+
+
+@pytest.mark.usefixtures("computing")
+def test_a_lost_answer_is_sent_again_and_counts_once(client: Client, network: InProcess, tmp_path: Path) -> None:
+    experiment = submitted(client)
+    for number, request in enumerate(client.requests(experiment.id, journal=tmp_path / "journal")):
+        network.lost = 2 if number == 1 else 0
+        request.tell(fitness(request))
+    samples = client.samples(experiment.id)
+    assert len(samples) == 5
+    with Journal(tmp_path / "journal") as journal:
+        assert journal.unsent() == []
+
+
+@pytest.mark.usefixtures("computing")
+def test_a_driver_that_died_after_a_repeat_goes_on_with_the_next(client: Client, tmp_path: Path) -> None:
+    experiment = submitted(client, repeats=3)
+    journal = tmp_path / "journal"
+    for request in client.requests(experiment.id, journal=journal):
+        request.note(0.25)
+        request.note(0.5)
+        break  # the power is cut: nothing is told
+    with journal.open("ab") as file:
+        file.write(b'{"request": "half')
+    ran = 0
+    for request in client.requests(experiment.id, journal=journal):
+        values = [value for value, _ in request.known]
+        while len(values) < request.repeats:
+            ran += 1
+            values.append(0.75)
+            request.note(values[-1])
+        request.tell(values)
+    assert ran == 5 * 3 - 2
+    assert client.samples(experiment.id).fitness.iloc[0] == 0.5
+
+
+@pytest.mark.usefixtures("computing")
+def test_an_answer_in_the_journal_is_sent_when_the_driver_starts_again(client: Client, tmp_path: Path) -> None:
+    submitted(client)
+    (request,) = client.bench.pending(wait_s=60)
+    with Journal(tmp_path / "journal") as journal:
+        journal.answer(request.id, {"values": [0.5]})
+    for following in client.requests(journal=tmp_path / "journal"):
+        assert following.id != request.id
+        break
+    assert client.bench.request(request.id).state == "measured"
+
+
+@pytest.mark.parametrize(
+    ("body", "pointer"),
+    [
+        ({"values": [0.5], "unit": "km/h"}, "/unit"),
+        ({"values": [0.5, 0.5]}, "/values"),
+        ({"values": ["0.5"]}, "/values/0"),
+        ({"values": []}, "/values"),
+        ({}, ""),
+        ({"values": [0.5], "failed": "both"}, ""),
+        ({"values": [0.5], "attachments": ["0" * 64]}, "/attachments/0"),
+        ({"values": [0.5], "readings": [[[0.1]]]}, "/readings/0"),
+        ({"values": [0.5], "surprise": 1}, "/surprise"),
+    ],
+)
+def test_nonsense_is_refused_with_its_place(client: Client, store: Store, body: Any, pointer: str) -> None:
+    submitted(client)
+    compute(store)
+    (request,) = client.bench.pending()
+    with pytest.raises(ServiceError) as refused:
+        client._connection.post(object, f"/requests/{request.id}/measurements", body)
+    assert refused.value.problem.status == 422
+    assert pointer in {each.pointer for each in refused.value.problem.errors or ()}
+    assert client.bench.request(request.id).answers == ()
+
+
+def test_infinite_values_are_refused(client: Client, store: Store) -> None:
+    submitted(client)
+    compute(store)
+    (request,) = client.bench.pending()
+    for value in ("NaN", "Infinity", "1e999"):
+        with pytest.raises(ServiceError) as refused:
+            client._connection.change(
+                object,
+                "POST",
+                f"/requests/{request.id}/measurements",
+                content=[f'{{"values": [{value}]}}'.encode()],
+                headers={"Content-Type": "application/json"},
+            )
+        assert refused.value.problem.status == 422
+
+
+def test_a_motion_leaves_in_three_formats(client: Client, store: Store) -> None:
+    experiment = client.submit(
+        SPEC | {"robot": "quadruped", "engine": "mujoco", "reality": {"kind": "physical", "probes": "each"}}
+    )
+    import numpy as np
+
+    from gaplab.schemas.records import MeasurementKind
+    from gaplab.services.core.robots.quadruped import Quadruped
+    from gaplab.services.core.types import Simulator, Transferred, Tuned
+    from gaplab.services.running import execution
+    from gaplab.services.store.lease import Requested
+
+    known = Quadruped().known
+    (claim,) = execution.claim(store, "here", 1)
+    for step in (Tuned(0, (Simulator(np.array([1.0, 0.8, 0.0])),)), Transferred(0, known, 0.4)):
+        execution.record(store, claim, step)
+    execution.record_all(store, [(claim, [Requested(2, 0, MeasurementKind.PROBE, known)])])
+    (request,) = client.bench.pending(experiment.id)
+    lines = client.bench.motion(request.id).splitlines()
+    plain = json.loads(client.bench.motion(request.id, "json"))
+    points = yaml.safe_load(client.bench.motion(request.id, "ros2"))
+    assert lines[0].split(",")[1:] == plain["actuators"] == points["joint_names"]
+    assert [float(number) for number in lines[1].split(",")[1:]] == plain["targets_rad"][0]
+    times = [each["time_from_start"]["sec"] + each["time_from_start"]["nanosec"] / 1e9 for each in points["points"]]
+    assert times == sorted(set(times))
+    assert times[-1] == plain["observe_s"][-1] == float(lines[-1].split(",")[0])
+
+
+def test_attachments_are_stored_once_and_never_shown_by_a_browser(client: Client, tmp_path: Path) -> None:
+    page = tmp_path / "evil.html"
+    page.write_text("<script>alert(1)</script>")
+    first, again = client.bench.attach(page, "text/html"), client.bench.attach(page, "text/html")
+    assert first == again
+    with client._connection.stream("GET", f"/attachments/{first.id}") as answer:
+        assert answer.read() == page.read_bytes()
+        assert answer.headers["content-type"] == "application/octet-stream"
+        assert "attachment" in answer.headers["content-disposition"]
+
+
+def test_a_table_of_samples_is_checked_and_used(client: Client, tmp_path: Path) -> None:
+    file = tmp_path / "runs.csv"
+    file.write_text("gene_0,value\n0.25,0.41\n1.5,x\n")
+    wrong = client.bench.check_samples(file, "toy_function")
+    assert [(each.line, each.column) for each in wrong.errors] == [(3, "value")]
+    file.write_text("gene_0,value\n0.25,0.41\n")
+    found = client.bench.check_samples(file, "toy_function", options={})
+    known = [sample.model_dump(mode="json") for sample in found.samples]
+    experiment = submitted(client, samples=known)
+    assert client.experiment(experiment.id).spec["reality"]["samples"][0]["values"] == [0.41]
+    with pytest.raises(ServiceError, match="unknown robot"):
+        client.bench.check_samples(file, "toy_functoin")
+    with pytest.raises(ServiceError, match="options"):
+        client.bench.check_samples(file, "toy_function", options={"legs": 4})
+
+
+@pytest.mark.usefixtures("computing")
+def test_errors_of_simulators_count_known_samples(client: Client) -> None:
+    known = [{"genome": [gene], "values": [0.4]} for gene in (0.2, 0.7)]
+    experiment = submitted(client, samples=known)
+    for request in client.requests(experiment.id):
+        request.tell(0.4)
+    for simulator in client.simulators(experiment.id).itertuples():
+        assert simulator.error == pytest.approx((simulator.squared_error / (2 + simulator.iteration)) ** 0.5)
+    assert [point.error.n for point in client.misfit(experiment.id).points] == [1, 1, 1]
+
+
+def test_an_answer_may_be_computed_from_traces(client: Client, store: Store, tmp_path: Path) -> None:
+    physical = {"kind": "physical", "probes": "each", "repeats": 2}
+    spec = SPEC | {"robot": "quadruped", "engine": "pybullet", "strategy": "random", "reality": physical}
+    experiment = client.submit(spec)
+    compute(store)
+    (request,) = client.bench.pending(experiment.id)
+    hashes = [client.bench.attach(file).id for file in traces_of(request.genome, tmp_path)]
+
+    read = client.bench.traces(request.id, hashes)
+    assert [round(trace.lag_s, 1) for trace in read.traces] == [2.0, 7.5]
+    assert all((trace.match or 0.0) > 0.3 for trace in read.traces)
+    assert read.unit == "m/s"
+    assert read.readings is not None
+    assert client.bench.pending(experiment.id)[0].answers == ()
+    again = client.bench.traces(request.id, hashes, lags_s=[2.0, 7.5])
+    assert again.values == pytest.approx(read.values, abs=0.02)
+    assert again.values[0] == pytest.approx(again.values[1], abs=1e-6)
+
+    answer = client.bench.answer(request.id, traces=hashes, operator="Ada", unit="m/s")
+    assert (answer.state, answer.values, answer.readings) == ("counted", read.values, read.readings)
+    assert answer.attachments == tuple(hashes)
+    assert [trace.lag_s for trace in answer.traces] == [trace.lag_s for trace in read.traces]
+    assert client.bench.answer(request.id, traces=hashes, operator="Ada", unit="m/s").id == answer.id
+    assert client.bench.request(request.id).answers == (answer,)
+
+
+@pytest.mark.usefixtures("computing")
+def test_repeats_and_the_noise_are_shown(client: Client) -> None:
+    known = [{"genome": [0.3], "values": [0.3, 0.5]}]
+    experiment = submitted(client, repeats=2, samples=known)
+    for request in client.requests(experiment.id):
+        request.tell([0.4, 0.6])
+    samples = client.samples(experiment.id)
+    assert set(samples["repeats"]) == {2}
+    assert samples["standard_error"].tolist() == pytest.approx([0.1] * len(samples))
+    assert samples["fitness"].tolist() == [0.5] * len(samples)
+    assert client.misfit(experiment.id).noise == pytest.approx(0.02**0.5)
+
+
+def traces_of(genome: Any, folder: Path) -> Iterator[Path]:
+    """Two recordings of a controller in reality, with clocks of their own."""
+    import numpy as np
+
+    from gaplab.services.core.arrays import frozen
+    from gaplab.services.core.robots.quadruped import Quadruped
+    from gaplab.services.engines.pybullet.engine import PyBullet
+
+    robot, times = Quadruped(), frozen(np.arange(301) * 0.01)
+    poses = PyBullet().record(robot.world, robot.motion(np.array(genome)), times).poses
+    still = [poses[:1].repeat(100, axis=0), poses, poses[-1:].repeat(100, axis=0)]
+    for name, lag_s in (("a", 2.0), ("b", 7.5)):
+        clock = np.arange(501) * 0.01 - 1.0 + lag_s
+        rows = np.column_stack([clock, np.vstack(still)])
+        file = folder / f"{name}.csv"
+        header = "time_s,x,y,z,qx,qy,qz,qw"
+        np.savetxt(file, rows, delimiter=",", header=header, comments="")
+        yield file
+
+
+def test_traces_that_say_nothing_are_refused(client: Client, store: Store, tmp_path: Path) -> None:
+    experiment = submitted(client, repeats=1)
+    compute(store)
+    (request,) = client.bench.pending(experiment.id)
+    file = tmp_path / "trace.csv"
+    file.write_text("time_s,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n0.5,1,0,0,0,0,0,1\n")
+    short = client.bench.attach(file).id
+    for traces, lags, said in [
+        ([short], None, "the trace does not contain the motion: it lasts 0.5 s, and the motion 1 s"),
+        (["0" * 64], None, "no attachment with this hash"),
+        ([short, short], None, "an answer has one trace for each repeat: 1, not 2"),
+        ([short], [0.0, 1.0], "there is one lag for each trace: 1, not 2"),
+    ]:
+        with pytest.raises(ServiceError, match=said):
+            client.bench.traces(request.id, traces, lags)
+    for both in ({"values": [0.5], "traces": [short]}, {"failed": "no", "traces": [short]}):
+        with pytest.raises(ServiceError, match="either"):
+            client.bench.answer(request.id, **both)
+    file.write_text("time_s,x,y,z,qx,qy,qz,qw\n3,0,0,0,0,0,0,1\n5,1,0,0,0,0,0,1\n")
+    assert client.bench.traces(request.id, [client.bench.attach(file).id]).values == (0.5,)

@@ -1,0 +1,103 @@
+"""Recordings in MCAP as traces."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.writer import Writer
+from mcap_ros2.writer import Writer as RosWriter
+
+from gaplab import ExtraMissing
+from gaplab.api.clients.mcap_traces import mcap_to_csv
+from gaplab.services.core.trace_tables import read_trace
+
+POSE = """std_msgs/Header header
+geometry_msgs/Pose pose
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+================================================================================
+MSG: geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+================================================================================
+MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+"""
+
+
+def pose(x: float) -> dict[str, Any]:
+    return {"position": {"x": x, "y": 2.0, "z": 3.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+
+
+def ros(file: Path, *, stamped: bool = True) -> Path:
+    with file.open("wb") as stream, RosWriter(stream) as writer:
+        schema = writer.register_msgdef("geometry_msgs/msg/PoseStamped", POSE)
+        for second in range(3):
+            stamp = {"sec": 1_700_000_000 + second, "nanosec": 500_000_000} if stamped else {"sec": 0, "nanosec": 0}
+            message = {"header": {"stamp": stamp, "frame_id": "map"}, "pose": pose(float(second))}
+            writer.write_message("/base", schema, message, log_time=second * 10**9, publish_time=0)
+    return file
+
+
+def foxglove(file: Path, *topics: str, schema: str = "foxglove.PoseInFrame") -> Path:
+    with file.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        kind = writer.register_schema(schema, "jsonschema", b"{}")
+        for topic in topics:
+            channel = writer.register_channel(topic, "json", kind)
+            for second in range(2):
+                body = {"timestamp": {"sec": second, "nsec": 250_000_000}, "frame_id": "map", "pose": pose(0.5)}
+                writer.add_message(channel, log_time=1, data=json.dumps(body).encode(), publish_time=0)
+        writer.finish()
+    return file
+
+
+def test_poses_of_ros_2_are_a_trace(tmp_path: Path) -> None:
+    trace = read_trace(mcap_to_csv(ros(tmp_path / "run.mcap")), "/traces/0")
+
+    assert trace.times_s.tolist() == [1_700_000_000.5, 1_700_000_001.5, 1_700_000_002.5]
+    assert trace.positions_m.tolist() == [[0, 2, 3], [1, 2, 3], [2, 2, 3]]
+    assert trace.orientations.tolist() == [[0, 0, 0, 1]] * 3
+    without = read_trace(mcap_to_csv(ros(tmp_path / "bare.mcap", stamped=False)), "/traces/0")
+    assert without.times_s.tolist() == [0, 1, 2]
+
+
+def test_poses_of_foxglove_are_a_trace_of_the_named_topic(tmp_path: Path) -> None:
+    file = foxglove(tmp_path / "run.mcap", "/base", "/camera")
+
+    assert read_trace(mcap_to_csv(file, "/base"), "/traces/0").times_s.tolist() == [0.25, 1.25]
+    with pytest.raises(ValueError, match="has several topics of poses; permitted: /base, /camera"):
+        mcap_to_csv(file)
+    with pytest.raises(ValueError, match="has no poses on '/bse'; permitted: /base, /camera"):
+        mcap_to_csv(file, "/bse")
+
+
+def test_what_has_no_poses_is_told(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="has no topics of poses"):
+        mcap_to_csv(foxglove(tmp_path / "log.mcap", "/log", schema="foxglove.Log"))
+    (tmp_path / "no.mcap").write_bytes(b"time_s,x\n0,0\n" * 20)
+    with pytest.raises(ValueError, match=r"no\.mcap is no MCAP file that can be read"):
+        mcap_to_csv(tmp_path / "no.mcap")
+
+
+def test_without_the_extra_its_command_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mcap.reader", None)
+    with pytest.raises(ExtraMissing, match=r"pip install 'gaplab\[mcap\]'"):
+        mcap_to_csv(ros(tmp_path / "run.mcap"))

@@ -1,0 +1,111 @@
+"""Traces of a physical robot: their clock, their place on the ground, and what is wrong with them."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.trace_tables import COLUMNS, read_trace
+from gaplab.services.core.traces import TooShort, Trace, align, from_start
+from gaplab.services.engines.mujoco.engine import MuJoCo
+
+ROBOT = Quadruped()
+MOTION = ROBOT.motion(ROBOT.known)
+END_S = float(MOTION.observe_s[-1])
+
+
+@pytest.fixture(scope="module")
+def expected() -> Trace:
+    """The known gait in the simulator."""
+    times = frozen(np.arange(151) * 0.02)
+    poses = MuJoCo().record(ROBOT.world, MOTION, times).poses
+    return Trace(times, poses[:, :3], poses[:, 3:])
+
+
+def shifted(trace: Trace, lag_s: float, turn_rad: float = 0.0, noise: float = 0.0) -> Trace:
+    """The same motion on a clock on which it begins at `lag_s`, elsewhere, with rest before and after it."""
+    times = frozen(np.arange(-100, 251) * 0.02)
+    seen = trace.at(np.clip(times, 0.0, END_S))
+    turn = Rotation.from_rotvec([0.0, 0.0, turn_rad])
+    rng = np.random.default_rng(1)
+    positions = turn.apply(seen.positions_m) + [3.0, -2.0, 0.0] + noise * rng.standard_normal((len(times), 3))
+    return Trace(frozen(times + lag_s), positions, (turn * Rotation.from_quat(seen.orientations)).as_quat())
+
+
+@pytest.mark.parametrize(("lag_s", "noise"), [(0.0, 0.0), (12.34, 0.0), (1.7e9, 0.0), (-3.0, 0.0005)])
+def test_the_clock_of_a_trace_is_found(expected: Trace, lag_s: float, noise: float) -> None:
+    found = align(shifted(expected, lag_s, 1.0, noise), expected)
+
+    assert found.lag_s == pytest.approx(lag_s, abs=0.011, rel=0)
+    assert found.match is not None
+    assert 0.5 < found.match <= 1.0
+
+
+@pytest.mark.parametrize("turn_rad", [0.0, 2.5, -1.0])
+def test_fitness_and_readings_depend_on_no_place_and_no_heading(expected: Trace, turn_rad: float) -> None:
+    trace = shifted(expected, 5.0, turn_rad)
+    lag_s = align(trace, expected).lag_s
+    moved = from_start(trace, lag_s, MOTION.observe_s)
+    world_s = ROBOT.sensors.times_s
+
+    real = float(ROBOT.fitness(MuJoCo().rollout(ROBOT.world, MOTION)))
+    assert float(ROBOT.fitness(moved)) == pytest.approx(real, abs=0.01)
+    told = ROBOT.sense(from_start(trace, lag_s, world_s))
+    assert told == pytest.approx(ROBOT.sense(expected.at(world_s)), abs=0.03)
+
+
+def test_a_given_lag_is_kept_and_a_motion_without_change_begins_with_its_trace(expected: Trace) -> None:
+    assert align(shifted(expected, 5.0), expected, 5.1).lag_s == 5.1
+    still = Trace(frozen([2.0, 4.0]), np.zeros((2, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
+    found = align(still, Trace(frozen([0.0, 1.0]), still.positions_m, still.orientations))
+    assert (found.lag_s, found.match) == (2.0, None)
+    unknown = Trace(expected.times_s, expected.positions_m * np.nan, expected.orientations)
+    assert align(shifted(expected, 5.0), unknown).match is None
+
+
+def test_a_trace_that_lacks_a_part_of_the_motion_is_refused(expected: Trace) -> None:
+    short = Trace(expected.times_s[:100], expected.positions_m[:100], expected.orientations[:100])
+    with pytest.raises(TooShort, match=r"it lasts 1.98 s, and the motion 3 s"):
+        align(short, expected)
+    with pytest.raises(TooShort, match="would begin at 9 s"):
+        align(shifted(expected, 0.0), expected, 9.0)
+
+
+def table(**changes: Any) -> str:
+    rows = [dict(zip(COLUMNS, [place * 0.1, 0, 0, 0.2, 0, 0, 0, 1], strict=True)) for place in range(3)]
+    rows[1] |= changes
+    return "\n".join([",".join(COLUMNS), *(",".join(str(cell) for cell in row.values()) for row in rows)])
+
+
+def test_a_trace_is_read_with_any_order_units_and_more_columns() -> None:
+    text = "qw;qx;qy;qz;note;time_s [s];x [m];y;z\n1;0;0;0;begins;0.5;1;2;3\n1;0;0;0;;0.75;2;2;3\n"
+    trace = read_trace(text, "/traces/0")
+
+    assert trace.times_s.tolist() == [0.5, 0.75]
+    assert trace.positions_m.tolist() == [[1, 2, 3], [2, 2, 3]]
+    assert trace.at(frozen([0.625])).positions_m.tolist() == [[1.5, 2, 3]]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "one column each of time_s, x, y, z, qx, qy, qz, qw"),
+        ("time_s,x,y,z\n0,0,0,0\n", "one column each of qx, qy, qz, qw"),
+        (table(x="left"), "line 3, x: 'left' is no finite number"),
+        (table(z="nan"), "line 3, z: 'nan' is no finite number"),
+        (table(qw=""), "line 3, qw: '' is no finite number"),
+        (table(time_s=0.0), "pose 2: time_s must ascend, and 0 follows 0"),
+        (table(time_s=9e9), "pose 3: time_s must ascend"),
+        (table(qw=2), "pose 2: qx, qy, qz, qw have size 2; permitted: 1"),
+        (",".join(COLUMNS), "the trace has 0 poses; at least 2 are needed"),
+        (table().replace("0.2,0.0,0", "5000,0,0").replace("\n0.2", "\n5000"), "at most 3600 s are permitted"),
+    ],
+)
+def test_what_is_no_trace_is_refused_with_its_line(text: str, message: str) -> None:
+    with pytest.raises(InvalidSpec, match=message) as refused:
+        read_trace(text, "/traces/0")
+    assert {each.pointer for each in refused.value.violations} == {"/traces/0"}
