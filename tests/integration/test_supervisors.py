@@ -2,16 +2,19 @@
 
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from functools import cache
 from pathlib import Path
 from threading import Event
 from typing import Any
 
+import psutil
 import pytest
 
 from gaplab.schemas.lifecycle import Ending, State, Verb
@@ -151,6 +154,17 @@ def test_two_supervisors_on_one_database_do_nothing_twice(store: Store) -> None:
     assert sum(each.ending is Ending.COMPLETED for each in tried) == 4
 
 
+def stop_outside_transactions(store: Store, pid: int) -> None:
+    """Stop a process while it holds no lock of SQLite: one that slept while it read would let nobody write."""
+    if not store.file:
+        os.kill(pid, signal.SIGSTOP)
+        return
+    with closing(sqlite3.connect(store.file, timeout=DEADLINE_S, isolation_level=None)) as connection:
+        connection.execute("BEGIN EXCLUSIVE")
+        os.kill(pid, signal.SIGSTOP)
+        wait(lambda: psutil.Process(pid).status() == psutil.STATUS_STOPPED)
+
+
 @pytest.fixture
 def other(store_url: str, tmp_path: Path) -> Iterator[Any]:
     """A supervisor in a process of its own, with a Ray of its own, and what it says."""
@@ -179,7 +193,7 @@ def test_a_supervisor_that_slept_past_its_lease_writes_nothing_any_more(
     experiment = submission.submit_experiment(store, spec(2)).id
     wait(lambda: len(stored(store, experiment)[0]) > 1)
 
-    store.write(lambda _: os.kill(process.pid, signal.SIGSTOP))  # SQLite's lock is ours then, and it sleeps without
+    stop_outside_transactions(store, process.pid)
     ours = Supervisor(store, lambda: 2)
     wait(lambda: state(store, experiment).ended, ours.step)
     ended = stored(store, experiment)
