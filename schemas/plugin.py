@@ -73,6 +73,7 @@ class BudgetRead(Frozen):
     as_published: bool = Field(
         default=False, description="whether options that a spec leaves out are those of the plain, published formulas"
     )
+    lean: bool = Field(default=False, description="whether plug-ins and options that a spec leaves out save rollouts")
 
 
 class Catalogue(Frozen):

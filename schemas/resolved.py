@@ -3,6 +3,9 @@
 The stored JSON is that of a submitted spec. A later change of a default therefore changes no stored experiment.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 from pydantic import model_validator
 
 from gaplab.schemas.base import Count, Label, Real, Seed
@@ -53,8 +56,17 @@ class ResolvedSpec(ExperimentSpec):
     robot: PluginRef
     strategy: PluginRef
     optimizer: PluginRef
+    controller_optimizer: PluginRef
     engine: PluginRef
     tunables: tuple[ResolvedTunable, ...]
     reality: ResolvedReality
     budget: ResolvedBudget
     seed: Seed
+
+    @model_validator(mode="before")
+    @classmethod
+    def _search_for_controllers_as_before(cls, value: Any) -> Any:  # noqa: ANN401 - JSON
+        """Give a spec from before there was an optimizer of controllers the one that it has."""
+        if isinstance(value, Mapping) and "optimizer" in value:
+            return {"controller_optimizer": value["optimizer"], **value}
+        return value

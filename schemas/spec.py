@@ -13,7 +13,7 @@ from gaplab.schemas.measurements import KnownSample
 from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.safety import Beyond, LimitsSpec
 
-BudgetName = Literal["smoke", "desk", "paper", "as_published"]
+BudgetName = Literal["smoke", "desk", "paper", "lean", "as_published"]
 
 
 class BudgetSpec(Frozen):
@@ -26,7 +26,8 @@ class BudgetSpec(Frozen):
     preset: BudgetName = Field(
         default="paper",
         description="`as_published` is `paper` with the formulas as the paper prints them: options that a strategy "
-        "leaves out are those of its plain formula",
+        "leaves out are those of its plain formula. `lean` is `paper` at a tenth of its rollouts: it also sets the "
+        "optimizer of controllers, and options of the strategy and the tuner, where a spec leaves them out",
     )
     controller_evaluations: Count | None = Field(
         default=None, description="evaluations of the search for the transferred controller"
@@ -113,6 +114,11 @@ class SharedSettings(Frozen):
         "and later, for which PyBullet has no wheels)",
     )
     optimizer: PluginRef = PluginRef(name="steady_state")
+    controller_optimizer: PluginRef | None = Field(
+        default=None,
+        description="optimizer that searches for controllers; default: `optimizer`, which searches for simulators; "
+        "with the budget `lean`: `cma_es`",
+    )
     tunables: tuple[TunableRef, ...] = Field(
         default=(
             TunableRef(name="static_friction"),

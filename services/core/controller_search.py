@@ -29,9 +29,19 @@ class Allowance:
     simulators: int
 
     @classmethod
-    def of_selection(cls, strategy: Strategy, evaluations: int, tunables: int) -> "Allowance":
-        """Return the allowance of a selection from its budget of evaluations."""
-        simulators = strategy.selection_simulators(tunables)
+    def of_selection(
+        cls, strategy: Strategy, evaluations: int, tunables: int, *, learned: bool = False
+    ) -> "Allowance":
+        """Return the allowance of a selection from its budget of evaluations.
+
+        Args:
+            strategy: selects.
+            evaluations: its budget.
+            tunables: number of tunables.
+            learned: whether there is a sample whose measurement succeeded.
+        """
+        needed = strategy.later_selection_simulators if learned else strategy.selection_simulators
+        simulators = needed(tunables)
         return cls(strategy.search_evaluations(evaluations, simulators) if strategy.searches else 0, simulators)
 
     @classmethod

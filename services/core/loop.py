@@ -54,7 +54,7 @@ class Setting:
         simulate: fitness in simulation.
         reality: fitness in reality, evaluated once for each sample and each probe.
         strategy: selects the samples.
-        optimizer: searches for controllers and simulators.
+        optimizer: searches for simulators, and for controllers if `controller_optimizer` is None.
         genomes: the space of controllers.
         parameters: the space of simulators.
         known: `(g,)`, the hand-designed genome.
@@ -72,6 +72,7 @@ class Setting:
         probes: iterations whose transferred controller is measured in reality.
         known_samples: samples from before the experiment, on which the first simulators are tuned.
         forecast: safety forecast of a controller for a physical robot; None if there is none.
+        controller_optimizer: searches for controllers.
     """
 
     simulate: Simulate
@@ -95,6 +96,7 @@ class Setting:
     probes: Literal["each", "last", "never"] = "each"
     known_samples: tuple[Sample, ...] = ()
     forecast: Forecast | None = None
+    controller_optimizer: Optimizer | None = None
 
     def stream(self, iteration: int, phase: str) -> Generator:
         """Return the random stream of one phase of one iteration."""
@@ -176,16 +178,15 @@ def _belief(setting: Setting, history: History) -> Belief:
     )
 
 
-def _search(
-    setting: Setting, belief: Belief, answers: Answers, allowance: Allowance, rng: Generator
-) -> ControllerSearch:
-    return ControllerSearch(setting.strategy.name, setting.optimizer, belief, answers, allowance, rng)
+def _search(setting: Setting, belief: Belief, answers: Answers, given: Allowance, rng: Generator) -> ControllerSearch:
+    optimizer = setting.controller_optimizer or setting.optimizer
+    return ControllerSearch(setting.strategy.name, optimizer, belief, answers, given, rng)
 
 
 def _select(setting: Setting, history: History, iteration: int, answers: Answers) -> Selected:
     """Return the controller that the strategy selects, from a search if it has one."""
-    budget, strategy = setting.budget, setting.strategy
-    allowance = Allowance.of_selection(strategy, budget.selection_evaluations, setting.parameters.size)
+    budget, strategy, learned = setting.budget, setting.strategy, bool(learnable(history.samples))
+    allowance = Allowance.of_selection(strategy, budget.selection_evaluations, setting.parameters.size, learned=learned)
     if budget.reuse_transfer and strategy.selects_transferred and history.transferred is not None:
         return Selected(iteration, history.transferred.genome, Cost(saved=allowance.rollouts))
     belief = _belief(setting, history)
@@ -244,7 +245,6 @@ def _probe(setting: Setting, history: History, iteration: int, genome: Genome) -
     """Return the probe of the transferred controller; one that was kept is not measured again."""
     if setting.probes == "never" or (setting.probes == "last" and iteration < setting.iterations):
         return probe_of(history, iteration, nan, left_out=True)
-    last = history.probed
-    if last is not None and not last.left_out and _keeps(setting, history):
+    if (last := history.probed) is not None and not last.left_out and _keeps(setting, history):
         return probe_of(history, iteration, last.fitness, last.readings, last.repeats)
     return probe_of(history, iteration, *setting.reality(genome))

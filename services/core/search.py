@@ -46,7 +46,14 @@ class Rejecting(Protocol):
         ...
 
 
-def maximise(optimizer: Optimizer, space: Space, evaluate: Evaluate, evaluations: int, rng: Generator) -> Population:
+def maximise(
+    optimizer: Optimizer,
+    space: Space,
+    evaluate: Evaluate,
+    evaluations: int,
+    rng: Generator,
+    start: Genomes | None = None,
+) -> Population:
     """Return the ranked population after exactly `evaluations` fitness evaluations; nan and infinities never win.
 
     A copy of a genome that the search has evaluated counts, but is not evaluated again unless it was rejected. Copies
@@ -58,12 +65,14 @@ def maximise(optimizer: Optimizer, space: Space, evaluate: Evaluate, evaluations
         evaluate: returns fitnesses; each call has the optimizer's genomes, or as many as the budget has left.
         evaluations: the budget, at least 1.
         rng: all randomness of the search.
+        start: `(n, g)`, n ≥ 1: genomes that are evaluated before those that the optimizer asks for; default: none.
     """
     thresholds_of = optimizer.rejection_thresholds if isinstance(optimizer, Rejecting) else _unknown
     state = optimizer.init(space)
     known: dict[bytes, float] = {}
     while evaluations > 0:
-        genomes = optimizer.ask(state, rng)[:evaluations]
+        genomes = (optimizer.ask(state, rng) if start is None else start)[:evaluations]
+        start = None
         if not len(genomes):
             raise PluginBroken(f"optimizer {optimizer.name!r} asks for no genome although {evaluations} are left")
         keys = [genome.tobytes() for genome in genomes]

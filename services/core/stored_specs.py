@@ -1,4 +1,4 @@
-"""Stored specs, which may be older than some options of their strategies."""
+"""Stored specs, which may be older than some options of their plug-ins."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,7 +9,9 @@ from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.discrepancies.squared_fitness import SquaredFitness
 from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.core.registry import Registry
 from gaplab.services.core.strategies import strategies
+from gaplab.services.core.tuners import tuners
 
 
 def spec_of(stored: Mapping[str, Any]) -> ResolvedSpec:
@@ -34,17 +36,22 @@ def spec_as_stored(stored: Mapping[str, Any]) -> ResolvedSpec:
 
 
 def _with_options_of_before(spec: ResolvedSpec) -> ResolvedSpec:
-    """Return the spec with the options that its strategy got since it was stored, so that its numbers stay the same.
+    """Return the spec with the options that strategy and tuner got since it was stored: its numbers stay the same.
 
-    The spec stays as it is if the strategy is not installed, or refuses its options.
+    A plug-in that is not installed, or refuses its options, stays as it is.
     """
-    name, options = spec.strategy.name, spec.strategy.options
-    before = strategies[name].before if name in strategies else {}
+    return spec.model_copy(
+        update={"strategy": _as_before(strategies, spec.strategy), "tuner": _as_before(tuners, spec.tuner)}
+    )
+
+
+def _as_before(registry: Registry[Any], ref: PluginRef) -> PluginRef:
+    before = registry[ref.name].before if ref.name in registry else {}
     try:
-        _, complete = strategies.check(PluginRef(name=name, options={**before, **options}))
+        _, complete = registry.check(PluginRef(name=ref.name, options={**before, **ref.options}))
     except InvalidSpec:
-        return spec
-    return spec.model_copy(update={"strategy": PluginRef(name=name, options=complete.model_dump(mode="json"))})
+        return ref
+    return PluginRef(name=ref.name, options=complete.model_dump(mode="json"))
 
 
 def discrepancy_of(spec: Mapping[str, Any]) -> Discrepancy:

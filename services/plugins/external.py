@@ -69,6 +69,8 @@ def _named_in(spec: Mapping[str, Any]) -> Iterator[str]:
         for kind in ("strategy", "robot", "optimizer", "engine", "discrepancy", "tuner")
         if spec.get(kind)
     )
+    if spec.get("controller_optimizer"):
+        yield f"optimizer {spec['controller_optimizer']['name']}"
     reality = spec.get("reality") or {}
     if reality.get("engine"):
         yield f"engine {reality['engine']['name']}"

@@ -92,6 +92,7 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
         reality=reality,
         strategy=strategy,
         optimizer=optimizers.create(spec.optimizer),
+        controller_optimizer=optimizers.create(spec.controller_optimizer),
         genomes=robot.space,
         parameters=parameters_of(spec.tunables),
         known=robot.known,

@@ -1,12 +1,17 @@
-"""The named budgets, each a share of the paper's computation.
+"""The named budgets, each a share of the paper's computation, and what they set beside numbers.
 
 With each of them, all strategies select their samples from searches of equal size. `reuse_transfer: true` in a spec
 changes that: docs/decisions/a-fair-comparison.md.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
-from gaplab.schemas.spec import BudgetName
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.spec import BudgetName, ExperimentSpec
+from gaplab.services.core.registry import Registry
+from gaplab.services.core.strategies import strategies
+from gaplab.services.core.tuners import tuners
 
 
 @dataclass(frozen=True)
@@ -15,6 +20,7 @@ class Preset:
 
     Attributes:
         as_published: true if options that a spec leaves out are those of the plain, published formulas.
+        lean: true if options and the optimizer of controllers that a spec leaves out save rollouts.
     """
 
     iterations: int
@@ -23,6 +29,7 @@ class Preset:
     selection_evaluations: int
     simulator_evaluations: int
     as_published: bool = False
+    lean: bool = False
 
 
 # Source: paper, sections 2 and 3; that a selection takes as many evaluations as the final search is its reading
@@ -34,5 +41,31 @@ PRESETS: dict[BudgetName, Preset] = {
     # to see an effect: about an hour on two cores for a study on PyBullet
     "desk": Preset(5, 8, 500, 150, 200),
     "paper": PAPER,
+    # the whole Fig. 4 at a tenth of the rollouts: docs/lean.md
+    "lean": Preset(10, 40, 1_350, 1_350, 300, lean=True),
     "as_published": replace(PAPER, as_published=True),
 }
+
+LEAN_OPTIMIZER = PluginRef(name="cma_es")
+"""Optimizer of controllers of a lean budget."""
+
+
+def with_preset(spec: ExperimentSpec) -> ExperimentSpec:
+    """Return the spec with the plug-ins and options that its preset sets, where the spec does not give them."""
+    preset = PRESETS[spec.budget.preset]
+    if preset.as_published:
+        return spec.model_copy(update={"strategy": _with(spec.strategy, strategies, "published")})
+    if not preset.lean:
+        return spec
+    changes = {
+        "strategy": _with(spec.strategy, strategies, "lean"),
+        "tuner": _with(spec.tuner, tuners, "lean"),
+        "controller_optimizer": spec.controller_optimizer or LEAN_OPTIMIZER,
+    }
+    return spec.model_copy(update=changes)
+
+
+def _with(ref: PluginRef, registry: Registry[Any], attribute: str) -> PluginRef:
+    """Return a plug-in with the options in an attribute of its class, under those that are given."""
+    options = getattr(registry[ref.name], attribute) if ref.name in registry else {}
+    return PluginRef(name=ref.name, options={**options, **ref.options})

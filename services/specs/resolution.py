@@ -25,7 +25,7 @@ from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.bench_violations import bench_violations
 from gaplab.services.specs.default_engines import default_engine, runs
-from gaplab.services.specs.presets import PRESETS, Preset
+from gaplab.services.specs.presets import PRESETS, Preset, with_preset
 from gaplab.services.specs.violations import (
     bounds_of,
     budget_violations,
@@ -48,13 +48,14 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     Raises:
         InvalidSpec: with every violation, each with its pointer into the spec.
     """
-    preset = PRESETS[spec.budget.preset]
-    spec = _as_published(spec) if preset.as_published else spec
+    spec, preset = with_preset(spec), PRESETS[spec.budget.preset]
     robot, strategy, optimizer, discrepancy, tuner = _created(spec)
     simulated = spec.engine or PluginRef(name=default_engine(robot))
     physical = spec.reality.kind == "physical"
     real = simulated if physical else spec.reality.engine or simulated
-    engine, reality_engine = gather(
+    controllers = spec.controller_optimizer or spec.optimizer
+    searching, engine, reality_engine = gather(
+        lambda: optimizers.create(controllers, "/controller_optimizer" if spec.controller_optimizer else "/optimizer"),
         lambda: _engine(simulated, robot, "/engine"),
         lambda: _engine(real, robot, "/reality/engine" if spec.reality.engine and not physical else "/engine"),
     )
@@ -65,7 +66,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         *tuning_violations(robot, discrepancy, tuner),
         *reality_violations(spec, strategy, engine, reality_engine),
         *bench_violations(spec, robot),
-        *budget_violations(budget, strategy, optimizer, len(spec.tunables)),
+        *budget_violations(budget, strategy, len(spec.tunables), controllers=searching, simulators=optimizer),
     ]:
         raise InvalidSpec(violations)
     return ResolvedSpec(
@@ -75,6 +76,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         iterations=spec.iterations or preset.iterations,
         repetitions=spec.repetitions or preset.repetitions,
         **{registry.kind: _completed(registry, getattr(spec, registry.kind)) for registry in NEED_NO_OTHERS},
+        controller_optimizer=_completed(optimizers, controllers),
         engine=_completed(engines, simulated),
         tunables=tuple(_with_bounds(ref) for ref in spec.tunables),
         held_out=spec.held_out,
@@ -82,13 +84,6 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         budget=budget,
         seed=spec.seed,
     )
-
-
-def _as_published(spec: ExperimentSpec) -> ExperimentSpec:
-    """Return the spec with the plain formula of its strategy, where the spec does not give an option."""
-    published = strategies[spec.strategy.name].published if spec.strategy.name in strategies else {}
-    options = {**published, **spec.strategy.options}
-    return spec.model_copy(update={"strategy": PluginRef(name=spec.strategy.name, options=options)})
 
 
 def _created(spec: ExperimentSpec) -> tuple[Robot, Strategy, Optimizer, Discrepancy, Tuner]:

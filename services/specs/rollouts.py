@@ -14,7 +14,11 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
     """
     strategy, tunables = strategies.create(spec.strategy), len(spec.tunables)
     budget, iterations = spec.budget, spec.iterations if strategy.takes_samples else 0
-    selection = Allowance.of_selection(strategy, budget.selection_evaluations, tunables)
+    knows = bool(spec.reality.samples)
+    selections = sum(
+        Allowance.of_selection(strategy, budget.selection_evaluations, tunables, learned=number > 1 or knows).rollouts
+        for number in range(1, iterations + 1)
+    )
     transfer = Allowance.of_transfer(strategy, budget.controller_evaluations, tunables)
     tuning = sum(
         (iterations + 1 - number) * (1 if is_held_out(number, spec.held_out) else budget.simulator_evaluations)
@@ -22,4 +26,4 @@ def expected_rollouts(spec: ResolvedSpec) -> int:
     )
     tuning += len(spec.reality.samples) * (iterations + 1) * budget.simulator_evaluations
     tuned = tuning if strategy.tunes else 0
-    return transfer.rollouts * (iterations + 1) + selection.rollouts * iterations + tuned
+    return transfer.rollouts * (iterations + 1) + selections + tuned

@@ -140,21 +140,29 @@ def _physical_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[V
 
 
 def budget_violations(
-    budget: ResolvedBudget, strategy: Strategy, optimizer: Optimizer, tunables: int
+    budget: ResolvedBudget, strategy: Strategy, tunables: int, *, controllers: Optimizer, simulators: Optimizer
 ) -> Iterator[Violation]:
-    """Yield searches whose budget is smaller than the population that they start with."""
-    least = optimizer.least_evaluations
-    tuning = optimizer.diverse(strategy.ensemble).least_evaluations if strategy.ensemble > 1 else least
+    """Yield searches whose budget is smaller than the population that they start with.
+
+    Args:
+        budget: with every number.
+        strategy: selects and transfers.
+        tunables: number of tunables.
+        controllers: optimizer of controllers.
+        simulators: optimizer of simulators.
+    """
+    least = controllers.least_evaluations
+    tuner = simulators.diverse(strategy.ensemble) if strategy.ensemble > 1 else simulators
     needed = {"controller_evaluations": (budget.controller_evaluations, least, strategy.transfer_simulators(tunables))}
     if strategy.searches and strategy.takes_samples:
         selection = strategy.selection_simulators(tunables)
         needed["selection_evaluations"] = (budget.selection_evaluations, least, selection)
     if strategy.tunes and strategy.takes_samples:
-        needed["simulator_evaluations"] = (budget.simulator_evaluations, tuning, 1)
-    for name, (given, population, simulators) in needed.items():
-        shared = strategy.equal_rollouts and simulators > 1
-        minimum = population * simulators if shared else population
+        needed["simulator_evaluations"] = (budget.simulator_evaluations, tuner.least_evaluations, 1)
+    for name, (given, population, count) in needed.items():
+        shared = strategy.equal_rollouts and count > 1
+        minimum = population * count if shared else population
         if given < minimum:
             message = f"{given} evaluations do not fill the population of {population} that the search starts with"
-            message += f"; equal_rollouts divides them by {simulators} simulators" if shared else ""
+            message += f"; equal_rollouts divides them by {count} simulators" if shared else ""
             yield Violation(f"/budget/{name}", given, message, f"at least {minimum}")

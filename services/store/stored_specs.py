@@ -29,7 +29,8 @@ LATER_IN_REALITY: Mapping[str, Any] = {
 
 def complete(spec: Mapping[str, Any]) -> dict[str, Any]:
     """Return the spec with every field, also if it was stored before a field was added."""
-    return {**LATER, **spec, "reality": {**LATER_IN_REALITY, **spec["reality"]}}
+    later = {**LATER, "controller_optimizer": spec["optimizer"]}
+    return {**later, **spec, "reality": {**LATER_IN_REALITY, **spec["reality"]}}
 
 
 def without_truth(spec: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,8 +2,10 @@
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Protocol, TypeAlias
 
+import numpy as np
 from numpy.random import Generator
 from pydantic import Field
 
@@ -12,7 +14,7 @@ from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Parameters
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.registry import Plugin
 from gaplab.services.core.repeats import variance_of_mean
-from gaplab.services.core.scoring import NO_FLOOR
+from gaplab.services.core.scoring import NO_FLOOR, weights_of
 from gaplab.services.core.space import Space
 from gaplab.services.core.types import Belief, Sample
 
@@ -57,7 +59,6 @@ class Strategy(Plugin):
         takes_samples: false if it transfers a controller at once: a level across the figure of curves.
         tunes: false if its first simulators stay as they are, at no cost.
         in_reality: true for the direct baseline, which evolves in reality and takes no samples.
-        published: options of the formula as its source prints it, which the preset `as_published` sets.
     """
 
     searches: ClassVar[bool] = True
@@ -65,7 +66,6 @@ class Strategy(Plugin):
     takes_samples: ClassVar[bool] = True
     tunes: ClassVar[bool] = True
     in_reality: ClassVar[bool] = False
-    published: ClassVar[Mapping[str, Any]] = {}
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -94,6 +94,10 @@ class Strategy(Plugin):
     def selection_simulators(self, tunables: int) -> int:  # noqa: ARG002 - for those that need it
         """Return the most simulators that an evaluation of a selection needs, given the number of tunables."""
         return self.ensemble
+
+    def later_selection_simulators(self, tunables: int) -> int:
+        """Return the same for selections after the first sample, when simulators differ in weight; by default as many."""
+        return self.selection_simulators(tunables)
 
     def transfer_simulators(self, tunables: int) -> int:  # noqa: ARG002 - for those that need it
         """Return the most simulators that an evaluation of a transfer needs, given the number of tunables."""
@@ -187,6 +191,24 @@ class DiverseOptions(Frozen):
         description="the same in the unit of the error: of fitness, or the noise of readings; 0: no floor, as in the "
         "paper; null: `least_share` counts",
     )
+    weightiest: EnsembleSize | None = Field(
+        default=None,
+        description="selections evaluate controllers in so many simulators of most weight alone; before any sample, "
+        "when all weigh the same, in all; null: always in all, as in the paper",
+    )
+
+    @property
+    def counted(self) -> int:
+        """Return the number of simulators in which a selection searches once they differ in weight."""
+        return min(self.simulators, self.weightiest or self.simulators)
+
+    def weighed(self, belief: Belief) -> Belief:
+        """Return the belief with the simulators in which a selection searches; of equal weights, the first ones."""
+        if self.weightiest is None or not belief.learnable:
+            return belief
+        weights = weights_of(belief.simulators, self.floor(belief))
+        chosen = sorted(np.argsort(-weights, kind="stable")[: self.weightiest].tolist())
+        return replace(belief, simulators=tuple(belief.simulators[index] for index in chosen))
 
     def floor(self, belief: Belief) -> float:
         """Return the floor under the discrepancies of simulators, above 0, and at least the noise of repeats."""
@@ -195,6 +217,23 @@ class DiverseOptions(Frozen):
             error = discrepancy.least_error(self.least_share * belief.scale)
         noise = 0.0 if discrepancy.senses else variance_of_mean(belief.learnable) ** 0.5
         return max(discrepancy.floor(max(error, noise)), NO_FLOOR)
+
+
+class Diverse(Strategy):
+    """A strategy that selects by a diverse ensemble of simulators, weighted by their accuracy."""
+
+    lean: ClassVar[Mapping[str, Any]] = {"weightiest": 10}
+    Options = DiverseOptions
+    options: DiverseOptions
+
+    @property
+    def ensemble(self) -> int:
+        """Return the size of the diverse ensemble."""
+        return self.options.simulators
+
+    def later_selection_simulators(self, tunables: int) -> int:  # noqa: ARG002 - the port's signature
+        """Return the number of simulators that count once they differ in weight."""
+        return self.options.counted
 
 
 class EnsembleOptions(Frozen):

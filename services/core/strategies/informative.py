@@ -7,11 +7,11 @@ from numpy.random import Generator
 
 from gaplab.services.core.arrays import Genome
 from gaplab.services.core.scoring import weighted_deviation, weights_of
-from gaplab.services.core.strategies.base import DiverseOptions, Search, Strategy
+from gaplab.services.core.strategies.base import Diverse, Search
 from gaplab.services.core.types import Belief
 
 
-class Informative(Strategy):
+class Informative(Diverse):
     """The controller on whose fitness a diverse ensemble of simulators disagrees most.
 
     Disagreement is the standard deviation, weighted by the accuracy of simulators.
@@ -20,15 +20,9 @@ class Informative(Strategy):
     name = "informative"
     source = "Paper, section 2, Informative; Estimation-Exploration"
     published: ClassVar[Mapping[str, Any]] = {"least_error": 0.0}
-    Options = DiverseOptions
-    options: DiverseOptions
-
-    @property
-    def ensemble(self) -> int:
-        """Return the size of the diverse ensemble."""
-        return self.options.simulators
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
         """Return the controller with the highest weighted deviation of simulated fitness found."""
+        belief = self.options.weighed(belief)
         weights = weights_of(belief.simulators, self.options.floor(belief))
-        return search(lambda _, fitnesses: weighted_deviation(fitnesses, weights))
+        return search(lambda _, fitnesses: weighted_deviation(fitnesses, weights), parameters=belief.parameters)

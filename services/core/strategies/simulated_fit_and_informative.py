@@ -8,7 +8,7 @@ from pydantic import Field
 
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes
 from gaplab.services.core.scoring import weighted_deviation, weighted_mean, weights_of
-from gaplab.services.core.strategies.base import DiverseOptions, Search, Strategy
+from gaplab.services.core.strategies.base import Diverse, DiverseOptions, Search
 from gaplab.services.core.types import Belief
 
 Weight = Annotated[float, Field(strict=True, ge=0, le=1e6)]
@@ -21,7 +21,7 @@ class SimulatedFitAndInformativeOptions(DiverseOptions):
     informative_weight: Weight = Field(default=1.0, description="weight of the standard deviation of simulated fitness")
 
 
-class SimulatedFitAndInformative(Strategy):
+class SimulatedFitAndInformative(Diverse):
     """The controller with high mean fitness in a diverse ensemble of simulators that disagree on it.
 
     The paper's most promising strategy: nearly perfect after one sample.
@@ -33,17 +33,13 @@ class SimulatedFitAndInformative(Strategy):
     Options = SimulatedFitAndInformativeOptions
     options: SimulatedFitAndInformativeOptions
 
-    @property
-    def ensemble(self) -> int:
-        """Return the size of the diverse ensemble."""
-        return self.options.simulators
-
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
         """Return the controller with the highest sum of weighted mean and weighted deviation found."""
+        belief = self.options.weighed(belief)
         weights = weights_of(belief.simulators, self.options.floor(belief))
 
         def score(_: Genomes, fitnesses: Fitnesses) -> FloatArray:
             fit = self.options.fit_weight * weighted_mean(fitnesses, weights)
             return fit + self.options.informative_weight * weighted_deviation(fitnesses, weights)
 
-        return search(score)
+        return search(score, parameters=belief.parameters)

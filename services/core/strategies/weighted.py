@@ -11,7 +11,7 @@ from pydantic import Field
 from gaplab.services.core.arrays import FloatArray, Genome, Genomes, Outcomes, Parameters
 from gaplab.services.core.information import beside, fisher_information, log_determinant, moved, trace
 from gaplab.services.core.scoring import scaled_uniqueness_penalty, weighted_deviation, weighted_mean, weights_of
-from gaplab.services.core.strategies.base import DiverseOptions, Search, Strategy
+from gaplab.services.core.strategies.base import Diverse, DiverseOptions, Search
 from gaplab.services.core.types import Belief
 
 Weight = Annotated[float, Field(strict=True, ge=0, le=1e6)]
@@ -55,7 +55,7 @@ class WeightedOptions(DiverseOptions):
     )
 
 
-class Weighted(Strategy):
+class Weighted(Diverse):
     """The controller with the highest weighted sum of fitness, disagreement, uniqueness, reliability and information.
 
     With `normalise` off, the first three weights give the scores of *simulated fit and informative* and, up to a
@@ -67,26 +67,27 @@ class Weighted(Strategy):
     Options = WeightedOptions
     options: WeightedOptions
 
-    @property
-    def ensemble(self) -> int:
-        """Return the size of the diverse ensemble."""
-        return self.options.simulators
-
-    @property
-    def _compared(self) -> int:
-        """Return how many simulators of the ensemble count: all, or the best alone."""
-        options = self.options
-        weights = (options.fit_weight, options.disagreement_weight, options.reliability_weight)
-        return self.ensemble if any(weights) else 1
-
     def selection_simulators(self, tunables: int) -> int:
         """Return the simulators that count, and those beside them that reliability and information need."""
-        nearby = self._compared if self.options.reliability_weight else 0
-        return self._compared + nearby + (tunables if self.options.information_weight else 0)
+        return self._needed(self._compared(self.ensemble), tunables)
+
+    def later_selection_simulators(self, tunables: int) -> int:
+        """Return the same for those of most weight."""
+        return self._needed(self._compared(self.options.counted), tunables)
+
+    def _compared(self, simulators: int) -> int:
+        """Return how many of these simulators count: all, or the best alone."""
+        options = self.options
+        weights = (options.fit_weight, options.disagreement_weight, options.reliability_weight)
+        return simulators if any(weights) else 1
+
+    def _needed(self, compared: int, tunables: int) -> int:
+        nearby = compared if self.options.reliability_weight else 0
+        return compared + nearby + (tunables if self.options.information_weight else 0)
 
     def select(self, belief: Belief, search: Search, rng: Generator) -> Genome:
         """Return the controller with the highest weighted sum found."""
-        options, senses = self.options, self.options.information_weight > 0
+        options, senses, belief = self.options, self.options.information_weight > 0, self.options.weighed(belief)
         asked = self._asked(belief, rng)
         divisors: dict[str, float] = {}
 
@@ -101,7 +102,7 @@ class Weighted(Strategy):
 
     def _asked(self, belief: Belief, rng: Generator) -> "_Asked":
         """Return the simulators in which each controller is evaluated."""
-        options, models = self.options, belief.parameters[: self._compared]
+        options, models = self.options, belief.parameters[: self._compared(self.ensemble)]
         steps = options.perturbation * rng.choice([-1.0, 1.0], models.shape)
         nearby = moved(models, steps, belief.tunables) if options.reliability_weight else models[:0]
         aside = beside(models[0], options.difference, belief.tunables) if options.information_weight else models[:0]
