@@ -6,6 +6,7 @@
 from argparse import ArgumentParser
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -39,6 +40,19 @@ def imported(store: Store, archives: Sequence[Path]) -> Imported:
             names = {id_: experiments.get_experiment(session, id_).name for id_ in ids}
         labels |= {id_: path.stem if len(ids) == 1 else f"{path.stem}: {name}" for id_, name in names.items()}
     return labels
+
+
+@contextmanager
+def opened(archives: Sequence[Path]) -> Iterator[tuple[Store, Imported]]:
+    """Open a temporary database with these archives, and the labels of their experiments."""
+    with TemporaryDirectory(prefix="gaplab-findings-") as folder:
+        url = f"sqlite:///{Path(folder) / 'gaplab.db'}"
+        migrations.upgrade(url)
+        store = Store(url)
+        try:
+            yield store, imported(store, archives)
+        finally:
+            store.dispose()
 
 
 @dataclass(frozen=True)
@@ -98,7 +112,7 @@ def _found(best: Sequence[BestSimulator], truth: FloatArray, extent: FloatArray)
 def distance_table(store: Store, labels: Imported) -> Table:
     """Return medians over repetitions of the distances, and the coverage of intervals."""
     columns = "study", "after", "n", "together", "each tunable", "truth in interval", "each", "median width"
-    table = _table("Median distance from the truth, as a share of the bounds; 95 % intervals", columns)
+    table = table_of("Median distance from the truth, as a share of the bounds; 95 % intervals", columns)
     for id_, label in labels.items():
         for samples, findings in found(store, id_).items():
             table.add_row(label, str(samples), *findings.row())
@@ -107,7 +121,7 @@ def distance_table(store: Store, labels: Imported) -> Table:
 
 def fitness_table(store: Store, labels: Imported) -> Table:
     """Return recorded fitness in reality after each number of real-world evaluations."""
-    table = _table("Recorded fitness in reality", ("study", "after", "n", "mean", "SD"))
+    table = table_of("Recorded fitness in reality", ("study", "after", "n", "mean", "SD"))
     for curve in curves(store, list(labels)):
         for point in curve.points:
             table.add_row(
@@ -119,7 +133,7 @@ def fitness_table(store: Store, labels: Imported) -> Table:
 def difference_table(store: Store, labels: Imported, counts: Sequence[int]) -> Table:
     """Return the differences of all pairs after each number of evaluations, with Holm's p over the pairs of a count."""
     title = "Differences of fitness with 90 % intervals; p of the trusted test after Holm"
-    table = _table(title, ("after", "first", "second", "difference", "p"))
+    table = table_of(title, ("after", "first", "second", "difference", "p"))
     for count in counts:
         for pair in compare(store, list(labels), from_evaluations=count, to_evaluations=count, intervals=False):
             table.add_row(str(count), labels[pair.first], labels[pair.second], *_difference(pair))
@@ -132,7 +146,8 @@ def _difference(pair: Comparison) -> Iterator[str]:
     yield "-" if test.p_holm is None else f"{test.p_holm:.2g}"
 
 
-def _table(title: str, columns: Sequence[str]) -> Table:
+def table_of(title: str, columns: Sequence[str]) -> Table:
+    """Return an empty table with these columns."""
     table = Table(title=title)
     for column in columns:
         table.add_column(column)
@@ -153,17 +168,12 @@ def main() -> None:
     parser.add_argument("archives", nargs="+", type=Path)
     parser.add_argument("--after", type=int, nargs="+", default=[1, 3], help="numbers of evaluations to compare at")
     arguments = parser.parse_args()
-    with TemporaryDirectory(prefix="gaplab-findings-") as folder:
-        url = f"sqlite:///{Path(folder) / 'gaplab.db'}"
-        migrations.upgrade(url)
-        store = Store(url)
-        labels = imported(store, arguments.archives)
+    with opened(arguments.archives) as (store, labels):
         console = Console()
         console.print(distance_table(store, labels))
         console.print(fitness_table(store, labels))
         if len(labels) > 1:
             console.print(difference_table(store, labels, arguments.after))
-        store.dispose()
 
 
 if __name__ == "__main__":

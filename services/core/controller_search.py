@@ -29,9 +29,7 @@ class Allowance:
     simulators: int
 
     @classmethod
-    def of_selection(
-        cls, strategy: Strategy, evaluations: int, tunables: int, *, learned: bool = False
-    ) -> "Allowance":
+    def of_selection(cls, strategy: Strategy, evaluations: int, tunables: int, *, learned: bool = False) -> "Allowance":
         """Return the allowance of a selection from its budget of evaluations.
 
         Args:

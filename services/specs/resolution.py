@@ -49,13 +49,11 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         InvalidSpec: with every violation, each with its pointer into the spec.
     """
     spec, preset = with_preset(spec), PRESETS[spec.budget.preset]
-    robot, strategy, optimizer, discrepancy, tuner = _created(spec)
+    robot, strategy, controllers, simulators, discrepancy, tuner = _created(spec)
     simulated = spec.engine or PluginRef(name=default_engine(robot))
     physical = spec.reality.kind == "physical"
     real = simulated if physical else spec.reality.engine or simulated
-    controllers = spec.controller_optimizer or spec.optimizer
-    searching, engine, reality_engine = gather(
-        lambda: optimizers.create(controllers, "/controller_optimizer" if spec.controller_optimizer else "/optimizer"),
+    engine, reality_engine = gather(
         lambda: _engine(simulated, robot, "/engine"),
         lambda: _engine(real, robot, "/reality/engine" if spec.reality.engine and not physical else "/engine"),
     )
@@ -66,7 +64,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         *tuning_violations(robot, discrepancy, tuner),
         *reality_violations(spec, strategy, engine, reality_engine),
         *bench_violations(spec, robot),
-        *budget_violations(budget, strategy, len(spec.tunables), controllers=searching, simulators=optimizer),
+        *budget_violations(budget, strategy, len(spec.tunables), controllers=controllers, simulators=simulators),
     ]:
         raise InvalidSpec(violations)
     return ResolvedSpec(
@@ -76,7 +74,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         iterations=spec.iterations or preset.iterations,
         repetitions=spec.repetitions or preset.repetitions,
         **{registry.kind: _completed(registry, getattr(spec, registry.kind)) for registry in NEED_NO_OTHERS},
-        controller_optimizer=_completed(optimizers, controllers),
+        controller_optimizer=_completed(optimizers, spec.controller_optimizer or spec.optimizer),
         engine=_completed(engines, simulated),
         tunables=tuple(_with_bounds(ref) for ref in spec.tunables),
         held_out=spec.held_out,
@@ -86,11 +84,13 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     )
 
 
-def _created(spec: ExperimentSpec) -> tuple[Robot, Strategy, Optimizer, Discrepancy, Tuner]:
-    """Return the plug-ins of a spec that need no others to be created."""
+def _created(spec: ExperimentSpec) -> tuple[Robot, Strategy, Optimizer, Optimizer, Discrepancy, Tuner]:
+    """Return the plug-ins of a spec that need no others to be created; of the optimizers, that of controllers first."""
+    given = spec.controller_optimizer
     return gather(
         lambda: robots.create(spec.robot, "/robot"),
         lambda: strategies.create(spec.strategy, "/strategy"),
+        lambda: optimizers.create(given or spec.optimizer, "/controller_optimizer" if given else "/optimizer"),
         lambda: optimizers.create(spec.optimizer, "/optimizer"),
         lambda: discrepancies.create(spec.discrepancy, "/discrepancy"),
         lambda: tuners.create(spec.tuner, "/tuner"),

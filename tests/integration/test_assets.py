@@ -120,7 +120,7 @@ def test_the_starts_of_the_form_are_the_examples(file: str) -> None:
 def test_the_catalogue_has_the_named_budgets() -> None:
     found = {each.name: each for each in catalogue().budgets}
 
-    assert list(found) == ["smoke", "desk", "paper", "as_published"]
+    assert list(found) == ["smoke", "desk", "paper", "lean", "as_published"]
     assert (found["paper"].iterations, found["paper"].repetitions, found["paper"].controller_evaluations) == (
         10,
         40,

@@ -17,7 +17,7 @@ from gaplab.schemas.spec import StudySpec
         ({"seed": -1}, "seed must be at least 0, not -1"),
         ({"name": ""}, "name must have at least 1 character, not 0"),
         ({"name": "x" * 201}, "name must have at most 200 characters, not 201"),
-        ({"budget": {"preset": "tiny"}}, 'preset must be one of smoke, desk, paper, as_published, not "tiny"'),
+        ({"budget": {"preset": "tiny"}}, 'preset must be one of smoke, desk, paper, lean, as_published, not "tiny"'),
         ({"tunables": 5}, "tunables must be a list, not 5"),
         ({"tunables": [5]}, "item 0 of tunables must be an object, not 5"),
         ({"robot": {}}, "name is missing"),

@@ -78,7 +78,7 @@ def test_an_option_given_beats_the_published_one() -> None:
 
     resolved = resolve_experiment(experiment(strategy=strategy, budget={"preset": "as_published"}))
 
-    assert resolved.strategy.options == {"simulators": 5, "least_share": 0.03, "least_error": 0.1}
+    assert resolved.strategy.options == {"simulators": 5, "least_share": 0.03, "least_error": 0.1, "weightiest": None}
 
 
 @pytest.mark.parametrize("attribute", ["published", "before"])
