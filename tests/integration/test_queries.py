@@ -82,6 +82,8 @@ QUERIES = {
     "study = none": {"done", "Tagged", "other"},
     "robot = toy_function": ALL,
     "engine = analytic and optimizer = steady_state": ALL,
+    "controller_optimizer = steady_state": ALL,
+    "controller_optimizer = cma_es": set(),
     "reality = analytic": ALL,
     "repetitions = 2 and study = none": {"done", "Tagged", "other"},
     "iterations < 2 and priority = 0": {"done", "Tagged", "other"},

@@ -19,7 +19,7 @@ const CATALOGUE = {
 test("a spec goes through the form unchanged", () => {
   const spec = {
     name: "all", strategies: ["two", { name: "two", options: { weight: 0.5 } }], robot: { name: "wheels", options: { radius: 2 } }, engine: "fast",
-    optimizer: "climber", discrepancy: { name: "squares", options: { to: 1 } }, tuner: "hill", tunables: ["grip", { name: "mass", lower: 0, upper: 2.5 }],
+    optimizer: "climber", controller_optimizer: { name: "climber", options: { steps: 2 } }, discrepancy: { name: "squares", options: { to: 1 } }, tuner: "hill", tunables: ["grip", { name: "mass", lower: 0, upper: 2.5 }],
     reality: { engine: "slow", parameters: { grip: 0 } },
     budget: { preset: "smoke", controller_evaluations: 100, reuse_transfer: true },
     iterations: 3, repetitions: 4, direct_repetitions: 8, seed: 18446744073709551615n, priority: -10, max_parallel: 2,

@@ -69,9 +69,10 @@ declare namespace Api {
     selection_evaluations: number;
     simulator_evaluations: number;
     as_published: boolean;
+    lean: boolean;
   }
   interface BudgetSpec {
-    preset: "smoke" | "desk" | "paper" | "as_published";
+    preset: "smoke" | "desk" | "paper" | "lean" | "as_published";
     controller_evaluations: number | null;
     selection_evaluations: number | null;
     simulator_evaluations: number | null;
@@ -293,6 +294,7 @@ declare namespace Api {
     robot: PluginRef;
     engine: PluginRef | null;
     optimizer: PluginRef;
+    controller_optimizer: PluginRef | null;
     tunables: Array<TunableRef>;
     discrepancy: PluginRef;
     tuner: PluginRef;
@@ -635,6 +637,7 @@ declare namespace Api {
     robot: PluginRef;
     engine: PluginRef | null;
     optimizer: PluginRef;
+    controller_optimizer: PluginRef | null;
     tunables: Array<TunableRef>;
     discrepancy: PluginRef;
     tuner: PluginRef;
@@ -710,6 +713,7 @@ declare namespace Api {
     robot: PluginRef;
     engine: PluginRef | null;
     optimizer: PluginRef;
+    controller_optimizer: PluginRef | null;
     tunables: Array<TunableRef>;
     discrepancy: PluginRef;
     tuner: PluginRef;

@@ -147,6 +147,7 @@ declare namespace Page {
     robot: PluginDraft;
     engine: PluginDraft;
     optimizer: PluginDraft;
+    controllerOptimizer: PluginDraft;
     discrepancy: PluginDraft;
     tuner: PluginDraft;
     tunables: TunableDraft[];

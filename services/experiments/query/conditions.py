@@ -78,6 +78,12 @@ def _named(kind: str) -> ColumnElement[str]:
     return func.coalesce(_E.spec[kind]["name"].as_string(), LATER[kind]["name"])
 
 
+def _of_controllers() -> ColumnElement[str]:
+    """SQL: the name of the optimizer of controllers; in specs from before there was one, that of the optimizer."""
+    later, earlier = (_E.spec[field]["name"].as_string() for field in ("controller_optimizer", "optimizer"))
+    return func.coalesce(later, earlier)
+
+
 EXPERIMENT_FIELDS: Fields = {
     "id": fields.text(_E.id, "id"),
     "name": fields.text(_E.name, "name"),
@@ -89,6 +95,7 @@ EXPERIMENT_FIELDS: Fields = {
     "engine": fields.text(_E.spec["engine"]["name"].as_string(), "engine of the simulators"),
     "reality": fields.text(_E.spec["reality"]["engine"]["name"].as_string(), "engine that is its reality"),
     "optimizer": fields.text(_E.spec["optimizer"]["name"].as_string(), "name of the optimizer"),
+    "controller_optimizer": fields.text(_of_controllers(), "name of the optimizer of controllers"),
     "tuner": fields.text(_named("tuner"), "name of the tuner"),
     "discrepancy": fields.text(_named("discrepancy"), "name of the discrepancy that tuning minimises"),
     "state": fields.state(lambda state: _E.state == state, "state"),

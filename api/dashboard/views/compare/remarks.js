@@ -5,7 +5,7 @@ import { h, refill } from "../../lib/dom.js";
 import { letter } from "./ranges.js";
 
 /** @type {Record<string, string>} */
-const SETTINGS = { engine: "engine", tunables: "tunables", budget: "budget", optimizer: "optimizer", discrepancy: "discrepancy", tuner: "tuner", iterations: "number of iterations" };
+const SETTINGS = { engine: "engine", tunables: "tunables", budget: "budget", optimizer: "optimizer", controller_optimizer: "optimizer of controllers", discrepancy: "discrepancy", tuner: "tuner", iterations: "number of iterations" };
 
 /** How reality is measured, which does not make it another one; with the defaults, which an older spec leaves out. @type {[key: string, words: string, otherwise: unknown][]} */
 const MEASURING = [["probes", "probes", "each"], ["repeats", "repeats of a measurement", 1], ["samples", "samples from before", []]];

@@ -36,6 +36,7 @@ export function draftOf(spec, catalogue) {
     robot: pluginDraft(spec.robot ?? defaults.robot),
     engine: pluginDraft(spec.engine),
     optimizer: pluginDraft(spec.optimizer ?? defaults.optimizer),
+    controllerOptimizer: pluginDraft(spec.controller_optimizer ?? ""),
     discrepancy: pluginDraft(spec.discrepancy ?? defaults.discrepancy),
     tuner: pluginDraft(spec.tuner ?? defaults.tuner),
     tunables: tunableDrafts(spec.tunables ?? defaults.tunables, catalogue),
@@ -102,13 +103,14 @@ export const ticked = (list) => list.filter(({ on }) => on);
  * @returns {Spec}
  */
 export function specOf(draft) {
-  const { strategies, robot, engine, optimizer, discrepancy, tuner, tunables, budget } = draft;
+  const { strategies, robot, engine, optimizer, controllerOptimizer, discrepancy, tuner, tunables, budget } = draft;
   return withoutEmpty({
     name: draft.name.trim(),
     strategies: ticked(strategies).map(pluginName),
     robot: pluginName(robot),
     engine: engine.name ? pluginName(engine) : "",
     optimizer: pluginName(optimizer),
+    controller_optimizer: controllerOptimizer.name ? pluginName(controllerOptimizer) : "",
     discrepancy: pluginName(discrepancy),
     tuner: pluginName(tuner),
     tunables: ticked(tunables).map(({ name, lower, upper }) => shortest({ name, ...withoutEmpty(typedValues({ lower, upper })) })),

@@ -100,11 +100,13 @@ function strategyField(form, strategy) {
 export function simulationPart(form) {
   const { draft, catalogue } = form;
   const robot = catalogue.robots.find(({ name }) => name === draft.robot.name);
+  const isLean = catalogue.budgets.some(({ name, lean }) => lean && name === draft.budget.preset);
   const robotEngine = `The robot’s own${robot ? `: ${robot.details.engine}` : ""}`;
   return part("Simulation",
     pluginField(form, "Robot", draft.robot, catalogue.robots, "/robot"),
     pluginField(form, "Engine of the simulators", draft.engine, catalogue.engines, "/engine", robotEngine),
     pluginField(form, "Optimizer", draft.optimizer, catalogue.optimizers, "/optimizer"),
+    pluginField(form, "Optimizer of controllers", draft.controllerOptimizer, catalogue.optimizers, "/controller_optimizer", isLean ? "That of the lean budget" : "The same"),
     pluginField(form, "Tuner", draft.tuner, catalogue.tuners, "/tuner"),
     pluginField(form, "Tuning minimises", draft.discrepancy, catalogue.discrepancies, "/discrepancy"));
 }
