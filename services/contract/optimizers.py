@@ -121,6 +121,15 @@ def keeps_diverse_members(plugin: Plugin) -> None:
     assert (found.size, different) == (9, 9), f"of 9 members it keeps {found.size}, of which {different} differ"
 
 
+def begins_with_given_genomes(plugin: Plugin) -> None:
+    """Begins with genomes that it did not ask for, as a warm start does, and keeps the best of them."""
+    hill, start = Hill(), np.vstack([SUMMIT, SPACE.draw(8, np.random.default_rng(1))])
+    found = maximise(plugin().diverse(9), SPACE, hill, 60, np.random.default_rng(0), start)
+    assert np.array_equal(hill.asked[0], start), "the search does not begin with the given genomes"
+    best = found.genomes[0]
+    assert np.array_equal(best, SUMMIT), f"it was told of the summit at {SUMMIT.tolist()} and returns {best.tolist()}"
+
+
 CHECKS = (
     asks_within_the_box,
     climbs_the_hill,
@@ -132,4 +141,5 @@ CHECKS = (
     goes_on_where_everything_fails,
     leaves_the_given_state,
     keeps_diverse_members,
+    begins_with_given_genomes,
 )
