@@ -15,16 +15,16 @@ from gaplab.services.core.world import Material, Motion, World
 from gaplab.services.engines.mujoco.callback import callbacks
 from gaplab.services.engines.mujoco.law import drive_torques, settings
 from gaplab.services.engines.mujoco.model import compiled, driven, drives, paint
-from gaplab.services.engines.stepping import plausible
+from gaplab.services.engines.stepping import consecutive, plausible
 
 ROWS = 64
 """Rollouts per thread in one call of MuJoCo; more would only take memory, 0.1 MB each for the quadruped."""
 
-TIME, ANGLES, POSE = 0, 1, slice(1, 8)
-"""Indices into a state: time; positions, then speeds; the base's among the positions."""
+TIME, ANGLES = 0, 1
+"""Indices into a state: time; positions of all joints, then speeds."""
 
-TURNED = np.array((0, 1, 2, 4, 5, 6, 3))
-"""Order of a pose: MuJoCo's quaternions have w first, a Trajectory's last."""
+TURNED_POSE = np.array((1, 2, 3, 5, 6, 7, 4))
+"""Indices into a state: the base's pose as in a Trajectory; MuJoCo's quaternions have w first, a Trajectory's last."""
 
 
 class MuJoCoScene:
@@ -44,9 +44,9 @@ class MuJoCoScene:
         self._mujoco = mujoco
         self._callbacks = callbacks()
         self._drives = drives(self.model, world)
-        self._dofs = [drive.dof for drive in self._drives]
-        self._driven = [world.actuators.index(joint) for joint in driven(world)]
-        self._angles = [POSE.start + int(self.model.joint(each.name).qposadr[0]) for each in world.joints]
+        self._dofs = consecutive([drive.dof for drive in self._drives])
+        self._driven = consecutive([world.actuators.index(joint) for joint in driven(world)])
+        self._angles = [ANGLES + int(self.model.joint(each.name).qposadr[0]) for each in world.joints]
         self._models = [self.model]
         self._datas = [self._data() for _ in range(threads)]
         self._start = self._initial()
@@ -83,7 +83,7 @@ class MuJoCoScene:
         states_with_start = np.vstack([self._start, states[0]])
         looked = states_with_start[chosen]
         torques = self._torques(controls[0], states_with_start)[chosen]
-        seen = np.hstack([looked[:, POSE][:, TURNED], looked[:, self._angles]])
+        seen = np.hstack([looked[:, TURNED_POSE], looked[:, self._angles]])
         return self._seen(states, observed)[0], seen, torques
 
     def close(self) -> None:
@@ -95,10 +95,10 @@ class MuJoCoScene:
 
     def _controls(self, motions: Sequence[Motion], steps: int) -> FloatArray:
         """Return `(n, steps, degrees of freedom)`: the targets in each step, where the law reads them."""
-        controls = np.zeros((len(motions), steps, self.model.nv))
+        controls, now = np.zeros((len(motions), steps, self.model.nv)), np.arange(steps)
         for motion, each in zip(motions, controls, strict=True):
-            current = np.searchsorted(self._steps(motion.times_s), np.arange(steps), side="right") - 1
-            each[:, self._dofs] = motion.targets[current][:, self._driven]
+            current = self._steps(motion.times_s).searchsorted(now, side="right") - 1
+            each[:, self._dofs] = motion.targets.take(current, axis=0)[:, self._driven]
         return controls
 
     def _rolled(self, models: list[Any], controls: FloatArray) -> FloatArray:
@@ -123,10 +123,11 @@ class MuJoCoScene:
     def _seen(self, states: FloatArray, steps: NDArray[np.int_]) -> FloatArray:
         """Return `(rows, t, 7)`: poses after the given steps; nan if MuJoCo stopped or the pose is implausible."""
         complete = states[:, -1, TIME] > (states.shape[1] - 0.5) * self.world.time_step_s
-        poses = states[:, np.maximum(steps, 1) - 1, POSE]
-        poses[:, steps == 0] = self._start[POSE]
+        poses = states[:, steps[:, None] - 1, TURNED_POSE]
+        if not steps[0]:
+            poses[:, steps == 0] = self._start[TURNED_POSE]
         poses[~(complete & plausible(poses))] = np.nan
-        return poses[..., TURNED]
+        return poses
 
     def _torques(self, controls: FloatArray, states: FloatArray) -> FloatArray:
         """Return `(steps + 1, joints)`: torques of the motors before each state; zeros before the first."""
