@@ -59,7 +59,9 @@ class Simulation:
             raise PluginBroken(f"{found}; permitted: {expected}")
         outcomes = np.empty((len(genomes), len(parameters), 1 + sensors.size))
         outcomes[..., 0], outcomes[..., 1:] = fitnesses, sensors.standardised(values)
-        outcomes[np.isnan(fitnesses)] = np.nan
+        failed = np.isnan(fitnesses)
+        if np.count_nonzero(failed):
+            outcomes[failed] = np.nan
         return outcomes
 
     def _fitnesses(self, seen: Trajectory, genomes: int, simulators: int) -> Fitnesses:
@@ -98,10 +100,11 @@ def _all_times(observed: bytes, sensed: bytes) -> _Times:
 
 
 def _places(all_s: FloatArray, times_s: FloatArray) -> Places:
-    """Return the places of some of the times; a slice where they follow each other, which copies nothing."""
+    """Return the places of some of the times; a slice where they are equally far apart, which copies nothing."""
     places = np.searchsorted(all_s, times_s)
-    if len(places) and places[-1] - places[0] == len(places) - 1:
-        return slice(int(places[0]), int(places[-1]) + 1)
+    steps = np.unique(np.diff(places))
+    if len(steps) == 1 and steps[0] > 0:
+        return slice(int(places[0]), int(places[-1]) + 1, int(steps[0]))
     return places
 
 

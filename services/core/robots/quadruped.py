@@ -126,12 +126,13 @@ class Quadruped(Robot):
 
     def sense(self, trajectory: Trajectory) -> FloatArray:
         """Return `(..., r, 5)`: roll and pitch of the trunk, its height, and its place on the ground from the start."""
-        x, y, z, w = (trajectory.orientations[..., part] for part in range(4))
-        values = np.empty((*x.shape, 5))
-        values[..., 0] = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x**2 + y**2))
-        values[..., 1] = np.arcsin(np.minimum(np.maximum(2 * (w * y - z * x), -1.0), 1.0))
-        values[..., 2], values[..., 3:] = trajectory.positions_m[..., 2], trajectory.positions_m[..., :2]
-        return values
+        x, y, z, w = trajectory.orientations.reshape(-1, 4).T  # numpy is twice as fast with vectors
+        values = np.empty((len(x), 5))
+        values[:, 0] = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+        values[:, 1] = np.arcsin(np.minimum(np.maximum(2 * (w * y - z * x), -1.0), 1.0))
+        places = trajectory.positions_m.reshape(-1, 3)
+        values[:, 2], values[:, 3:] = places[:, 2], places[:, :2]
+        return values.reshape(*trajectory.positions_m.shape[:-1], 5)
 
 
 def _world() -> World:

@@ -126,7 +126,9 @@ class MuJoCoScene:
         poses = states[:, steps[:, None] - 1, TURNED_POSE]
         if not steps[0]:
             poses[:, steps == 0] = self._start[TURNED_POSE]
-        poses[~(complete & plausible(poses))] = np.nan
+        failed = ~(complete & plausible(poses))
+        if np.count_nonzero(failed):
+            poses[failed] = np.nan
         return poses
 
     def _torques(self, controls: FloatArray, states: FloatArray) -> FloatArray:
