@@ -52,7 +52,7 @@ class MuJoCoScene:
         self._start = self._initial()
         self._starts = np.tile(self._start, (ROWS * threads, 1))
         self._channel = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
-        self._memory = np.empty(0)
+        self._memory, self._targets = np.empty(0), np.zeros(0)
         self._pool = import_module("mujoco.rollout").Rollout(nthread=threads if threads > 1 else 0)
 
     def poses(self, materials: Sequence[Material], motions: Sequence[Motion]) -> FloatArray:
@@ -62,9 +62,9 @@ class MuJoCoScene:
         found = np.empty((len(motions), len(materials), len(steps), 7))
         with _in_force(self._mujoco, *self._callbacks):
             for down in _slices(len(motions), max(1, rows // len(materials))):
-                controls = self._controls(motions[down], max(1, int(steps[-1])))
                 for across in _slices(len(materials), rows):
                     models = self._painted(materials[across])
+                    controls = self._controls(motions[down], max(1, int(steps[-1])), len(models))
                     states = self._rolled(models, controls)
                     found[down, across] = self._seen(states, steps).reshape(-1, len(models), len(steps), 7)
         return found
@@ -93,24 +93,36 @@ class MuJoCoScene:
     def _steps(self, times_s: FloatArray) -> NDArray[np.int_]:
         return np.rint(times_s / self.world.time_step_s).astype(int)
 
-    def _controls(self, motions: Sequence[Motion], steps: int) -> FloatArray:
-        """Return `(n, steps, degrees of freedom)`: the targets in each step, where the law reads them."""
-        controls, now = np.zeros((len(motions), steps, self.model.nv)), np.arange(steps)
+    def _controls(self, motions: Sequence[Motion], steps: int, copies: int = 1) -> FloatArray:
+        """Return `(n · copies, steps, degrees of freedom)`: the targets in each step, where the law reads them.
+
+        They are in the memory of the last call if it is large enough; what no motor drives stays zero in it.
+        """
+        rows, dofs = len(motions) * copies, int(self.model.nv)
+        size = rows * steps * dofs
+        if self._targets.size < size:
+            self._targets = np.zeros(size)
+        controls, now = self._targets[:size].reshape(-1, copies, steps, dofs), np.arange(steps)
         for motion, each in zip(motions, controls, strict=True):
             current = self._steps(motion.times_s).searchsorted(now, side="right") - 1
-            each[:, self._dofs] = motion.targets.take(current, axis=0)[:, self._driven]
-        return controls
+            each[..., self._dofs] = motion.targets.take(current, axis=0)[:, self._driven]
+        return controls.reshape(rows, steps, dofs)
 
     def _rolled(self, models: list[Any], controls: FloatArray) -> FloatArray:
-        """Return `(n · m, steps, state)`: states after each step, by motion and model; nan where MuJoCo stopped."""
-        count, steps = len(models) * len(controls), controls.shape[1]
+        """Return `(n · m, steps, state)`: states after each step, by motion and model; nan where MuJoCo stopped.
+
+        Args:
+            models: m models.
+            controls: `(n · m, steps, degrees of freedom)`, by motion and model.
+        """
+        count, steps = controls.shape[:2]
         states = self._room(count, steps)
         try:
             self._pool.rollout(
-                models * len(controls),
+                models * (count // len(models)),
                 self._datas,
                 self._starts[:count],
-                controls if len(models) == 1 else np.repeat(controls, len(models), axis=0),
+                controls,
                 control_spec=self._channel,
                 skip_checks=True,
                 nstep=steps,
