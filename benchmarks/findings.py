@@ -158,7 +158,7 @@ def main() -> None:
         migrations.upgrade(url)
         store = Store(url)
         labels = imported(store, arguments.archives)
-        console = Console()
+        console = Console(width=150)
         console.print(distance_table(store, labels))
         console.print(fitness_table(store, labels))
         if len(labels) > 1:
