@@ -14,6 +14,7 @@ from benchmarks.reproduction.pairs import (
     weak_strategies_differ,
 )
 from benchmarks.reproduction.studies import Study
+from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.statistics import brown_forsythe
 from gaplab.services.figures.words import number_of, spoken
 from gaplab.services.reports.numbers import probability
@@ -44,15 +45,13 @@ def starts_are_alike(study: Study) -> Examined:
     margin, level = NEAR * study.unit, paper.START * study.direct
     evidence = [
         Evidence(
-            f"{spoken(name)} within {NEAR} of direct of the others",
+            f"{spoken(name)} near the others",
             *statements.alike(own, np.concatenate([starts[each] for each in starts if each != name]), margin),
         )
         for name, own in starts.items()
         if len(starts) > 1
     ]
-    near = Evidence(
-        f"all together within {NEAR} of {paper.START:.2f} of direct", *statements.alike(together, level, margin)
-    )
+    near = Evidence(f"all together near {paper.START:.2f}", *statements.alike(together, level, margin))
     ratios = [own.mean() / study.unit for own in starts.values()]
     here = f"{together.mean() / study.unit:.2f} of direct; strategies {min(ratios):.2f} to {max(ratios):.2f}"
     unequal = study.unequal([*study.present, "direct"], selections=False)
@@ -65,8 +64,8 @@ def three_samples_reach_direct(study: Study) -> Examined:
     lacking = [spoken(name).lower() for name in paper.SIMULATED_FIT if name not in present]
     if not len(study.direct) or not present or study.last < 3:
         missing = [] if len(study.direct) else [NO_DIRECT]
-        missing += ["value after 3 samples"] if present and study.last < 3 else []
-        return Examined("", "", (), (*missing, *lacking))
+        short = ["value after 3 samples"] if present and study.last < 3 else []
+        return Examined("", "", (), (*missing, *lacking, *short))
     evidence = [_reaches(study, name, 3, paper.AT_LEAST) for name in present]
     if study.last >= paper.ITERATIONS:
         evidence += [_reaches(study, name, paper.ITERATIONS, 1.0) for name in present]
@@ -80,7 +79,7 @@ def three_samples_reach_direct(study: Study) -> Examined:
 
 def _reaches(study: Study, name: str, count: int, share: float) -> Evidence:
     p_values = statements.above(study.values(name, count, count), share * study.direct)
-    return Evidence(f"{spoken(name)} above {share:.2f} of direct after {count}", *p_values)
+    return Evidence(f"{spoken(name)} above {share:.2f} after {count}", *p_values)
 
 
 def _ratio(study: Study, name: str, count: int) -> str:
@@ -95,11 +94,13 @@ def fit_strategies_vary_less(study: Study) -> Examined:
     lacking = [spoken(name).lower() for name in paper.STRATEGIES if not study.arm(name)]
     if not fit or not weak or study.last < 3:
         reason = ["value after 3 samples"] if fit and weak else []
-        return Examined("", "", (), (*reason, *lacking))
-    groups = [[study.complete(name, 3, study.last) for name in names] for names in (fit, weak)]
-    ratio, p_values = statements.narrower(*groups, NEARER_TO_A_THIRD)
+        return Examined("", "", (), (*lacking, *reason))
+    narrow, wide = ([study.complete(name, 3, study.last) for name in names] for names in (fit, weak))
+    ratio, p_values = statements.narrower(narrow, wide, NEARER_TO_A_THIRD)
     evidence = Evidence(f"ratio of the deviations below {NEARER_TO_A_THIRD:.2f}", *p_values)
-    centred = [np.concatenate([each.mean(axis=1) - np.median(each.mean(axis=1)) for each in side]) for side in groups]
+    centred = [
+        np.concatenate([each.mean(axis=1) - np.median(each.mean(axis=1)) for each in side]) for side in (narrow, wide)
+    ]
     levene = brown_forsythe(*centred)
     here = f"ratio of the deviations over 3 to {study.last} samples {ratio:.2f}"
     told = f"{here}; Brown and Forsythe, one value for each repetition: p {probability(levene.p)}"
@@ -112,7 +113,7 @@ def curves_rise_and_flatten(study: Study) -> Examined:
     lacking = [spoken(name).lower() for name in paper.STRATEGIES if name not in present]
     if not present or study.last < FEWEST_SAMPLES:
         short = f"value after {number_of('sample', FEWEST_SAMPLES)}: it ends after {study.last}"
-        return Examined("", "", (), (*([short] if present else []), *lacking))
+        return Examined("", "", (), (*lacking, *([short] if present else [])))
     least = 0.0 if np.isnan(study.unit) else paper.LEAST_RISE * study.unit
     middle, evidence, told = study.last // 2, [], []
     for name in present:
@@ -128,7 +129,7 @@ def curves_rise_and_flatten(study: Study) -> Examined:
     return Examined(here, NO_TEST, tuple(evidence), tuple(lacking))
 
 
-def _gain(study: Study, gains: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
+def _gain(study: Study, gains: FloatArray) -> str:
     unit = 1.0 if np.isnan(study.unit) else study.unit
     return f"{gains.mean() / unit:+.2f}".replace("-", "−")
 

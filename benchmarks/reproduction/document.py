@@ -92,7 +92,7 @@ class Document:
             yield f"### {label}\n\n{tables.direct_in_words(study)}"
             if picture := self.pictures.get((label, 4)):
                 yield f"![Recorded fitness of {label} against the number of real-world evaluations]({picture})"
-            if study.present:
+            if len(study.direct) and len(study.arms) > 1:
                 yield tables.figure_4(study)
 
     def _figure_3(self) -> Iterator[str]:
@@ -133,8 +133,8 @@ class Document:
         )
         return (
             "## What it took\n\nStored steps have the time of their computation. Attempts also have work that was "
-            "lost, and waiting for a core. A core-hour is an hour of one thread of the engine, on the machines of the "
-            f"archives' provenance.\n\n{tables.table(tables.COST_HEAD, [*rows, total])}"
+            "lost, and waiting for a core; early archives lack them. A core-hour is an hour of one thread of the "
+            f"engine, on the machines of the archives' provenance.\n\n{tables.table(tables.COST_HEAD, [*rows, total])}"
         )
 
 

@@ -27,7 +27,8 @@ class Verdict(StrEnum):
 RULES = (
     f"A statement is **shown** if the p of the hypothesis that it does not hold is below {SIGNIFICANT}. It is "
     "**refuted** if the p of the hypothesis that it holds, in the least size that the paper's own numbers imply, is "
-    f"below {SIGNIFICANT}. Both are corrected by Holm's method over the statements of the claim.",
+    f"below {SIGNIFICANT}. Both are corrected by Holm's method over the statements of the claim; the tables have each "
+    "p as it is before.",
     "*reproduced*: every statement of the claim is shown. *not*: a statement is refuted, and is not shown in a smaller "
     "size. *open*: anything else. *absent*: the study has nothing that the claim speaks of.",
     "Sample size: each repetition is one value, its mean over the numbers of evaluations that the claim names. A group "
@@ -41,7 +42,7 @@ RULES = (
     "A claim that names more strategies or samples than the study has is refuted by those that it has, but not "
     "reproduced by them.",
     "A verdict holds for the budget, the robot and the engines of its study. Budgets smaller than the paper's are "
-    "stated, and change no verdict.",
+    "stated, and change no verdict. Of several experiments with one strategy, the first counts.",
 )
 """The rules of a verdict, in sentences."""
 

@@ -144,9 +144,10 @@ def _here(study: Study, tested: Sequence[Tested]) -> str:
     """Return the differences of the means, the smallest first for those that the paper has ahead."""
     ranked = sorted(tested, key=lambda each: each.difference if each.pair.ahead else abs(each.difference))
     unit = 1.0 if np.isnan(study.unit) else study.unit
-    told = f"{ranked[0].difference / unit:+.2f} ({ranked[0].pair})".replace("-", "−")
+    told = f"{ranked[0].difference / unit:+.2f}".replace("-", "−")
     whose = "" if np.isnan(study.unit) else " of direct"
-    return f"difference {told}{whose}" if len(ranked) == 1 else f"least difference{whose} {told}"
+    least = "difference" if len(ranked) == 1 else "least difference"
+    return f"{least} {told}{whose} ({ranked[0].pair})"
 
 
 def _paper_test(tested: Sequence[Tested], first: int, last: int) -> str:

@@ -5,6 +5,7 @@ SIMPAR 2012, section 3 and the caption of Fig. 4.
 """
 
 from dataclasses import dataclass
+from math import sqrt
 
 from scipy import stats
 
@@ -55,7 +56,8 @@ class Difference:
     def least(self) -> float:
         """Return the least difference with this p, in standard deviations of the values."""
         freedom = 2 * self.values - 2
-        return float(stats.t.ppf(1 - self.p / 2, freedom)) * (2 / self.values) ** 0.5
+        quantile: float = stats.t.ppf(1 - self.p / 2, freedom)
+        return quantile * sqrt(2 / self.values)
 
 
 ONE_SAMPLE = Difference(0.01, REPETITIONS)

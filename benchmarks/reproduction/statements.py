@@ -93,11 +93,11 @@ def _variance(groups: Sequence[FloatArray]) -> float:
 
 def _resampled(groups: Sequence[FloatArray], rng: np.random.Generator) -> FloatArray:
     """Return the mean variance of each resample, `(RESAMPLES,)`."""
-    found = []
+    found = np.zeros(RESAMPLES)
     for group in groups:
         drawn = group[rng.integers(len(group), size=(RESAMPLES, len(group)))]
-        found.append(drawn.var(axis=1, ddof=1).mean(axis=1))
-    return np.mean(found, axis=0)
+        found += drawn.var(axis=1, ddof=1).mean(axis=1) / len(groups)
+    return found
 
 
 def _share(resamples: np.ndarray[Any, np.dtype[np.bool_]]) -> float:

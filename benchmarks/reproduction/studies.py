@@ -76,7 +76,7 @@ class Arm:
     @property
     def last(self) -> int:
         """Return the number of real-world evaluations of a complete repetition."""
-        return self.recorded.shape[1] - 1
+        return int(self.recorded.shape[1]) - 1
 
     @property
     def selection(self) -> int | None:
@@ -86,6 +86,10 @@ class Arm:
             return None
         reused = budget.reuse_transfer and kind.selects_transferred
         return budget.controller_evaluations if reused else budget.selection_evaluations
+
+    def values(self, first: int, last: int) -> FloatArray:
+        """Return the mean `(r,)` of each repetition over a range of evaluations, without incomplete repetitions."""
+        return finite(Range(first, last).values(self.compared()))
 
     def compared(self) -> Compared:
         """Return the experiment as the core compares it."""
@@ -136,7 +140,7 @@ class Study:
     def values(self, strategy: str, first: int, last: int) -> FloatArray:
         """Return the mean `(r,)` of each repetition over a range of evaluations, without incomplete repetitions."""
         arm = self.arm(strategy)
-        return finite(Range(first, last).values(arm.compared())) if arm else np.empty(0)
+        return arm.values(first, last) if arm else np.empty(0)
 
     def complete(self, strategy: str, first: int, last: int) -> FloatArray:
         """Return the values `(r, k)` of the complete repetitions at each number of evaluations of a range."""

@@ -1,14 +1,13 @@
 """The tables of the document: studies, Fig. 4, Fig. 3 and costs, as rows of Markdown."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from benchmarks.findings import found
+from benchmarks.findings import Found, found
 from benchmarks.reproduction import paper
 from benchmarks.reproduction.studies import Arm, Study
 from gaplab.schemas.lifecycle import State
-from gaplab.schemas.plugin import PluginRef
 from gaplab.services.figures.words import spoken
 from gaplab.services.reports.numbers import MISSING
 from gaplab.services.store.session import Store
@@ -43,7 +42,7 @@ def study_row(study: Study, label: str, link: str) -> tuple[str, ...]:
     return (
         f"[{label}]({link}): {study.name}",
         spec.robot.name,
-        _with_options(spec.engine),
+        spec.engine.name,
         f"{simulated} ({truth})" if truth else simulated,
         "/".join(sorted({str(arm.spec.seed) for arm in study.arms})),
         f"{budget.preset}: {' / '.join(f'{size:,}' for size in sizes)} ({', '.join(shares)} of the paper's){reused}",
@@ -68,11 +67,6 @@ STUDY_HEAD = (
 )
 
 
-def _with_options(engine: PluginRef) -> str:
-    told = ", ".join(f"{name} {value}" for name, value in engine.options.items())
-    return f"{engine.name} ({told})" if told else engine.name
-
-
 def _repetitions(study: Study) -> str:
     """Return the repetitions that most experiments have, and those that differ."""
     counts = [arm.repetitions for arm in study.arms]
@@ -91,10 +85,11 @@ def _exception(arm: Arm) -> str:
 
 def figure_4(study: Study) -> str:
     """Return the recorded fitness over direct by number of samples, beside the paper's."""
-    counts = range(study.last + 1)
+    arms = [arm for arm in study.arms if not arm.read.direct]
+    counts = range(min(paper.ITERATIONS, max(arm.last for arm in arms)) + 1)
     rows = [_paper_row("the paper, with simulated fit", counts, learned=True)]
     rows += [_paper_row("the paper, the other three", counts, learned=False)]
-    rows += [_ratios(study, arm, counts) for name in study.present if (arm := study.arm(name))]
+    rows += [_ratios(study, arm, counts) for arm in arms]
     return table(("samples", *map(str, counts)), rows)
 
 
@@ -109,10 +104,10 @@ def _paper_row(name: str, counts: Sequence[int], *, learned: bool) -> tuple[str,
 def _ratios(study: Study, arm: Arm, counts: Sequence[int]) -> tuple[str, ...]:
     cells = []
     for count in counts:
-        values = study.values(arm.strategy, count, count) / study.unit
+        values = arm.values(count, count) / study.unit
         deviation = f" ± {values.std(ddof=1):.2f}" if len(values) > 1 else ""
         cells.append(f"{values.mean():.2f}{deviation}" if len(values) and np.isfinite(values).all() else MISSING)
-    return f"{spoken(arm.strategy)} ({arm.repetitions})", *cells
+    return f"{spoken(arm.read.name)} ({arm.repetitions})", *cells
 
 
 def direct_in_words(study: Study) -> str:
@@ -132,12 +127,12 @@ def figure_3(store: Store, study: Study) -> str:
     rows = [("the paper, in words", "", *("more accurate, and fitter" for _ in counts[1:]))]
     for name in study.present:
         arm = study.arm(name)
-        away = found(store, arm.read.id) if arm else {}
+        away: Mapping[int, Found] = found(store, arm.read.id) if arm else {}
         rows.append((spoken(name), *(_toy_cell(study, name, count, away) for count in counts)))
     return table(("samples", *map(str, counts)), rows)
 
 
-def _toy_cell(study: Study, name: str, count: int, away: dict) -> str:  # type: ignore[type-arg]
+def _toy_cell(study: Study, name: str, count: int, away: Mapping[int, Found]) -> str:
     distance = f"{np.median(np.linalg.norm(away[count].away, axis=1)):.2f}" if count in away else MISSING
     values = study.values(name, count, count) / study.unit
     return f"{distance}; {values.mean():.2f}" if len(values) and np.isfinite(values).all() else distance
@@ -154,8 +149,8 @@ def cost_rows(label: str, study: Study) -> Iterator[tuple[str, ...]]:
             f"{progress.rollouts_done:,}",
             f"{progress.rollouts_saved:,}",
             f"{arm.core_hours:.2f}",
-            f"{arm.attempts:,}",
-            f"{arm.held_core_hours:.2f}",
+            f"{arm.attempts:,}" if arm.attempts else MISSING,
+            f"{arm.held_core_hours:.2f}" if arm.attempts else MISSING,
         )
 
 
