@@ -17,7 +17,7 @@ from benchmarks.reproduction.studies import Study
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.statistics import brown_forsythe
 from gaplab.services.figures.words import number_of, spoken
-from gaplab.services.reports.numbers import probability
+from gaplab.services.reports.numbers import probability, signed
 
 NEAR = 0.15
 """Margin, as a share of direct, within which fitnesses before any sample count as alike.
@@ -54,8 +54,7 @@ def starts_are_alike(study: Study) -> Examined:
     near = Evidence(f"all together near {paper.START:.2f}", *statements.alike(together, level, margin))
     ratios = [own.mean() / study.unit for own in starts.values()]
     here = f"{together.mean() / study.unit:.2f} of direct; strategies {min(ratios):.2f} to {max(ratios):.2f}"
-    unequal = study.unequal([*study.present, "direct"], selections=False)
-    return Examined(here, NO_TEST, (*evidence, near), lacking, unequal)
+    return Examined(here, NO_TEST, (*evidence, near), lacking)
 
 
 def three_samples_reach_direct(study: Study) -> Examined:
@@ -73,8 +72,7 @@ def three_samples_reach_direct(study: Study) -> Examined:
         lacking.append(f"value after {number_of('sample', paper.ITERATIONS)}: it ends after {study.last}")
     counts = [count for count in (3, paper.ITERATIONS) if count <= study.last]
     here = "; ".join(f"{spoken(name)} {', '.join(_ratio(study, name, each) for each in counts)}" for name in present)
-    unequal = study.unequal([*present, "direct"], selections=False)
-    return Examined(here, NO_TEST, tuple(evidence), tuple(lacking), unequal)
+    return Examined(here, NO_TEST, tuple(evidence), tuple(lacking))
 
 
 def _reaches(study: Study, name: str, count: int, share: float) -> Evidence:
@@ -104,7 +102,7 @@ def fit_strategies_vary_less(study: Study) -> Examined:
     levene = brown_forsythe(*centred)
     here = f"ratio of the deviations over 3 to {study.last} samples {ratio:.2f}"
     told = f"{here}; Brown and Forsythe, one value for each repetition: p {probability(levene.p)}"
-    return Examined(told, NO_TEST, (evidence,), tuple(lacking), study.unequal([*fit, *weak], selections=True))
+    return Examined(told, NO_TEST, (evidence,), tuple(lacking), study.unequal([*fit, *weak]))
 
 
 def curves_rise_and_flatten(study: Study) -> Examined:
@@ -131,7 +129,7 @@ def curves_rise_and_flatten(study: Study) -> Examined:
 
 def _gain(study: Study, gains: FloatArray) -> str:
     unit = 1.0 if np.isnan(study.unit) else study.unit
-    return f"{gains.mean() / unit:+.2f}".replace("-", "−")
+    return signed(float(gains.mean() / unit))
 
 
 @dataclass(frozen=True)

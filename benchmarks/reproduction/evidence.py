@@ -34,11 +34,12 @@ RULES = (
     "Sample size: each repetition is one value, its mean over the numbers of evaluations that the claim names. A group "
     f"of fewer than {FEWEST_REPETITIONS} repetitions says nothing, so its statement is open. A p above {SIGNIFICANT} "
     "refutes nothing: too few repetitions leave a claim open. The reason then says which difference the study could "
-    f"find in {POWER:.0%} of its repetitions.",
+    f"find with a power of {POWER:.0%}.",
     "Spread: strategies vary unequally, so a difference counts only if both Student's and Welch's p are below "
     f"{SIGNIFICANT}; the larger of the two is given.",
-    "Equal budgets: a claim that compares strategies is open if they may spend unequally, or select their samples from "
-    "searches of unequal size. A comparison with the direct baseline needs the same search for controllers only.",
+    "Equal budgets: the experiments of a study have one robot, engine and budget. A claim that compares strategies is "
+    "open if these select their samples from searches of unequal size, as with `reuse_transfer`. A comparison with the "
+    "direct baseline concerns the search for controllers only.",
     "A claim that names more strategies or samples than the study has is refuted by those that it has, but not "
     "reproduced by them.",
     "A verdict holds for the budget, the robot and the engines of its study. Budgets smaller than the paper's are "
@@ -71,7 +72,7 @@ class Examined:
         paper_test: result of the paper's own test.
         evidence: the statements; none if the study has nothing that the claim speaks of.
         lacking: what the claim names and the study lacks.
-        unequal: how budgets differ; None if they do not.
+        unequal: why strategies are compared unfairly; None if they are not.
         findable: the least difference that the study could find, or what it would need, in a sentence.
     """
 

@@ -14,7 +14,7 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.comparisons import Range
 from gaplab.services.core.statistics import compare
 from gaplab.services.figures.words import number_of, spoken
-from gaplab.services.reports.numbers import probability
+from gaplab.services.reports.numbers import probability, signed
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def _examined(study: Study, pairs: Sequence[Pair], first: int, last: int) -> Exa
         paper_test=_paper_test(tested, first, reached),
         evidence=tuple(each.evidence() for each in tested),
         lacking=tuple(lacking),
-        unequal=study.unequal([name for name in names if study.arm(name)], selections=True),
+        unequal=study.unequal(names),
         findable=_findable(study, tested),
     )
 
@@ -144,7 +144,7 @@ def _here(study: Study, tested: Sequence[Tested]) -> str:
     """Return the differences of the means, the smallest first for those that the paper has ahead."""
     ranked = sorted(tested, key=lambda each: each.difference if each.pair.ahead else abs(each.difference))
     unit = 1.0 if np.isnan(study.unit) else study.unit
-    told = f"{ranked[0].difference / unit:+.2f}".replace("-", "−")
+    told = signed(ranked[0].difference / unit)
     whose = "" if np.isnan(study.unit) else " of direct"
     least = "difference" if len(ranked) == 1 else "least difference"
     return f"{least} {told}{whose} ({ranked[0].pair})"

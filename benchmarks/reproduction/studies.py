@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,9 +22,6 @@ from gaplab.services.results.curves import curves, recorded_of
 from gaplab.services.store.queries import attempts, experiments
 from gaplab.services.store.queries.costs import work_of
 from gaplab.services.store.session import Session, Store
-
-NO_BUDGET = {"name", "strategy", "repetitions", "iterations", "seed", "priority", "max_parallel"}
-"""Fields of a spec that may differ between strategies that are compared fairly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,23 +144,14 @@ class Study:
         found = arm.recorded[:, first : last + 1] if arm else np.empty((0, last + 1 - first))
         return found[np.isfinite(found).all(axis=1)]
 
-    def unequal(self, names: Iterable[str], *, selections: bool) -> str | None:
-        """Return how experiments differ in what they may spend or simulate; None if they do not.
-
-        Args:
-            names: strategies, and `direct`.
-            selections: compare the sizes of the searches for a sample too.
-        """
+    def unequal(self, names: Iterable[str]) -> str | None:
+        """Return how the searches for a sample of these strategies differ in size; None if they do not."""
         arms = [arm for name in names if (arm := self.arm(name))]
-        specs = [_settings(arm.spec) for arm in arms]
-        fields = sorted({field for spec in specs[1:] for field in spec if spec[field] != specs[0][field]})
-        if fields:
-            return f"settings differ: {', '.join(fields)}"
         sizes = {arm.strategy: arm.selection for arm in arms if arm.selection is not None}
-        if selections and len(set(sizes.values())) > 1:
-            told = ", ".join(f"{name} {size:,}" for name, size in sizes.items())
-            return f"samples are selected from searches of unequal size ({told} evaluations)"
-        return None
+        if len(set(sizes.values())) < 2:
+            return None
+        told = ", ".join(f"{name} {size:,}" for name, size in sizes.items())
+        return f"samples are selected from searches of unequal size ({told} evaluations)"
 
 
 def read_study(store: Store, archive: Path) -> Study:
@@ -210,10 +197,3 @@ def _spans(session: Session, experiment: str, repetitions: int) -> list[tuple[da
         for each in attempts.attempts_of(session, experiment, number)
         if each.ended_at is not None
     ]
-
-
-def _settings(spec: ResolvedSpec) -> dict[str, Any]:
-    """Return what a spec lets a strategy spend and simulate."""
-    found = spec.model_dump(mode="json", exclude=NO_BUDGET)
-    budget = {field: value for field, value in found.pop("budget").items() if field != "preset"}
-    return {**found, **{f"budget/{field}": value for field, value in budget.items()}}

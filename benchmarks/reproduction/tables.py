@@ -35,7 +35,7 @@ def study_row(study: Study, label: str, link: str) -> tuple[str, ...]:
     spec = study.arms[0].spec
     budget, reality = spec.budget, study.arms[0].read.spec["reality"]
     sizes = budget.controller_evaluations, budget.selection_evaluations, budget.simulator_evaluations
-    shares = [f"{size / full:.0%}" for size, full in zip(sizes, paper.EVALUATIONS, strict=True)]
+    shares = [f"{100 * size / full:.2g} %" for size, full in zip(sizes, paper.EVALUATIONS, strict=True)]
     reused = "; transfers reused" if budget.reuse_transfer else ""
     truth = ", ".join(f"{spoken(name).lower()} {value}" for name, value in reality["parameters"].items())
     simulated = "a robot on a bench" if reality["engine"] is None else reality["engine"]["name"]
@@ -124,7 +124,7 @@ def direct_in_words(study: Study) -> str:
 def figure_3(store: Store, study: Study) -> str:
     """Return how near the simulators of a toy study are to the truth, and its fitness, by number of samples."""
     counts = [count for count in FIGURE_3 if count <= study.last]
-    rows = [("the paper, in words", "", *("more accurate, and fitter" for _ in counts[1:]))]
+    rows = []
     for name in study.present:
         arm = study.arm(name)
         away: Mapping[int, Found] = found(store, arm.read.id) if arm else {}
