@@ -37,7 +37,10 @@ def study_row(study: Study, label: str, link: str) -> tuple[str, ...]:
     sizes = budget.controller_evaluations, budget.selection_evaluations, budget.simulator_evaluations
     shares = [f"{100 * size / full:.2g} %" for size, full in zip(sizes, paper.EVALUATIONS, strict=True)]
     reused = "; transfers reused" if budget.reuse_transfer else ""
-    truth = ", ".join(f"{spoken(name).lower()} {value}" for name, value in reality["parameters"].items())
+    truth = ", ".join(
+        f"{spoken(name).lower()} {'hidden' if value is None else value}"
+        for name, value in reality["parameters"].items()
+    )
     simulated = "a robot on a bench" if reality["engine"] is None else reality["engine"]["name"]
     return (
         f"[{label}]({link}): {study.name}",
