@@ -132,8 +132,14 @@ def log(recorded: Sequence[float]) -> Iterator[Step]:
 
 def archive(store: Store, label: str, study: Study, folder: Path) -> Path:
     """Run a study, whose fitness is made, and export it."""
-    spec = {"name": f"made: {label}", "strategies": list(study.curves), "robot": "toy_function", "budget": "smoke"}
-    spec |= {"iterations": study.samples, "repetitions": study.repetitions, "seed": 7, **study.changes}
+    spec: dict[str, Any] = {"name": f"made: {label}", "strategies": list(study.curves), "robot": "toy_function"}
+    spec |= {
+        "budget": "smoke",
+        "iterations": study.samples,
+        "repetitions": study.repetitions,
+        "seed": 7,
+        **study.changes,
+    }
     made = submission.submit_study(store, StudySpec.model_validate(spec))
     recorded = {
         each.id: values(
@@ -387,8 +393,9 @@ def test_the_published_archives_have_a_document() -> None:
 
 
 def test_two_archives_of_one_name_are_refused(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "benchmarks.reproduction", tmp_path / "a" / "one.zip", tmp_path / "b" / "one.zip"]
+    archives = [str(tmp_path / folder / "one.zip") for folder in "ab"]
 
+    command = [sys.executable, "-m", "benchmarks.reproduction", *archives]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
 
     assert ended.returncode == 2
