@@ -79,7 +79,8 @@ class Document:
         ]
         return (
             f"## The verdicts\n\n{tables.table(('claim', *self.studies), rows)}\n\n"
-            "Each verdict has its reason [below](#the-claims), and follows from [rules](#how-a-verdict-is-reached)."
+            "Each verdict has its reason [below](#the-claims), and follows from [rules](#how-a-verdict-is-reached). Those "
+            "on a toy function say nothing of the paper's quadruped."
         )
 
     def _figure_4(self) -> Iterator[str]:
@@ -106,7 +107,7 @@ class Document:
         if not toys:
             yield "None of the archives is a study of the toy function."
         for label, study in toys.items():
-            yield f"### {label}, toy"
+            yield f"### Fig. 3: {label}"
             if picture := self.pictures.get((label, 3)):
                 yield f"![Function, simulators, samples and transfer in one repetition of {label}]({picture})"
             yield tables.figure_3(self.store, study)

@@ -345,7 +345,7 @@ def test_fitness_is_a_ratio_to_direct_beside_the_papers(document: Document) -> N
 
 
 def test_a_toy_study_has_the_papers_figure_3(document: Document) -> None:
-    row = document.row("agrees, toy", "Simulated fit")
+    row = document.row("Fig. 3: agrees", "Simulated fit")
 
     assert row["8"].startswith("0.00; 1.0")
     assert list(row) == ["samples", "0", "2", "4", "6", "8"]
