@@ -79,8 +79,8 @@ class Document:
         ]
         return (
             f"## The verdicts\n\n{tables.table(('claim', *self.studies), rows)}\n\n"
-            "Each verdict has its reason [below](#the-claims), and follows from [rules](#how-a-verdict-is-reached). Those "
-            "on a toy function say nothing of the paper's quadruped."
+            "Each verdict has its reason [below](#the-claims), and follows from [rules](#how-a-verdict-is-reached). "
+            "Those on a toy function say nothing of the paper's quadruped."
         )
 
     def _figure_4(self) -> Iterator[str]:

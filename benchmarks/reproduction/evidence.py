@@ -43,7 +43,8 @@ RULES = (
     "A claim that names more strategies or samples than the study has is refuted by those that it has, but not "
     "reproduced by them.",
     "The paper's claims are of its quadruped. A study of the toy function is judged by the same rules, but its "
-    "verdicts say nothing of a robot: evolution in the toy's reality finds the maximum, which no strategy can pass (C2).",
+    "verdicts say nothing of a robot: evolution in the toy's reality finds the maximum, which no strategy can "
+    "pass (C2).",
     "A verdict holds for the budget, the robot and the engines of its study. Budgets smaller than the paper's are "
     "stated, and change no verdict. Of several experiments with one strategy, the first counts.",
 )
