@@ -8,15 +8,13 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from gaplab import migrations
+from benchmarks.archives import import_file, private_store
 from gaplab.schemas.comparisons import Comparison
-from gaplab.services.archives import import_archive
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.results.comparisons import compare
@@ -33,8 +31,7 @@ def imported(store: Store, archives: Sequence[Path]) -> Imported:
     """Import archives, and return the labels of their experiments."""
     labels: Imported = {}
     for path in archives:
-        with path.open("rb") as file:
-            ids = import_archive(store, file).experiments
+        ids = import_file(store, path).experiments
         with store.reading() as session:
             names = {id_: experiments.get_experiment(session, id_).name for id_ in ids}
         labels |= {id_: path.stem if len(ids) == 1 else f"{path.stem}: {name}" for id_, name in names.items()}
@@ -153,17 +150,13 @@ def main() -> None:
     parser.add_argument("archives", nargs="+", type=Path)
     parser.add_argument("--after", type=int, nargs="+", default=[1, 3], help="numbers of evaluations to compare at")
     arguments = parser.parse_args()
-    with TemporaryDirectory(prefix="gaplab-findings-") as folder:
-        url = f"sqlite:///{Path(folder) / 'gaplab.db'}"
-        migrations.upgrade(url)
-        store = Store(url)
+    with private_store() as store:
         labels = imported(store, arguments.archives)
         console = Console(width=150)
         console.print(distance_table(store, labels))
         console.print(fitness_table(store, labels))
         if len(labels) > 1:
             console.print(difference_table(store, labels, arguments.after))
-        store.dispose()
 
 
 if __name__ == "__main__":
