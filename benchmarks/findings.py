@@ -9,15 +9,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from gaplab import migrations
+from benchmarks.archives import import_file, private_store
 from gaplab.schemas.comparisons import Comparison
-from gaplab.services.archives import import_archive
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.results.comparisons import compare
@@ -34,8 +32,7 @@ def imported(store: Store, archives: Sequence[Path]) -> Imported:
     """Import archives, and return the labels of their experiments."""
     labels: Imported = {}
     for path in archives:
-        with path.open("rb") as file:
-            ids = import_archive(store, file).experiments
+        ids = import_file(store, path).experiments
         with store.reading() as session:
             names = {id_: experiments.get_experiment(session, id_).name for id_ in ids}
         labels |= {id_: path.stem if len(ids) == 1 else f"{path.stem}: {name}" for id_, name in names.items()}
@@ -45,14 +42,8 @@ def imported(store: Store, archives: Sequence[Path]) -> Imported:
 @contextmanager
 def opened(archives: Sequence[Path]) -> Iterator[tuple[Store, Imported]]:
     """Open a temporary database with these archives, and the labels of their experiments."""
-    with TemporaryDirectory(prefix="gaplab-findings-") as folder:
-        url = f"sqlite:///{Path(folder) / 'gaplab.db'}"
-        migrations.upgrade(url)
-        store = Store(url)
-        try:
-            yield store, imported(store, archives)
-        finally:
-            store.dispose()
+    with private_store() as store:
+        yield store, imported(store, archives)
 
 
 @dataclass(frozen=True)
@@ -169,7 +160,7 @@ def main() -> None:
     parser.add_argument("--after", type=int, nargs="+", default=[1, 3], help="numbers of evaluations to compare at")
     arguments = parser.parse_args()
     with opened(arguments.archives) as (store, labels):
-        console = Console()
+        console = Console(width=150)
         console.print(distance_table(store, labels))
         console.print(fitness_table(store, labels))
         if len(labels) > 1:

@@ -43,7 +43,7 @@ def at_once(engine: Engine) -> Callable[[], int]:
 def bare(threads: int) -> Callable[[], int]:
     """Return work: `mujoco.rollout` of the same motions, model and contact law, with precomputed inputs."""
     engine = MuJoCo(MuJoCo.Options(threads=threads))
-    scene: MuJoCoScene = engine._scene(ROBOT.world)
+    scene: MuJoCoScene = engine._scenes[ROBOT.world.kind]
     motions = [ROBOT.motion(genome) for genome in genomes(MANY)]
     steps = int(scene._steps(motions[0].observe_s)[-1])
     controls = scene._controls(motions, steps)

@@ -79,7 +79,7 @@ def main() -> None:
                 seconds = _latency(url + path.format(**ids))
                 cells = f"{1000 * seconds:.1f} ms", "", f"{seconds / livez:.1f}"
                 table.add_row(f"GET {path}", f"{experiments + 7:,}", *cells)
-    Console().print(table)
+    Console(width=140).print(table)
 
 
 @contextmanager

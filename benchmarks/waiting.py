@@ -114,7 +114,7 @@ def main() -> None:
             to_none = f"{many[name][0] / none[name][0]:.2f}"
             memory = f"{none[name][2]:.2f}, {few[name][2]:.2f} and {many[name][2]:.2f} MB"
             table.add_row(kind, name, *milliseconds, *ratios, to_none, memory)
-    Console().print(table)
+    Console(width=140).print(table)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from gaplab.services.core.arrays import frozen
 from gaplab.services.core.robots import robots
 from gaplab.services.core.world import Motion
 from gaplab.services.specs.assembly import engine_of
+from gaplab.services.specs.default_engines import default_engine
 
 
 class Driver:
@@ -16,7 +17,7 @@ class Driver:
     def connect(self) -> None:
         """Connect once, before the first run: here, to a simulation in place of a serial port."""
         self.robot = robots.create(PluginRef(name="quadruped"))
-        self.engine = engine_of(PluginRef(name="mujoco"))
+        self.engine = engine_of(PluginRef(name=default_engine(self.robot)))
         self.noise = default_rng()
 
     def run(self, motion: DriverMotion) -> float:

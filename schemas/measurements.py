@@ -26,7 +26,7 @@ Table = tuple[tuple[Real | None, ...], ...]
 """`(r, s)`: a row for each time of reading, a column for each sensor, in its unit; null where it failed."""
 
 
-class Measured(Frozen):
+class MeasuredValues(Frozen):
     """What was measured of one controller.
 
     Attributes:
@@ -44,13 +44,13 @@ class Measured(Frozen):
     )
 
     @model_validator(mode="after")
-    def _check_the_readings(self) -> "Measured":
+    def _check_the_readings(self) -> "MeasuredValues":
         if self.readings is not None and len(self.readings) != len(self.values):
             raise ValueError(f"readings have one table for each value: {len(self.values)}, not {len(self.readings)}")
         return self
 
 
-class KnownSample(Measured):
+class KnownSample(MeasuredValues):
     """A controller that was measured before the experiment; the first simulators are tuned on it."""
 
     genome: tuple[Real, ...] = Field(min_length=1, max_length=100_000, examples=[(0.12, 0.55, 0.83, 0.31)])

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Literal, TypedDict, Unpack
 
 from gaplab.api.clients.connection import Connection, segment
-from gaplab.api.clients.driving import Driving, Task
+from gaplab.api.clients.driving import Driving, TakenRequest
 from gaplab.api.clients.journal import Journal
 from gaplab.api.clients.mcap_traces import mcap_to_csv
 from gaplab.api.clients.records import Records
@@ -45,7 +45,7 @@ class Bench:
         operator: str | None = None,
         lease_s: float = 60.0,
         journal: str | Path | None = None,
-    ) -> Iterator[Task]:
+    ) -> Iterator[TakenRequest]:
         """Yield the requests one after the other, each taken, until the experiment has ended.
 
             for request in client.requests(experiment, journal="journal.jsonl"):

@@ -15,7 +15,7 @@ from pathlib import Path
 from threading import Thread
 from typing import Any, Protocol
 
-from gaplab.api.clients.driving import DriverMotion, Task
+from gaplab.api.clients.driving import DriverMotion, TakenRequest
 
 
 class MeasurementFailed(Exception):
@@ -61,7 +61,7 @@ def load(file: Path) -> Driver:
     return driver
 
 
-def measure(task: Task, driver: Driver, limit_s: float | None, tell: Callable[[str], None]) -> None:
+def measure(task: TakenRequest, driver: Driver, limit_s: float | None, tell: Callable[[str], None]) -> None:
     """Run a taken request to its end: all repeats that an earlier run did not measure, then the answer.
 
     Args:

@@ -43,7 +43,7 @@ class DriverMotion:
     observe_s: tuple[float, ...]
 
 
-class Task:
+class TakenRequest:
     """A taken request.
 
     Attributes:
@@ -114,7 +114,7 @@ class Driving:
         self._connection, self._records = connection, records
         self._lease_s, self._operator = lease_s, operator or socket.gethostname()
 
-    def tasks(self, experiment: str | None, bench: str | None) -> Iterator[Task]:
+    def tasks(self, experiment: str | None, bench: str | None) -> Iterator[TakenRequest]:
         """Yield taken requests until the experiment has ended."""
         for id_, answer, key in self.journal.unsent():
             self._deliver(id_, answer, key)
@@ -127,7 +127,7 @@ class Driving:
             with self._held(request):
                 task = None
                 try:
-                    task = Task(self, request, self._motion(request))
+                    task = TakenRequest(self, request, self._motion(request))
                     yield task
                 finally:
                     if task is None or task.answered is None:

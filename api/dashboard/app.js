@@ -23,6 +23,9 @@ const VIEWS = [
 const IDS = ["experiment", "request"];
 const ID = /^[\w-]*$/;  // dots and slashes would lead to another path of the service
 
+/** @type {Record<string, string[]>} */
+const modules = JSON.parse(byId("modules").textContent ?? "{}");
+
 const AWAY = new Set([0, 502, 503, 504]);
 const RETRY_MS = 2000;
 
@@ -93,12 +96,25 @@ function retryLater(retry, signal) {
  * @param {string} name
  */
 async function loadView(name) {
+  preload(name);
   try {
     return await import(`./views/${name}.js`);
   } catch (error) {
     await fetch("livez").catch(() => { throw unreachable(reloadOnceBack); });
     throw error;
   }
+}
+
+/**
+ * Ask for all modules of a view at once: each level of imports would wait for the level above.
+ *
+ * @param {string} name
+ */
+function preload(name) {
+  for (const path of modules[name] ?? []) {
+    document.head.append(h("link", { rel: "modulepreload", href: new URL(path, import.meta.url).href }));
+  }
+  delete modules[name];
 }
 
 async function reloadOnceBack() {

@@ -1,5 +1,6 @@
 """The page at `/`: static files without data, open to everyone; the page asks the API like any client."""
 
+import json
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -9,9 +10,11 @@ from fastapi import FastAPI
 from fastapi.responses import HTMLResponse
 
 from gaplab.api.http.assets import Assets, version_of
+from gaplab.api.http.modules import modules_of
 from gaplab.api.http.security_headers import page
 
 FILES: Final = Path(__file__).parents[1] / "dashboard"
+SCRIPT: Final = "app.js"
 
 
 def install(app: FastAPI) -> None:
@@ -28,4 +31,12 @@ def _index() -> HTMLResponse:
 
 @cache
 def _html() -> str:
-    return (FILES / "index.html").read_text(encoding="utf-8").replace("{plotly}", version("plotly"))
+    """Return the page with the modules of its script, and of those that each view adds when it is shown."""
+    always = modules_of(FILES, SCRIPT)
+    views = {
+        view.stem: [path for path in modules_of(FILES, f"views/{view.name}") if path not in always]
+        for view in sorted(FILES.glob("views/*.js"))
+    }
+    preloads = "\n".join(f'  <link rel="modulepreload" href="assets/dashboard/{path}">' for path in always[1:])
+    html = (FILES / "index.html").read_text(encoding="utf-8").replace("{plotly}", version("plotly"))
+    return html.replace("  <!-- preloads -->", preloads).replace("{modules}", json.dumps(views))

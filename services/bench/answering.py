@@ -28,7 +28,7 @@ from gaplab.services.store.session import Session, Store
 from gaplab.services.store.statements import storable
 
 
-class Addressed(MeasurementSpec):
+class AddressedAnswer(MeasurementSpec):
     """An answer with the request that it is of, so that an idempotency key fits this request alone."""
 
     request: str
@@ -54,7 +54,7 @@ def answer(
         InvalidSpec: the values do not fit the request; every violation is named.
         Conflict: the request is wanted no more.
     """
-    asked = Addressed(request=id_, **spec.model_dump())
+    asked = AddressedAnswer(request=id_, **spec.model_dump())
     return once(store, admitted, asked, AnswerRead, lambda session: _answer(session, id_, spec, traces, admitted.token))
 
 

@@ -107,7 +107,7 @@ def read_request(session: Session, id_: str) -> RequestRead:
     return view_requests(session, [requests.get(session, id_)[0]])[0]
 
 
-class Addressed(TakeSpec):
+class AddressedTake(TakeSpec):
     """A take with the request that it is of, so that an idempotency key fits this request alone."""
 
     request: str
@@ -120,7 +120,7 @@ def take(store: Store, id_: str, spec: TakeSpec, admitted: Admission) -> Once[Re
         NotFound: it does not exist.
         Conflict: it is not open, its bench is busy, or its experiment is paused.
     """
-    asked = Addressed(request=id_, **spec.model_dump())
+    asked = AddressedTake(request=id_, **spec.model_dump())
     try:
         return once(store, admitted, asked, RequestRead, lambda session: _take(session, id_, spec))
     except IntegrityError as error:

@@ -92,10 +92,12 @@ def _judged(left: float | None) -> Identification:
 
 
 def _sentence(now: TunableDistribution, verdict: Identification, left: float | None) -> str:
+    repetitions = f"{now.n} repetition{'s' if now.n != 1 else ''}"
     if left is None:
-        return f"{now.name}: unknown, for {now.n} repetitions are too few to compare, and the tuner gives no intervals"
+        few = f"{repetitions} {'is' if now.n == 1 else 'are'} too few to compare"
+        return f"{now.name}: unknown, for {few}, and the tuner gives no intervals"
     deviation = f" \N{PLUS-MINUS SIGN} {now.sd:.2g}" if now.sd is not None else ""
-    value = f"{now.mean:.2g}{deviation} over {now.n} repetitions"
+    value = f"{now.mean:.2g}{deviation} over {repetitions}"
     return f"{now.name}: {verdict.value}; {value}, with {100 * left:.0f} % of the uncertainty before any sample"
 
 

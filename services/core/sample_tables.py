@@ -33,7 +33,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
 @dataclass(frozen=True)
-class Column:
+class SampleColumn:
     """What a column holds.
 
     Attributes:
@@ -79,7 +79,9 @@ def read_samples(text: str, robot: Robot) -> SamplesRead:
     return SamplesRead(samples=() if errors else tuple(samples), errors=told, more=len(errors) - len(told))
 
 
-def _columns(line: int, headings: Sequence[str], robot: Robot, errors: list[CellError]) -> Iterator[Column | None]:
+def _columns(
+    line: int, headings: Sequence[str], robot: Robot, errors: list[CellError]
+) -> Iterator[SampleColumn | None]:
     """Yield what each column holds, None if it is unknown; add what is wrong with the header to the errors."""
     found = []
     for heading in headings:
@@ -103,13 +105,13 @@ def _columns(line: int, headings: Sequence[str], robot: Robot, errors: list[Cell
         errors.append(CellError(line=line, column=name, message=f"there is no column {name}", permitted=_told(robot)))
 
 
-def _column(name: str, robot: Robot) -> Column | None:
+def _column(name: str, robot: Robot) -> SampleColumn | None:
     """Return what a column of this name holds; None if the robot has nothing of this name."""
     if match := _GENE.fullmatch(name):
-        return Column(name, "gene", int(match[1])) if int(match[1]) < robot.space.size else None
+        return SampleColumn(name, "gene", int(match[1])) if int(match[1]) < robot.space.size else None
     if match := _VALUE.fullmatch(name):
         repeat = int(match[1] or 1)
-        return Column(name, "value", repeat - 1) if 1 <= repeat <= MOST_VALUES else None
+        return SampleColumn(name, "value", repeat - 1) if 1 <= repeat <= MOST_VALUES else None
     match, sensors = _READING.fullmatch(name), robot.sensors
     if match is None or match["sensor"] not in sensors.names:
         return None
@@ -117,10 +119,10 @@ def _column(name: str, robot: Robot) -> Column | None:
     repeat = int(match["repeat"] or 1)
     if not times or not 1 <= repeat <= MOST_VALUES:
         return None
-    return Column(name, "reading", repeat - 1, times[0], sensors.names.index(match["sensor"]))
+    return SampleColumn(name, "reading", repeat - 1, times[0], sensors.names.index(match["sensor"]))
 
 
-def _absent(columns: Sequence[Column], robot: Robot) -> Iterator[str]:
+def _absent(columns: Sequence[SampleColumn], robot: Robot) -> Iterator[str]:
     """Yield the names of columns that a table must have."""
     genes = {column.place for column in columns if column.kind == "gene"}
     values = {column.place for column in columns if column.kind == "value"}
@@ -131,14 +133,14 @@ def _absent(columns: Sequence[Column], robot: Robot) -> Iterator[str]:
 
 
 def _numbers(
-    line: int, cells: Sequence[str], columns: Sequence[Column | None], errors: list[CellError]
-) -> dict[Column, float]:
+    line: int, cells: Sequence[str], columns: Sequence[SampleColumn | None], errors: list[CellError]
+) -> dict[SampleColumn, float]:
     """Return the numbers of a line, none if it has an error; add what is wrong with its cells to the errors."""
     if len(cells) != len(columns):
         message = f"the line has {len(cells)} cells, and the header {len(columns)}"
         errors.append(CellError(line=line, message=message, permitted=f"exactly {len(columns)} cells"))
         return {}
-    before, numbers = len(errors), dict[Column, float]()
+    before, numbers = len(errors), dict[SampleColumn, float]()
     for column, cell in zip(columns, cells, strict=True):
         if column is None:
             continue
@@ -155,8 +157,8 @@ def _numbers(
 
 def _sample(
     line: int,
-    numbers: Mapping[Column, float],
-    columns: Sequence[Column | None],
+    numbers: Mapping[SampleColumn, float],
+    columns: Sequence[SampleColumn | None],
     robot: Robot,
     errors: list[CellError],
 ) -> tuple[KnownSample, ...]:
@@ -169,7 +171,7 @@ def _sample(
     return (sample,)
 
 
-def _gaps(line: int, numbers: Mapping[Column, float]) -> Iterator[CellError]:
+def _gaps(line: int, numbers: Mapping[SampleColumn, float]) -> Iterator[CellError]:
     """Yield a value after an empty one, and a reading of a repeat without a value."""
     count = sum(column.kind == "value" for column in numbers)
     for column, number in numbers.items():
@@ -180,7 +182,7 @@ def _gaps(line: int, numbers: Mapping[Column, float]) -> Iterator[CellError]:
             yield CellError(line=line, column=column.name, value=f"{number:g}", message=missing)
 
 
-def _assembled(numbers: Mapping[Column, float], reads: bool, robot: Robot) -> KnownSample:
+def _assembled(numbers: Mapping[SampleColumn, float], reads: bool, robot: Robot) -> KnownSample:
     """Return the sample of a line without gaps; with readings if the table has any."""
     genes = {column.place: number for column, number in numbers.items() if column.kind == "gene"}
     values = {column.place: number for column, number in numbers.items() if column.kind == "value"}

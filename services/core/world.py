@@ -3,7 +3,8 @@
 SI units throughout; z points up; the ground is the plane z = 0. Lengths of boxes are full edges, not halves.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TypeAlias
 
 from gaplab.services.core.arrays import FloatArray
@@ -109,6 +110,11 @@ class World:
     def actuators(self) -> tuple[Joint, ...]:
         """Return the joints that a motion drives."""
         return tuple(joint for joint in self.joints if joint.motor is not None)
+
+    @cached_property
+    def kind(self) -> "World":
+        """The world in the default material: equal for worlds that differ only in their material."""
+        return replace(self, material=Material())
 
 
 @dataclass(frozen=True, eq=False)

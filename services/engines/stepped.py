@@ -72,15 +72,14 @@ class SteppedEngine(Engine, Generic[S]):
 
         All is nan if the poses of the checked rows are implausible.
         """
-        bare = replace(world, material=Material())
-        scene = self._scenes[bare]
+        scene = self._scenes[world.kind]
         look = (lambda: _joints_too(scene)) if with_angles else scene.pose
         try:
             seen = watch(scene, self._start(scene, world.material), motion, look)
         except self.failures:
             seen = np.full((len(motion.observe_s), 7 + with_angles * 2 * len(world.joints)), np.nan)
         if not plausible(seen[checked, :7]):
-            self._scenes.drop(bare)  # nan persists in a PhysX scene; Bullet drops bodies that are too far away
+            self._scenes.drop(world.kind)  # nan persists in a PhysX scene; Bullet drops bodies that are too far away
             return np.full_like(seen, np.nan)
         return seen
 

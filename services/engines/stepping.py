@@ -1,14 +1,14 @@
 """Shared parts of engines that advance step by step: motions in whole time steps, and a cache of scenes."""
 
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.world import Motion, Recording, Trajectory, World
 
 WARM_SCENES = 4
@@ -19,6 +19,9 @@ FARTHEST_M = 100.0
 
 DEEPEST_M = 1.0
 """Largest plausible depth of the base in the ground."""
+
+LOWEST, HIGHEST = frozen([-FARTHEST_M, -FARTHEST_M, -DEEPEST_M]), frozen([FARTHEST_M] * 3)
+"""Open bounds of a plausible position."""
 
 
 class Warm(Protocol):
@@ -61,20 +64,26 @@ class WarmScenes(Generic[S]):
     def __init__(self, build: Callable[[World], S]) -> None:
         self._build = build
         self._scenes: OrderedDict[World, S] = OrderedDict()
+        self._latest: tuple[World, S] | None = None
 
     def __getitem__(self, world: World) -> S:
+        if self._latest is not None and self._latest[0] == world:  # a hash would take 25 µs
+            return self._latest[1]
         scene = self._scenes.pop(world, None) or self._build(world)
         self._scenes[world] = scene
         while len(self._scenes) > WARM_SCENES:
             self._scenes.popitem(last=False)[1].close()
+        self._latest = world, scene
         return scene
 
     def drop(self, world: World) -> None:
         """Drop a broken scene; the next call rebuilds it."""
+        self._latest = None
         self._scenes.pop(world).close()
 
     def close(self) -> None:
         """Close all scenes."""
+        self._latest = None
         while self._scenes:
             self._scenes.popitem()[1].close()
 
@@ -115,8 +124,14 @@ def watch(
 
 def plausible(poses: FloatArray) -> NDArray[np.bool_]:
     """Return `(...)`: whether all poses `(..., t, 7)` are plausible; nan is not."""
-    near = np.all(np.abs(poses[..., :3]) < FARTHEST_M, axis=(-2, -1))
-    return np.asarray(near & np.all(poses[..., 2] > -DEEPEST_M, axis=-1))
+    places = poses[..., :3]
+    return np.asarray(((places > LOWEST) & (places < HIGHEST)).all(axis=(-2, -1)))
+
+
+def consecutive(indices: Sequence[int]) -> slice | list[int]:
+    """Return ascending indices, as a slice if each follows the one before: a slice copies nothing."""
+    first, last = (indices[0], indices[-1]) if indices else (0, -1)
+    return slice(first, last + 1) if list(indices) == list(range(first, last + 1)) else list(indices)
 
 
 def _commands(motion: Motion, time_step_s: float) -> dict[int, list[tuple[int, float]]]:

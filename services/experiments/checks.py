@@ -7,6 +7,7 @@ cannot be used.
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from hashlib import sha256
 
 from sqlalchemy import select
@@ -27,7 +28,7 @@ from gaplab.services.store.models import ExperimentRow, SensitivityRow
 from gaplab.services.store.queries.events import note
 from gaplab.services.store.session import Store, snapshot
 from gaplab.services.store.statements import insert_new, storable
-from gaplab.services.store.stored_specs import checked
+from gaplab.services.store.stored_specs import checked, subject
 
 
 @dataclass(frozen=True)
@@ -130,9 +131,7 @@ def summaries(session: Session, experiments: Iterable[ExperimentRow]) -> dict[st
 
     An imported experiment names no check: it has the check of the same tunables, if there is one.
     """
-    ids = {
-        row.id: row.sensitivity_id or id_of(checked(row.spec), external={}) for row in experiments if row.iterations > 1
-    }
+    ids = {row.id: row.sensitivity_id or _id_of_text(subject(row.spec)) for row in experiments if row.iterations > 1}
     rows = session.scalars(select(SensitivityRow).where(SensitivityRow.id.in_(ids.values())))
     found = {row.id: CheckSummary(row.id, warnings(row)) for row in rows}
     return {experiment: found[check] for experiment, check in ids.items() if check in found}
@@ -158,6 +157,12 @@ def id_of(spec: Checked, external: Mapping[str, str] | None = None) -> str:
     files = [versions[name] for name in names if name in versions]
     text = json.dumps([VERSION, spec.model_dump(mode="json"), *files], sort_keys=True)
     return sha256(text.encode()).hexdigest()[:16]
+
+
+@lru_cache(maxsize=256)
+def _id_of_text(subject: str) -> str:
+    """Return the id of the check of a subject without external plug-ins; the experiments of a list share subjects."""
+    return id_of(Checked.model_validate_json(subject), external={})
 
 
 def _findings(check: SensitivityRow) -> tuple[Sensitivity, ...]:

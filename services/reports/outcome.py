@@ -20,7 +20,7 @@ MOST_ROWS = 1_000_000
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ExperimentOutcome:
     """The outcome of an experiment so far.
 
     Attributes:
@@ -57,7 +57,7 @@ class Outcome:
         return {verdict.name: verdict for verdict in self.misfit.verdicts} if self.misfit else {}
 
 
-def outcome_of(store: Store, experiment_id: str) -> Outcome:
+def outcome_of(store: Store, experiment_id: str) -> ExperimentOutcome:
     """Return the outcome of an experiment so far.
 
     Raises:
@@ -76,7 +76,7 @@ def outcome_of(store: Store, experiment_id: str) -> Outcome:
     if best is None and not simulators:
         raise Conflict(f"experiment {experiment_id!r} has measured and tuned nothing yet; try again later")
     spec = spec_of(row.spec)
-    return Outcome(
+    return ExperimentOutcome(
         facts=facts,
         spec=spec,
         robot=robots.create(spec.robot, "/robot"),

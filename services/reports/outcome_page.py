@@ -6,14 +6,14 @@ from gaplab.services.figures.words import number, number_of, spoken, with_unit
 from gaplab.services.reports import tables
 from gaplab.services.reports.blocks import Block, Bullets, Code, Drawing, Grid, Paragraph, Report, Section
 from gaplab.services.reports.numbers import MISSING
-from gaplab.services.reports.outcome import Outcome
+from gaplab.services.reports.outcome import ExperimentOutcome
 from gaplab.services.reports.reproduction import instructions
 
 MOST_SHOWN = 60
 """Most measurements on the page; the files have all."""
 
 
-def outcome_report(outcome: Outcome) -> Report:
+def outcome_report(outcome: ExperimentOutcome) -> Report:
     """Return the outcome of an experiment as a short report."""
     experiment = outcome.experiment
     sections = [
@@ -36,7 +36,7 @@ def outcome_report(outcome: Outcome) -> Report:
     )
 
 
-def verdict_sentences(outcome: Outcome) -> tuple[str, ...]:
+def verdict_sentences(outcome: ExperimentOutcome) -> tuple[str, ...]:
     """Return what the experiment found, and what its samples say about the tunables, in sentences."""
     misfit = outcome.misfit
     found = [*outcome.facts.verdict.sentences]
@@ -49,7 +49,7 @@ def verdict_sentences(outcome: Outcome) -> tuple[str, ...]:
     return tuple(found) or ("There are too few results for a verdict.",)
 
 
-def _controller(outcome: Outcome) -> tuple[Block, ...]:
+def _controller(outcome: ExperimentOutcome) -> tuple[Block, ...]:
     best, unit = outcome.best, outcome.robot.unit
     assert best is not None
     error = "" if best.standard_error is None else f" ± {best.standard_error:.3g} (standard error)"
@@ -63,7 +63,7 @@ def _controller(outcome: Outcome) -> tuple[Block, ...]:
     )
 
 
-def _simulator(outcome: Outcome) -> tuple[Block, ...]:
+def _simulator(outcome: ExperimentOutcome) -> tuple[Block, ...]:
     simulator, misfit = outcome.simulators[0], outcome.misfit
     rows = tuple(
         (
@@ -84,7 +84,7 @@ def _simulator(outcome: Outcome) -> tuple[Block, ...]:
     return (Grid(caption, ("Tunable", "Value", "95 % interval", "Bounds", "Verdict"), rows, words=True), *left)
 
 
-def _measurements(outcome: Outcome) -> tuple[Block, ...]:
+def _measurements(outcome: ExperimentOutcome) -> tuple[Block, ...]:
     shown = outcome.measured[:MOST_SHOWN]
     rows = tuple(
         (

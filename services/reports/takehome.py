@@ -13,7 +13,7 @@ from gaplab.services.bench import motions
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.tunables import tunables
 from gaplab.services.reports.html import render_html
-from gaplab.services.reports.outcome import Outcome, outcome_of
+from gaplab.services.reports.outcome import ExperimentOutcome, outcome_of
 from gaplab.services.reports.outcome_page import outcome_report, verdict_sentences
 from gaplab.services.reports.reproduction import spec_text
 from gaplab.services.store.session import Store
@@ -73,11 +73,11 @@ def takehome_zip(store: Store, experiment_id: str, draw: Callable[[Callable[[], 
     return content.getvalue()
 
 
-def _page(outcome: Outcome) -> str:
+def _page(outcome: ExperimentOutcome) -> str:
     return render_html(outcome_report(outcome), f"Made by gaplab {version('gaplab')}.")
 
 
-def _files(outcome: Outcome) -> Iterator[tuple[str, str]]:
+def _files(outcome: ExperimentOutcome) -> Iterator[tuple[str, str]]:
     """Yield name and text of each file beside the page."""
     experiment, best = outcome.experiment, outcome.best
     yield "README.txt", README.format(id=experiment.id, name=experiment.name, version=version("gaplab"))
@@ -95,7 +95,7 @@ def _files(outcome: Outcome) -> Iterator[tuple[str, str]]:
         yield "simulator.json", _json(_simulator(outcome))
 
 
-def samples_csv(outcome: Outcome) -> str:
+def samples_csv(outcome: ExperimentOutcome) -> str:
     """Return the measurements as a table of samples; equal ones once, since a sample may also be a probe.
 
     Readings are in it unless measurements have repeats, since the mean of readings is all that is stored.
@@ -116,7 +116,7 @@ def samples_csv(outcome: Outcome) -> str:
     return text.getvalue()
 
 
-def _readings(sample: SampleRead, outcome: Outcome) -> list[float | None]:
+def _readings(sample: SampleRead, outcome: ExperimentOutcome) -> list[float | None]:
     """Return the readings of a measurement in the sensors' units, empty where one failed."""
     size = outcome.robot.sensors.size
     if sample.readings is None or len(sample.readings) != size:
@@ -125,7 +125,7 @@ def _readings(sample: SampleRead, outcome: Outcome) -> list[float | None]:
     return [None if value != value else value for value in told.ravel().tolist()]  # noqa: PLR0124 - nan
 
 
-def _simulator(outcome: Outcome) -> dict[str, Any]:
+def _simulator(outcome: ExperimentOutcome) -> dict[str, Any]:
     best, misfit = outcome.simulators[0], outcome.misfit
     return {
         "experiment": outcome.experiment.id,

@@ -11,7 +11,7 @@ from gaplab.services.core.safety import MOST_SIMULATORS, Extremes, extremes, rec
 from gaplab.services.core.world import Recording, World
 
 
-class Records(Protocol):
+class RecordsRollouts(Protocol):
     """A simulation that records rollouts."""
 
     def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:
@@ -28,7 +28,7 @@ class SafetyForecast:
         simulation: simulation of the robot.
     """
 
-    def __init__(self, spec: ResolvedSpec, robot: Robot, simulation: Records) -> None:
+    def __init__(self, spec: ResolvedSpec, robot: Robot, simulation: RecordsRollouts) -> None:
         self._limits, self._engine = spec.reality.limits, spec.engine.name
         self._robot, self._simulation = robot, simulation
 
@@ -57,7 +57,7 @@ class SafetyForecast:
         return extremes(world, recording, float(self._robot.fitness(recording.trajectory)))
 
 
-def forecast_of(spec: ResolvedSpec, robot: Robot, simulation: Records) -> SafetyForecast | None:
+def forecast_of(spec: ResolvedSpec, robot: Robot, simulation: RecordsRollouts) -> SafetyForecast | None:
     """Return the forecast of a spec; None if its reality is simulated, or its robot has no body."""
     if spec.reality.kind != "physical" or not robot.world.bodies:
         return None

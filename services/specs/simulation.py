@@ -1,7 +1,6 @@
 """The simulation of a robot on an engine, in worlds that tunables edit."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple, TypeAlias
 
@@ -12,7 +11,7 @@ from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, 
 from gaplab.services.core.errors import PluginBroken
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.tunables.base import Tunable
-from gaplab.services.core.world import Recording, Trajectory, World
+from gaplab.services.core.world import Motion, Recording, Trajectory, World
 from gaplab.services.engines.base import Engine
 
 WORLDS_KEPT = 4096
@@ -48,7 +47,8 @@ class Simulation:
         worlds = [self._world(tuple(row)) for row in parameters.tolist()]
         motions = [self._robot.motion(genome) for genome in genomes]
         times = _all_times(motions[0].observe_s.tobytes(), sensors.times_s.tobytes())
-        seen = self._engine.rollouts(worlds, [replace(motion, observe_s=times.all_s) for motion in motions])
+        longer = [Motion(motion.times_s, motion.targets, times.all_s) for motion in motions]
+        seen = self._engine.rollouts(worlds, longer)
         fitnesses = self._fitnesses(_at(seen, times.observed), len(genomes), len(parameters))
         if not sensors.size:
             return fitnesses[..., None]
@@ -59,7 +59,9 @@ class Simulation:
             raise PluginBroken(f"{found}; permitted: {expected}")
         outcomes = np.empty((len(genomes), len(parameters), 1 + sensors.size))
         outcomes[..., 0], outcomes[..., 1:] = fitnesses, sensors.standardised(values)
-        outcomes[np.isnan(fitnesses)] = np.nan
+        failed = np.isnan(fitnesses)
+        if np.count_nonzero(failed):
+            outcomes[failed] = np.nan
         return outcomes
 
     def _fitnesses(self, seen: Trajectory, genomes: int, simulators: int) -> Fitnesses:
@@ -98,10 +100,11 @@ def _all_times(observed: bytes, sensed: bytes) -> _Times:
 
 
 def _places(all_s: FloatArray, times_s: FloatArray) -> Places:
-    """Return the places of some of the times; a slice where they follow each other, which copies nothing."""
+    """Return the places of some of the times; a slice where they are equally far apart, which copies nothing."""
     places = np.searchsorted(all_s, times_s)
-    if len(places) and places[-1] - places[0] == len(places) - 1:
-        return slice(int(places[0]), int(places[-1]) + 1)
+    steps = np.unique(np.diff(places))
+    if len(steps) == 1 and steps[0] > 0:
+        return slice(int(places[0]), int(places[-1]) + 1, int(steps[0]))
     return places
 
 

@@ -1,5 +1,6 @@
 """Resolved specs as they are stored: plain JSON."""
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,7 +9,12 @@ from gaplab.schemas.sensitivity import Checked
 
 def checked(spec: Mapping[str, Any]) -> Checked:
     """Return the subject of a sensitivity check of this resolved spec."""
-    return Checked.model_validate({name: spec[name] for name in ("robot", "engine", "tunables")})
+    return Checked.model_validate_json(subject(spec))
+
+
+def subject(spec: Mapping[str, Any]) -> str:
+    """Return, as JSON, what a sensitivity check of this resolved spec is about."""
+    return json.dumps({name: spec[name] for name in ("robot", "engine", "tunables")})
 
 
 LATER = {"discrepancy": {"name": "squared_fitness", "options": {}}, "tuner": {"name": "search", "options": {}}}

@@ -9,6 +9,7 @@ from fastapi.testclient import TestClient
 
 from gaplab.api.app import create_app
 from gaplab.api.http.assets import version_of
+from gaplab.api.http.modules import modules_of
 from gaplab.api.routes.dashboard import FILES
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.plugins.catalogue import catalogue
@@ -64,6 +65,38 @@ def test_the_next_visit_asks_for_no_module(api: TestClient, tmp_path: Path) -> N
     before = version_of(tmp_path)
     (tmp_path / "a.js").write_text("12")
     assert version_of(tmp_path) != before
+
+
+def test_the_page_names_all_modules_at_once(api: TestClient) -> None:
+    html = api.get("/").text
+    preloaded = re.findall(r'rel="modulepreload" href="(assets/[^"]+/dashboard/)([^"]+)"', html)
+    of_views = json.loads(html.split('id="modules">')[1].split("<")[0])
+
+    asked = {base + path for base, path in preloaded}
+    asked |= {preloaded[0][0] + path for paths in of_views.values() for path in paths}
+    named = {path.removeprefix(preloaded[0][0]) for path in asked} | {"app.js"}
+    imported = re.compile(r'^(?:import|export)[^"\']*"(\.[^"]+)"', re.MULTILINE)
+    wanted = {
+        (FILES / path).parent.joinpath(each).resolve().relative_to(FILES.resolve()).as_posix()
+        for path in named
+        for each in imported.findall((FILES / path).read_text())
+    }
+
+    assert set(of_views) == {path.stem for path in (FILES / "views").glob("*.js")}
+    assert {api.get(f"/{path}").status_code for path in asked} == {200}
+    assert wanted <= named
+    assert not {path for _, path in preloaded} & {path for paths in of_views.values() for path in paths}
+
+
+def test_modules_that_import_each_other_are_named_once(tmp_path: Path) -> None:
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "a.js").write_text(
+        'import {\n  b,\n} from "./lib/b.js";\nexport { c } from "./c.js";\nimport "plotly";\n'
+    )
+    (tmp_path / "lib/b.js").write_text('import { a } from "../a.js";\nconst late = import("./d.js");\n')
+    (tmp_path / "c.js").write_text('import "./lib/b.js";\n')
+
+    assert modules_of(tmp_path, "a.js") == ("a.js", "lib/b.js", "c.js")
 
 
 def test_a_module_is_script_also_where_it_is_compressed(api: TestClient) -> None:

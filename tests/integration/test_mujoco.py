@@ -257,7 +257,7 @@ def test_the_pose_is_of_the_bodys_frame_not_of_its_center_of_mass(engine: MuJoCo
 
 
 def test_every_body_has_the_mass_and_the_inertia_of_its_solid_shape(engine: MuJoCo) -> None:
-    model = engine._scene(ROBOT.world).model
+    model = engine._scenes[ROBOT.world.kind].model
 
     for body in ROBOT.world.bodies:
         made = model.body(body.name)

@@ -69,7 +69,7 @@ ARROWS = {
         {"pydantic", "pydantic_settings", "sqlalchemy"},
     ),
     "workers": (("schemas", "services", "workers"), {"numpy", "ray"}),
-    "api/http": (("schemas", "services", "api.http"), WEB | {"fastapi_offline"}),
+    "api/http": (("schemas", "services", "api.http"), WEB | {"fastapi_offline", "cachetools"}),
     "api/routes": (("schemas", "services", "api.http", "api.routes"), WEB),
     "api/app.py": (("services", "api.http", "api.routes"), {"fastapi"}),
     "api/process": (("services", "migrations", "api.app", "api.clients", "api.process"), {"fastapi", "uvicorn", "h11"}),

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.robots import quadruped
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.world import Motion, Trajectory
@@ -62,6 +63,33 @@ def test_a_pulse_starts_at_its_phase_and_lasts_for_its_width(
     expected = amplitude if since < share else -amplitude
     for period in (0, 1, 3):
         assert target(motion, actuator, (period + when) * quadruped.PERIOD_S) == expected
+
+
+@pytest.mark.parametrize("counted_s", [0.3, 2.5, 11.37])
+def test_motions_equal_the_plain_formula_to_the_last_bit(counted_s: float) -> None:
+    robot, rng = Quadruped(Quadruped.Options(counted_s=counted_s)), np.random.default_rng(0)
+    nearly = np.minimum(rng.choice([0.0, 0.1, 0.5, 1.0], (50, 24)) + rng.choice([0.0, 1e-16, 3e-16], (50, 24)), 1.0)
+    tenths, anywhere = rng.integers(0, 11, (50, 24)) / 10, robot.space.draw(50, rng)
+
+    for genome in (robot.known, *nearly, *tenths, *anywhere):
+        times_s, targets = plainly(genome, quadruped.SETTLING_S + counted_s)
+        motion = robot.motion(genome)
+        assert motion.times_s.tobytes() == times_s.tobytes()
+        assert motion.targets.tobytes() == targets.tobytes()
+        assert not motion.times_s.flags.writeable
+        assert not motion.targets.flags.writeable
+
+
+def plainly(genome: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArray]:
+    """Return times and targets of a motion by the formula, without regard to speed."""
+    phases, widths = genome[0::2], quadruped.NARROWEST + (quadruped.WIDEST - quadruped.NARROWEST) * genome[1::2]
+    edges = np.mod(np.concatenate([phases, phases + widths]), 1.0)
+    cycles = np.arange(np.ceil(duration_s / quadruped.PERIOD_S))
+    times = np.unique(np.append(0.0, np.add.outer(cycles, edges)))
+    middles = (times + np.append(times[1:], times[-1] + 1e-9)) / 2
+    inside = np.mod(middles[:, None] - phases, 1.0) < widths
+    amplitudes = np.tile(quadruped.AMPLITUDES_RAD, 4)
+    return times * quadruped.PERIOD_S, np.where(inside, amplitudes, -amplitudes)
 
 
 def test_phases_of_zero_and_one_are_the_same_controller() -> None:

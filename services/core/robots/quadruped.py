@@ -86,36 +86,53 @@ class Quadruped(Robot):
             noises=frozen([TILT_NOISE_RAD] * 2 + [PLACE_NOISE_M] * 3),
             times_s=frozen(SETTLING_S + times),
         )
+        self._prepare_pulses(actuators)
+
+    def _prepare_pulses(self, actuators: int) -> None:
+        """Compute what all motions share; numpy is faster with these arrays than with numbers or rows to repeat."""
+        duration_s = SETTLING_S + self.options.counted_s
+        self._observe_s = frozen([SETTLING_S, duration_s])
+        self._cycles = frozen(np.arange(np.ceil(duration_s / PERIOD_S))[:, None])
+        self._narrowest, self._range = frozen([NARROWEST] * actuators), frozen([WIDEST - NARROWEST] * actuators)
+        amplitudes = np.tile(AMPLITUDES_RAD, len(LEGS))[:, None]
+        self._inside = frozen(np.repeat(amplitudes, 1 + 2 * actuators * self._cycles.size, axis=1))
+        self._outside = frozen(-self._inside)
 
     def motion(self, genome: Genome) -> Motion:
         """Return the motion: each actuator is at plus its amplitude during its pulse, else at minus."""
-        phases, widths = genome[0::2], NARROWEST + (WIDEST - NARROWEST) * genome[1::2]
-        duration_s = SETTLING_S + self.options.counted_s
-        edges = np.mod(np.concatenate([phases, phases + widths]), 1.0)
-        cycles = np.arange(np.ceil(duration_s / PERIOD_S))
-        times = np.unique(np.append(0.0, np.add.outer(cycles, edges)))
-        middles = (times + np.append(times[1:], times[-1] + 1e-9)) / 2
-        inside = np.mod(middles[:, None] - phases, 1.0) < widths
-        amplitudes = np.tile(AMPLITUDES_RAD, len(LEGS))
-        return Motion(
-            times_s=frozen(times * PERIOD_S),
-            targets=frozen(np.where(inside, amplitudes, -amplitudes)),
-            observe_s=frozen([SETTLING_S, duration_s]),
-        )
+        phases, widths = genome[0::2], self._narrowest + self._range * genome[1::2]
+        ends = np.concatenate((phases, phases + widths))
+        edges = ends - np.floor(ends)  # mod 1, to the last bit, in half the time
+        edges.sort()
+        times = np.empty(2 + self._cycles.size * edges.size)  # in periods, and a moment after the last
+        times[0], times[1:-1] = 0.0, (self._cycles + edges).ravel()
+        times[-1] = times[-2] + 1e-9
+        since = (times[:-1] + times[1:]) / 2 - phases[:, None]
+        since -= np.floor(since)
+        targets = np.where(since < widths[:, None], self._inside, self._outside).T
+        times_s, distinct = times[:-1] * PERIOD_S, times[:-1] != times[1:]
+        if np.count_nonzero(distinct) < len(distinct):
+            times_s, targets = times_s[distinct], targets[distinct]
+        times_s.setflags(write=False)
+        targets.setflags(write=False)
+        return Motion(times_s, targets, self._observe_s)
 
     def fitness(self, trajectory: Trajectory) -> FloatArray:
         """Return `(...)`: the distance between first and last observation, divided by the time between them."""
         travelled = trajectory.positions_m[..., -1, :2] - trajectory.positions_m[..., 0, :2]
-        return np.asarray(np.linalg.norm(travelled, axis=-1) / (trajectory.times_s[-1] - trajectory.times_s[0]))
+        squares = travelled * travelled
+        distances = np.sqrt(squares[..., 0] + squares[..., 1])
+        return np.asarray(distances / (trajectory.times_s[-1] - trajectory.times_s[0]))
 
     def sense(self, trajectory: Trajectory) -> FloatArray:
         """Return `(..., r, 5)`: roll and pitch of the trunk, its height, and its place on the ground from the start."""
-        x, y, z, w = (trajectory.orientations[..., part] for part in range(4))
-        values = np.empty((*x.shape, 5))
-        values[..., 0] = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x**2 + y**2))
-        values[..., 1] = np.arcsin(np.minimum(np.maximum(2 * (w * y - z * x), -1.0), 1.0))
-        values[..., 2], values[..., 3:] = trajectory.positions_m[..., 2], trajectory.positions_m[..., :2]
-        return values
+        x, y, z, w = trajectory.orientations.reshape(-1, 4).T  # numpy is twice as fast with vectors
+        values = np.empty((len(x), 5))
+        values[:, 0] = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+        values[:, 1] = np.arcsin(np.minimum(np.maximum(2 * (w * y - z * x), -1.0), 1.0))
+        places = trajectory.positions_m.reshape(-1, 3)
+        values[:, 2], values[:, 3:] = places[:, 2], places[:, :2]
+        return values.reshape(*trajectory.positions_m.shape[:-1], 5)
 
 
 def _world() -> World:

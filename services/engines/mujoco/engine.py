@@ -1,7 +1,6 @@
 """The MuJoCo engine: worlds are grouped by kind, and each kind's rollouts run in one call."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Annotated
@@ -11,10 +10,10 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Material, Motion, Recording, Trajectory, World
+from gaplab.services.core.world import Motion, Recording, Trajectory, World
 from gaplab.services.engines.base import ALL_FIELDS, Engine
 from gaplab.services.engines.mujoco.scene import MuJoCoScene
-from gaplab.services.engines.stepping import WarmScenes, recording
+from gaplab.services.engines.stepping import WarmScenes, consecutive, recording
 
 
 class MuJoCoOptions(Frozen):
@@ -46,7 +45,6 @@ class MuJoCo(Engine):
         super().__init__(options)
         mujoco = import_module("mujoco")
         self._scenes = WarmScenes(lambda world: MuJoCoScene(mujoco, world, self.options.threads))
-        self._latest: MuJoCoScene | None = None
 
     @classmethod
     def runs(cls, world: World) -> bool:
@@ -60,36 +58,25 @@ class MuJoCo(Engine):
 
     def rollout(self, world: World, motion: Motion) -> Trajectory:
         """Return the trajectory of the base, `(t, 3)`; times are rounded to whole time steps."""
-        poses = self._scene(_kind(world)).poses([world.material], [motion])[0, 0]
+        poses = self._scenes[world.kind].poses([world.material], [motion])[0, 0]
         return Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
 
     def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion]) -> Trajectory:
         """Return every motion in every world; worlds that differ only in material share calls of MuJoCo."""
         poses = np.empty((len(motions), len(worlds), len(motions[0].observe_s), 7))
-        kinds = [_kind(world) for world in worlds]
         left = list(range(len(worlds)))
         while left:
-            alike = [column for column in left if kinds[column] == kinds[left[0]]]
-            scene = self._scene(kinds[left[0]])
-            poses[:, alike] = scene.poses([worlds[column].material for column in alike], motions)
+            kind = worlds[left[0]].kind
+            alike = [column for column in left if worlds[column].kind == kind]
+            here = consecutive(alike)
+            poses[:, here] = self._scenes[kind].poses([worlds[column].material for column in alike], motions)
             left = [column for column in left if column not in alike]
         return Trajectory(motions[0].observe_s, poses[..., :3], poses[..., 3:])
 
     def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
         """Return the same rollout with joint angles and torques."""
-        return recording(motion, times_s, *self._scene(_kind(world)).record(world.material, motion, times_s))
+        return recording(motion, times_s, *self._scenes[world.kind].record(world.material, motion, times_s))
 
     def close(self) -> None:
         """End all threads."""
-        self._latest = None
         self._scenes.close()
-
-    def _scene(self, kind: World) -> MuJoCoScene:
-        """Return the cached scene of a world, found by equality: a hash would take 25 µs."""
-        if self._latest is None or self._latest.world != kind:
-            self._latest = self._scenes[kind]
-        return self._latest
-
-
-def _kind(world: World) -> World:
-    return replace(world, material=Material())

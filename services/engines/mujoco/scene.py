@@ -15,16 +15,16 @@ from gaplab.services.core.world import Material, Motion, World
 from gaplab.services.engines.mujoco.callback import callbacks
 from gaplab.services.engines.mujoco.law import drive_torques, settings
 from gaplab.services.engines.mujoco.model import compiled, driven, drives, paint
-from gaplab.services.engines.stepping import plausible
+from gaplab.services.engines.stepping import consecutive, plausible
 
 ROWS = 64
 """Rollouts per thread in one call of MuJoCo; more would only take memory, 0.1 MB each for the quadruped."""
 
-TIME, ANGLES, POSE = 0, 1, slice(1, 8)
-"""Indices into a state: time; positions, then speeds; the base's among the positions."""
+TIME, ANGLES = 0, 1
+"""Indices into a state: time; positions of all joints, then speeds."""
 
-TURNED = np.array((0, 1, 2, 4, 5, 6, 3))
-"""Order of a pose: MuJoCo's quaternions have w first, a Trajectory's last."""
+TURNED_POSE = np.array((1, 2, 3, 5, 6, 7, 4))
+"""Indices into a state: the base's pose as in a Trajectory; MuJoCo's quaternions have w first, a Trajectory's last."""
 
 
 class MuJoCoScene:
@@ -44,15 +44,15 @@ class MuJoCoScene:
         self._mujoco = mujoco
         self._callbacks = callbacks()
         self._drives = drives(self.model, world)
-        self._dofs = [drive.dof for drive in self._drives]
-        self._driven = [world.actuators.index(joint) for joint in driven(world)]
-        self._angles = [POSE.start + int(self.model.joint(each.name).qposadr[0]) for each in world.joints]
+        self._dofs = consecutive([drive.dof for drive in self._drives])
+        self._driven = consecutive([world.actuators.index(joint) for joint in driven(world)])
+        self._angles = [ANGLES + int(self.model.joint(each.name).qposadr[0]) for each in world.joints]
         self._models = [self.model]
         self._datas = [self._data() for _ in range(threads)]
         self._start = self._initial()
         self._starts = np.tile(self._start, (ROWS * threads, 1))
         self._channel = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
-        self._memory = np.empty(0)
+        self._memory, self._targets = np.empty(0), np.zeros(0)
         self._pool = import_module("mujoco.rollout").Rollout(nthread=threads if threads > 1 else 0)
 
     def poses(self, materials: Sequence[Material], motions: Sequence[Motion]) -> FloatArray:
@@ -62,9 +62,9 @@ class MuJoCoScene:
         found = np.empty((len(motions), len(materials), len(steps), 7))
         with _in_force(self._mujoco, *self._callbacks):
             for down in _slices(len(motions), max(1, rows // len(materials))):
-                controls = self._controls(motions[down], max(1, int(steps[-1])))
                 for across in _slices(len(materials), rows):
                     models = self._painted(materials[across])
+                    controls = self._controls(motions[down], max(1, int(steps[-1])), len(models))
                     states = self._rolled(models, controls)
                     found[down, across] = self._seen(states, steps).reshape(-1, len(models), len(steps), 7)
         return found
@@ -83,7 +83,7 @@ class MuJoCoScene:
         states_with_start = np.vstack([self._start, states[0]])
         looked = states_with_start[chosen]
         torques = self._torques(controls[0], states_with_start)[chosen]
-        seen = np.hstack([looked[:, POSE][:, TURNED], looked[:, self._angles]])
+        seen = np.hstack([looked[:, TURNED_POSE], looked[:, self._angles]])
         return self._seen(states, observed)[0], seen, torques
 
     def close(self) -> None:
@@ -93,24 +93,36 @@ class MuJoCoScene:
     def _steps(self, times_s: FloatArray) -> NDArray[np.int_]:
         return np.rint(times_s / self.world.time_step_s).astype(int)
 
-    def _controls(self, motions: Sequence[Motion], steps: int) -> FloatArray:
-        """Return `(n, steps, degrees of freedom)`: the targets in each step, where the law reads them."""
-        controls = np.zeros((len(motions), steps, self.model.nv))
+    def _controls(self, motions: Sequence[Motion], steps: int, copies: int = 1) -> FloatArray:
+        """Return `(n · copies, steps, degrees of freedom)`: the targets in each step, where the law reads them.
+
+        They are in the memory of the last call if it is large enough; what no motor drives stays zero in it.
+        """
+        rows, dofs = len(motions) * copies, int(self.model.nv)
+        size = rows * steps * dofs
+        if self._targets.size < size:
+            self._targets = np.zeros(size)
+        controls, now = self._targets[:size].reshape(-1, copies, steps, dofs), np.arange(steps)
         for motion, each in zip(motions, controls, strict=True):
-            current = np.searchsorted(self._steps(motion.times_s), np.arange(steps), side="right") - 1
-            each[:, self._dofs] = motion.targets[current][:, self._driven]
-        return controls
+            current = self._steps(motion.times_s).searchsorted(now, side="right") - 1
+            each[..., self._dofs] = motion.targets.take(current, axis=0)[:, self._driven]
+        return controls.reshape(rows, steps, dofs)
 
     def _rolled(self, models: list[Any], controls: FloatArray) -> FloatArray:
-        """Return `(n · m, steps, state)`: states after each step, by motion and model; nan where MuJoCo stopped."""
-        count, steps = len(models) * len(controls), controls.shape[1]
+        """Return `(n · m, steps, state)`: states after each step, by motion and model; nan where MuJoCo stopped.
+
+        Args:
+            models: m models.
+            controls: `(n · m, steps, degrees of freedom)`, by motion and model.
+        """
+        count, steps = controls.shape[:2]
         states = self._room(count, steps)
         try:
             self._pool.rollout(
-                models * len(controls),
+                models * (count // len(models)),
                 self._datas,
                 self._starts[:count],
-                controls if len(models) == 1 else np.repeat(controls, len(models), axis=0),
+                controls,
                 control_spec=self._channel,
                 skip_checks=True,
                 nstep=steps,
@@ -123,10 +135,13 @@ class MuJoCoScene:
     def _seen(self, states: FloatArray, steps: NDArray[np.int_]) -> FloatArray:
         """Return `(rows, t, 7)`: poses after the given steps; nan if MuJoCo stopped or the pose is implausible."""
         complete = states[:, -1, TIME] > (states.shape[1] - 0.5) * self.world.time_step_s
-        poses = states[:, np.maximum(steps, 1) - 1, POSE]
-        poses[:, steps == 0] = self._start[POSE]
-        poses[~(complete & plausible(poses))] = np.nan
-        return poses[..., TURNED]
+        poses = states[:, steps[:, None] - 1, TURNED_POSE]
+        if not steps[0]:
+            poses[:, steps == 0] = self._start[TURNED_POSE]
+        failed = ~(complete & plausible(poses))
+        if np.count_nonzero(failed):
+            poses[failed] = np.nan
+        return poses
 
     def _torques(self, controls: FloatArray, states: FloatArray) -> FloatArray:
         """Return `(steps + 1, joints)`: torques of the motors before each state; zeros before the first."""

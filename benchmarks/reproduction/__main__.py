@@ -1,0 +1,71 @@
+"""The paper's figures and claims beside stored studies, as a Markdown document with pictures.
+
+`python -m benchmarks.reproduction ARCHIVE.zip … -o docs/reproduction.md`; without -o, it prints the text alone.
+"""
+
+from argparse import ArgumentParser
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from benchmarks.archives import private_store
+from benchmarks.reproduction.document import ROOT, Document
+from benchmarks.reproduction.studies import Study, read_study
+from benchmarks.reproduction.tables import FIGURE_3, TOY
+from gaplab.services.figures.kinds.curves import curves_figure
+from gaplab.services.figures.kinds.toy import toy_figure
+from gaplab.services.figures.marks import FigureDefinition
+from gaplab.services.figures.matplotlib.files import render_file
+from gaplab.services.results.toy import toy_iterations
+from gaplab.services.store.session import Store
+
+WIDTH_IN = 7.2
+FOLDER = "figures"
+"""Folder of the pictures, beside the document."""
+
+
+def figures(store: Store, label: str, study: Study) -> Iterator[tuple[int, FigureDefinition]]:
+    """Yield the paper's figures as the study has them, each with its number."""
+    yield 4, curves_figure(study.curves, title=label)
+    shown = [count for count in FIGURE_3[1:] if count <= study.last]
+    first = next((arm for name in study.present if (arm := study.arm(name))), None)
+    if study.arms[0].spec.robot.name == TOY and first and shown:
+        yield 3, toy_figure(toy_iterations(store, first.read.id, 0, shown))
+
+
+def pictures(store: Store, studies: dict[str, Study], folder: Path) -> dict[tuple[str, int], str]:
+    """Write the figures as SVG, and return their addresses, by label and number of the figure."""
+    (folder / FOLDER).mkdir(parents=True, exist_ok=True)
+    addresses = {}
+    for label, study in studies.items():
+        for number, figure in figures(store, label, study):
+            address = f"{FOLDER}/reproduction-{label}-{number}.svg"
+            (folder / address).write_bytes(render_file(figure, "svg", width_in=WIDTH_IN))
+            addresses[label, number] = address
+    return addresses
+
+
+def write(archives: Sequence[Path], output: Path | None) -> None:
+    """Write the document and its pictures, or print it."""
+    with private_store() as store:
+        studies = {archive.stem: read_study(store, archive.resolve()) for archive in archives}
+        if output is None:
+            print(Document(store, studies, ROOT / "docs", {}).text(), end="")
+            return
+        folder = output.resolve().parent
+        text = Document(store, studies, folder, pictures(store, studies, folder)).text()
+        output.write_text(text, encoding="utf-8")
+
+
+def main() -> None:
+    """Read the command, and write the document."""
+    parser = ArgumentParser(prog="python -m benchmarks.reproduction", description=__doc__)
+    parser.add_argument("archives", nargs="+", type=Path, help="archives of studies, in the order of the document")
+    parser.add_argument("-o", "--output", type=Path, help="file of the document; its pictures go to figures/ beside it")
+    arguments = parser.parse_args()
+    if len({archive.stem for archive in arguments.archives}) < len(arguments.archives):
+        parser.error("two archives have one name; a name is the label of a study, so rename one")
+    write(arguments.archives, arguments.output)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,149 @@
+"""The document, as Markdown, from studies."""
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.reproduction import tables
+from benchmarks.reproduction.claims import CLAIMS, Claim
+from benchmarks.reproduction.evidence import RULES, Examined, Judged, Verdict, judge
+from benchmarks.reproduction.limits import limits
+from benchmarks.reproduction.studies import Study
+from gaplab.services.store.session import Store
+
+ROOT = Path(__file__).parents[2]
+
+WORDS = {
+    Verdict.REPRODUCED: "**reproduced**",
+    Verdict.NOT: "**not**",
+    Verdict.OPEN: "open",
+    Verdict.ABSENT: "absent from it",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """What a document is made of.
+
+    Attributes:
+        store: database with the studies.
+        studies: the studies, by their labels.
+        folder: folder of the document, from which its links begin.
+        pictures: address of each picture, by the label of its study and the number of its figure.
+    """
+
+    store: Store
+    studies: dict[str, Study]
+    folder: Path
+    pictures: dict[tuple[str, int], str]
+
+    def text(self) -> str:
+        """Return the document."""
+        sections = [
+            self._opening(),
+            self._studies(),
+            self._verdicts(),
+            *self._figure_4(),
+            *self._figure_3(),
+            *self._claims(),
+            "\n".join(["## How a verdict is reached", "", *(f"- {rule}" for rule in RULES)]),
+            "\n".join(["## What the reconstruction cannot know", "", *(f"- {one}" for one in limits(self._link))]),
+            self._costs(),
+        ]
+        return "\n\n".join(sections) + "\n"
+
+    def _link(self, path: str | Path) -> str:
+        """Return the address of a file, seen from the document."""
+        return Path(os.path.relpath(ROOT / path, self.folder)).as_posix()
+
+    def _opening(self) -> str:
+        archives = " ".join(os.path.relpath(study.archive, ROOT) for study in self.studies.values())
+        return (
+            "# The paper's figures and claims\n\n"
+            "*A Comparison of Sampling Strategies for Parameter Estimation of a Robot Simulator* (Klaus, Glette and "
+            "Tørresen, SIMPAR 2012), beside stored studies of gaplab. Fitness is a ratio to *direct*: the mean fitness "
+            "of controllers that evolve in reality itself, with as many evaluations.\n\n"
+            "This command wrote the page from the archives below; run it again instead of editing the page:\n\n"
+            f"```sh\npython -m benchmarks.reproduction {archives} -o docs/reproduction.md\n```"
+        )
+
+    def _studies(self) -> str:
+        rows = [tables.study_row(study, label, self._link(study.archive)) for label, study in self.studies.items()]
+        return f"## The studies\n\n{tables.table(tables.STUDY_HEAD, rows)}"
+
+    def _verdicts(self) -> str:
+        rows = [
+            (f"{claim.key}: {claim.says}", *(WORDS[judged(claim, study)[1].verdict] for study in self.studies.values()))
+            for claim in CLAIMS
+        ]
+        return (
+            f"## The verdicts\n\n{tables.table(('claim', *self.studies), rows)}\n\n"
+            "Each verdict has its reason [below](#the-claims), and follows from [rules](#how-a-verdict-is-reached). "
+            "Those on a toy function say nothing of the paper's quadruped."
+        )
+
+    def _figure_4(self) -> Iterator[str]:
+        yield (
+            "## Fig. 4\n\nRecorded fitness over direct, mean ± standard deviation over repetitions (their number is in "
+            "brackets), by number of real-world evaluations. A dash in the paper's rows is a number that its text does "
+            "not have."
+        )
+        for label, study in self.studies.items():
+            yield f"### {label}\n\n{tables.direct_in_words(study)}"
+            if picture := self.pictures.get((label, 4)):
+                yield f"![Recorded fitness of {label} against the number of real-world evaluations]({picture})"
+            if len(study.direct) and len(study.arms) > 1:
+                yield tables.figure_4(study)
+
+    def _figure_3(self) -> Iterator[str]:
+        yield (
+            "## Fig. 3\n\nOn the toy function: the median distance of the best simulators from the truth, as a share "
+            "of the bounds; then the fitness over direct. The paper shows one run without numbers, and says that with "
+            "more samples the simulations become more accurate, and the fitness of the transferred individual "
+            "increases until it is near the maximum."
+        )
+        toys = {label: each for label, each in self.studies.items() if each.arms[0].spec.robot.name == tables.TOY}
+        if not toys:
+            yield "None of the archives is a study of the toy function."
+        for label, study in toys.items():
+            yield f"### Fig. 3: {label}"
+            if picture := self.pictures.get((label, 3)):
+                yield f"![Function, simulators, samples and transfer in one repetition of {label}]({picture})"
+            yield tables.figure_3(self.store, study)
+
+    def _claims(self) -> Iterator[str]:
+        yield "## The claims"
+        for claim in CLAIMS:
+            rows = [_claim_row(label, *judged(claim, study)) for label, study in self.studies.items()]
+            head = "study", "verdict", "here", "the paper's test", "the careful test", "why"
+            yield f"### {claim.key}\n\n{claim.says}\n\nThe rule: {claim.rule}\n\n{tables.table(head, rows)}"
+
+    def _costs(self) -> str:
+        rows = [row for label, study in self.studies.items() for row in tables.cost_rows(label, study)]
+        arms = [arm for study in self.studies.values() for arm in study.arms]
+        total = (
+            "all",
+            "",
+            "",
+            f"{sum(arm.read.progress.rollouts_done for arm in arms):,}",
+            f"{sum(arm.read.progress.rollouts_saved for arm in arms):,}",
+            f"{sum(arm.core_hours for arm in arms):.2f}",
+            f"{sum(arm.attempts for arm in arms):,}",
+            f"{sum(arm.held_core_hours for arm in arms):.2f}",
+        )
+        return (
+            "## What it took\n\nStored steps have the time of their computation. Attempts also have work that was "
+            "lost, and waiting for a core; early archives lack them. A core-hour is an hour of one thread of the "
+            f"engine, on the machines of the archives' provenance.\n\n{tables.table(tables.COST_HEAD, [*rows, total])}"
+        )
+
+
+def judged(claim: Claim, study: Study) -> tuple[Examined, Judged]:
+    """Return a claim as a study shows it, and the verdict."""
+    examined = claim.examine(study)
+    return examined, judge(examined)
+
+
+def _claim_row(label: str, examined: Examined, verdict: Judged) -> Sequence[str]:
+    return label, WORDS[verdict.verdict], examined.here, examined.paper_test, verdict.careful, verdict.why

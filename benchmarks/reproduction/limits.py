@@ -1,0 +1,48 @@
+"""What a reconstruction cannot know, in sentences."""
+
+from collections.abc import Callable, Iterator
+
+OPEN_CHOICES = "docs/decisions/what-the-paper-leaves-open.md"
+FAIR = "docs/decisions/a-fair-comparison.md"
+ENGINES = "docs/engines.md"
+ROBOT = "docs/robot.md"
+
+
+def limits(link: Callable[[str], str]) -> Iterator[str]:
+    """Yield the limits, each with its source.
+
+    Args:
+        link: returns the address of a file of the repository, seen from the document.
+    """
+    yield (
+        "**The robot and the evolutionary algorithm.** The paper leaves both to its reference [10], which could not "
+        "be found. Body, masses, motors, pulse period, length of an episode, population, selection, crossover and "
+        f"mutation are [choices of ours]({link(OPEN_CHOICES)}). A [robot]({link(ROBOT)}) with another gap has other "
+        "ratios before any sample (C1). Source: paper, section 2."
+    )
+    yield (
+        "**The unit of fitness.** The paper prints 1.33 without a unit, so only ratios to its direct baseline can be "
+        "compared. Its fitnesses have one decimal: each ratio is uncertain by ±0.04. Source: paper, section 3."
+    )
+    yield (
+        "**The bounds of the coefficients.** How wrong a random simulator is depends on them, and the paper does not "
+        "state them. Source: paper, section 2."
+    )
+    yield (
+        "**The points of Fig. 4.** They are in a picture, and the text has few of them; so no curve is compared point "
+        "by point. Fig. 3 has no numbers at all. Source: paper, section 3."
+    )
+    yield (
+        "**The size of a selection's search, and the weights.** The paper does not say whether informative selections "
+        "spend as many evaluations as others, nor what a perfect simulator weighs: "
+        f"[a fair comparison]({link(FAIR)}). Source: paper, section 2."
+    )
+    yield (
+        "**The engine.** The paper ran a version of PhysX of its time. Today's engines "
+        f"[differ from each other]({link(ENGINES)}) about as much as one engine with half the friction differs from "
+        "itself. Source: paper, section 2."
+    )
+    yield (
+        "**The tests.** The paper pools the values of a repetition at several numbers of samples as if they were "
+        "independent. Its p-values are therefore too small by an unknown factor. Source: caption of Fig. 4."
+    )

@@ -1,0 +1,402 @@
+"""The document of the paper's figures and claims: each verdict, from archives of studies that were made for it.
+
+The studies run the toy function. Their recorded fitnesses are made, so that the verdict on each claim is known.
+"""
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from shutil import copyfileobj
+from typing import Any, NamedTuple
+from zlib import crc32
+
+import numpy as np
+import pytest
+
+from gaplab import migrations
+from gaplab.schemas.spec import StudySpec
+from gaplab.services.archives import export_study
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
+from gaplab.services.experiments import submission
+from gaplab.services.running import execution
+from gaplab.services.running.execution import TimedStep
+from gaplab.services.store.session import Store
+
+ROOT = Path(__file__).parents[2]
+CLAIMS = [f"C{number}" for number in range(1, 9)]
+STEP_S = 36.0
+GENOME, SIMULATOR = frozen([0.5]), Simulator(frozen([1.0, 0.8, 0.0]), 0.01)
+
+
+class Made(NamedTuple):
+    """A curve: its means, and the deviations of a repetition and of its single values."""
+
+    means: Sequence[float]
+    deviation: float = 0.01
+    wiggle: float = 0.003
+
+
+def rising(start: float, last: float, samples: int = 10) -> list[float]:
+    """Means that rise, and flatten."""
+    return [last - (last - start) * 0.5**sample for sample in range(samples + 1)]
+
+
+DIRECT = {"direct": Made([1.0], 0.02)}
+AGREES = DIRECT | {
+    "simulated_fit": Made([0.68, 0.85, 1.0, *rising(1.03, 1.08, 7)]),
+    "simulated_fit_and_unique": Made([0.68, 0.85, 1.02, *rising(1.07, 1.12, 7)]),
+    "informative": Made(rising(0.68, 0.90), 0.05, 0.01),
+    "simulated_fit_and_informative": Made([0.68, 0.98, *rising(0.98, 1.04, 8)]),
+    "random": Made(rising(0.68, 0.74), 0.05, 0.01),
+    "known_fit": Made(rising(0.68, 0.82), 0.05, 0.01),
+}
+"""Every claim holds."""
+
+CONTRADICTS = DIRECT | {
+    "simulated_fit": Made(rising(0.4, 0.8), 0.05),
+    "simulated_fit_and_unique": Made(rising(0.4, 0.7), 0.05),
+    "informative": Made(rising(0.4, 0.9)),
+    "simulated_fit_and_informative": Made(rising(0.4, 0.6), 0.05),
+    "random": Made([0.95] * 11),
+    "known_fit": Made(rising(0.4, 0.3)),
+}
+"""No claim holds, but C6."""
+
+VAGUE = {"direct": Made([1.0], 0.3)} | {
+    name: Made(rising(0.68, 0.98), *(deviation, deviation))
+    for name, deviation in [(name, 0.12 if name.startswith("simulated") else 0.21) for name in AGREES]
+    if name != "direct"
+}
+"""Repetitions vary so much that nothing is decided."""
+
+LUCKY = {name: Made([0.4, 0.646 if name == "simulated_fit_and_informative" else 0.5], 0.1, 0.0) for name in AGREES}
+"""One strategy leads each other one by a p of 0.03: so small a p is expected by chance in one of five pairs."""
+
+
+class Study(NamedTuple):
+    """A study to make."""
+
+    curves: Mapping[str, Made]
+    repetitions: int = 12
+    samples: int = 10
+    changes: Mapping[str, Any] = {}
+
+
+def only(curves: Mapping[str, Made], *names: str) -> dict[str, Made]:
+    return {name: curves[name] for name in names}
+
+
+STUDIES = {
+    "agrees": Study(AGREES),
+    "contradicts": Study(CONTRADICTS),
+    "vague": Study(VAGUE, repetitions=7),
+    "unequal": Study(AGREES, changes={"budget": {"preset": "smoke", "reuse_transfer": True}}),
+    "few": Study(AGREES, repetitions=4),
+    "short": Study(AGREES, samples=3),
+    "two": Study(only(AGREES, "simulated_fit", "random", "direct")),
+    "reversed": Study(only(CONTRADICTS, "simulated_fit", "random")),
+    "equal": Study({"random": Made([0.5] * 7, 0.1), "known_fit": Made([0.5] * 7, 0.1)}, 160, 6),
+    "lucky": Study(LUCKY, 6, 1),
+    "spread": Study(
+        {"simulated_fit": Made([0.5] * 4, 0.001, 0.0), "simulated_fit_and_unique": Made([0.7147] * 4, 0.2, 0.0)}, 5, 3
+    ),
+}
+
+
+def standard(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    """Random numbers whose mean and deviation over the first axis are exactly 0 and 1."""
+    drawn = rng.normal(size=shape)
+    drawn -= drawn.mean(axis=0)
+    return drawn / drawn.std(axis=0, ddof=1)
+
+
+def values(strategy: str, made: Made, repetitions: int, counts: int) -> np.ndarray:
+    """`(repetitions, counts)`"""
+    rng = np.random.default_rng(crc32(strategy.encode()))
+    each = made.deviation * standard(rng, repetitions, 1) + made.wiggle * standard(rng, repetitions, counts)
+    return np.array(made.means[:counts]) + each
+
+
+def log(recorded: Sequence[float]) -> Iterator[Step]:
+    for iteration, value in enumerate(recorded):
+        if iteration:
+            yield Selected(iteration, GENOME, Cost(30))
+            yield Measured(iteration, Sample(GENOME, 0.1))
+        yield Tuned(iteration, (SIMULATOR,), Cost(60) if iteration else Cost())
+        yield Transferred(iteration, GENOME, 0.5, Cost(60))
+        yield Probed(iteration, float(value), float(value))
+
+
+def archive(store: Store, label: str, study: Study, folder: Path) -> Path:
+    """Run a study, whose fitness is made, and export it."""
+    spec: dict[str, Any] = {"name": f"made: {label}", "strategies": list(study.curves), "robot": "toy_function"}
+    spec |= {
+        "budget": "smoke",
+        "iterations": study.samples,
+        "repetitions": study.repetitions,
+        "seed": 7,
+        **study.changes,
+    }
+    made = submission.submit_study(store, StudySpec.model_validate(spec))
+    recorded = {
+        each.id: values(
+            each.strategy, study.curves[each.strategy], study.repetitions, 1 if each.level else study.samples + 1
+        )
+        for each in made.experiments
+    }
+    claims = execution.claim(store, "test", limit=10_000)
+    steps = [(claim, log(recorded[claim.experiment_id][claim.number])) for claim in claims]
+    execution.record_all(store, [(claim, [TimedStep(step, STEP_S) for step in each]) for claim, each in steps])
+    assert all(execution.complete(store, claim) for claim in claims)
+    exported = export_study(store, made.id)
+    path = folder / f"{label}.zip"
+    with exported.file as source, path.open("wb") as target:
+        copyfileobj(source, target)
+    return path
+
+
+def reproduce(*arguments: object) -> str:
+    """Run the command, and return what it prints."""
+    command = [sys.executable, "-m", "benchmarks.reproduction", *map(str, arguments)]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    return ended.stdout
+
+
+class Document:
+    """A document, and its tables by the title above them."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        self.text = file.read_text()
+        self.sections = dict(re.findall(r"^#+ (.+?)\n(.*?)(?=^#+ |\Z)", self.text, re.MULTILINE | re.DOTALL))
+
+    def rows(self, title: str) -> list[dict[str, str]]:
+        lines = [line for line in self.sections[title].splitlines() if line.startswith("| ")]
+        head, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+        return [dict(zip(head, row, strict=True)) for row in rows]
+
+    def row(self, title: str, name: str) -> dict[str, str]:
+        return next(row for row in self.rows(title) if next(iter(row.values())).startswith(name))
+
+    def verdict(self, claim: str, study: str) -> str:
+        return self.row(claim, study)["verdict"].strip("*")
+
+
+@pytest.fixture(scope="module")
+def document(tmp_path_factory: pytest.TempPathFactory) -> Document:
+    """The document of all made studies."""
+    folder = tmp_path_factory.mktemp("reproduction")
+    url = f"sqlite:///{folder / 'made.db'}"
+    migrations.upgrade(url)
+    store = Store(url)
+    archives = [archive(store, label, study, folder) for label, study in STUDIES.items()]
+    store.dispose()
+
+    assert reproduce(*archives, "-o", folder / "reproduction.md") == ""
+
+    return Document(folder / "reproduction.md")
+
+
+@pytest.mark.parametrize("claim", CLAIMS)
+def test_a_claim_whose_every_statement_is_shown_is_reproduced(document: Document, claim: str) -> None:
+    assert document.verdict(claim, "agrees") == "reproduced"
+
+
+@pytest.mark.parametrize(
+    ("claim", "study", "statement"),
+    [
+        ("C1", "contradicts", "Random near the others"),
+        ("C2", "contradicts", "Simulated fit above 0.94 after 3"),
+        ("C3", "contradicts", "ratio of the deviations below 0.58"),
+        ("C4", "contradicts", "Simulated fit and informative above random"),
+        ("C5", "contradicts", "Simulated fit above random"),
+        ("C6", "equal", "Random apart from known fit"),
+        ("C7", "contradicts", "Simulated fit and unique above simulated fit"),
+        ("C8", "contradicts", "Known fit rises"),
+    ],
+)
+def test_a_claim_with_a_refuted_statement_is_not_reproduced(
+    document: Document, claim: str, study: str, statement: str
+) -> None:
+    row = document.row(claim, study)
+
+    assert document.verdict(claim, study) == "not"
+    assert row["why"].startswith("Refuted: ")
+    assert f"{statement} (p " in row["why"]
+
+
+@pytest.mark.parametrize("claim", CLAIMS)
+def test_a_claim_that_varied_repetitions_neither_show_nor_refute_is_open(document: Document, claim: str) -> None:
+    assert document.verdict(claim, "vague") == "open"
+    assert document.row(claim, "vague")["why"].startswith("Neither shown nor refuted: ")
+
+
+@pytest.mark.parametrize("claim", CLAIMS)
+def test_fewer_than_five_repetitions_leave_every_claim_open(document: Document, claim: str) -> None:
+    assert document.verdict(claim, "few") == "open"
+    assert "Too few values: " in document.row(claim, "few")["why"]
+
+
+@pytest.mark.parametrize("claim", ["C3", "C4", "C5", "C7"])
+def test_unequal_searches_for_samples_leave_comparisons_of_strategies_open(document: Document, claim: str) -> None:
+    row = document.row(claim, "unequal")
+
+    assert document.verdict(claim, "unequal") == "open"
+    assert row["why"].startswith("Not a fair comparison: samples are selected from searches of unequal size")
+    assert "simulated_fit 60, simulated_fit_and_unique 30" in row["why"]
+
+
+@pytest.mark.parametrize("claim", ["C1", "C2", "C6", "C8"])
+def test_unequal_searches_for_samples_concern_only_comparisons_of_the_strategies_that_have_them(
+    document: Document, claim: str
+) -> None:
+    assert document.verdict(claim, "unequal") == "reproduced"
+
+
+@pytest.mark.parametrize("claim", ["C4", "C6", "C7"])
+def test_a_claim_on_strategies_that_a_study_lacks_is_absent_from_it(document: Document, claim: str) -> None:
+    row = document.row(claim, "two")
+
+    assert document.verdict(claim, "two") == "absent from it"
+    assert row["why"].startswith("The study has no ")
+
+
+@pytest.mark.parametrize("claim", ["C1", "C2", "C3", "C5", "C8"])
+def test_a_claim_is_not_reproduced_by_a_part_of_its_strategies(document: Document, claim: str) -> None:
+    row = document.row(claim, "two")
+
+    assert document.verdict(claim, "two") == "open"
+    assert row["why"].startswith("Shown for what the study has. The study has no simulated fit and unique")
+
+
+def test_a_claim_is_refuted_by_a_part_of_its_strategies(document: Document) -> None:
+    assert document.verdict("C5", "reversed") == "not"
+
+
+@pytest.mark.parametrize("claim", ["C1", "C2"])
+def test_a_claim_on_direct_is_absent_from_a_study_without_it(document: Document, claim: str) -> None:
+    assert document.verdict(claim, "reversed") == "absent from it"
+    assert "no direct baseline" in document.row(claim, "reversed")["why"]
+
+
+def test_a_study_that_ends_early_says_which_samples_it_lacks(document: Document) -> None:
+    assert document.verdict("C2", "short") == "open"
+    assert document.row("C2", "short")["why"].endswith("no value after 10\N{NO-BREAK SPACE}samples: it ends after 3.")
+    assert document.verdict("C6", "short") == "absent from it"
+    assert document.verdict("C8", "short") == "absent from it"
+    assert document.verdict("C4", "short") == "reproduced"
+
+
+def test_a_difference_that_only_equal_spreads_would_show_is_open(document: Document) -> None:
+    row = document.row("C7", "spread")
+
+    assert document.verdict("C7", "spread") == "open"
+    assert "largest p 0.0" in row["the careful test"]
+
+
+def test_a_claim_on_many_pairs_is_open_if_only_uncorrected_tests_show_it(document: Document) -> None:
+    row = document.row("C4", "lucky")
+
+    assert document.verdict("C4", "lucky") == "open"
+    assert row["the careful test"].startswith("0 of 5 shown; largest p 0.03")
+
+
+def test_an_open_difference_comes_with_what_the_repetitions_could_find(document: Document) -> None:
+    why = document.row("C4", "vague")["why"]
+
+    found = re.search(r"With 7 and 7 repetitions it finds a difference of (\d\.\d\d) of direct", why)
+    assert found
+    assert float(found[1]) == pytest.approx(0.59, abs=0.03)
+    assert re.search(r"paper's p is 0\.1\d: finding it takes \d+\N{NO-BREAK SPACE}repetitions", why)
+
+
+def test_the_papers_own_test_stands_beside_the_careful_one(document: Document) -> None:
+    agrees = document.row("C5", "agrees")
+
+    assert agrees["the paper's test"].startswith("Student pooled over 3 to 10 samples: 13 of 13\N{NO-BREAK SPACE}pairs")
+    assert agrees["the careful test"].startswith("13 of 13 shown")
+    assert document.row("C4", "agrees")["the paper's test"].startswith("Student at 1\N{NO-BREAK SPACE}sample: 5 of 5")
+    assert document.row("C7", "contradicts")["the paper's test"].startswith("Student pooled over 3 to 10 samples: 0 of")
+
+
+def test_the_verdicts_at_the_top_are_those_of_the_claims(document: Document) -> None:
+    for claim in CLAIMS:
+        top = document.row("The verdicts", f"{claim}: ")
+        assert {study: top[study].strip("*") for study in STUDIES} == {
+            study: document.verdict(claim, study) for study in STUDIES
+        }
+
+
+def test_fitness_is_a_ratio_to_direct_beside_the_papers(document: Document) -> None:
+    curve = AGREES["simulated_fit"]
+
+    row = document.row("agrees", "Simulated fit (12)")
+    paper = document.row("agrees", "the paper, with simulated fit")
+
+    assert [float(row[str(count)].split(" ± ")[0]) for count in range(11)] == [
+        pytest.approx(mean, abs=0.006) for mean in curve.means
+    ]
+    assert (paper["0"], paper["3"][:6], paper["10"][:4]) == ("0.68", "≥ 0.98", "1.05")
+    assert "has no direct baseline" in document.sections["reversed"]
+
+
+def test_a_toy_study_has_the_papers_figure_3(document: Document) -> None:
+    row = document.row("Fig. 3: agrees", "Simulated fit")
+
+    assert row["8"].startswith("0.00; 1.0")
+    assert list(row) == ["samples", "0", "2", "4", "6", "8"]
+
+
+def test_the_document_says_what_it_took(document: Document) -> None:
+    steps, repetitions = 3 + 10 * 5, STUDIES["agrees"].repetitions
+    hours = steps * repetitions * STEP_S / 3600
+
+    rows = [row for row in document.rows("What it took") if row["study"] == "agrees"]
+
+    took = {row["experiment"]: row for row in rows}
+    assert float(took["Simulated fit"]["core-hours of stored steps"]) == pytest.approx(hours, abs=0.01)
+    assert took["Simulated fit"]["rollouts"] == f"{repetitions * (60 + 10 * 150):,}"
+    assert took["Simulated fit"]["attempts"] == f"{repetitions}"
+    assert float(document.row("The studies", "[agrees]")["core-hours"]) == pytest.approx(
+        sum(float(row["core-hours of stored steps"]) for row in rows), abs=0.05
+    )
+
+
+def test_the_list_of_studies_says_what_each_is(document: Document) -> None:
+    row = document.row("The studies", "[agrees](agrees.zip): made: agrees")
+
+    assert (row["robot"], row["simulators"], row["seed"], row["iterations"]) == ("toy_function", "analytic", "7", "10")
+    assert row["reality"] == "analytic (static friction 1.0, dynamic friction 0.8, restitution 0.0)"
+    assert row["evaluations: controller / selection / tuning"].startswith("smoke: 60 / 30 / 60")
+    assert row["repetitions"] == "12"
+
+
+def test_every_link_and_picture_leads_somewhere(document: Document) -> None:
+    addresses = re.findall(r"\]\(([^)#]+)\)", document.text)
+
+    assert {f"figures/reproduction-agrees-{number}.svg" for number in (3, 4)} <= set(addresses)
+    assert not [each for each in addresses if not (document.file.parent / each).exists()]
+
+
+def test_the_published_archives_have_a_document() -> None:
+    archives = sorted((ROOT / "docs" / "studies").glob("*.zip"))
+
+    text = reproduce(*archives)
+
+    assert all(f"### {archive.stem}\n" in text for archive in archives)
+    assert all(f"### {claim}\n" in text for claim in CLAIMS)
+    assert "nan" not in re.findall(r"\w+", text)
+
+
+def test_two_archives_of_one_name_are_refused(tmp_path: Path) -> None:
+    archives = [str(tmp_path / folder / "one.zip") for folder in "ab"]
+
+    command = [sys.executable, "-m", "benchmarks.reproduction", *archives]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+
+    assert ended.returncode == 2
+    assert "two archives have one name" in ended.stderr
