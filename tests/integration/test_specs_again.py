@@ -14,6 +14,7 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.archives import export_study
 from gaplab.services.archives.rerunning import Recorded, rerun, submitted_spec
 from gaplab.services.archives.step_differences import difference
+from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import Conflict
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.types import Measured, Probed
@@ -163,6 +164,18 @@ def test_what_cannot_be_computed_says_why() -> None:
 def test_zeros_of_both_signs_differ_and_nan_is_nan() -> None:
     assert difference(Probed(1, 0.0, 1.0), Probed(1, -0.0, 1.0)) == "fitness is -0.0 here, and 0.0 in the archive"
     assert difference(Probed(1, float("nan"), 1.0), Probed(1, float("nan"), 1.0)) is None
+
+
+def test_readings_that_an_earlier_version_did_not_store_are_not_compared() -> None:
+    earlier, now = Probed(1, 0.5, 1.0), Probed(1, 0.5, 1.0, readings=frozen([16.0, -4.0]))
+    other = Probed(1, 0.5, 1.0, readings=frozen([16.0, -4.5]))
+
+    assert difference(earlier, now) is None
+    assert difference(now, other) == "readings[1] is -4.5 here, and -4.0 in the archive"
+    assert difference(now, earlier) == "readings[0] is absent here, and 16.0 in the archive"
+    assert difference(replace(earlier, repeats=frozen([0.5])), earlier) == (
+        "repeats[0] is absent here, and 0.5 in the archive"
+    )
 
 
 def test_an_archive_of_before_gives_its_spec_too() -> None:
