@@ -14,9 +14,9 @@ from scipy.stats import spearmanr
 from benchmarks.physics import SWITCHING as TRUTH
 from benchmarks.physics import evolved, simulation
 from gaplab.services.core.arrays import FloatArray, Genomes
+from gaplab.services.core.motions import Motion
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.streams import stream
-from gaplab.services.core.world import Motion
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 

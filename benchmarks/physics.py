@@ -8,11 +8,11 @@ import pybullet
 
 from benchmarks.measure import Row, rates, ratio
 from gaplab.services.core.arrays import Genome, Genomes, Parameters
+from gaplab.services.core.motions import Motion
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.search import maximise
 from gaplab.services.core.tunables import tunables
-from gaplab.services.core.world import Motion
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.engines.pybullet.scene import PyBulletScene

@@ -9,9 +9,9 @@ from scipy import stats
 from benchmarks.measure import Row, rates, ratio
 from benchmarks.physics import SWITCHING, edges, evolved, genomes, simulation, through_simulate
 from gaplab.services.core.arrays import Fitnesses, Genomes
+from gaplab.services.core.motions import Motion
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.streams import stream
-from gaplab.services.core.world import Motion
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.physx import PhysX
 from gaplab.services.engines.pybullet import PyBullet

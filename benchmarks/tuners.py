@@ -19,7 +19,7 @@ from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.streams import stream
-from gaplab.services.core.tuners.base import Task
+from gaplab.services.core.tuners.base import TuningTask
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Sample, Simulator
 from gaplab.services.specs.assembly import setting
@@ -91,7 +91,7 @@ def tunings(method: Method, engine: str, number: int, samples: int) -> Iterator[
                 measured.append(Sample(genome, *outcome))
         answers = Answers(one.simulate, sense=one.sense)
         misfit = Misfit(answers, measured, one.discrepancy, one.reading_times_s)
-        task = Task(misfit, space, optimizer, method.ensemble, method.evaluations, previous)
+        task = TuningTask(misfit, space, optimizer, method.ensemble, method.evaluations, previous)
         previous = one.tuner.tune(task, stream(0, "tune", number, count))
         away = np.abs(previous[0].parameters - truth) / space.extent
         yield Trial(away, _inside(previous, truth), answers.cost_of(0).rollouts)

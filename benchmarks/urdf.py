@@ -1,6 +1,7 @@
 """A World as a URDF file, as users give it to PyBullet."""
 
-from gaplab.services.core.world import Body, Box, Joint, World
+from gaplab.services.core.shapes import Box
+from gaplab.services.core.world import Body, Joint, World
 
 
 def urdf(world: World) -> str:

@@ -5,8 +5,8 @@ from numpy.random import default_rng
 from gaplab.api.clients.driving import DriverMotion
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.arrays import frozen
+from gaplab.services.core.motions import Motion
 from gaplab.services.core.robots import robots
-from gaplab.services.core.world import Motion
 from gaplab.services.specs.assembly import engine_of
 from gaplab.services.specs.default_engines import default_engine
 

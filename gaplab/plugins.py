@@ -1,4 +1,5 @@
-"""Names for your own plug-ins: a strategy, robot, tunable, optimizer, engine, discrepancy or tuner, each in one file.
+"""Names for your own plug-ins: a strategy, robot, controller, task, tunable, optimizer, engine,
+discrepancy or tuner, each in one file.
 
 Put the file into a folder that GAPLAB_PLUGINS names, and start the service. docs/how-to describes each kind.
 """
@@ -12,8 +13,13 @@ from gaplab.services.core.arrays import Genomes as Genomes
 from gaplab.services.core.arrays import Outcomes as Outcomes
 from gaplab.services.core.arrays import Parameters as Parameters
 from gaplab.services.core.arrays import frozen as frozen
+from gaplab.services.core.controllers.base import Controller as Controller
 from gaplab.services.core.discrepancies.base import Discrepancy as Discrepancy
 from gaplab.services.core.errors import TryAgain as TryAgain
+from gaplab.services.core.motions import Act as Act
+from gaplab.services.core.motions import Loop as Loop
+from gaplab.services.core.motions import Motion as Motion
+from gaplab.services.core.motions import Trajectory as Trajectory
 from gaplab.services.core.optimizers.base import Optimizer as Optimizer
 from gaplab.services.core.optimizers.base import Population as Population
 from gaplab.services.core.robots.base import Robot as Robot
@@ -23,26 +29,32 @@ from gaplab.services.core.scoring import simulator_weights as simulator_weights
 from gaplab.services.core.scoring import uniqueness_penalty as uniqueness_penalty
 from gaplab.services.core.scoring import weighted_deviation as weighted_deviation
 from gaplab.services.core.scoring import weighted_mean as weighted_mean
+from gaplab.services.core.shapes import Box as Box
+from gaplab.services.core.shapes import Capsule as Capsule
+from gaplab.services.core.shapes import Cylinder as Cylinder
+from gaplab.services.core.shapes import Hull as Hull
+from gaplab.services.core.shapes import Part as Part
+from gaplab.services.core.shapes import Sphere as Sphere
 from gaplab.services.core.space import Space as Space
 from gaplab.services.core.strategies.base import DiverseOptions as DiverseOptions
 from gaplab.services.core.strategies.base import EnsembleOptions as EnsembleOptions
 from gaplab.services.core.strategies.base import Search as Search
 from gaplab.services.core.strategies.base import Strategy as Strategy
 from gaplab.services.core.strategies.base import Untuned as Untuned
+from gaplab.services.core.tasks.base import Task as Task
 from gaplab.services.core.tunables.base import MaterialTunable as MaterialTunable
 from gaplab.services.core.tunables.base import Tunable as Tunable
-from gaplab.services.core.tuners.base import Task as Task
 from gaplab.services.core.tuners.base import Tuner as Tuner
+from gaplab.services.core.tuners.base import TuningTask as TuningTask
 from gaplab.services.core.types import Belief as Belief
 from gaplab.services.core.types import Sample as Sample
 from gaplab.services.core.types import Simulator as Simulator
 from gaplab.services.core.world import Body as Body
-from gaplab.services.core.world import Box as Box
+from gaplab.services.core.world import Inertia as Inertia
 from gaplab.services.core.world import Joint as Joint
 from gaplab.services.core.world import Material as Material
-from gaplab.services.core.world import Motion as Motion
 from gaplab.services.core.world import Motor as Motor
-from gaplab.services.core.world import Sphere as Sphere
-from gaplab.services.core.world import Trajectory as Trajectory
+from gaplab.services.core.world import Noise as Noise
+from gaplab.services.core.world import PDMotor as PDMotor
 from gaplab.services.core.world import World as World
 from gaplab.services.engines.base import Engine as Engine

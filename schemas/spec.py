@@ -108,6 +108,12 @@ class SharedSettings(Frozen):
         default=None, description="repetitions of each experiment; the paper: 40"
     )
     robot: PluginRef = PluginRef(name="quadruped")
+    controller: PluginRef | None = Field(
+        default=None, description="how a genome drives the actuators; default: the robot's usual controller"
+    )
+    task: PluginRef | None = Field(
+        default=None, description="how long a rollout lasts, and what is fit in it; default: the robot's usual task"
+    )
     engine: PluginRef | None = Field(
         default=None,
         description="engine of the simulators; default: the robot's, PyBullet for the quadruped (MuJoCo on Python 3.12 "

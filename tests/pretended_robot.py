@@ -16,8 +16,9 @@ from gaplab import MeasurementFailed
 from gaplab.api.clients.driving import DriverMotion
 from gaplab.schemas.plugin import PluginRef
 from gaplab.services.core.arrays import frozen
+from gaplab.services.core.motions import Motion
 from gaplab.services.core.robots import robots
-from gaplab.services.core.world import Material, Motion
+from gaplab.services.core.world import Material
 from gaplab.services.specs.assembly import engine_of
 
 SETTINGS = "PRETENDED_ROBOT"

@@ -9,14 +9,14 @@ from benchmarks.robot.laboratory import EPISODE_S, NAMES, SAMPLING_S, Laboratory
 from benchmarks.robot.text import bar, mean_and_sd, numbers, table
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.motions import Motion
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import BODY_M, COUNTED_S, PERIOD_S, SETTLING_S
 from gaplab.services.core.streams import stream
-from gaplab.services.core.tuners.base import Task
+from gaplab.services.core.tuners.base import TuningTask
 from gaplab.services.core.tuners.search import SearchTuner
 from gaplab.services.core.tuning import Misfit, squared_errors
 from gaplab.services.core.types import Sample
-from gaplab.services.core.world import Motion
 
 
 def stands(laboratory: Laboratory, _: Namespace) -> None:
@@ -108,7 +108,7 @@ def identifiable(laboratory: Laboratory, arguments: Namespace) -> None:
                 rng = stream(seed, "tune", count)
                 chosen = [samples[index] for index in rng.permutation(10)[:count]]
                 misfit = Misfit(Answers(laboratory.simulate), chosen)
-                task = Task(misfit, laboratory.parameters, SteadyState(), 1, arguments.tuning, ())
+                task = TuningTask(misfit, laboratory.parameters, SteadyState(), 1, arguments.tuning, ())
                 best = SearchTuner().tune(task, rng)[0]
                 fitness = laboratory.real(laboratory.evolve(best.parameters, "tuned", arguments.tuning, count, seed))
                 found.setdefault(count, []).append((best.parameters, fitness))

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from gaplab.services.core.motions import Trajectory
 from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.world import Trajectory
 from gaplab.services.engines import engines
 
 Plugin = type[Robot]

@@ -9,7 +9,7 @@ from gaplab.services.core.arrays import NO_READINGS, Fitnesses, Genomes, Outcome
 from gaplab.services.core.discrepancies.readings import Readings
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.space import Space
-from gaplab.services.core.tuners.base import Task, Tuner
+from gaplab.services.core.tuners.base import Tuner, TuningTask
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Sample, Simulator
 
@@ -63,7 +63,7 @@ def tuned(plugin: Plugin, physics: Physics, ensemble: int = 1, seed: int = 0) ->
     optimizer = SteadyState().diverse(ensemble) if ensemble > 1 else SteadyState()
     rng = np.random.default_rng(seed)
     previous = tuple(Simulator(row) for row in SPACE.draw(ensemble, rng))
-    return plugin().tune(Task(misfit, SPACE, optimizer, ensemble, EVALUATIONS, previous), rng)
+    return plugin().tune(TuningTask(misfit, SPACE, optimizer, ensemble, EVALUATIONS, previous), rng)
 
 
 def finds_the_simulator(plugin: Plugin) -> None:

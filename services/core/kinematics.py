@@ -7,7 +7,8 @@ bodies by 1e-8, and refuses the nan of failed physics.
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Body, Box, World
+from gaplab.services.core.shapes import Box
+from gaplab.services.core.world import Body, World
 
 TOUCHING_M = 0.002
 """Height of the lowest point below which a body touches the ground: engines separate surfaces by less."""

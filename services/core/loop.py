@@ -27,7 +27,7 @@ from gaplab.services.core.probes import probe_of
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.streams import stream
-from gaplab.services.core.tuners.base import Task, Tuner
+from gaplab.services.core.tuners.base import Tuner, TuningTask
 from gaplab.services.core.tuners.search import SearchTuner
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import (
@@ -216,7 +216,7 @@ def _tune(setting: Setting, history: History, iteration: int, answers: Answers) 
         return Tuned(iteration, _drawn(setting, iteration), Cost(saved=budget))
     optimizer = setting.optimizer.diverse(ensemble) if ensemble > 1 else setting.optimizer
     misfit = Misfit(answers, samples, setting.discrepancy, setting.reading_times_s)
-    task = Task(misfit, setting.parameters, optimizer, ensemble, evaluations, history.simulators)
+    task = TuningTask(misfit, setting.parameters, optimizer, ensemble, evaluations, history.simulators)
     found = setting.tuner.tune(task, setting.stream(iteration, "tune"))
     source = f"tuner {setting.tuner.name!r} with optimizer {setting.optimizer.name!r}"
     if not 1 <= len(found) <= ensemble:

@@ -10,7 +10,8 @@ import numpy as np
 from gaplab.schemas.safety import LimitsSpec, Safety
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.kinematics import clearances_m
-from gaplab.services.core.world import Motion, Recording, World
+from gaplab.services.core.motions import Motion, Recording
+from gaplab.services.core.world import World
 
 MOST_SIMULATORS = 20
 """Largest number of believed simulators that a forecast asks, the best first."""

@@ -14,7 +14,7 @@ from scipy import signal
 from scipy.spatial.transform import Rotation, Slerp
 
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.world import Trajectory
+from gaplab.services.core.motions import Trajectory
 
 STEP_S = 0.005
 """Resolution of the alignment."""

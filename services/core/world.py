@@ -1,15 +1,13 @@
-"""Engine-neutral description of what is simulated: immutable, edited by `dataclasses.replace`.
+"""Engine-neutral description of what is simulated: immutable, edited by `dataclasses.replace` and `World.edited`.
 
-SI units throughout; z points up; the ground is the plane z = 0. Lengths of boxes are full edges, not halves.
+SI units throughout; z points up; the ground is the plane z = 0.
 """
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, Literal, TypeAlias
 
-from gaplab.services.core.arrays import FloatArray
-
-Vector: TypeAlias = tuple[float, float, float]
+from gaplab.services.core.shapes import ORIGIN, UNTURNED, Part, Quaternion, Shape, Vector
 
 
 @dataclass(frozen=True)
@@ -26,20 +24,16 @@ class Material:
 
 
 @dataclass(frozen=True)
-class Box:
-    """A cuboid with edges `size_m`."""
+class Inertia:
+    """The inertia of a body about its centre of mass.
 
-    size_m: Vector
+    Attributes:
+        moments_kg_m2: principal moments.
+        turn: rotation of the principal axes, in the frame of the body.
+    """
 
-
-@dataclass(frozen=True)
-class Sphere:
-    """A ball."""
-
-    radius_m: float
-
-
-Shape: TypeAlias = Box | Sphere
+    moments_kg_m2: Vector
+    turn: Quaternion = UNTURNED
 
 
 @dataclass(frozen=True)
@@ -47,16 +41,37 @@ class Body:
     """A rigid body.
 
     Attributes:
-        shape: shape for inertia, and for collisions if it collides.
-        center_m: centre of the shape, in the frame of the body (that of its joint, or of the base).
-        collides: true if the body collides with the ground; bodies of a robot never collide with each other.
+        shape: one solid shape, whose centre is the centre of mass, or parts, each with its own place.
+        center_m: centre of mass, in the frame of the body (that of its joint, or of the base).
+        collides: true if the solid shape collides with the ground; each part says so itself. Bodies of a robot never
+            collide with each other.
+        inertia: inertia; None for that of the solid shape at uniform density.
+        surface: name of its surface, if its material is not that of the ground.
     """
 
     name: str
     mass_kg: float
-    shape: Shape
-    center_m: Vector = (0.0, 0.0, 0.0)
+    shape: Shape | tuple[Part, ...]
+    center_m: Vector = ORIGIN
     collides: bool = True
+    inertia: Inertia | None = None
+    surface: str = ""
+
+    def __post_init__(self) -> None:
+        if isinstance(self.shape, tuple) and self.inertia is None:
+            raise ValueError(f"the body {self.name!r} consists of parts, so it needs an inertia")
+
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """The shapes of the body."""
+        if isinstance(self.shape, tuple):
+            return self.shape
+        return (Part(self.shape, self.center_m, collides=self.collides),)
+
+    @cached_property
+    def touches(self) -> bool:
+        """Whether any of its shapes collides with the ground."""
+        return any(part.collides for part in self.parts)
 
 
 @dataclass(frozen=True)
@@ -69,13 +84,51 @@ class Motor:
 
 
 @dataclass(frozen=True)
+class PDMotor:
+    """A motor whose torque follows from its target; for a joint that slides, N in place of N·m and m in place of rad.
+
+    With target u, angle q, speed v, time step h, and the inverse inertia w that the joint has at the start of a
+    rollout, its torque is the one that would act at the end of the step if the joint moved alone:
+
+    - position: (kp (u - q - h v) - kd v) / (1 + h (kd + h kp) w),
+    - velocity: kd (u - v) / (1 + h kd w),
+    - torque: u,
+
+    each limited to ± `max_torque_nm`. Source: gaplab; a linearly implicit Euler step of one joint.
+
+    Attributes:
+        follows: what its target is.
+        kp: N·m/rad.
+        kd: N·m·s/rad.
+        max_torque_nm: largest torque.
+        delay_s: time from a command until the motor follows it, rounded to whole time steps; before, its target is the
+            joint's start, or 0 for a velocity or a torque.
+    """
+
+    follows: Literal["position", "velocity", "torque"]
+    max_torque_nm: float
+    kp: float = 0.0
+    kd: float = 0.0
+    delay_s: float = 0.0
+
+
+@dataclass(frozen=True)
 class Joint:
-    """A hinge that carries `child`.
+    """A hinge, or a slide, that carries `child`; a slide has m for rad, N for N·m, and kg for kg m².
 
     Attributes:
         parent: name of the parent body, in whose frame `origin_m` is.
-        axis: unit vector in the parent's frame.
-        motor: None leaves the hinge passive.
+        axis: unit vector in the child's frame.
+        motor: None leaves the joint passive.
+        turn: rotation of the child's frame in the parent's frame, with the joint at zero.
+        slides: true if the child moves along the axis, false if it turns about it.
+        limits: smallest and largest angle, rad; None if it has none.
+        damping: torque by speed, N·m·s/rad.
+        dry_friction: torque that the joint withstands at rest, and that brakes it in motion, N·m.
+        armature: inertia of what turns with the joint, seen from the joint, kg m².
+        start: angle at time 0, rad.
+        swing: how far its motor usually moves it to each side of the start, in the unit of the motor's targets; it is
+            for controllers, and physics does not depend on it.
     """
 
     name: str
@@ -83,7 +136,39 @@ class Joint:
     child: str
     origin_m: Vector
     axis: Vector
-    motor: Motor | None = None
+    motor: Motor | PDMotor | None = None
+    turn: Quaternion = UNTURNED
+    slides: bool = False
+    limits: tuple[float, float] | None = None
+    damping: float = 0.0
+    dry_friction: float = 0.0
+    armature: float = 0.0
+    start: float = 0.0
+    swing: float = 0.5
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise and latency of a robot's commands and of what its controller observes.
+
+    Attributes:
+        target: standard deviation of each target, in its unit.
+        angle_rad: of a joint's angle.
+        speed_rad_s: of a joint's speed.
+        tilt: of each component of the direction of gravity, of length 1.
+        turning_rad_s: of each component of the base's angular velocity.
+        latency_s: age of what a controller observes, rounded to whole time steps.
+    """
+
+    target: float = 0.0
+    angle_rad: float = 0.0
+    speed_rad_s: float = 0.0
+    tilt: float = 0.0
+    turning_rad_s: float = 0.0
+    latency_s: float = 0.0
+
+
+Surfaces: TypeAlias = tuple[tuple[str, Material], ...]
 
 
 @dataclass(frozen=True)
@@ -95,7 +180,16 @@ class World:
     Attributes:
         bodies: bodies; the first is the base, each other one is the child of exactly one joint.
         joints: joints; those with a motor are the actuators, in this order.
-        start_height_m: height of the base's frame at time 0, at rest with all joints at zero.
+        material: material of the ground, and of all bodies without a surface of their own.
+        start_height_m: height of the base's frame at time 0, at rest with all joints at their starts.
+        start_turn: rotation of the base at time 0.
+        fixed: true if the base never moves.
+        surfaces: material of each named surface, in contact with the ground.
+        slope_rad: angle by which the ground rises along x. The ground stays the plane z = 0; gravity turns.
+        noise: noise of commands and observations.
+        observed: name of the body whose motion is the trajectory; "" for the base.
+        origin: world that this one was edited from, in fields that most engines set in place; None if it is as built.
+        edits: names of these fields, as in the `honours` of engines.
     """
 
     bodies: tuple[Body, ...] = ()
@@ -105,6 +199,14 @@ class World:
     gravity_m_s2: float = 9.81
     time_step_s: float = 1 / 120
     solver_iterations: int = 15
+    start_turn: Quaternion = UNTURNED
+    fixed: bool = False
+    surfaces: Surfaces = ()
+    slope_rad: float = 0.0
+    noise: Noise = Noise()
+    observed: str = ""
+    origin: "World | None" = field(default=None, compare=False, repr=False)
+    edits: frozenset[str] = field(default=frozenset(), compare=False, repr=False)
 
     @property
     def actuators(self) -> tuple[Joint, ...]:
@@ -116,53 +218,29 @@ class World:
         """The world in the default material: equal for worlds that differ only in their material."""
         return replace(self, material=Material())
 
+    def edited(self, name: str, **changes: Any) -> "World":  # noqa: ANN401 - values of fields
+        """Return the world with other values of fields that engines may set in place.
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Actuator targets over time, constant between changes.
+        Args:
+            name: name of the edited field, like `body.mass_kg`.
+            changes: new values of the world's own fields.
+        """
+        return replace(self, **changes, origin=self.origin or self, edits=self.edits | {name})
 
-    Attributes:
-        times_s: `(k,)`, ascending from 0: times at which targets change.
-        targets: `(k, a)`, rad for a hinge: targets from each time on.
-        observe_s: `(t,)`, ascending: times of observation; the last one ends the rollout.
-    """
+    def built(self, in_place: frozenset[str]) -> "World":
+        """Return the world that an engine builds, in the default material, before it sets the other values in place.
 
-    times_s: FloatArray
-    targets: FloatArray
-    observe_s: FloatArray
+        Args:
+            in_place: names of the fields that the engine sets in place.
+        """
+        if self.origin is None:
+            return self.kind
+        return self.origin.kind if self.edits <= in_place else self._as_built
 
+    @cached_property
+    def _as_built(self) -> "World":
+        return replace(self.kind, origin=None, edits=frozenset())
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
-    """The observed motion of the base.
-
-    Attributes:
-        times_s: `(t,)`: the motion's `observe_s`.
-        positions_m: `(..., t, 3)`: positions of the base's frame; leading axes are motions × worlds. All nan where the
-            physics failed.
-        orientations: `(..., t, 4)`: orientations of the base, as quaternions x, y, z, w.
-    """
-
-    times_s: FloatArray
-    positions_m: FloatArray
-    orientations: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """A rollout with additional observations and joint angles.
-
-    Attributes:
-        trajectory: trajectory, bit-equal to that of the plain rollout.
-        times_s: `(k,)`: times of observation.
-        poses: `(k, 7)`: positions and quaternions x, y, z, w of the base's frame; nan where the physics failed.
-        angles_rad: `(k, joints)`, in the world's order; None if the engine does not provide them.
-        torques_nm: `(k, joints)`: torques of the motors in the time step before; None if the engine does not provide
-            them.
-    """
-
-    trajectory: Trajectory
-    times_s: FloatArray
-    poses: FloatArray
-    angles_rad: FloatArray | None
-    torques_nm: FloatArray | None = None
+    def material_of(self, body: Body) -> Material:
+        """Return the material of a body's contacts."""
+        return dict(self.surfaces).get(body.surface, self.material)

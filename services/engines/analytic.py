@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Motion, Trajectory, World
+from gaplab.services.core.motions import Motion, Trajectory
+from gaplab.services.core.world import World
 from gaplab.services.engines.base import Engine
 
 

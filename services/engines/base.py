@@ -12,8 +12,9 @@ from gaplab.schemas.base import Frozen
 from gaplab.schemas.plugin import PluginRead
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import EngineUnavailable
+from gaplab.services.core.motions import Motion, Recording, Trajectory
 from gaplab.services.core.registry import Plugin
-from gaplab.services.core.world import Motion, Recording, Trajectory, World
+from gaplab.services.core.world import World
 
 ALL_FIELDS = frozenset(
     {

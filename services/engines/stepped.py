@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Material, Motion, Recording, Trajectory, World
+from gaplab.services.core.motions import Motion, Recording, Trajectory
+from gaplab.services.core.world import Material, World
 from gaplab.services.engines.base import ALL_FIELDS, Engine
 from gaplab.services.engines.stepping import SteppedScene, WarmScenes, plausible, recording, watch
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.world import Motion, Recording, Trajectory, World
+from gaplab.services.core.motions import Motion, Recording, Trajectory
+from gaplab.services.core.world import World
 
 WARM_SCENES = 4
 """Largest number of cached scenes. Worlds that differ only in material share a scene."""

@@ -8,9 +8,10 @@ from gaplab.schemas.replays import ControllerKind, Interval, Replay, ReplayReadi
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m
+from gaplab.services.core.motions import Recording
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot, Sensors
-from gaplab.services.core.world import Recording, World
+from gaplab.services.core.world import World
 from gaplab.services.plugins.watching import imported
 from gaplab.services.replay.shapes import feet_of, labels, shapes_of
 from gaplab.services.specs.assembly import edits_of, engine_of, reality_of

@@ -4,7 +4,8 @@ import numpy as np
 
 from gaplab.schemas.replays import Orientation, Position, Shape
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Body, Box, World
+from gaplab.services.core.shapes import Box
+from gaplab.services.core.world import Body, World
 
 SLENDER = 0.4
 """Radius of a strut, as a factor of the radius of its body."""

@@ -12,12 +12,12 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.traces import AlignedTrace, TracesRead, TracesSpec
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
+from gaplab.services.core.motions import Trajectory
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.trace_tables import read_trace
 from gaplab.services.core.traces import TooShort, Trace, align, from_start
-from gaplab.services.core.world import Trajectory
 from gaplab.services.plugins.watching import imported
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.specs.assembly import edits_of, engine_of

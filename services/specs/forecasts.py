@@ -6,9 +6,10 @@ from typing import Protocol
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.safety import Safety
 from gaplab.services.core.arrays import FloatArray, Genome, Parameters
+from gaplab.services.core.motions import Recording
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.safety import MOST_SIMULATORS, Extremes, extremes, recording_times, safety
-from gaplab.services.core.world import Recording, World
+from gaplab.services.core.world import World
 
 
 class RecordsRollouts(Protocol):

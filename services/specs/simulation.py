@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters, frozen
 from gaplab.services.core.errors import PluginBroken
+from gaplab.services.core.motions import Motion, Recording, Trajectory
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.tunables.base import Tunable
-from gaplab.services.core.world import Motion, Recording, Trajectory, World
+from gaplab.services.core.world import World
 from gaplab.services.engines.base import Engine
 
 WORLDS_KEPT = 4096

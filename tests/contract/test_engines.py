@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.motions import Motion, Trajectory
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.shapes import Box, Sphere
 from gaplab.services.core.tunables import tunables
-from gaplab.services.core.world import Body, Box, Material, Motion, Sphere, Trajectory, World
+from gaplab.services.core.world import Body, Material, World
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 

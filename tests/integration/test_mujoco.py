@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.motions import Motion
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, World
+from gaplab.services.core.shapes import Box, Sphere
+from gaplab.services.core.world import Body, Joint, Material, Motor, World
 from gaplab.services.engines.mujoco import MuJoCo
 from gaplab.services.engines.mujoco.callback import callbacks
 from gaplab.services.engines.mujoco.layout import layout

@@ -10,8 +10,10 @@ import pytest
 
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.motions import Motion
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, Vector, World
+from gaplab.services.core.shapes import Box, Sphere, Vector
+from gaplab.services.core.world import Body, Joint, Material, Motor, World
 from gaplab.services.engines.physx import PhysX
 from gaplab.services.engines.physx.scene import PhysXScene
 from gaplab.services.engines.stepping import WARM_SCENES

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.motions import Motion
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, World
+from gaplab.services.core.shapes import Box, Sphere
+from gaplab.services.core.world import Body, Joint, Material, Motor, World
 from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.engines.pybullet.stick_slip import StickSlip
 from gaplab.services.engines.stepping import WARM_SCENES

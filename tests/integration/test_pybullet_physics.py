@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Sphere, World
+from gaplab.services.core.motions import Motion
+from gaplab.services.core.shapes import Box, Sphere
+from gaplab.services.core.world import Body, Joint, Material, World
 from gaplab.services.engines.pybullet import PyBullet
 from gaplab.services.engines.pybullet.scene import PyBulletScene
 from gaplab.services.engines.pybullet.stick_slip import StickSlip

@@ -8,7 +8,7 @@ import pytest
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.space import Space
-from gaplab.services.core.tuners.base import Task
+from gaplab.services.core.tuners.base import TuningTask
 from gaplab.services.core.tuners.climbers import Climbers, ClimbersOptions
 from gaplab.services.core.tuning import Misfit
 from gaplab.services.core.types import Sample, Simulator
@@ -21,7 +21,7 @@ SAMPLES = [Sample(genome, float(paraboloid(genome[None], TRUTH[None])[0, 0])) fo
 
 def climbed(evaluations: Any, previous: Any = (), ensemble: Any = 5, simulate: Any = paraboloid) -> Any:
     misfit = Misfit(Answers(simulate), SAMPLES)
-    task = Task(misfit, SPACE, SteadyState(), ensemble, evaluations, tuple(previous))
+    task = TuningTask(misfit, SPACE, SteadyState(), ensemble, evaluations, tuple(previous))
     return Climbers().tune(task, np.random.default_rng(1))
 
 

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.motions import Motion, Trajectory
 from gaplab.services.core.robots import quadruped
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.core.world import Motion, Trajectory
 
 ROBOT = Quadruped()
 

@@ -9,9 +9,10 @@ import pytest
 from gaplab.schemas.safety import LimitsSpec
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.core.motions import Recording, Trajectory
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.safety import Extremes, extremes, recording_times, safety
-from gaplab.services.core.world import Recording, Trajectory, World
+from gaplab.services.core.world import World
 from gaplab.services.engines import engines
 from gaplab.services.specs.assembly import setting
 from gaplab.services.specs.forecasts import SafetyForecast

@@ -8,7 +8,7 @@ import pytest
 from gaplab.services.core.answers import Answers
 from gaplab.services.core.optimizers.steady_state import SteadyState, SteadyStateOptions
 from gaplab.services.core.space import Space
-from gaplab.services.core.tuners.base import Task
+from gaplab.services.core.tuners.base import TuningTask
 from gaplab.services.core.tuners.search import SearchTuner
 from gaplab.services.core.tuning import Misfit, simulator_fitness, squared_errors
 from gaplab.services.core.types import Sample
@@ -21,7 +21,7 @@ SAMPLES = [Sample(genome, float(paraboloid(genome[None], TRUTH[None])[0, 0])) fo
 
 def tune(misfit: Any, space: Any, optimizer: Any, evaluations: Any, rng: Any) -> Any:
     """All of the final population, best first."""
-    return SearchTuner().tune(Task(misfit, space, optimizer, 1_000, evaluations, ()), rng)
+    return SearchTuner().tune(TuningTask(misfit, space, optimizer, 1_000, evaluations, ()), rng)
 
 
 def test_squared_errors_are_summed_over_samples() -> None:

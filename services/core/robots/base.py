@@ -1,88 +1,82 @@
-"""The contract of a robot: a world, genomes that describe its motion, the fitness of a trajectory, and its sensors."""
+"""The contract of a robot: a world, and what drives and rates it by default."""
 
-from abc import abstractmethod
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
-import numpy as np
-
-from gaplab.services.core.arrays import FloatArray, Genome, no_readings
+from gaplab.schemas.plugin import PluginRef
+from gaplab.services.core.arrays import FloatArray, Genome
+from gaplab.services.core.controllers import controllers
+from gaplab.services.core.controllers.base import Controller
+from gaplab.services.core.motions import Loop, Motion, Trajectory
 from gaplab.services.core.registry import Plugin
+from gaplab.services.core.sensors import Sensors as Sensors
 from gaplab.services.core.space import Space
-from gaplab.services.core.world import Motion, Trajectory, World
-
-
-@dataclass(frozen=True, eq=False)
-class Sensors:
-    """The sensors of a robot, and the times at which all of them are read.
-
-    Attributes:
-        names: name of each of the s sensors.
-        units: unit of each.
-        noises: `(s,)`: standard deviation of each sensor's noise, in its unit.
-        times_s: `(r,)`, ascending: seconds from the start of a rollout.
-    """
-
-    names: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-    noises: FloatArray = field(default_factory=no_readings)
-    times_s: FloatArray = field(default_factory=no_readings)
-
-    @property
-    def size(self) -> int:
-        """Return the number of readings of a rollout, q = r · s: all sensors at the first time, then at the next."""
-        return len(self.names) * len(self.times_s)
-
-    @property
-    def reading_times_s(self) -> FloatArray:
-        """Return the time of each reading, `(q,)`."""
-        return np.repeat(self.times_s, len(self.names))
-
-    def details(self) -> dict[str, Any]:
-        """Return name, unit and noise of each sensor, and the times of reading, for the catalogue."""
-        named = zip(self.names, self.units, self.noises.tolist(), strict=True)
-        sensors = [{"name": name, "unit": unit, "noise": noise} for name, unit, noise in named]
-        return {"sensors": sensors, "reading_times_s": self.times_s.tolist()}
-
-    def standardised(self, values: FloatArray) -> FloatArray:
-        """Return readings `(..., q)`, each divided by its noise, from values `(..., r, s)` in the sensors' units."""
-        return (values / self.noises).reshape(*values.shape[:-2], self.size)
-
-    def values(self, readings: FloatArray) -> FloatArray:
-        """Return values `(..., r, s)` in the sensors' units, from readings `(..., q)`."""
-        return readings.reshape(*readings.shape[:-1], len(self.times_s), len(self.names)) * self.noises
+from gaplab.services.core.tasks import tasks
+from gaplab.services.core.tasks.base import Task
+from gaplab.services.core.world import World
 
 
 class Robot(Plugin):
-    """A morphology with a genome space.
+    """A morphology, with a controller that drives it and a task that rates it.
+
+    Most robots set `world`, `usual_controller` and `usual_task`, and call `perform`. A robot that brings a controller
+    and a task of its own, like a function, has neither: it sets `unit`, `space` and `known`, and overrides `motion` and
+    `fitness`.
 
     Attributes:
         engine: the engine that runs it when a spec names none.
-        unit: unit of its fitness.
         world: the robot in reality: its nominal world, whose coefficients are the default hidden truth.
+        usual_controller: controller of a spec that names none; None if it brings its own.
+        usual_task: task of a spec that names none; None if it brings its own.
+        designed: hand-designed genomes of middling fitness, by the name of their controller.
+        unit: unit of its fitness.
         space: space of its genomes.
-        known: `(g,)`, a hand-designed genome of middling fitness.
-        sensors: what it senses during a rollout; by default nothing.
+        known: `(g,)`, a hand-designed genome.
+        sensors: what is read during a rollout; by default nothing.
     """
 
     engine: ClassVar[str]
-    unit: ClassVar[str]
+    unit: str
     world: World
+    usual_controller: PluginRef | None = None
+    usual_task: PluginRef | None = None
+    designed: Mapping[str, Genome] = MappingProxyType({})
     space: Space
     known: Genome
     sensors: Sensors = Sensors()
+    _controller: Controller
+    _task: Task
 
-    @abstractmethod
-    def motion(self, genome: Genome) -> Motion:
+    def perform(self, controller: Controller, task: Task) -> None:
+        """Let a controller drive the robot, and a task rate it; both are new, and serve this robot alone."""
+        controller.prepare(self.world, task.observe_s)
+        self._controller, self._task = controller, task
+        self.unit, self.sensors, self.space = task.unit, task.sensors, controller.space
+        known = self.designed.get(controller.name)
+        fits = known is not None and known.shape == controller.known.shape
+        self.known = known if known is not None and fits else controller.known
+
+    def perform_as_usual(self) -> None:
+        """Let the usual controller drive the robot, and the usual task rate it."""
+        assert self.usual_controller is not None
+        assert self.usual_task is not None
+        self.perform(controllers.create(self.usual_controller), tasks.create(self.usual_task))
+
+    def motion(self, genome: Genome) -> Motion | Loop:
         """Return the motion that the genome `(g,)` describes."""
+        return self._controller.motion(genome)
 
-    @abstractmethod
     def fitness(self, trajectory: Trajectory) -> FloatArray:
         """Return `(...)`: the fitness of each trajectory, maximised; nan where the physics failed."""
+        return self._task.fitness(trajectory)
 
     def sense(self, trajectory: Trajectory) -> FloatArray:
-        """Return `(..., r, s)`: what the sensors say, in their units, of trajectories observed at `sensors.times_s`."""
-        return np.empty((*trajectory.positions_m.shape[:-1], len(self.sensors.names)))
+        """Return `(..., r, s)`: what the sensors say, in their units, of trajectories observed at `sensors.times_s`.
+
+        By default they are those of the task; a robot with a task of its own that has sensors overrides it.
+        """
+        return self._task.sense(trajectory)
 
     @property
     def is_function(self) -> bool:
@@ -91,12 +85,18 @@ class Robot(Plugin):
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return the default engine, the unit of fitness, the number of genes, the sensors, and if it is a function."""
+        """Return engine, controller, task, unit, number of genes, sensors, and if it is a function, for the catalogue."""
         robot = cls()
         return {
             "engine": cls.engine,
-            "unit": cls.unit,
+            "controller": _named(robot.usual_controller),
+            "task": _named(robot.usual_task),
+            "unit": robot.unit,
             "genes": robot.space.size,
             "function": robot.is_function,
             **robot.sensors.details(),
         }
+
+
+def _named(ref: PluginRef | None) -> dict[str, Any] | None:
+    return None if ref is None else ref.model_dump(mode="json")

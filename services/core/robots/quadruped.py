@@ -2,14 +2,14 @@
 
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Real
-from gaplab.services.core.arrays import FloatArray, Genome, frozen
-from gaplab.services.core.robots.base import Robot, Sensors
-from gaplab.services.core.space import Space
-from gaplab.services.core.world import Body, Box, Joint, Material, Motion, Motor, Sphere, Trajectory, Vector, World
+from gaplab.schemas.plugin import PluginRef
+from gaplab.services.core.arrays import Genome, frozen
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.shapes import Box, Sphere, Vector
+from gaplab.services.core.world import Body, Joint, Material, Motor, World
 
 BODY_M: Vector = (0.30, 0.20, 0.06)
 BODY_KG = 1.5
@@ -30,14 +30,6 @@ SETTLING_S = 0.5
 """Time before the counted time: the robot drops to the ground and starts its gait."""
 
 COUNTED_S = 2.5
-SENSED_EVERY_S = 0.25
-"""Interval between readings of the sensors."""
-
-TILT_NOISE_RAD, PLACE_NOISE_M = 0.02, 0.005
-"""Noise of the sensors: gaplab's defaults, of a cheap inertial sensor and a camera above the floor."""
-
-NARROWEST, WIDEST = 0.1, 0.9
-"""Width of a pulse in periods, at gene values 0 and 1."""
 
 LEGS: dict[str, tuple[int, int]] = {
     "front_left": (1, 1),
@@ -53,7 +45,7 @@ class QuadrupedOptions(Frozen):
 
     counted_s: Annotated[Real, Field(gt=0, le=600)] = Field(
         default=COUNTED_S,
-        description="counted seconds, after the robot has settled; the cost of a rollout grows with it",
+        description="counted seconds of its usual task, after the robot has settled; a spec with a task says so there",
     )
 
 
@@ -69,70 +61,18 @@ class Quadruped(Robot):
     name = "quadruped"
     source = "Paper, section 2 and figure 1; docs/robot.md"
     engine = "pybullet"
-    unit = "m/s"
     Options = QuadrupedOptions
     options: QuadrupedOptions
 
     def __init__(self, options: Frozen | None = None) -> None:
         super().__init__(options)
         self.world = _world()
-        actuators = len(self.world.actuators)
-        self.space = Space.box([0.0] * 2 * actuators, [1.0] * 2 * actuators, [True, False] * actuators)
-        self.known = _trot()
-        times = np.arange(1, np.floor(self.options.counted_s / SENSED_EVERY_S) + 1) * SENSED_EVERY_S
-        self.sensors = Sensors(
-            names=("roll", "pitch", "height", "x", "y"),
-            units=("rad", "rad", "m", "m", "m"),
-            noises=frozen([TILT_NOISE_RAD] * 2 + [PLACE_NOISE_M] * 3),
-            times_s=frozen(SETTLING_S + times),
+        self.usual_controller = PluginRef(name="square_pulses", options={"period_s": PERIOD_S})
+        self.usual_task = PluginRef(
+            name="walk", options={"settling_s": SETTLING_S, "counted_s": self.options.counted_s}
         )
-        self._prepare_pulses(actuators)
-
-    def _prepare_pulses(self, actuators: int) -> None:
-        """Compute what all motions share; numpy is faster with these arrays than with numbers or rows to repeat."""
-        duration_s = SETTLING_S + self.options.counted_s
-        self._observe_s = frozen([SETTLING_S, duration_s])
-        self._cycles = frozen(np.arange(np.ceil(duration_s / PERIOD_S))[:, None])
-        self._narrowest, self._range = frozen([NARROWEST] * actuators), frozen([WIDEST - NARROWEST] * actuators)
-        amplitudes = np.tile(AMPLITUDES_RAD, len(LEGS))[:, None]
-        self._inside = frozen(np.repeat(amplitudes, 1 + 2 * actuators * self._cycles.size, axis=1))
-        self._outside = frozen(-self._inside)
-
-    def motion(self, genome: Genome) -> Motion:
-        """Return the motion: each actuator is at plus its amplitude during its pulse, else at minus."""
-        phases, widths = genome[0::2], self._narrowest + self._range * genome[1::2]
-        ends = np.concatenate((phases, phases + widths))
-        edges = ends - np.floor(ends)  # mod 1, to the last bit, in half the time
-        edges.sort()
-        times = np.empty(2 + self._cycles.size * edges.size)  # in periods, and a moment after the last
-        times[0], times[1:-1] = 0.0, (self._cycles + edges).ravel()
-        times[-1] = times[-2] + 1e-9
-        since = (times[:-1] + times[1:]) / 2 - phases[:, None]
-        since -= np.floor(since)
-        targets = np.where(since < widths[:, None], self._inside, self._outside).T
-        times_s, distinct = times[:-1] * PERIOD_S, times[:-1] != times[1:]
-        if np.count_nonzero(distinct) < len(distinct):
-            times_s, targets = times_s[distinct], targets[distinct]
-        times_s.setflags(write=False)
-        targets.setflags(write=False)
-        return Motion(times_s, targets, self._observe_s)
-
-    def fitness(self, trajectory: Trajectory) -> FloatArray:
-        """Return `(...)`: the distance between first and last observation, divided by the time between them."""
-        travelled = trajectory.positions_m[..., -1, :2] - trajectory.positions_m[..., 0, :2]
-        squares = travelled * travelled
-        distances = np.sqrt(squares[..., 0] + squares[..., 1])
-        return np.asarray(distances / (trajectory.times_s[-1] - trajectory.times_s[0]))
-
-    def sense(self, trajectory: Trajectory) -> FloatArray:
-        """Return `(..., r, 5)`: roll and pitch of the trunk, its height, and its place on the ground from the start."""
-        x, y, z, w = trajectory.orientations.reshape(-1, 4).T  # numpy is twice as fast with vectors
-        values = np.empty((len(x), 5))
-        values[:, 0] = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-        values[:, 1] = np.arcsin(np.minimum(np.maximum(2 * (w * y - z * x), -1.0), 1.0))
-        places = trajectory.positions_m.reshape(-1, 3)
-        values[:, 2], values[:, 3:] = places[:, 2], places[:, :2]
-        return values.reshape(*trajectory.positions_m.shape[:-1], 5)
+        self.designed = {"square_pulses": _trot()}
+        self.perform_as_usual()
 
 
 def _world() -> World:
@@ -161,10 +101,11 @@ def _leg(name: str, ahead: int, left: int) -> tuple[list[Body], list[Joint]]:
         Body(thigh, THIGH_KG, Box((HIP_M, THIGH_M, HIP_M)), (0.0, left * THIGH_M / 2, 0.0), collides=False),
         Body(shin, FOOT_KG, Sphere(FOOT_RADIUS_M), (0.0, 0.0, -SHIN_M)),
     ]
+    yaw, roll, knee = AMPLITUDES_RAD
     joints = [
-        Joint(f"{name}_yaw", "trunk", hip, corner, (0.0, 0.0, -float(left)), MOTOR),
-        Joint(f"{name}_roll", hip, thigh, (0.0, 0.0, 0.0), (float(left), 0.0, 0.0), MOTOR),
-        Joint(f"{name}_knee", thigh, shin, (0.0, left * THIGH_M, 0.0), (float(left), 0.0, 0.0), MOTOR),
+        Joint(f"{name}_yaw", "trunk", hip, corner, (0.0, 0.0, -float(left)), MOTOR, swing=yaw),
+        Joint(f"{name}_roll", hip, thigh, (0.0, 0.0, 0.0), (float(left), 0.0, 0.0), MOTOR, swing=roll),
+        Joint(f"{name}_knee", thigh, shin, (0.0, left * THIGH_M, 0.0), (float(left), 0.0, 0.0), MOTOR, swing=knee),
     ]
     return bodies, joints
 

@@ -3,9 +3,10 @@
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray, Genome, frozen
+from gaplab.services.core.motions import Motion, Trajectory
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.space import Space
-from gaplab.services.core.world import Material, Motion, Trajectory, World
+from gaplab.services.core.world import Material, World
 
 
 class ToyFunction(Robot):

@@ -10,7 +10,7 @@ from pydantic import Field
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray, Parameters
 from gaplab.services.core.space import Space
-from gaplab.services.core.tuners.base import Task, Tuner
+from gaplab.services.core.tuners.base import Tuner, TuningTask
 from gaplab.services.core.types import Simulator
 
 WIDER = 2.0
@@ -45,7 +45,7 @@ class AbcSmc(Tuner):
     Options = AbcSmcOptions
     options: AbcSmcOptions
 
-    def tune(self, task: Task, rng: Generator) -> tuple[Simulator, ...]:
+    def tune(self, task: TuningTask, rng: Generator) -> tuple[Simulator, ...]:
         """Return the best particle, then draws from the posterior."""
         size = max(2, task.evaluations // self.options.rounds)
         stay = max(2, round(size * self.options.kept))

@@ -14,7 +14,7 @@ from gaplab.services.core.types import Simulator
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class TuningTask:
     """What a tuner has to do, and with what.
 
     Attributes:
@@ -46,7 +46,7 @@ class Tuner(Plugin):
     intervals: ClassVar[bool] = False
 
     @abstractmethod
-    def tune(self, task: Task, rng: Generator) -> tuple[Simulator, ...]:
+    def tune(self, task: TuningTask, rng: Generator) -> tuple[Simulator, ...]:
         """Return `task.ensemble` simulators, the best estimate first."""
 
     @classmethod

@@ -10,7 +10,7 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.answers import nothing
 from gaplab.services.core.arrays import FloatArray, Parameters
 from gaplab.services.core.search import Question
-from gaplab.services.core.tuners.base import Task, Tuner
+from gaplab.services.core.tuners.base import Tuner, TuningTask
 from gaplab.services.core.types import Simulator
 
 
@@ -37,7 +37,7 @@ class Climbers(Tuner):
     Options = ClimbersOptions
     options: ClimbersOptions
 
-    def tune(self, task: Task, rng: Generator) -> tuple[Simulator, ...]:
+    def tune(self, task: TuningTask, rng: Generator) -> tuple[Simulator, ...]:
         """Return where the climbers have arrived, best first."""
         parents = self._starts(task, rng)
         errors = np.full(len(parents), np.inf)
@@ -51,12 +51,12 @@ class Climbers(Tuner):
             left -= len(children)
         return tuple(Simulator(parents[index], float(errors[index])) for index in np.argsort(errors, kind="stable"))
 
-    def _starts(self, task: Task, rng: Generator) -> Parameters:
+    def _starts(self, task: TuningTask, rng: Generator) -> Parameters:
         """Return the simulators of the tuning before, and random ones for those that are missing."""
         before = np.array([each.parameters for each in task.previous]).reshape(-1, task.space.size)[: task.ensemble]
         return np.vstack([before, task.space.draw(task.ensemble - len(before), rng)])
 
-    def _children(self, task: Task, parents: Parameters, rng: Generator) -> Parameters:
+    def _children(self, task: TuningTask, parents: Parameters, rng: Generator) -> Parameters:
         """Return a child of each parent, `(m, p)`."""
         steps = np.zeros_like(parents)
         for row in steps:

@@ -11,7 +11,7 @@ from scipy.stats.qmc import LatinHypercube
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.tuners.base import Task, Tuner
+from gaplab.services.core.tuners.base import Tuner, TuningTask
 from gaplab.services.core.types import Simulator
 
 CONFIDENCE = 0.95
@@ -64,7 +64,7 @@ class GaussNewton(Tuner):
     Options = GaussNewtonOptions
     options: GaussNewtonOptions
 
-    def tune(self, task: Task, rng: Generator) -> tuple[Simulator, ...]:
+    def tune(self, task: TuningTask, rng: Generator) -> tuple[Simulator, ...]:
         """Return the estimate with its intervals, then draws from its error."""
         left = min(self.options.evaluations, task.evaluations) - task.ensemble
         box = np.array([np.zeros(task.space.size), np.ones(task.space.size)])
@@ -158,7 +158,7 @@ def _place(places: FloatArray, answers: FloatArray, asked: FloatArray, noise: fl
     return np.asarray(np.clip(found, 0.0, 1.0))
 
 
-def _simulators(task: Task, estimate: LocalEstimate, rng: Generator) -> tuple[Simulator, ...]:
+def _simulators(task: TuningTask, estimate: LocalEstimate, rng: Generator) -> tuple[Simulator, ...]:
     """Return the estimate with its intervals, then draws from its error; each with its discrepancy."""
     drawn = rng.multivariate_normal(estimate.place, estimate.covariance, task.ensemble - 1)
     found = _parameters(task, np.clip(np.vstack([estimate.place, drawn]), 0.0, 1.0))
@@ -169,5 +169,5 @@ def _simulators(task: Task, estimate: LocalEstimate, rng: Generator) -> tuple[Si
     return (first, *(Simulator(parameters, float(error), None, weight) for parameters, error in others))
 
 
-def _parameters(task: Task, places: FloatArray) -> FloatArray:
+def _parameters(task: TuningTask, places: FloatArray) -> FloatArray:
     return np.asarray(task.space.lower + places * task.space.extent)

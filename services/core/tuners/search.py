@@ -9,7 +9,7 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.search import maximise
-from gaplab.services.core.tuners.base import Task, Tuner
+from gaplab.services.core.tuners.base import Tuner, TuningTask
 from gaplab.services.core.types import Simulator
 
 
@@ -37,7 +37,7 @@ class SearchTuner(Tuner):
     Options = SearchOptions
     options: SearchOptions
 
-    def tune(self, task: Task, rng: Generator) -> tuple[Simulator, ...]:
+    def tune(self, task: TuningTask, rng: Generator) -> tuple[Simulator, ...]:
         """Return the best simulators of the final population."""
         before = [each.parameters for each in task.previous[: task.ensemble]]
         start = np.array(before) if self.options.warm_start and before else None

@@ -10,7 +10,8 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Motion, Recording, Trajectory, World
+from gaplab.services.core.motions import Motion, Recording, Trajectory
+from gaplab.services.core.world import World
 from gaplab.services.engines.base import ALL_FIELDS, Engine
 from gaplab.services.engines.mujoco.scene import MuJoCoScene
 from gaplab.services.engines.stepping import WarmScenes, consecutive, recording

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from gaplab.services.core.world import Body, Box, Joint, Material, World
+from gaplab.services.core.shapes import Box
+from gaplab.services.core.world import Body, Joint, Material, World
 from gaplab.services.engines.mujoco.law import EACH, FIRST, Drive
 
 GROUND = "the ground"

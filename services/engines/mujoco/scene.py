@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Material, Motion, World
+from gaplab.services.core.motions import Motion
+from gaplab.services.core.world import Material, World
 from gaplab.services.engines.mujoco.callback import callbacks
 from gaplab.services.engines.mujoco.law import drive_torques, settings
 from gaplab.services.engines.mujoco.model import compiled, driven, drives, paint

@@ -8,7 +8,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Body, Box, Joint, Motor, Vector, World
+from gaplab.services.core.shapes import Box, Vector
+from gaplab.services.core.world import Body, Joint, Motor, World
 
 Handle: TypeAlias = Any
 """An object of SAPIEN, untyped because the library must not be imported here."""

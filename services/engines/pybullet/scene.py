@@ -6,7 +6,8 @@ from types import ModuleType
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Body, Box, Joint, Material, World
+from gaplab.services.core.shapes import Box
+from gaplab.services.core.world import Body, Joint, Material, World
 
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
 FAR_AWAY = (0.0, 0.0, 1e4)

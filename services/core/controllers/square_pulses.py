@@ -1,0 +1,71 @@
+"""The paper's controller: each actuator is extended and contracted by a periodic pulse of two genes."""
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from gaplab.schemas.base import Frozen, Real
+from gaplab.services.core.arrays import FloatArray, Genome, frozen
+from gaplab.services.core.controllers.base import Controller
+from gaplab.services.core.motions import Motion
+from gaplab.services.core.space import Space
+from gaplab.services.core.world import World
+
+NARROWEST, WIDEST = 0.1, 0.9
+"""Width of a pulse in periods, at gene values 0 and 1."""
+
+
+class SquarePulsesOptions(Frozen):
+    """Options of `square_pulses`."""
+
+    period_s: Annotated[Real, Field(gt=0, le=60)] = Field(default=0.5, description="period of all pulses")
+    amplitude: Annotated[Real, Field(gt=0, le=10)] = Field(
+        default=1.0, description="amplitude, as a factor of each joint's usual swing"
+    )
+
+
+class SquarePulses(Controller):
+    """A periodic pulse of phase and width for each actuator.
+
+    Gene 2i is the phase of actuator i, and gene 2i + 1 the width of its pulse, both in [0, 1]; phases wrap around.
+    During its pulse an actuator is at its start plus its amplitude, else at its start minus its amplitude.
+    """
+
+    name = "square_pulses"
+    source = "Paper, section 2"
+    Options = SquarePulsesOptions
+    options: SquarePulsesOptions
+
+    def prepare(self, world: World, observe_s: FloatArray) -> None:
+        """Compute what all motions share; numpy is faster with these arrays than with numbers or rows to repeat."""
+        actuators = len(world.actuators)
+        self.space = Space.box([0.0] * 2 * actuators, [1.0] * 2 * actuators, [True, False] * actuators)
+        self.known = frozen([0.5] * 2 * actuators)
+        self._observe_s, self._period_s = observe_s, self.options.period_s
+        self._cycles = frozen(np.arange(np.ceil(observe_s[-1] / self._period_s))[:, None])
+        self._narrowest, self._range = frozen([NARROWEST] * actuators), frozen([WIDEST - NARROWEST] * actuators)
+        swings = np.array([joint.swing for joint in world.actuators])[:, None] * self.options.amplitude
+        starts = np.array([joint.start for joint in world.actuators])[:, None]
+        times = 1 + 2 * actuators * self._cycles.size
+        self._inside = frozen(np.repeat(starts + swings, times, axis=1))
+        self._outside = frozen(np.repeat(starts - swings, times, axis=1))
+
+    def motion(self, genome: Genome) -> Motion:
+        """Return the motion: each actuator is at plus its amplitude during its pulse, else at minus."""
+        phases, widths = genome[0::2], self._narrowest + self._range * genome[1::2]
+        ends = np.concatenate((phases, phases + widths))
+        edges = ends - np.floor(ends)  # mod 1, to the last bit, in half the time
+        edges.sort()
+        times = np.empty(2 + self._cycles.size * edges.size)  # in periods, and a moment after the last
+        times[0], times[1:-1] = 0.0, (self._cycles + edges).ravel()
+        times[-1] = times[-2] + 1e-9
+        since = (times[:-1] + times[1:]) / 2 - phases[:, None]
+        since -= np.floor(since)
+        targets = np.where(since < widths[:, None], self._inside, self._outside).T
+        times_s, distinct = times[:-1] * self._period_s, times[:-1] != times[1:]
+        if np.count_nonzero(distinct) < len(distinct):
+            times_s, targets = times_s[distinct], targets[distinct]
+        times_s.setflags(write=False)
+        targets.setflags(write=False)
+        return Motion(times_s, targets, self._observe_s)

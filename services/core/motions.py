@@ -1,0 +1,110 @@
+"""What a world does: commands of a controller, in advance or in a loop, and what is observed."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from gaplab.services.core.arrays import FloatArray, Genome, frozen, no_readings
+
+Act: TypeAlias = Callable[[FloatArray, FloatArray, FloatArray, float], tuple[FloatArray, FloatArray]]
+"""Genomes `(n, g)`, observations `(n, s)`, memories `(n, m)` and seconds to targets `(n, a)` and memories `(n, m)`.
+
+Each row of the results depends on the same row of the arguments alone, to the last bit, whatever n is.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Actuator targets over time, constant between changes.
+
+    Attributes:
+        times_s: `(k,)`, ascending from 0: times at which targets change.
+        targets: `(k, a)`, rad for a hinge: targets from each time on.
+        observe_s: `(t,)`, ascending: times of observation; the last one ends the rollout.
+    """
+
+    times_s: FloatArray
+    targets: FloatArray
+    observe_s: FloatArray
+
+    def observed_at(self, times_s: FloatArray) -> "Motion":
+        """Return the same motion, observed at other times."""
+        return Motion(self.times_s, self.targets, times_s)
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """A controller in a loop: once in each period, it observes and sets the targets of the actuators.
+
+    Attributes:
+        act: function that all loops of a call share: see Act.
+        senses: groups of `observations.GROUPS` that it observes, in that order.
+        genome: `(g,)`: its row of the genomes.
+        memory: `(m,)`: its memory at time 0.
+        period_s: time between two calls of `act`, the first at time 0, rounded to whole time steps.
+        observe_s: `(t,)`, ascending: times at which the trajectory is observed; the last one ends the rollout.
+        observation_noise: `(ticks, s)`: what is added to its observations, by call of `act`; empty: nothing.
+        target_noise: `(ticks, a)`: what is added to its targets, likewise.
+        latency_s: age of its observations.
+    """
+
+    act: Act
+    senses: tuple[str, ...]
+    genome: Genome
+    memory: FloatArray
+    period_s: float
+    observe_s: FloatArray
+    observation_noise: FloatArray = field(default_factory=no_readings)
+    target_noise: FloatArray = field(default_factory=no_readings)
+    latency_s: float = 0.0
+
+    def observed_at(self, times_s: FloatArray) -> "Loop":
+        """Return the same loop, whose trajectory is observed at other times."""
+        return replace(self, observe_s=times_s)
+
+    @property
+    def ticks(self) -> int:
+        """Return the number of calls of `act` in a rollout."""
+        return int(np.floor(float(self.observe_s[-1]) / self.period_s + 1e-6)) + 1
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """The observed motion of the base, or of the world's observed body.
+
+    Attributes:
+        times_s: `(t,)`: the motion's `observe_s`.
+        positions_m: `(..., t, 3)`: positions of the base's frame; leading axes are motions × worlds. All nan where the
+            physics failed.
+        orientations: `(..., t, 4)`: orientations of the base, as quaternions x, y, z, w.
+    """
+
+    times_s: FloatArray
+    positions_m: FloatArray
+    orientations: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A rollout with additional observations and joint angles.
+
+    Attributes:
+        trajectory: trajectory, bit-equal to that of the plain rollout.
+        times_s: `(k,)`: times of observation.
+        poses: `(k, 7)`: positions and quaternions x, y, z, w of the base's frame; nan where the physics failed.
+        angles_rad: `(k, joints)`, in the world's order; None if the engine does not provide them.
+        torques_nm: `(k, joints)`: torques of the motors in the time step before; None if the engine does not provide
+            them.
+    """
+
+    trajectory: Trajectory
+    times_s: FloatArray
+    poses: FloatArray
+    angles_rad: FloatArray | None
+    torques_nm: FloatArray | None = None
+
+
+NO_MEMORY = frozen([])
+"""The memory of a controller without one."""
