@@ -167,14 +167,14 @@ def test_links_are_where_kinematics_says_in_whatever_order_joints_are_listed(eng
         Joint("c", "trunk", "near", (0.0, 0.0, 0.1), axis, turn=turn, start=0.7),
         Joint("d", "trunk", "other", (0.0, 0.2, 0.1), axis, turn=turn, start=-0.2),
     )
-    world = World(bodies, joints, start_height_m=1.0, start_turn=turn, gravity_m_s2=3.0)
+    world = World(bodies, joints, start_height_m=0.2, start_turn=turn)
     scene = engine._scenes[world]
     scene.start(world)
-    scene.step(20)
+    scene.step(60)
 
     positions, orientations = body_poses(world, scene.pose()[None], scene.angles()[None])
 
-    assert scene.pose()[2] < 1.0
+    assert np.linalg.norm(scene.pose()[:2]) > 1e-3
     assert np.ptp(scene.angles() - [0.3, -0.1, 0.7, -0.2]) > 1e-3
     for link, joint in zip(scene._robot.joints, world.joints, strict=True):
         state = scene.bullet.getLinkState(scene.robot, link, 0, 1, physicsClientId=scene.client)
@@ -182,5 +182,5 @@ def test_links_are_where_kinematics_says_in_whatever_order_joints_are_listed(eng
         place = names.index(joint.child)
         assert info[0] == bodies[place].mass_kg
         assert info[2] == pytest.approx(inertia.moments_kg_m2)
-        assert positions[0, place] == pytest.approx(state[4], abs=1e-9)
-        assert abs(orientations[0, place] @ state[5]) == pytest.approx(1)
+        assert positions[0, place] == pytest.approx(state[4], abs=1e-6)
+        assert abs(orientations[0, place] @ state[5]) == pytest.approx(1, abs=1e-6)
