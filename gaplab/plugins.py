@@ -1,5 +1,6 @@
-"""Names for your own plug-ins: a strategy, robot, controller, task, tunable, optimizer, engine,
-discrepancy or tuner, each in one file.
+"""Names for your own plug-ins, each in one file.
+
+A plug-in is a strategy, robot, controller, task, tunable, optimizer, engine, discrepancy or tuner.
 
 Put the file into a folder that GAPLAB_PLUGINS names, and start the service. docs/how-to describes each kind.
 """

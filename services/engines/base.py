@@ -2,7 +2,6 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib.util import find_spec
 from typing import Any, ClassVar
 
@@ -12,7 +11,7 @@ from gaplab.schemas.base import Frozen
 from gaplab.schemas.plugin import PluginRead
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import EngineUnavailable
-from gaplab.services.core.motions import Motion, Recording, Trajectory
+from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
 from gaplab.services.core.registry import Plugin
 from gaplab.services.core.world import World
 
@@ -69,10 +68,10 @@ class Engine(Plugin):
         """Return whether the engine can simulate the world."""
 
     @abstractmethod
-    def rollout(self, world: World, motion: Motion) -> Trajectory:
+    def rollout(self, world: World, motion: Motion | Loop) -> Trajectory:
         """Return the trajectory of the base, `(t, 3)`, under the motion from the start of the world."""
 
-    def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion]) -> Trajectory:
+    def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion] | Sequence[Loop]) -> Trajectory:
         """Return every motion in every world, `(n motions, m worlds, t, 3)`; observation times are equal.
 
         An engine that is faster in batches overrides this loop.
@@ -84,7 +83,7 @@ class Engine(Plugin):
             orientations=np.array([[each.orientations for each in row] for row in grid]),
         )
 
-    def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
+    def record(self, world: World, motion: Motion | Loop, times_s: FloatArray) -> Recording:
         """Return the same rollout, with poses at additional times.
 
         This default records the base alone. An engine that knows joint angles overrides it.
@@ -94,7 +93,7 @@ class Engine(Plugin):
             motion: as in `rollout`.
             times_s: `(k,)`, ascending, from 0 to the last observation.
         """
-        seen = self.rollout(world, replace(motion, observe_s=times_s))
+        seen = self.rollout(world, motion.observed_at(times_s))
         poses = np.hstack([seen.positions_m, seen.orientations])
         return Recording(self.rollout(world, motion), times_s, poses, None)
 

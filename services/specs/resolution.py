@@ -2,12 +2,15 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from functools import lru_cache
+from types import ModuleType
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.resolved import ResolvedBudget, ResolvedReality, ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked, SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, SharedSettings, StudySpec
+from gaplab.services.core import external_plugins
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import InvalidSpec, Violation, gather
@@ -18,6 +21,7 @@ from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import Strategy
+from gaplab.services.core.tasks import tasks
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.tuners.base import Tuner
@@ -26,6 +30,7 @@ from gaplab.services.engines.base import Engine
 from gaplab.services.specs.bench_violations import bench_violations
 from gaplab.services.specs.default_engines import default_engine, runs
 from gaplab.services.specs.presets import PRESETS, Preset, with_preset
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.violations import (
     bounds_of,
     budget_violations,
@@ -75,6 +80,8 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         repetitions=spec.repetitions or preset.repetitions,
         **{registry.kind: _completed(registry, getattr(spec, registry.kind)) for registry in NEED_NO_OTHERS},
         controller_optimizer=_completed(optimizers, spec.controller_optimizer or spec.optimizer),
+        controller=spec.controller and _completed(controllers, spec.controller),
+        task=spec.task and _completed(tasks, spec.task),
         engine=_completed(engines, simulated),
         tunables=tuple(_with_bounds(ref) for ref in spec.tunables),
         held_out=spec.held_out,
@@ -88,7 +95,7 @@ def _created(spec: ExperimentSpec) -> tuple[Robot, Strategy, Optimizer, Optimize
     """Return the plug-ins of a spec that need no others to be created; of the optimizers, that of controllers first."""
     given = spec.controller_optimizer
     return gather(
-        lambda: robots.create(spec.robot, "/robot"),
+        lambda: robot_of(spec),
         lambda: strategies.create(spec.strategy, "/strategy"),
         lambda: optimizers.create(given or spec.optimizer, "/controller_optimizer" if given else "/optimizer"),
         lambda: optimizers.create(spec.optimizer, "/optimizer"),
@@ -142,6 +149,8 @@ def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
     resolved = resolve_experiment(ExperimentSpec(**shared, strategy=PluginRef(name="random")))
     return Checked(
         robot=resolved.robot,
+        controller=resolved.controller,
+        task=resolved.task,
         engine=resolved.engine,
         tunables=resolved.tunables,
         points=spec.points,
@@ -160,8 +169,18 @@ def takes_samples(spec: ExperimentSpec) -> bool:
 
 
 def unit(spec: ExperimentSpec | Checked) -> str:
-    """Return the unit of fitness; "" if the robot is not installed."""
-    return robots[spec.robot.name].unit if spec.robot.name in robots else ""
+    """Return the unit of fitness; "" if the robot or the task is not installed."""
+    if spec.task is not None:
+        return tasks[spec.task.name].unit if spec.task.name in tasks else ""
+    return _own_unit(external_plugins.package(), spec.robot.model_dump_json())
+
+
+@lru_cache
+def _own_unit(_package: ModuleType | None, ref: str) -> str:
+    try:
+        return robots.create(PluginRef.model_validate_json(ref)).unit
+    except InvalidSpec:
+        return ""
 
 
 def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:

@@ -85,7 +85,7 @@ class Robot(Plugin):
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return engine, controller, task, unit, number of genes, sensors, and if it is a function, for the catalogue."""
+        """Return engine, controller, task, unit, genes, sensors, and whether it is a function, for the catalogue."""
         robot = cls()
         return {
             "engine": cls.engine,
