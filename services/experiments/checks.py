@@ -22,7 +22,8 @@ from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import move
 from gaplab.services.plugins.external import external_plugins, named_in
-from gaplab.services.specs.resolution import resolve_sensitivity, unit
+from gaplab.services.specs.resolution import resolve_sensitivity
+from gaplab.services.specs.robots import unit
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import ExperimentRow, SensitivityRow
 from gaplab.services.store.queries.events import note

@@ -13,8 +13,7 @@ from gaplab.services.plugins.external import imported_files
 from gaplab.services.plugins.watching import imported
 from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess
 from gaplab.services.specs.assembly import edits_of, engine_of, refuse_missing
-from gaplab.services.specs.resolution import unit
-from gaplab.services.specs.robots import robot_of
+from gaplab.services.specs.robots import robot_of, unit
 from gaplab.services.specs.simulation import Simulation
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.queries.replays import TunedSample

@@ -20,8 +20,8 @@ from gaplab.services.core.robots import robots
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
 from gaplab.services.core.tuners import tuners
 from gaplab.services.specs.assembly import parameters_of
-from gaplab.services.specs.resolution import takes_samples, unit
-from gaplab.services.specs.robots import robot_of
+from gaplab.services.specs.resolution import takes_samples
+from gaplab.services.specs.robots import robot_of, unit
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.queries.tunings import BestSimulator, MeasuredIterations
 from gaplab.services.store.session import Store

@@ -2,15 +2,12 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from functools import lru_cache
-from types import ModuleType
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef, TunableRef
 from gaplab.schemas.resolved import ResolvedBudget, ResolvedReality, ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked, SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, SharedSettings, StudySpec
-from gaplab.services.core import external_plugins
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
 from gaplab.services.core.errors import InvalidSpec, Violation, gather
@@ -43,7 +40,15 @@ from gaplab.services.specs.violations import (
 SIMULATED_PROBES, PHYSICAL_PROBES = "each", "last"
 """Which transferred controllers are measured by default."""
 
-NEED_NO_OTHERS: tuple[Registry[Any], ...] = (robots, strategies, optimizers, discrepancies, tuners)
+NEED_NO_OTHERS: tuple[Registry[Any], ...] = (
+    robots,
+    controllers,
+    tasks,
+    strategies,
+    optimizers,
+    discrepancies,
+    tuners,
+)
 """The kinds of plug-ins of a spec that can be created without others; the field of each has the name of its kind."""
 
 
@@ -78,10 +83,8 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         name=spec.name or _label(strategy),
         iterations=spec.iterations or preset.iterations,
         repetitions=spec.repetitions or preset.repetitions,
-        **{registry.kind: _completed(registry, getattr(spec, registry.kind)) for registry in NEED_NO_OTHERS},
+        **{each.kind: (ref := getattr(spec, each.kind)) and _completed(each, ref) for each in NEED_NO_OTHERS},
         controller_optimizer=_completed(optimizers, spec.controller_optimizer or spec.optimizer),
-        controller=spec.controller and _completed(controllers, spec.controller),
-        task=spec.task and _completed(tasks, spec.task),
         engine=_completed(engines, simulated),
         tunables=tuple(_with_bounds(ref) for ref in spec.tunables),
         held_out=spec.held_out,
@@ -166,21 +169,6 @@ def is_direct(spec: ExperimentSpec) -> bool:
 def takes_samples(spec: ExperimentSpec) -> bool:
     """Return whether the experiment takes samples; one without them has iteration 0 only, and a level for a curve."""
     return spec.strategy.name not in strategies or strategies[spec.strategy.name].takes_samples
-
-
-def unit(spec: ExperimentSpec | Checked) -> str:
-    """Return the unit of fitness; "" if the robot or the task is not installed."""
-    if spec.task is not None:
-        return tasks[spec.task.name].unit if spec.task.name in tasks else ""
-    return _own_unit(external_plugins.package(), spec.robot.model_dump_json())
-
-
-@lru_cache
-def _own_unit(_package: ModuleType | None, ref: str) -> str:
-    try:
-        return robots.create(PluginRef.model_validate_json(ref)).unit
-    except InvalidSpec:
-        return ""
 
 
 def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:

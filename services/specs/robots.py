@@ -1,8 +1,11 @@
 """The robot of a spec, with its controller and its task."""
 
+from functools import lru_cache
+from types import ModuleType
 from typing import Protocol
 
 from gaplab.schemas.plugin import PluginRef
+from gaplab.services.core import external_plugins
 from gaplab.services.core.controllers import controllers
 from gaplab.services.core.errors import InvalidSpec, Violation, gather
 from gaplab.services.core.robots import robots
@@ -47,3 +50,18 @@ def robot_of(spec: NamesARobot) -> Robot:
     controller, task = gather(lambda: controllers.create(driving, "/controller"), lambda: tasks.create(rating, "/task"))
     robot.perform(controller, task)
     return robot
+
+
+def unit(spec: NamesARobot) -> str:
+    """Return the unit of fitness; "" if the robot or the task is not installed."""
+    if spec.task is not None:
+        return tasks[spec.task.name].unit if spec.task.name in tasks else ""
+    return _own_unit(external_plugins.package(), spec.robot.model_dump_json())
+
+
+@lru_cache
+def _own_unit(_package: ModuleType | None, ref: str) -> str:
+    try:
+        return robots.create(PluginRef.model_validate_json(ref)).unit
+    except InvalidSpec:
+        return ""

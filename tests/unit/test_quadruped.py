@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.controllers import square_pulses
 from gaplab.services.core.motions import Motion, Trajectory
 from gaplab.services.core.robots import quadruped
 from gaplab.services.core.robots.quadruped import Quadruped
@@ -52,7 +53,7 @@ def test_a_pulse_starts_at_its_phase_and_lasts_for_its_width(
 ) -> None:
     genome = np.full(24, 0.5)
     genome[2 * actuator], genome[2 * actuator + 1] = phase, width
-    share = quadruped.NARROWEST + (quadruped.WIDEST - quadruped.NARROWEST) * width
+    share = square_pulses.NARROWEST + (square_pulses.WIDEST - square_pulses.NARROWEST) * width
     since = (when - phase) % 1.0
     if min(since, abs(since - share), 1.0 - since) < 1e-6:
         return  # on an edge, where rounding decides
@@ -82,7 +83,10 @@ def test_motions_equal_the_plain_formula_to_the_last_bit(counted_s: float) -> No
 
 def plainly(genome: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArray]:
     """Return times and targets of a motion by the formula, without regard to speed."""
-    phases, widths = genome[0::2], quadruped.NARROWEST + (quadruped.WIDEST - quadruped.NARROWEST) * genome[1::2]
+    phases, widths = (
+        genome[0::2],
+        square_pulses.NARROWEST + (square_pulses.WIDEST - square_pulses.NARROWEST) * genome[1::2],
+    )
     edges = np.mod(np.concatenate([phases, phases + widths]), 1.0)
     cycles = np.arange(np.ceil(duration_s / quadruped.PERIOD_S))
     times = np.unique(np.append(0.0, np.add.outer(cycles, edges)))
