@@ -1,5 +1,6 @@
 """The robot of a spec, with its controller and its task."""
 
+from dataclasses import dataclass
 from functools import lru_cache
 from types import ModuleType
 from typing import Protocol
@@ -30,6 +31,15 @@ class NamesARobot(Protocol):
     def task(self) -> PluginRef | None:
         """Return the task; None for the robot's own."""
         ...
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A robot with a controller and a task; None for its own."""
+
+    robot: PluginRef
+    controller: PluginRef | None = None
+    task: PluginRef | None = None
 
 
 def robot_of(spec: NamesARobot) -> Robot:
