@@ -1,16 +1,19 @@
 """The judgement of `lean` beside `paper`, from archives of studies that were made for it."""
 
+import os
+import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
-from benchmarks.findings import opened
-from benchmarks.lean import PARTS, judge, rollouts
 from gaplab import migrations
 from gaplab.services.store.session import Store
 from tests.made_studies import Made, Study, archive
+
+ROOT = Path(__file__).parents[2]
 
 PAPER = {
     "direct": Made([1.0], 0.01),
@@ -19,6 +22,19 @@ PAPER = {
 }
 LEAN = {name: made._replace(deviation=0.015) for name, made in PAPER.items()}
 Judged = Callable[..., str]
+
+
+def command(*arguments: str) -> str:
+    """What the command prints.
+
+    Raises:
+        SystemExit: it refuses.
+    """
+    named = [sys.executable, "-m", "benchmarks.lean", *arguments]
+    ended = subprocess.run(named, cwd=ROOT, capture_output=True, text=True, env=os.environ | {"COLUMNS": "160"})
+    if ended.returncode:
+        raise SystemExit(ended.stderr)
+    return ended.stdout
 
 
 def moved(name: str, by: float) -> dict[str, Made]:
@@ -40,11 +56,8 @@ def judged(tmp_path: Path) -> Judged:
             for preset, curves in (("lean", lean), ("paper", paper))
         ]
         store.dispose()
-        console = Console(width=160, record=True)
-        with opened(archives) as (stored, labels):
-            for table in judge(stored, labels, direct):
-                console.print(table)
-        return console.export_text()
+        given = [] if direct is None else ["--direct", str(direct)]
+        return command("judge", *map(str, archives), *given)
 
     return found
 
@@ -97,4 +110,7 @@ def test_strategies_that_only_one_side_has_are_left_out(judged: Judged) -> None:
 
 
 def test_lean_costs_at_most_a_tenth_of_the_rollouts_of_the_paper() -> None:
-    assert rollouts(PARTS["lean"]) <= 0.1 * rollouts(PARTS["paper"])
+    shares = {row[1].strip(): float(row[3]) for row in re.findall(r"(│)([^│]+)│([^│]+)│([^│]+)│", command("count"))}
+
+    assert shares["paper"] == 1.0
+    assert shares["lean"] <= 0.1
