@@ -10,7 +10,7 @@ import pytest
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import about, body_poses
-from gaplab.services.core.motions import Motion
+from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.shapes import Box, Hull, Part, Sphere
 from gaplab.services.core.world import Body, Inertia, Joint, Material, Motor, World
@@ -21,8 +21,7 @@ from gaplab.services.engines.stepping import WARM_SCENES
 pytest.importorskip("pybullet")
 
 ROBOT = Quadruped()
-MOTION = ROBOT.motion(ROBOT.known)
-assert isinstance(MOTION, Motion)
+MOTION = open_loop(ROBOT.motion(ROBOT.known))
 
 
 @pytest.fixture
