@@ -40,7 +40,7 @@ def test_inertia_is_the_sum_over_the_solid(shape: Sphere | Capsule | Cylinder | 
 
 def test_the_inertia_of_a_hull_is_that_of_the_box_that_it_is() -> None:
     corners = np.array([(x, y, z) for x in (-0.1, 0.1) for y in (-0.2, 0.2) for z in (-0.3, 0.3)])
-    box, turned = inertia_of(Body("b", 2.0, Box((0.2, 0.4, 0.6)))), rotated(TURN, corners) + [1.0, 2.0, 3.0]
+    box, turned = inertia_of(Body("b", 2.0, Box((0.2, 0.4, 0.6)))), rotated(TURN, corners) + np.array([1.0, 2.0, 3.0])
 
     hull = inertia_of(Body("h", 2.0, Hull(tuple(map(tuple, turned.tolist())))))
 

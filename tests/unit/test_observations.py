@@ -122,7 +122,7 @@ def test_joints_slide_and_turn_their_children() -> None:
     assert orientations[0, 1] == pytest.approx(near)
     assert positions[0, 2] == pytest.approx([1.5, 2.2, 3.0])
     assert positions[0, 1] == pytest.approx(
-        [1.5, 2.2, 3.0] + place(near, np.array([1.0, 0.0, 0.0]) + 0.3 * np.array(AXIS))
+        np.array([1.5, 2.2, 3.0]) + place(near, np.array([1.0, 0.0, 0.0]) + 0.3 * np.array(AXIS))
     )
 
 
