@@ -2,7 +2,6 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib.util import find_spec
 from typing import Any, ClassVar
 
@@ -12,9 +11,10 @@ from gaplab.schemas.base import Frozen
 from gaplab.schemas.plugin import PluginRead
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import EngineUnavailable
-from gaplab.services.core.motions import Motion, Recording, Trajectory
+from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
 from gaplab.services.core.registry import Plugin
 from gaplab.services.core.world import World
+from gaplab.services.engines.uses import USES
 
 ALL_FIELDS = frozenset(
     {
@@ -30,6 +30,7 @@ ALL_FIELDS = frozenset(
         "gravity_m_s2",
         "time_step_s",
         "solver_iterations",
+        *USES,
     }
 )
 """All fields of a World that an engine can honour."""
@@ -44,7 +45,9 @@ class Engine(Plugin):
     Attributes:
         library: Python module that the engine needs, imported inside the class; None if there is none.
         install: command that installs the library.
-        honours: World fields that affect the results, like `material.dynamic_friction`.
+        honours: World fields that affect the results, like `material.dynamic_friction`: names of `ALL_FIELDS`.
+        in_place: fields in which worlds may differ and still share what the engine built: names as in `World.edited`.
+        closes_loops: true if it runs Loops, not only Motions.
         batch: preferred number of rollouts in a call; 1 if a call has little overhead.
         usual_rollout_s: usual seconds of a rollout, for estimates before any measurement.
         repeatable: true if a rollout is only computed, so that it may be repeated at any time: for replays, and by
@@ -54,6 +57,8 @@ class Engine(Plugin):
     library: ClassVar[str | None] = None
     install: ClassVar[str] = ""
     honours: ClassVar[frozenset[str]]
+    in_place: ClassVar[frozenset[str]] = frozenset()
+    closes_loops: ClassVar[bool] = False
     batch: ClassVar[int] = 1
     usual_rollout_s: ClassVar[float] = 0.02
     repeatable: ClassVar[bool] = False
@@ -68,11 +73,20 @@ class Engine(Plugin):
     def runs(cls, world: World) -> bool:
         """Return whether the engine can simulate the world."""
 
-    @abstractmethod
-    def rollout(self, world: World, motion: Motion) -> Trajectory:
-        """Return the trajectory of the base, `(t, 3)`, under the motion from the start of the world."""
+    @classmethod
+    def lacks(cls, world: World) -> tuple[str, ...]:
+        """Return the names of the fields that the world uses and the engine does not honour, sorted.
 
-    def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion]) -> Trajectory:
+        A world uses a field of `USES` if its value differs from that without a name. Fields that every world has, like
+        its material, are not among them.
+        """
+        return tuple(sorted(name for name, uses in USES.items() if name not in cls.honours and uses(world)))
+
+    @abstractmethod
+    def rollout(self, world: World, motion: Motion | Loop) -> Trajectory:
+        """Return the trajectory of the observed body, `(t, 3)`, under the motion from the start of the world."""
+
+    def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> Trajectory:
         """Return every motion in every world, `(n motions, m worlds, t, 3)`; observation times are equal.
 
         An engine that is faster in batches overrides this loop.
@@ -84,7 +98,7 @@ class Engine(Plugin):
             orientations=np.array([[each.orientations for each in row] for row in grid]),
         )
 
-    def record(self, world: World, motion: Motion, times_s: FloatArray) -> Recording:
+    def record(self, world: World, motion: Motion | Loop, times_s: FloatArray) -> Recording:
         """Return the same rollout, with poses at additional times.
 
         This default records the base alone. An engine that knows joint angles overrides it.
@@ -94,7 +108,7 @@ class Engine(Plugin):
             motion: as in `rollout`.
             times_s: `(k,)`, ascending, from 0 to the last observation.
         """
-        seen = self.rollout(world, replace(motion, observe_s=times_s))
+        seen = self.rollout(world, motion.observed_at(times_s))
         poses = np.hstack([seen.positions_m, seen.orientations])
         return Recording(self.rollout(world, motion), times_s, poses, None)
 
@@ -114,5 +128,5 @@ class Engine(Plugin):
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return the World fields that the engine honours, for the catalogue."""
-        return {"honours": sorted(cls.honours)}
+        """Return the World fields that the engine honours, and whether it closes loops, for the catalogue."""
+        return {"honours": sorted(cls.honours), "closes_loops": cls.closes_loops}
