@@ -52,7 +52,8 @@ def _law(numba: Any) -> Any:
     """Compute torques, then forces of joints and contacts, which are added; MuJoCo's solver has no rows left."""
     structs = import_module("mujoco.introspect.structs")
     at, settings_of = layout(structs, "mjData")[0], layout(structs, "mjModel")[0]["numeric_data"] // 8
-    rows_of, forces_of, angles_of, speeds_of = at["nefc"] // 4, *(at[name] // 8 for name in ("qfrc_applied", "qpos", "qvel"))
+    rows_of, forces_of = at["nefc"] // 4, at["qfrc_applied"] // 8
+    angles_of, speeds_of = at["qpos"] // 8, at["qvel"] // 8
     accelerations_of = at["qacc_warmstart"] // 8  # those of the last step: MuJoCo copies them there at its end
     view, pointer, compiled = numba.carray, _pointer(numba), numba.njit(error_model="numpy")
     turn, slow, meet = compiled(drive), compiled(damp), compiled(_meet(numba))

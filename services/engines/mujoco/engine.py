@@ -16,7 +16,6 @@ from gaplab.services.engines.base import ALL_FIELDS, Engine
 from gaplab.services.engines.mujoco.scene import MuJoCoScene
 from gaplab.services.engines.stepping import WarmScenes, consecutive, recording
 
-
 IN_PLACE = frozenset(
     {
         "body.mass_kg",

@@ -50,9 +50,10 @@ ROWS = 3
 def drive(known: Any, forces: Any, angles: Any, speeds: Any, accelerations: Any) -> None:
     """Compute the torques of the motors.
 
-    A PDMotor has the torque of its law. A Motor targets the speed that closes its share of the error in a step. Its rotor turns with its hinge, and the
-    torque would bring the rotor alone to that speed. This acts like an implicit servo, which is stable at any strength.
-    The hinge should get the whole torque, so the torque that the rotor took in the last step is added to the limit.
+    A PDMotor has the torque of its law. A Motor targets the speed that closes its share of the error in a step. Its
+    rotor turns with its joint, and the torque would bring the rotor alone to that speed. This acts like an implicit
+    servo, which is stable at any strength. The joint should get the whole torque, so the torque that the rotor took in
+    the last step is added to the limit.
 
     Args:
         known: settings.

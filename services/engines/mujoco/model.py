@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Quaternion, Shape, Sphere
+from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Quaternion, Sphere
 from gaplab.services.core.world import Joint, World
 from gaplab.services.engines.mujoco.settings import EACH, EACH_DAMPER, FIRST
 
@@ -24,8 +24,8 @@ FASTEST = 30.0
 """Speed up to which a joint stops at its limit, rad/s or m/s; a faster one is pushed back from beyond it."""
 
 TURNED = (0.6, 0.0, 0.0, 0.8)
-"""A rotation that no body's inertia has in the compiled model: MuJoCo then takes no shortcut that a world in place would
-not permit."""
+"""The turn of any inertia in the compiled model, w, x, y, z: MuJoCo then takes no shortcut that the written one may not
+permit."""
 
 FREE_DOFS, FREE_POSITIONS = 6, 7
 """Degrees of freedom of a free base, and positions in a state."""
@@ -83,16 +83,6 @@ def compiled(mujoco: ModuleType, world: World) -> Structure:
     ]
     model = spec.compile()
     return _structure(world, model, order, [(at, model.geom(name).id) for at, name in geoms])
-
-
-def compiled_inertia(mujoco: ModuleType, shape: Shape) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the center of a solid shape of 1 kg, its principal moments, and their turn as w, x, y, z."""
-    spec = mujoco.MjSpec()
-    body = spec.worldbody.add_body(name="solid")
-    body.add_freejoint()
-    _add_geom(mujoco, spec, body, "solid", Part(shape), mass=1.0)
-    model = spec.compile()
-    return model.body_ipos[1].copy(), model.body_inertia[1].copy(), model.body_iquat[1].copy()
 
 
 def scalar_first(turn: Quaternion) -> list[float]:
@@ -158,7 +148,7 @@ def _add_bodies(mujoco: ModuleType, spec: Any, world: World, order: list[Joint])
 def _add_part(mujoco: ModuleType, spec: Any, body: str, number: int, part: Part) -> str:
     """Add a shape, and its contacts with the ground, with friction in two directions; return its name."""
     name = f"{body}/{number}"
-    _add_geom(mujoco, spec, spec.body(body), name, part, mass=0.0)
+    _add_geom(mujoco, spec, spec.body(body), name, part)
     spec.add_pair(
         geomname1=GROUND,
         geomname2=name,
@@ -171,11 +161,11 @@ def _add_part(mujoco: ModuleType, spec: Any, body: str, number: int, part: Part)
     return name
 
 
-def _add_geom(mujoco: ModuleType, spec: Any, body: Any, name: str, part: Part, mass: float) -> None:
+def _add_geom(mujoco: ModuleType, spec: Any, body: Any, name: str, part: Part) -> None:
     """Add a shape that collides only in declared pairs."""
     kinds, shape = mujoco.mjtGeom, part.shape
-    place = {"name": name, "pos": part.center_m, "quat": scalar_first(part.turn), "mass": mass}
-    place |= {"contype": 0, "conaffinity": 0}
+    place: dict[str, Any] = {"name": name, "pos": part.center_m, "quat": scalar_first(part.turn)}
+    place |= {"mass": 0.0, "contype": 0, "conaffinity": 0}
     match shape:
         case Box():
             body.add_geom(type=kinds.mjGEOM_BOX, size=[edge / 2 for edge in shape.size_m], **place)

@@ -37,7 +37,7 @@ class Pool:
 
     def __init__(self, mujoco: ModuleType, model: Any, threads: int) -> None:
         self._mujoco = mujoco
-        self._datas = [mujoco.MjData(model) for _ in range(threads)]
+        self.datas = [mujoco.MjData(model) for _ in range(threads)]
         self._size = int(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
         self._channel = mujoco.mjtState.mjSTATE_QFRC_APPLIED.value
         self._sensor_off = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
@@ -102,7 +102,7 @@ class Pool:
         try:
             self._threads.rollout(
                 models,
-                self._datas,
+                self.datas,
                 starts,
                 controls,
                 control_spec=self._channel,

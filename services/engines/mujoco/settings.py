@@ -31,7 +31,7 @@ EACH, EACH_DAMPER = 5, 2
 
 
 class Servo(NamedTuple):
-    """The settings of a Motor: its degree of freedom, share of the error closed in a step, limits, and rotor's inertia."""
+    """The settings of a Motor: degree of freedom, share of the error closed in a step, limits, and rotor's inertia."""
 
     dof: int
     gain: float

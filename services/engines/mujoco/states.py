@@ -7,7 +7,6 @@ import numpy as np
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.observations import Bearing
 from gaplab.services.core.world import World
-from gaplab.services.engines.mujoco.model import FREE_POSITIONS
 from gaplab.services.engines.mujoco.models import Models
 from gaplab.services.engines.stepping import consecutive
 

@@ -3,19 +3,18 @@
 All of a group is written from the world alone, so a model that had another world is the same to the bit.
 """
 
-from functools import lru_cache
-from importlib import import_module
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.inertias import inertia_of
 from gaplab.services.core.motor_law import pd_law
 from gaplab.services.core.observations import gravity_m_s2
-from gaplab.services.core.shapes import Box, Shape, Sphere
+from gaplab.services.core.shapes import UNTURNED, Box, Quaternion, Sphere, Vector
 from gaplab.services.core.world import Body, Material, Motor, PDMotor, World
-from gaplab.services.engines.mujoco.model import FREE_POSITIONS, Structure, compiled_inertia, scalar_first
+from gaplab.services.engines.mujoco.model import Structure, scalar_first
 from gaplab.services.engines.mujoco.settings import Servo, Settings, settings
 
 ROTOR = 8.0
@@ -72,8 +71,8 @@ def _write_bodies(structure: Structure, model: Any, world: World) -> None:
     for body, at in zip(world.bodies, structure.bodies, strict=True):
         center, moments, turn = inertial(body)
         model.body_mass[at], model.body_inertia[at] = body.mass_kg, moments
-        model.body_ipos[at], model.body_iquat[at] = center, turn
-        model.body_sameframe[at] = _sameframe(center, turn)
+        model.body_ipos[at], model.body_iquat[at] = center, scalar_first(turn)
+        model.body_sameframe[at] = _sameframe(center, scalar_first(turn))
     for at, geom, offset in structure.solids:
         place = np.array(world.bodies[at].center_m) + offset
         model.geom_pos[geom] = place
@@ -86,48 +85,46 @@ def _sameframe(place: Any, turn: Any) -> int:
     return SAME_TURN if any(place) else IN_PLACE
 
 
-def inertial(body: Body) -> tuple[Any, Any, Any]:
-    """Return center, principal moments, and their turn as w, x, y, z."""
-    if body.inertia is not None:
-        return body.center_m, body.inertia.moments_kg_m2, scalar_first(body.inertia.turn)
-    assert not isinstance(body.shape, tuple)
-    match body.shape:
-        case Box():
-            x, y, z = (edge / 2 * (edge / 2) for edge in body.shape.size_m)
-            return body.center_m, [body.mass_kg * each / 3 for each in (y + z, x + z, x + y)], (1.0, 0.0, 0.0, 0.0)
-        case Sphere():
-            moment = 2 * body.mass_kg * body.shape.radius_m * body.shape.radius_m / 5
-            return body.center_m, [moment] * 3, (1.0, 0.0, 0.0, 0.0)
-        case _:
-            center, moments, turn = _unit_inertia(body.shape)
-            return center + np.array(body.center_m), body.mass_kg * moments, turn
-
-
-@lru_cache(maxsize=256)
-def _unit_inertia(shape: Shape) -> tuple[FloatArray, FloatArray, FloatArray]:
-    return compiled_inertia(import_module("mujoco"), shape)
+def inertial(body: Body) -> tuple[Vector, Vector, Quaternion]:
+    """Return center, principal moments, and their turn; those of boxes and balls are MuJoCo's to the bit."""
+    shape, mass = None if body.inertia is not None else body.shape, body.mass_kg
+    if isinstance(shape, Box):
+        x, y, z = (edge / 2 * (edge / 2) for edge in shape.size_m)
+        return body.center_m, (mass * (y + z) / 3, mass * (x + z) / 3, mass * (x + y) / 3), UNTURNED
+    if isinstance(shape, Sphere):
+        return body.center_m, (2 * mass * shape.radius_m * shape.radius_m / 5,) * 3, UNTURNED
+    inertia = inertia_of(body)
+    return body.center_m, inertia.moments_kg_m2, inertia.turn
 
 
 def _write_joints(mujoco: ModuleType, structure: Structure, model: Any, data: Any, world: World) -> None:
     joints, dofs = world.joints, structure.dofs
+    model.opt.disableflags = structure.model.opt.disableflags | _unused(mujoco, world)
     model.dof_frictionloss[dofs] = [joint.dry_friction for joint in joints]
     model.jnt_limited[structure.joints] = [joint.limits is not None for joint in joints]
     model.jnt_range[structure.joints] = [joint.limits or (0.0, 0.0) for joint in joints] or np.empty((0, 2))
     model.dof_armature[dofs] = [joint.armature for joint in joints]
     mujoco.mj_setConst(model, data)
-    servos = []
+    servos, motors = [], _motors(mujoco, structure, model, data, world)
     for joint, dof in zip(joints, dofs.tolist(), strict=True):
         if isinstance(joint.motor, Motor) and joint.motor.max_torque_nm > 0:
             rotor, motor = ROTOR * float(model.dof_M0[dof]), joint.motor
             model.dof_armature[dof] += rotor
             servos.append(Servo(dof, motor.position_gain, motor.max_speed_rad_s, motor.max_torque_nm, rotor))
-    motors = _motors(mujoco, structure, model, data, world)
     dampers = [(dof, joint.damping) for joint, dof in zip(joints, dofs.tolist(), strict=True) if joint.damping]
     for dof, damping in dampers:
         model.dof_armature[dof] += world.time_step_s * damping  # the speed after the step is damped, not that before
     mujoco.mj_setConst(model, data)
     known = settings(world, model.nv, structure.ahead, Settings(servos, motors, dampers))
     model.numeric_data[: len(known)] = known
+
+
+def _unused(mujoco: ModuleType, world: World) -> int:
+    """Return the flags of rows that a world has none of: MuJoCo then does not look for them."""
+    flags = mujoco.mjtDisableBit
+    no_limits = all(joint.limits is None for joint in world.joints)
+    no_friction = not any(joint.dry_friction for joint in world.joints)
+    return no_limits * int(flags.mjDSBL_LIMIT) | no_friction * int(flags.mjDSBL_FRICTIONLOSS)
 
 
 def _motors(mujoco: ModuleType, structure: Structure, model: Any, data: Any, world: World) -> list[Any]:
