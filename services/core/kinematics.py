@@ -4,8 +4,6 @@ They are used as the engine returns them. scipy's `Rotation` would normalise the
 bodies by 1e-8, and refuses the nan of failed physics.
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
@@ -28,7 +26,8 @@ def body_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> tuple
     positions = np.empty((len(poses), len(places), 3))
     orientations = np.empty((len(poses), len(places), 4))
     positions[:, 0], orientations[:, 0] = poses[:, :3], poses[:, 3:]
-    for joint, angles in _outwards(world, angles_rad):
+    for number in outwards(world):
+        joint, angles = world.joints[number], angles_rad[:, number]
         parent, child = places[joint.parent], places[joint.child]
         frame = positions[:, parent], orientations[:, parent]
         positions[:, child], orientations[:, child] = _carried(joint, *frame, angles)
@@ -61,16 +60,18 @@ def observes_base(world: World) -> bool:
     return not world.observed or world.observed == world.bodies[0].name
 
 
-def _outwards(world: World, angles_rad: FloatArray) -> Iterator[tuple[Joint, FloatArray]]:
-    """Yield joints with their angles `(k,)`, each after the joint of its parent."""
+def outwards(world: World) -> tuple[int, ...]:
+    """Return the numbers of the joints, each after the joint of its parent, and else in the world's order."""
     placed = {world.bodies[0].name}
-    left = list(zip(world.joints, angles_rad.T, strict=True))
+    order: list[int] = []
+    left = list(enumerate(world.joints))
     while left:
-        for joint, angles in left:
+        for number, joint in left:
             if joint.parent in placed:
                 placed.add(joint.child)
-                yield joint, angles
-        left = [pair for pair in left if pair[0].child not in placed]
+                order.append(number)
+        left = [pair for pair in left if pair[1].child not in placed]
+    return tuple(order)
 
 
 def _carried(joint: Joint, position: FloatArray, turn: FloatArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:

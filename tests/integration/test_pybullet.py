@@ -138,7 +138,7 @@ def test_a_motor_closes_its_share_of_the_error_in_each_step(engine: PyBullet) ->
         gravity_m_s2=0.0,
     )
     scene = engine._scenes[wheel]
-    scene.start(Material(), 1.0)
+    scene.start(wheel)
     scene.command(0, 1.0)
 
     scene.step(10)
