@@ -45,7 +45,7 @@ class MuJoCoScene:
         self._looping = Looping(self.pool, self.states, self.controls)
 
     def poses(self, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> FloatArray:
-        """Return `(n, m, t, 7)`: positions and quaternions x, y, z, w of the observed body; nan where physics failed."""
+        """Return `(n, m, t, 7)`: positions and quaternions x, y, z, w of the observed body; nan if physics failed."""
         steps = self.steps(motions[0].observe_s)
         found = np.empty((len(motions), len(worlds), len(steps), 7))
         rows = self._rows if isinstance(motions[0], Motion) else LOOPING_ROWS
