@@ -57,6 +57,7 @@ class PyBulletScene:
         bullet.performCollisionDetection(physicsClientId=client)
         bullet.restoreState(self._initial, physicsClientId=client)
         self._become(world)
+        self._torques.reset()
         named = dict(world.surfaces)
         for link, body in self._robot.colliding.items():
             material = self.materials[link] = named.get(body.surface, world.material)

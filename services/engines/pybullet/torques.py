@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 from gaplab.services.core.inertias import inverse_inertias
-from gaplab.services.core.motor_law import DAMPING, PDLaw, pd_law, pd_torque
+from gaplab.services.core.motor_law import PDLaw, pd_law, pd_torque
 from gaplab.services.core.world import Joint, Motor, PDMotor, World
 
 States: TypeAlias = tuple[tuple[float, ...], ...]
@@ -15,26 +15,28 @@ FREE = PDLaw(0.0, 0.0, 0.0, 0.0)
 
 
 class _Resisted(NamedTuple):
-    """A joint's law, and what resists it.
+    """A joint's law, and what resists it; with damping, a joint that coasts at c ends the step at c · share.
 
     Attributes:
         law: law of its motor.
+        kick: speed by torque at the end of a step, without damping.
         damping: torque by speed.
+        share: 1 / (1 + kick · damping).
         friction_nm: largest torque of its dry friction, if no motor of Bullet's is free for it.
-        stopping: torque by speed that stops the joint alone in one step.
     """
 
     law: PDLaw
+    kick: float
     damping: float
+    share: float
     friction_nm: float
-    stopping: float
 
 
 class Torques:
     """The torques of some joints, computed before each step.
 
-    Damping acts at the speed that it leaves at the end of the step, if the joint moved alone, so that it is stable at
-    any strength; so does dry friction.
+    They are those of the end of the step, if the joint moved alone under the load of the step before. The load is what
+    else accelerates the joint: the change of its speed in that step, less what these torques did.
 
     Args:
         world: world.
@@ -42,11 +44,15 @@ class Torques:
 
     def __init__(self, world: World) -> None:
         self.joints = tuple(number for number, joint in enumerate(world.joints) if needs_torque(joint))
-        inverse = inverse_inertias(_without_armature(world)) if self.joints else ()
-        step_s = world.time_step_s
-        self._resisted = [_resisted(world.joints[number], float(inverse[number]), step_s) for number in self.joints]
-        self._targets = [0.0] * len(self.joints)
-        self._motors_nm = [0.0] * len(self.joints)
+        inverse = inverse_inertias(_without_armature(world)).tolist() if self.joints else []
+        self._resisted = [_resisted(world.joints[number], inverse[number], world.time_step_s) for number in self.joints]
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget targets, speeds and torques, for another rollout."""
+        count = len(self.joints)
+        self._targets, self._motors_nm = [0.0] * count, [0.0] * count
+        self._expected: list[float | None] = [None] * count
 
     def command(self, joint: int, target: float) -> None:
         """Set a new target for the motor of a joint."""
@@ -65,11 +71,15 @@ class Torques:
         total = []
         for place, (target, state, resisted) in enumerate(zip(self._targets, states, self._resisted, strict=True)):
             angle, speed = state[0], state[1]
-            law, damping, friction, stopping = resisted
-            self._motors_nm[place] = torque = pd_torque(target, angle, speed, law)
-            torque -= damping * speed
+            law, kick, damping, share, friction = resisted
+            expected = self._expected[place]
+            coasting = share * (speed if expected is None else speed + (speed - expected))
+            torque = self._motors_nm[place] = pd_torque(target, angle, coasting, law)
+            ending = coasting + share * kick * torque
+            torque -= damping * ending
             if friction:
-                torque -= min(max(stopping * speed, -friction), friction)
+                torque -= min(max(ending / (share * kick), -friction), friction)
+            self._expected[place] = speed + kick * torque
             total.append(torque)
         return total
 
@@ -81,13 +91,10 @@ def needs_torque(joint: Joint) -> bool:
 
 
 def _resisted(joint: Joint, inverse: float, step_s: float) -> _Resisted:
-    law = pd_law(joint.motor, inverse, step_s) if isinstance(joint.motor, PDMotor) else FREE
-    # The law's own damping is already divided by 1 + a; without the division it would be a / (step · inverse).
-    own = law[DAMPING] * step_s * inverse
-    own = own / (1.0 - own) if own < 1.0 else 0.0
-    damping = joint.damping / (1.0 + own + step_s * joint.damping * inverse)
+    share = 1.0 / (1.0 + step_s * joint.damping * inverse)
+    law = pd_law(joint.motor, share * inverse, step_s) if isinstance(joint.motor, PDMotor) else FREE
     friction = joint.dry_friction if isinstance(joint.motor, Motor) else 0.0
-    return _Resisted(law, damping, friction, 1.0 / (step_s * inverse))
+    return _Resisted(law, step_s * inverse, joint.damping, share, friction)
 
 
 def _without_armature(world: World) -> World:
