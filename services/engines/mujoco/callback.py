@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gaplab.services.core.motor_law import pd_torque
 from gaplab.services.engines.mujoco.law import ROWS, apply_impulses, coast, damp, drive, press, stop, touch
 from gaplab.services.engines.mujoco.layout import layout
 from gaplab.services.engines.mujoco.settings import AHEAD, DOFS, STEP, SWEEPS
@@ -41,7 +40,6 @@ def callbacks() -> Callbacks:
     """
     numba = import_module("numba")
     types = numba.types
-    numba.extending.register_jitable(pd_torque)
     law = numba.cfunc(types.void(types.voidptr, types.voidptr), error_model="numpy")(_law(numba))
     clock = numba.cfunc(types.float64())(lambda: 0.0)
     sensor = numba.cfunc(types.void(types.voidptr, types.voidptr, types.int32))(_sensor(numba))

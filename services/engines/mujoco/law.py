@@ -5,25 +5,30 @@ computes kinematics, collisions and the inverse inertia at contacts and limits, 
 plain functions on arrays. `callback` compiles them.
 """
 
+from collections.abc import Iterator
 from math import hypot
 from typing import Any
 
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motor_law import pd_torque
+from gaplab.services.core.motor_law import DAMPING as VISCOSITY
+from gaplab.services.core.motor_law import FEED, STIFFNESS
+from gaplab.services.core.motor_law import STRONGEST as STRONGEST_NM
 from gaplab.services.engines.mujoco.settings import (
     AHEAD,
     DAMPERS,
     DAMPING,
     DOF,
-    EACH,
     EACH_DAMPER,
+    EACH_MOTOR,
+    EACH_SERVO,
     FALL,
     FASTEST,
     FIRST,
     GAIN,
     LAW,
+    MOTOR_ROTOR,
     MOTORS,
     ROTOR,
     SERVOS,
@@ -50,10 +55,10 @@ ROWS = 3
 def drive(known: Any, forces: Any, angles: Any, speeds: Any, accelerations: Any) -> None:
     """Compute the torques of the motors.
 
-    A PDMotor has the torque of its law. A Motor targets the speed that closes its share of the error in a step. Its
-    rotor turns with its joint, and the torque would bring the rotor alone to that speed. This acts like an implicit
-    servo, which is stable at any strength. The joint should get the whole torque, so the torque that the rotor took in
-    the last step is added to the limit.
+    A Motor targets the speed that closes its share of the error in a step. Its rotor turns with its joint, and the
+    torque would bring the rotor alone to that speed. This acts like an implicit servo, which is stable at any strength.
+    A PDMotor has a rotor too, of the inertia that makes its torque that of the end of the step. The joint should get
+    the whole torque, so the torque that the rotor took in the last step is added to the limit.
 
     Args:
         known: settings.
@@ -70,16 +75,19 @@ def drive(known: Any, forces: Any, angles: Any, speeds: Any, accelerations: Any)
         wanted = np.minimum(np.maximum(closing, -fastest), fastest)
         asked, took = rotor * (wanted - speeds[dof]) / known[STEP], rotor * accelerations[dof]
         forces[dof] = np.minimum(np.maximum(asked, min(0.0, took) - strongest), max(0.0, took) + strongest)
-        at += EACH
+        at += EACH_SERVO
     for _ in range(int(known[MOTORS])):
-        dof = int(known[at + DOF])
-        forces[dof] = pd_torque(forces[dof], angles[dof + ahead], speeds[dof], known, at + LAW)
-        at += EACH
+        dof, law = int(known[at + DOF]), at + LAW
+        asked = known[law + STIFFNESS] * (forces[dof] - angles[dof + ahead]) + known[law + FEED] * forces[dof]
+        asked -= known[law + VISCOSITY] * speeds[dof]
+        strongest, took = known[law + STRONGEST_NM], known[at + MOTOR_ROTOR] * accelerations[dof]
+        forces[dof] = np.minimum(np.maximum(asked, min(0.0, took) - strongest), max(0.0, took) + strongest)
+        at += EACH_MOTOR
 
 
 def damp(known: Any, forces: Any, speeds: Any) -> None:
     """Subtract the damping `(d,)` from the forces; MuJoCo's armature makes it that of the speeds after the step."""
-    at = FIRST + EACH * int(known[SERVOS] + known[MOTORS])
+    at = FIRST + EACH_SERVO * int(known[SERVOS]) + EACH_MOTOR * int(known[MOTORS])
     for _ in range(int(known[DAMPERS])):
         dof = int(known[at + DOF])
         forces[dof] -= known[at + DAMPING] * speeds[dof]
@@ -106,11 +114,19 @@ def drive_torques(known: FloatArray, targets: FloatArray, angles: FloatArray, sp
     found = np.array(targets)
     for step, forces in enumerate(found):
         drive(known, forces, angles[step], speeds[step], before[step])
-    for servo in range(int(known[SERVOS])):
-        at = FIRST + EACH * servo
-        dof, strongest = int(known[at + DOF]), known[at + STRONGEST]
-        found[:, dof] = np.clip(found[:, dof] - known[at + ROTOR] * accelerations[:, dof], -strongest, strongest)
+    for dof, strongest, rotor in _rotors(known):
+        found[:, dof] = np.clip(found[:, dof] - rotor * accelerations[:, dof], -strongest, strongest)
     return found
+
+
+def _rotors(known: FloatArray) -> Iterator[tuple[int, float, float]]:
+    """Yield the degree of freedom, the largest torque and the rotor's inertia of each motor."""
+    servos, motors = int(known[SERVOS]), int(known[MOTORS])
+    for at in range(FIRST, FIRST + EACH_SERVO * servos, EACH_SERVO):
+        yield int(known[at + DOF]), known[at + STRONGEST], known[at + ROTOR]
+    first = FIRST + EACH_SERVO * servos
+    for at in range(first, first + EACH_MOTOR * motors, EACH_MOTOR):
+        yield int(known[at + DOF]), known[at + LAW + STRONGEST_NM], known[at + MOTOR_ROTOR]
 
 
 def coast(step: float, jacobian: Any, before: Any, accelerations: Any, excess: Any, impulses: Any) -> None:

@@ -42,14 +42,14 @@ class Looping:
         """
         step_s, end = prepared[0].world.time_step_s, int(kept[-1])
         run = _Run(self._states, prepared, loops)
-        at = np.array([step for step in tick_steps(loops[0], step_s) if step < end])
+        at = np.array(tick_steps(loops[0], step_s))
         history = np.empty((len(run.models), len(at), len(prepared[0].world.actuators)))
         controls = np.zeros((len(run.models), end, self._controls.width))
         found = np.empty((len(run.models), len(kept), len(self._states.start)))
         found[:, kept == 0] = self._states.start
         now = Continued(run.recent[:, -1], np.zeros((len(run.models), self._controls.width)))
         with self._pool.sensing(run.models[: len(prepared)]):
-            for tick, (begin, then) in enumerate(zip(at, [*at[1:], end], strict=True)):
+            for tick, (begin, then) in enumerate(zip(at, [*np.minimum(at[1:], end), end], strict=True)):
                 history[:, tick] = run.targets(tick)
                 if begin == then:
                     continue

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.shapes import Box, Capsule, Cylinder, Hull, Part, Quaternion, Sphere
 from gaplab.services.core.world import Joint, World
-from gaplab.services.engines.mujoco.settings import EACH, EACH_DAMPER, FIRST
+from gaplab.services.engines.mujoco.settings import EACH_DAMPER, EACH_MOTOR, FIRST
 
 GROUND = "the ground"
 
@@ -119,7 +119,7 @@ def _set_up_physics(mujoco: ModuleType, spec: Any, world: World) -> None:
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     option.disableflags = sum(int(getattr(mujoco.mjtDisableBit, each)) for each in SWITCHED_OFF)
     spec.compiler.autolimits = False
-    spec.add_numeric(name="settings", size=FIRST + (EACH + EACH_DAMPER) * len(world.joints))
+    spec.add_numeric(name="settings", size=FIRST + (EACH_MOTOR + EACH_DAMPER) * len(world.joints))
     spec.add_sensor(
         name="accelerations",
         type=mujoco.mjtSensor.mjSENS_USER,

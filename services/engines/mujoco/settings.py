@@ -17,17 +17,14 @@ damped joints, and the first of these."""
 DOF = 0
 """Index into the settings of a servo, a PD motor or a damped joint: its degree of freedom."""
 
-GAIN, FASTEST, STRONGEST, ROTOR = range(1, 5)
-"""Indices into a servo's settings: see Servo."""
+GAIN, FASTEST, STRONGEST, ROTOR, EACH_SERVO = range(1, 6)
+"""Indices into a servo's settings, and their number: see Servo."""
 
-LAW = 1
-"""Index into a PD motor's settings of its PDLaw."""
+LAW, MOTOR_ROTOR, EACH_MOTOR = 1, 5, 6
+"""Indices into a PD motor's settings of its PDLaw and its rotor, and their number: see PD."""
 
-DAMPING = 1
-"""Index into a damped joint's settings."""
-
-EACH, EACH_DAMPER = 5, 2
-"""Numbers of settings of a motor, and of a damped joint."""
+DAMPING, EACH_DAMPER = 1, 2
+"""Index into a damped joint's settings, and their number."""
 
 
 class Servo(NamedTuple):
@@ -40,17 +37,29 @@ class Servo(NamedTuple):
     rotor_kg_m2: float
 
 
+class PD(NamedTuple):
+    """The settings of a PDMotor: degree of freedom, law, and inertia of a rotor that turns with its joint.
+
+    The law gives the torque on joint and rotor. What the rotor takes of it makes the rest depend on the speed at the
+    end of the step.
+    """
+
+    dof: int
+    law: PDLaw
+    rotor_kg_m2: float
+
+
 class Settings(NamedTuple):
     """What the law reads of a world, apart from what MuJoCo's model has.
 
     Attributes:
         servos: its Motors.
-        motors: the degrees of freedom of its PDMotors, with their laws.
+        motors: its PDMotors.
         dampers: damping of degrees of freedom, by these.
     """
 
     servos: Sequence[Servo] = ()
-    motors: Sequence[tuple[int, PDLaw]] = ()
+    motors: Sequence[PD] = ()
     dampers: Sequence[tuple[int, float]] = ()
 
 
@@ -67,7 +76,7 @@ def settings(world: World, dofs: int, ahead: int, of: Settings) -> FloatArray:
     counts = (len(of.servos), len(of.motors), len(of.dampers))
     tables = [
         *(value for servo in of.servos for value in servo),
-        *(value for dof, law in of.motors for value in (dof, *law)),
+        *(value for dof, law, rotor in of.motors for value in (dof, *law, rotor)),
         *(value for damper in of.dampers for value in damper),
     ]
     return np.array([step, abs(world.gravity_m_s2) * step, sweeps, dofs, ahead, *counts, *tables])

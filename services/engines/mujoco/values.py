@@ -10,16 +10,19 @@ import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.inertias import inertia_of
-from gaplab.services.core.motor_law import pd_law
+from gaplab.services.core.motor_law import PDLaw, pd_law
 from gaplab.services.core.observations import gravity_m_s2
 from gaplab.services.core.shapes import UNTURNED, Box, Quaternion, Sphere, Vector
 from gaplab.services.core.world import Body, Material, Motor, PDMotor, World
 from gaplab.services.engines.mujoco.model import Structure, scalar_first
-from gaplab.services.engines.mujoco.settings import Servo, Settings, settings
+from gaplab.services.engines.mujoco.settings import PD, Servo, Settings, settings
 
 ROTOR = 8.0
 """Inertia of a servo's rotor, relative to that of what its joint carries in the zero pose: in one step a free limb
 reaches eight ninths of the target speed. docs/engines.md has results for other values."""
+
+WEAK = PDLaw(0.0, 0.0, 0.0, 0.0)
+"""The law of a motor without strength."""
 
 IN_PLACE, SAME_TURN, ANYWHERE = 1, 3, 0
 """MuJoCo's values of `sameframe`: frames are equal, only their turns are, or neither."""
@@ -105,12 +108,10 @@ def _write_joints(mujoco: ModuleType, structure: Structure, model: Any, data: An
     model.jnt_range[structure.joints] = [joint.limits or (0.0, 0.0) for joint in joints] or np.empty((0, 2))
     model.dof_armature[dofs] = [joint.armature for joint in joints]
     mujoco.mj_setConst(model, data)
-    servos, motors = [], _motors(mujoco, structure, model, data, world)
-    for joint, dof in zip(joints, dofs.tolist(), strict=True):
-        if isinstance(joint.motor, Motor) and joint.motor.max_torque_nm > 0:
-            rotor, motor = ROTOR * float(model.dof_M0[dof]), joint.motor
-            model.dof_armature[dof] += rotor
-            servos.append(Servo(dof, motor.position_gain, motor.max_speed_rad_s, motor.max_torque_nm, rotor))
+    servos, motors = _servos(structure, model, world), _motors(mujoco, structure, model, data, world)
+    rotors = [(each.dof, each.rotor_kg_m2) for each in servos] + [(each.dof, each.rotor_kg_m2) for each in motors]
+    for dof, rotor in rotors:
+        model.dof_armature[dof] += rotor
     dampers = [(dof, joint.damping) for joint, dof in zip(joints, dofs.tolist(), strict=True) if joint.damping]
     for dof, damping in dampers:
         model.dof_armature[dof] += world.time_step_s * damping  # the speed after the step is damped, not that before
@@ -127,19 +128,44 @@ def _unused(mujoco: ModuleType, world: World) -> int:
     return no_limits * int(flags.mjDSBL_LIMIT) | no_friction * int(flags.mjDSBL_FRICTIONLOSS)
 
 
-def _motors(mujoco: ModuleType, structure: Structure, model: Any, data: Any, world: World) -> list[Any]:
-    """Return the degrees of freedom and the laws of PD motors, and of motors without strength, which give no torque."""
-    found: list[Any] = []
-    weak = PDMotor("torque", 0.0)
-    motors = [(joint.motor, dof) for joint, dof in zip(world.joints, structure.dofs.tolist(), strict=True)]
-    if any(isinstance(motor, PDMotor) for motor, _ in motors):
-        inverses = _inverse_inertias(mujoco, structure, model, data, world)
-    for motor, dof in motors:
-        if isinstance(motor, PDMotor):
-            found.append((dof, pd_law(motor, inverses[dof], world.time_step_s)))
-        elif motor is not None and motor.max_torque_nm <= 0:
-            found.append((dof, pd_law(weak, 0.0, world.time_step_s)))
-    return found
+def _servos(structure: Structure, model: Any, world: World) -> list[Servo]:
+    """Return the settings of Motors that have any strength."""
+    return [
+        Servo(dof, motor.position_gain, motor.max_speed_rad_s, motor.max_torque_nm, ROTOR * float(model.dof_M0[dof]))
+        for motor, dof in _motors_at(structure, world)
+        if isinstance(motor, Motor) and motor.max_torque_nm > 0
+    ]
+
+
+def _motors(mujoco: ModuleType, structure: Structure, model: Any, data: Any, world: World) -> list[PD]:
+    """Return the settings of PDMotors, and of Motors without strength, which give no torque."""
+    motors = _motors_at(structure, world)
+    driven = any(isinstance(motor, PDMotor) for motor, _ in motors)
+    inverses = _inverse_inertias(mujoco, structure, model, data, world) if driven else []
+    return [
+        _pd(motor, dof, inverses[dof], world.time_step_s) if isinstance(motor, PDMotor) else PD(dof, WEAK, 0.0)
+        for motor, dof in motors
+        if isinstance(motor, PDMotor) or motor.max_torque_nm <= 0
+    ]
+
+
+def _motors_at(structure: Structure, world: World) -> list[tuple[Motor | PDMotor, int]]:
+    """Return the motors with their degrees of freedom."""
+    pairs = zip(world.joints, structure.dofs.tolist(), strict=True)
+    return [(joint.motor, dof) for joint, dof in pairs if joint.motor is not None]
+
+
+def _pd(motor: PDMotor, dof: int, inverse: float, step_s: float) -> PD:
+    """Return the settings of a motor.
+
+    The law of the core is that of a joint without a rotor. One with the rotor moves alike, and also in contact, or
+    under a load. A rotor is no heavier than a servo's, for it delays a torque at its limit.
+    """
+    law = pd_law(motor, inverse, step_s)
+    gains = {"position": motor.kd + step_s * motor.kp, "velocity": motor.kd, "torque": 0.0}
+    rotor = min(step_s * gains[motor.follows], ROTOR / inverse)
+    more = 1.0 + rotor * inverse
+    return PD(dof, PDLaw(more * law.stiffness, more * law.damping, more * law.feed, law.strongest_nm), rotor)
 
 
 def _inverse_inertias(mujoco: ModuleType, structure: Structure, model: Any, data: Any, world: World) -> list[float]:
