@@ -26,7 +26,7 @@ def body_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> tuple
     positions = np.empty((len(poses), len(places), 3))
     orientations = np.empty((len(poses), len(places), 4))
     positions[:, 0], orientations[:, 0] = poses[:, :3], poses[:, 3:]
-    for number in outwards(world):
+    for number in _outwards(world):
         joint, angles = world.joints[number], angles_rad[:, number]
         parent, child = places[joint.parent], places[joint.child]
         frame = positions[:, parent], orientations[:, parent]
@@ -60,7 +60,7 @@ def observes_base(world: World) -> bool:
     return not world.observed or world.observed == world.bodies[0].name
 
 
-def outwards(world: World) -> tuple[int, ...]:
+def _outwards(world: World) -> tuple[int, ...]:
     """Return the numbers of the joints, each after the joint of its parent, and else in the world's order."""
     placed = {world.bodies[0].name}
     order: list[int] = []

@@ -1,4 +1,4 @@
-"""A World's robot in Bullet. Links 0 … j - 1 carry the joints, from the base outwards; the links after them are parts.
+"""A World's robot in Bullet.
 
 Bullet gives a link one shape, and only a plain hull can do without a margin. Therefore the further shapes of a body
 are links without mass, welded to it.
@@ -12,7 +12,7 @@ import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.inertias import inertia_of
-from gaplab.services.core.kinematics import inverse, outwards, product, rotated
+from gaplab.services.core.kinematics import inverse, product, rotated
 from gaplab.services.core.shapes import ORIGIN, UNTURNED, Box, Capsule, Cylinder, Hull, Part, Quaternion, Sphere, Vector
 from gaplab.services.core.world import Body, World
 
@@ -20,6 +20,7 @@ BASE = -1
 """Bullet's index of the base. Links count from 0."""
 
 NO_SHAPE = -1
+NO_JOINT = -1
 
 
 @dataclass(frozen=True)
@@ -31,14 +32,14 @@ class Link:
         part: its shape; None without.
         welded: true if it is a further shape of its body, without mass.
         parent: number of its parent's link, counted from 0 for the base.
-        joint: number of its joint; -1 for the base and a welded link.
+        joint: number of its joint; `NO_JOINT` for the base and a welded link.
     """
 
     body: Body
     part: Part | None
     welded: bool = False
     parent: int = 0
-    joint: int = -1
+    joint: int = NO_JOINT
 
 
 @dataclass(frozen=True)
@@ -105,25 +106,29 @@ def inertial_frame(body: Body) -> tuple[Vector, Quaternion]:
 
 
 def _links(world: World) -> tuple[Link, ...]:
-    """Return the base, the child of each joint, and the further shapes of all of them."""
+    """Return the links depth first: Bullet would put them into this order itself, and number them by it."""
     bodies = {body.name: body for body in world.bodies}
-    order = outwards(world)
-    names = [world.bodies[0].name, *(world.joints[number].child for number in order)]
-    links = [Link(world.bodies[0], _first(world.bodies[0]))]
-    for number in order:
-        joint = world.joints[number]
-        body = bodies[joint.child]
-        links.append(Link(body, _first(body), parent=names.index(joint.parent), joint=number))
-    for place, name in enumerate(names):
-        further = [part for part in bodies[name].parts if part.collides][1:]
-        links += [Link(bodies[name], part, welded=True, parent=place) for part in further]
+    links: list[Link] = []
+
+    def add(body: Body, parent: int, joint: int) -> None:
+        links.append(Link(body, _first(body), parent=parent, joint=joint))
+        place = len(links) - 1
+        links.extend(Link(body, part, welded=True, parent=place) for part in _colliding(body)[1:])
+        for number, each in enumerate(world.joints):
+            if each.parent == body.name:
+                add(bodies[each.child], place, number)
+
+    add(world.bodies[0], 0, NO_JOINT)
     return tuple(links)
+
+
+def _colliding(body: Body) -> list[Part]:
+    return [part for part in body.parts if part.collides]
 
 
 def _first(body: Body) -> Part | None:
     """Return the shape of a body's own link: a solid one that does not collide stays, because it has the inertia."""
-    colliding = [part for part in body.parts if part.collides]
-    if colliding:
+    if colliding := _colliding(body):
         return colliding[0]
     return None if isinstance(body.shape, tuple) else body.parts[0]
 
