@@ -47,7 +47,7 @@ def _walker() -> World:
 
 
 WALKER = _walker()
-MOTION = Motion(np.arange(5) * 0.25, 0.5 * np.cos(np.arange(20)).reshape(5, 4), np.array([0.5, 1.0, 1.25]))
+MOTION = Motion(np.linspace(0.0, 1.0, 5), 0.5 * np.cos(np.arange(20)).reshape(5, 4), np.array([0.5, 1.0, 1.25]))
 
 
 def each_body(world: World, change: Callable[[Body], Body]) -> tuple[Body, ...]:
@@ -68,10 +68,11 @@ def each_motor(world: World, **changes: Any) -> tuple[Joint, ...]:
 
 
 def heavier(body: Body, factor: float) -> Body:
-    scaled = body.inertia and replace(
-        body.inertia, moments_kg_m2=tuple(factor * moment for moment in body.inertia.moments_kg_m2)
-    )
-    return replace(body, mass_kg=factor * body.mass_kg, inertia=scaled)
+    inertia = body.inertia
+    if inertia is not None:
+        x, y, z = inertia.moments_kg_m2
+        inertia = replace(inertia, moments_kg_m2=(factor * x, factor * y, factor * z))
+    return replace(body, mass_kg=factor * body.mass_kg, inertia=inertia)
 
 
 IN_PLACE: dict[str, Callable[[World, float], dict[str, Any]]] = {

@@ -21,6 +21,7 @@ __all__ = ["engine"]
 ROBOT = Quadruped()
 PERIOD_S = 0.05
 SEEN_S = np.array([0.5, 1.0])
+AT_S: FloatArray = np.asarray(np.arange(21) * PERIOD_S)
 
 
 @pytest.fixture
@@ -30,7 +31,7 @@ def closing(engine: Engine) -> Engine:
     return engine
 
 
-def loop(act: Act, observe_s: FloatArray = SEEN_S, **values: Any) -> Loop:
+def loop(act: Act, observe_s: Any = SEEN_S, **values: Any) -> Loop:
     return Loop(
         **{
             "act": act,
@@ -48,7 +49,9 @@ class Watching:
     """Holds targets, and keeps what it observes."""
 
     def __init__(self, *targets: float) -> None:
-        self.targets, self.seen, self.at_s = np.array(targets), [], []
+        self.targets = np.array(targets)
+        self.seen: list[Any] = []
+        self.at_s: list[float] = []
 
     def __call__(self, genomes: Any, observations: Any, memories: Any, time_s: Any) -> Any:
         self.seen.append(observations[0].copy())
@@ -77,7 +80,7 @@ def test_a_loop_that_observes_nothing_is_a_motion(closing: Engine) -> None:
     blind = loop(
         lambda genomes, _, memories, time_s: (rows[[round(time_s / PERIOD_S)] * len(genomes)], memories), senses=()
     )
-    ahead = Motion(np.arange(21) * PERIOD_S, rows, SEEN_S)
+    ahead = Motion(AT_S, rows, SEEN_S)
 
     one, other = closing.rollout(ROBOT.world, blind), closing.rollout(ROBOT.world, ahead)
 
@@ -90,7 +93,7 @@ def test_a_controller_is_called_once_in_each_period_from_time_0(closing: Engine)
 
     closing.rollout(ROBOT.world, loop(watching))
 
-    assert watching.at_s == pytest.approx(np.arange(21) * PERIOD_S)
+    assert watching.at_s == pytest.approx(AT_S)
 
 
 def test_a_falling_body_observes_tilt_and_turning(closing: Engine) -> None:
@@ -107,7 +110,7 @@ def test_a_falling_body_observes_tilt_and_turning(closing: Engine) -> None:
     seen = closing.rollout(world, loop(watching, np.arange(1, 21) * PERIOD_S))
 
     tilt, turning, speeds = (group(world, each, watching.seen) for each in ("tilt", "turning", "speeds"))
-    moment, at_s = 0.4 * 0.1**2, np.arange(21) * PERIOD_S
+    moment, at_s = 0.4 * 0.1**2, AT_S
     assert turning == pytest.approx(np.outer(-0.004 / moment * at_s, Y), abs=0.01)
     assert speeds[:, 0] == pytest.approx(2 * 0.004 / moment * at_s, abs=0.01)
     back = seen.orientations * np.array([-1, -1, -1, 1])
@@ -139,7 +142,7 @@ def test_angles_and_speeds_are_those_of_the_actuated_joints(closing: Engine) -> 
 
     closing.rollout(world, loop(watching))
 
-    at_s = np.arange(21) * PERIOD_S
+    at_s = AT_S
     assert names(world, ("angles", "speeds")) == ("angle joint", "speed joint")
     assert group(world, "speeds", watching.seen)[:, 0] == pytest.approx(4.0 / 2.001 * at_s, rel=0.01, abs=1e-6)
     assert group(world, "angles", watching.seen)[:, 0] == pytest.approx(0.1 + 4.0 / 2.001 / 2 * at_s**2, abs=0.02)
@@ -164,7 +167,8 @@ def test_contacts_tell_which_feet_are_down(closing: Engine) -> None:
 
     contacts = group(world, "contacts", watching.seen)
     assert names(world, ("contacts",)) == ("contact foot0", "contact foot1", "contact foot2", "contact tail")
-    falling = np.arange(21) * PERIOD_S < np.sqrt(2 * 0.24 / G)
+    landing_s = np.sqrt(2 * 0.24 / G)
+    falling = landing_s > AT_S
     assert np.all(contacts[falling] == 0)
     assert np.all(contacts[-5:] == [1, 1, 1, 0])
 
@@ -204,7 +208,7 @@ def test_noise_is_added_to_observations_and_targets(closing: Engine) -> None:
     closing.rollout(ROBOT.world, loop(clean))
     closing.rollout(ROBOT.world, loop(watching, observation_noise=heard))
     noisy = closing.rollout(ROBOT.world, loop(Watching(*[0.1] * 12), target_noise=trembles))
-    ahead = closing.rollout(ROBOT.world, Motion(np.arange(21) * PERIOD_S, 0.1 + trembles, SEEN_S))
+    ahead = closing.rollout(ROBOT.world, Motion(AT_S, 0.1 + trembles, SEEN_S))
 
     assert np.array_equal(np.array(watching.seen), np.array(clean.seen) + heard)
     assert np.array_equal(noisy.positions_m, ahead.positions_m)

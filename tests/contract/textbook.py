@@ -46,12 +46,12 @@ def block(body: Body, **changes: Any) -> World:
     return replace(World(bodies=(body,), time_step_s=STEP_S), **changes)
 
 
-def held(times_s: FloatArray, *targets: float) -> Motion:
+def held(times_s: Any, *targets: float) -> Motion:
     """Constant targets."""
     return Motion(np.zeros(1), np.array([targets]).reshape(1, -1), times_s)
 
 
-def changing(times_s: FloatArray, targets: dict[float, float]) -> Motion:
+def changing(times_s: Any, targets: dict[float, float]) -> Motion:
     """Targets of one actuator, by the time from which on they hold."""
     return Motion(np.array(list(targets)), np.array(list(targets.values()))[:, None], times_s)
 
