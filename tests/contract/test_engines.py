@@ -115,7 +115,7 @@ WITH_OR_WITHOUT: dict[str, tuple[Callable[[World], World], Callable[[World], Wor
     "joint.start": (lambda world: world, lambda world: each_joint(world, start=0.2)),
     "joint.turn": (lambda world: world, lambda world: each_joint(world, turn=TURN)),
     "motor.delay_s": (with_pd, lambda world: with_pd(world, delay_s=0.1)),
-    "motor.follows": (with_pd, lambda world: with_pd(world, follows="torque")),
+    "motor.follows": (with_pd, lambda world: with_pd(world, follows="velocity")),
     "motor.kd": (with_pd, lambda world: with_pd(world, kd=1.0)),
     "motor.kp": (with_pd, lambda world: with_pd(world, kp=10.0)),
     "observed": (lambda world: world, lambda world: replace(world, observed=world.bodies[-1].name)),
