@@ -18,6 +18,7 @@ from gaplab.services.core.world import Body, Joint, Material, Motor, World
 from gaplab.services.engines.mujoco import MuJoCo
 from gaplab.services.engines.mujoco.callback import callbacks
 from gaplab.services.engines.mujoco.layout import layout
+from gaplab.services.engines.mujoco.model import named
 from gaplab.services.engines.mujoco.models import Models
 from gaplab.services.engines.mujoco.pool import in_force
 from gaplab.services.engines.mujoco.scene import ROWS
@@ -280,7 +281,7 @@ def test_every_body_has_the_mass_and_the_inertia_of_its_solid_shape(engine: MuJo
     model = prepared.model
 
     for body in ROBOT.world.bodies:
-        made = model.body(body.name)
+        made = model.body(named(body.name))
         assert made.mass[0] == pytest.approx(body.mass_kg)
         assert sorted(made.inertia) == pytest.approx(sorted(solid(body)))
         assert made.ipos == pytest.approx(body.center_m)

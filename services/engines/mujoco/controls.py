@@ -36,7 +36,7 @@ class Controls:
         They are in the memory of the last call if it is large enough; what no motor drives stays zero in it.
         """
         controls, now = self.room(len(motions) * len(delays), steps), np.arange(steps)
-        for motion, each in zip(motions, controls.reshape(-1, len(delays), steps, self.width), strict=True):
+        for motion, each in zip(motions, controls.reshape(len(motions), len(delays), steps, self.width), strict=True):
             at = np.rint(motion.times_s / self._step_s).astype(int)
             for late, columns in grouped(delays):
                 targets = held(at, motion.targets, now, late)

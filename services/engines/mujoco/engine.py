@@ -33,6 +33,7 @@ IN_PLACE = frozenset(
         "motor.kd",
         "motor.delay_s",
         "surfaces",
+        "gravity_m_s2",
         "slope_rad",
         "noise",
     }

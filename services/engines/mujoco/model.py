@@ -55,8 +55,8 @@ class Structure(NamedTuple):
         joints: `(j,)`: its indices of the world's joints.
         ahead: number of positions, less that of degrees of freedom.
         pairs: index of the world's body, of each pair of shapes that may collide.
-        solids: bodies of one shape that collides: index of the body, index of its geometry, and the place that MuJoCo
-            gave it in the frame of the shape.
+        solids: bodies of one shape that collides: index of the body, index of its geometry, and place and turn that
+            MuJoCo gave it in the frame of the shape.
     """
 
     model: Any
@@ -65,7 +65,7 @@ class Structure(NamedTuple):
     joints: NDArray[np.int_]
     ahead: int
     pairs: tuple[int, ...]
-    solids: tuple[tuple[int, int, FloatArray], ...]
+    solids: tuple[tuple[int, int, FloatArray, Quaternion], ...]
 
 
 def compiled(mujoco: ModuleType, world: World) -> Structure:
@@ -85,9 +85,19 @@ def compiled(mujoco: ModuleType, world: World) -> Structure:
     return _structure(world, model, order, [(at, model.geom(name).id) for at, name in geoms])
 
 
+def named(body: str) -> str:
+    """Return MuJoCo's name of a body: its ground is a body too, named "world"."""
+    return f"body {body}"
+
+
 def scalar_first(turn: Quaternion) -> list[float]:
     """Return a quaternion x, y, z, w as MuJoCo's w, x, y, z."""
     return [turn[3], turn[0], turn[1], turn[2]]
+
+
+def _scalar_last(turn: FloatArray) -> Quaternion:
+    w, x, y, z = turn.tolist()
+    return x, y, z, w
 
 
 def _structure(world: World, model: Any, order: list[Joint], geoms: list[tuple[int, int]]) -> Structure:
@@ -95,7 +105,7 @@ def _structure(world: World, model: Any, order: list[Joint], geoms: list[tuple[i
     carried = {joint.child: place + 2 for place, joint in enumerate(order)}  # the ground is 0, the base 1
     joints = np.array([places[joint.name] for joint in world.joints], int)
     solids = [
-        (at, geom, model.geom_pos[geom] - np.array(world.bodies[at].center_m))
+        (at, geom, model.geom_pos[geom] - np.array(world.bodies[at].center_m), _scalar_last(model.geom_quat[geom]))
         for at, geom in geoms
         if not isinstance(world.bodies[at].shape, tuple)
     ]
@@ -133,12 +143,13 @@ def _add_bodies(mujoco: ModuleType, spec: Any, world: World, order: list[Joint])
     """Add bodies and joints, with an inertia that takes any center and any turn."""
     inertia = {"mass": 1.0, "ipos": [1e-3, 0.0, 0.0], "iquat": TURNED, "inertia": [1.0] * 3, "explicitinertial": True}
     base, start = world.bodies[0].name, [0.0, 0.0, world.start_height_m]
-    made = {base: spec.worldbody.add_body(name=base, pos=start, quat=scalar_first(world.start_turn), **inertia)}
+    turn = scalar_first(world.start_turn)
+    made = {base: spec.worldbody.add_body(name=named(base), pos=start, quat=turn, **inertia)}
     if not world.fixed:
         made[base].add_freejoint()
     for joint in order:
         frame = {"pos": joint.origin_m, "quat": scalar_first(joint.turn)}
-        made[joint.child] = made[joint.parent].add_body(name=joint.child, **frame, **inertia)
+        made[joint.child] = made[joint.parent].add_body(name=named(joint.child), **frame, **inertia)
         kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.slides else mujoco.mjtJoint.mjJNT_HINGE
         margin = FASTEST * world.time_step_s
         made[joint.child].add_joint(name=joint.name, type=kind, axis=joint.axis, margin=margin, solimp_limit=RIGID)
@@ -148,7 +159,7 @@ def _add_bodies(mujoco: ModuleType, spec: Any, world: World, order: list[Joint])
 def _add_part(mujoco: ModuleType, spec: Any, body: str, number: int, part: Part) -> str:
     """Add a shape, and its contacts with the ground, with friction in two directions; return its name."""
     name = f"{body}/{number}"
-    _add_geom(mujoco, spec, spec.body(body), name, part)
+    _add_geom(mujoco, spec, spec.body(named(body)), name, part)
     spec.add_pair(
         geomname1=GROUND,
         geomname2=name,

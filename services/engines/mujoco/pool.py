@@ -120,7 +120,7 @@ class Pool:
         size = count * steps * self._size
         if self._memory.size < size:
             self._memory = np.empty(size)
-        return self._memory[:size].reshape(count, steps, -1)
+        return self._memory[:size].reshape(count, steps, self._size)
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 All of a group is written from the world alone, so a model that had another world is the same to the bit.
 """
 
+from collections.abc import Sequence
 from types import ModuleType
 from typing import Any
 
@@ -15,7 +16,7 @@ from gaplab.services.core.observations import gravity_m_s2
 from gaplab.services.core.shapes import UNTURNED, Box, Quaternion, Sphere, Vector
 from gaplab.services.core.world import Body, Material, Motor, PDMotor, World
 from gaplab.services.engines.mujoco.model import Structure, scalar_first
-from gaplab.services.engines.mujoco.settings import PD, Servo, Settings, settings
+from gaplab.services.engines.mujoco.settings import FALL, PD, Servo, Settings, settings
 
 ROTOR = 8.0
 """Inertia of a servo's rotor, relative to that of what its joint carries in the zero pose: in one step a free limb
@@ -39,10 +40,13 @@ def write(mujoco: ModuleType, structure: Structure, model: Any, data: Any, world
         world: world to write.
         before: world that the model has; None if none has been written.
     """
-    if before is None or world.bodies is not before.bodies or world.joints is not before.joints:
+    other_bodies = before is None or world.bodies is not before.bodies
+    if other_bodies:
         _write_bodies(structure, model, world)
+    if other_bodies or before is None or world.joints is not before.joints:
         _write_joints(mujoco, structure, model, data, world)
-    if before is None or world.slope_rad != before.slope_rad:
+    if before is None or (world.slope_rad, world.gravity_m_s2) != (before.slope_rad, before.gravity_m_s2):
+        model.numeric_data[FALL] = abs(world.gravity_m_s2) * world.time_step_s
         model.opt.gravity[:] = gravity_m_s2(world)
     paint(structure, model, world)
 
@@ -52,8 +56,10 @@ def paint(structure: Structure, model: Any, world: World) -> None:
     if not world.surfaces:
         model.pair_friction[:] = _coefficients(world.material)
         return
-    for pair, body in enumerate(structure.pairs):
-        model.pair_friction[pair] = _coefficients(world.material_of(world.bodies[body]))
+    surfaces = {name: _coefficients(material) for name, material in world.surfaces}
+    plain = _coefficients(world.material)
+    coefficients = [surfaces.get(world.bodies[body].surface, plain) for body in structure.pairs]
+    model.pair_friction[:] = coefficients or np.empty((0, 5))
 
 
 def start(structure: Structure, world: World) -> FloatArray:
@@ -71,19 +77,20 @@ def _coefficients(material: Material) -> tuple[float, ...]:
 
 
 def _write_bodies(structure: Structure, model: Any, world: World) -> None:
-    for body, at in zip(world.bodies, structure.bodies, strict=True):
-        center, moments, turn = inertial(body)
-        model.body_mass[at], model.body_inertia[at] = body.mass_kg, moments
-        model.body_ipos[at], model.body_iquat[at] = center, scalar_first(turn)
-        model.body_sameframe[at] = _sameframe(center, scalar_first(turn))
-    for at, geom, offset in structure.solids:
-        place = np.array(world.bodies[at].center_m) + offset
+    all_bodies, at = [inertial(body) for body in world.bodies], structure.bodies
+    model.body_mass[at] = [body.mass_kg for body in world.bodies]
+    model.body_ipos[at] = [center for center, _, _ in all_bodies]
+    model.body_inertia[at] = [moments for _, moments, _ in all_bodies]
+    model.body_iquat[at] = [scalar_first(turn) for _, _, turn in all_bodies]
+    model.body_sameframe[at] = [_sameframe(center, turn) for center, _, turn in all_bodies]
+    for body, geom, offset, turn in structure.solids:
+        place = np.array(world.bodies[body].center_m) + offset
         model.geom_pos[geom] = place
-        model.geom_sameframe[geom] = _sameframe(place, model.geom_quat[geom])
+        model.geom_sameframe[geom] = _sameframe(place, turn)
 
 
-def _sameframe(place: Any, turn: Any) -> int:
-    if tuple(turn) != (1.0, 0.0, 0.0, 0.0):
+def _sameframe(place: Sequence[float] | FloatArray, turn: Quaternion) -> int:
+    if turn != UNTURNED:
         return ANYWHERE
     return SAME_TURN if any(place) else IN_PLACE
 
