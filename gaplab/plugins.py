@@ -1,11 +1,13 @@
-"""Names for your own plug-ins: a strategy, robot, controller, task, tunable, optimizer, engine,
-discrepancy or tuner, each in one file.
+"""Names for your own plug-ins, each in one file.
+
+A plug-in is a strategy, robot, controller, task, tunable, optimizer, engine, discrepancy or tuner.
 
 Put the file into a folder that GAPLAB_PLUGINS names, and start the service. docs/how-to describes each kind.
 """
 
 from gaplab.schemas.base import Frozen as Frozen
 from gaplab.schemas.base import Real as Real
+from gaplab.schemas.plugin import PluginRef as PluginRef
 from gaplab.services.core.arrays import Fitnesses as Fitnesses
 from gaplab.services.core.arrays import FloatArray as FloatArray
 from gaplab.services.core.arrays import Genome as Genome

@@ -85,6 +85,8 @@ class Catalogue(Frozen):
     tunables: tuple[PluginRead, ...]
     optimizers: tuple[PluginRead, ...]
     discrepancies: tuple[PluginRead, ...] = ()
+    controllers: tuple[PluginRead, ...] = ()
+    tasks: tuple[PluginRead, ...] = ()
     tuners: tuple[PluginRead, ...] = ()
     budgets: tuple[BudgetRead, ...] = ()
     ignored: tuple[IgnoredFile, ...] = Field(

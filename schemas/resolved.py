@@ -48,7 +48,10 @@ class ResolvedReality(RealitySpec):
 
 
 class ResolvedSpec(ExperimentSpec):
-    """An experiment with every field: a spec on which no default has any influence."""
+    """An experiment with every field: a spec on which no default has any influence.
+
+    A controller or a task that is null is the robot's own, as its world is.
+    """
 
     name: Label
     iterations: Count

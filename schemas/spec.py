@@ -109,10 +109,10 @@ class SharedSettings(Frozen):
     )
     robot: PluginRef = PluginRef(name="quadruped")
     controller: PluginRef | None = Field(
-        default=None, description="how a genome drives the actuators; default: the robot's usual controller"
+        default=None, description="how a genome drives the actuators; default: the robot's own"
     )
     task: PluginRef | None = Field(
-        default=None, description="how long a rollout lasts, and what is fit in it; default: the robot's usual task"
+        default=None, description="how long a rollout lasts, and what is fit in it; default: the robot's own"
     )
     engine: PluginRef | None = Field(
         default=None,

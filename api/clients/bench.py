@@ -161,18 +161,29 @@ class Bench:
         body = {"traces": list(traces), "lags_s": None if lags_s is None else list(lags_s)}
         return self._connection.post(TracesRead, f"/requests/{segment(id)}/traces", _without_none(body))
 
-    def check_samples(self, file: str | Path, robot: str, options: Mapping[str, Any] | None = None) -> SamplesRead:
+    def check_samples(
+        self,
+        file: str | Path,
+        robot: str,
+        options: Mapping[str, Any] | None = None,
+        controller: str | Mapping[str, Any] | None = None,
+        task: str | Mapping[str, Any] | None = None,
+    ) -> SamplesRead:
         """Return the samples of a CSV file, for `reality.samples` of a spec, or everything that is wrong with it.
 
         Args:
             file: table with the columns `gene_0`, `gene_1` and so on, and `value`, or `value_1`, `value_2` and so on.
             robot: name of the robot that was measured.
             options: its options; left out: their defaults.
+            controller: its controller, as in a spec; left out: its own.
+            task: its task, likewise.
         """
+        given = {"options": dict(options or {}), "controller": controller, "task": task}
+        query = "".join(f"&{name}={segment(json.dumps(value))}" for name, value in given.items() if value is not None)
         return self._connection.change(
             SamplesRead,
             "POST",
-            f"/samples/check?robot={segment(robot)}&options={segment(json.dumps(dict(options or {})))}",
+            f"/samples/check?robot={segment(robot)}{query}",
             content=[Path(file).read_bytes()],
             headers={"Content-Type": "text/csv"},
         )

@@ -10,7 +10,17 @@ PATIENCE_S = 1.5
 """Longest wait for an answer; a shell that waits longer seems to hang."""
 
 MOST = 50
-KINDS = ("strategies", "robots", "engines", "tunables", "optimizers", "discrepancies", "tuners")
+KINDS = (
+    "strategies",
+    "robots",
+    "controllers",
+    "tasks",
+    "engines",
+    "tunables",
+    "optimizers",
+    "discrepancies",
+    "tuners",
+)
 
 
 def ids(incomplete: str) -> list[tuple[str, str]]:

@@ -16,7 +16,7 @@ from gaplab.services.plugins import folders
 if TYPE_CHECKING:
     from gaplab.services.contract.files import CheckedPlugin
 
-Kind = Literal["strategy", "robot", "engine", "tunable", "optimizer", "discrepancy", "tuner"]
+Kind = Literal["strategy", "robot", "controller", "task", "engine", "tunable", "optimizer", "discrepancy", "tuner"]
 
 plugin = typer.Typer(help="Write your own plug-ins, and check them.", no_args_is_help=True)
 app.add_typer(plugin, name="plugin", rich_help_panel=PLUGINS)

@@ -11,6 +11,7 @@ from gaplab.api.http.problems import documented
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.samples import SamplesRead
 from gaplab.services.specs import sample_tables
+from gaplab.services.specs.robots import Driven
 
 router = APIRouter(prefix="/samples", tags=["bench"])
 
@@ -18,10 +19,12 @@ _TABLE = {"text/csv": {"schema": {"type": "string"}, "example": "gene_0,value_1,
 
 
 class SamplesQuery(Parameters):
-    """The robot of a table."""
+    """The robot of a table, and what drives it and rates it."""
 
     robot: str = Field(min_length=1, max_length=200, description="name of the robot that was measured")
     options: Json[dict[str, object]] = Field(default={}, description="its options, as JSON")
+    controller: Json[PluginRef] | None = Field(default=None, description="its controller, as JSON; default: its own")
+    task: Json[PluginRef] | None = Field(default=None, description="its task, as JSON; default: its own")
 
 
 @router.post(
@@ -38,6 +41,5 @@ async def check_samples(query: Annotated[SamplesQuery, Query()], request: Reques
     readings like `roll@0.75`, or `roll@0.75#2` of repeat 2. An empty reading means that the sensor failed.
     """
     text = (await request.body()).decode("utf-8", "replace")
-    return await run_in_threadpool(
-        sample_tables.check_samples, text, PluginRef(name=query.robot, options=query.options)
-    )
+    robot = Driven(PluginRef(name=query.robot, options=query.options), query.controller, query.task)
+    return await run_in_threadpool(sample_tables.check_samples, text, robot)

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 
 from gaplab.schemas.measurements import Table
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.bench.robots import robot_of
 from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.measured_values import readings_violations, unit_violations
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.queries import attachments
 from gaplab.services.store.session import Session
 

@@ -8,10 +8,10 @@ from typing import Any, Literal
 import yaml
 
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.bench.robots import robot_of
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.motions import Motion
 from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import requests
 from gaplab.services.store.session import Session, snapshot

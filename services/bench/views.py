@@ -12,10 +12,10 @@ from gaplab.schemas.measurements import (
     Safety,
 )
 from gaplab.schemas.traces import TraceRead
-from gaplab.services.bench.robots import robot_of
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.repeats import mean
 from gaplab.services.core.stored_specs import spec_of
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import requests

@@ -10,7 +10,7 @@ import numpy as np
 from gaplab.schemas.safety import LimitsSpec, Safety
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.kinematics import clearances_m
-from gaplab.services.core.motions import Motion, Recording
+from gaplab.services.core.motions import Loop, Motion, Recording
 from gaplab.services.core.world import World
 
 MOST_SIMULATORS = 20
@@ -70,7 +70,7 @@ LIMITS = (
 )
 
 
-def recording_times(motion: Motion, world: World) -> FloatArray:
+def recording_times(motion: Motion | Loop, world: World) -> FloatArray:
     """Return the times `(k,)` of all time steps of a motion: between them, nothing moves."""
     steps = int(motion.observe_s[-1] / world.time_step_s + 1e-6)
     return frozen(np.arange(steps + 1) * world.time_step_s)

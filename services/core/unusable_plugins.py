@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from traceback import extract_tb
 
-KINDS = ("strategy", "robot", "engine", "tunable", "optimizer", "discrepancy", "tuner")
+KINDS = ("strategy", "robot", "controller", "task", "engine", "tunable", "optimizer", "discrepancy", "tuner")
 
 LONGEST = 300
 """Longest message of a plug-in's own error that is quoted, in characters."""

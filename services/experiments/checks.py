@@ -21,8 +21,9 @@ from gaplab.services.core.sensitivity import VERSION, Effort, warning
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import move
-from gaplab.services.plugins.external import external_plugins
-from gaplab.services.specs.resolution import resolve_sensitivity, unit
+from gaplab.services.plugins.external import external_plugins, named_in
+from gaplab.services.specs.resolution import resolve_sensitivity
+from gaplab.services.specs.robots import unit
 from gaplab.services.store.clock import moment
 from gaplab.services.store.models import ExperimentRow, SensitivityRow
 from gaplab.services.store.queries.events import note
@@ -153,9 +154,10 @@ def id_of(spec: Checked, external: Mapping[str, str] | None = None) -> str:
             this process's.
     """
     versions = external_plugins() if external is None else external
-    names = (f"robot {spec.robot.name}", f"engine {spec.engine.name}", *(f"tunable {t.name}" for t in spec.tunables))
+    names = named_in(spec.model_dump(mode="json"))
+    own = {name for name in ("controller", "task") if getattr(spec, name) is None}  # as checks of before had them
     files = [versions[name] for name in names if name in versions]
-    text = json.dumps([VERSION, spec.model_dump(mode="json"), *files], sort_keys=True)
+    text = json.dumps([VERSION, spec.model_dump(mode="json", exclude=own), *files], sort_keys=True)
     return sha256(text.encode()).hexdigest()[:16]
 
 

@@ -67,7 +67,7 @@ def _measured(found: tuple[tuple[dict[str, object], float, int], ...]) -> dict[K
 
 
 def _key(spec: ResolvedSpec) -> Key:
-    return spec.robot.model_dump_json(), _engine(spec).model_dump_json()
+    return spec.model_dump_json(include={"robot", "controller", "task"}), _engine(spec).model_dump_json()
 
 
 def _engine(spec: ResolvedSpec) -> PluginRef:

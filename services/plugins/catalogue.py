@@ -4,10 +4,12 @@ from dataclasses import asdict
 
 from gaplab.schemas.plugin import BudgetRead, Catalogue, PluginRead
 from gaplab.schemas.spec import StudySpec
+from gaplab.services.core.controllers import controllers
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
+from gaplab.services.core.tasks import tasks
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
@@ -25,6 +27,8 @@ def catalogue() -> Catalogue:
         tunables=tunables.describe(),
         optimizers=optimizers.describe(),
         discrepancies=discrepancies.describe(),
+        controllers=controllers.describe(),
+        tasks=tasks.describe(),
         tuners=tuners.describe(),
         budgets=tuple(BudgetRead(name=name, **asdict(preset)) for name, preset in PRESETS.items()),
         ignored=ignored_files(),

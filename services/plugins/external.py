@@ -3,12 +3,14 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from gaplab.services.core.controllers import controllers
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.external_plugins import file_of
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.registry import Registry
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
+from gaplab.services.core.tasks import tasks
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
@@ -16,7 +18,8 @@ from gaplab.services.plugins.contents import Contents
 from gaplab.services.plugins.watching import imported, present
 
 REGISTRIES: Mapping[str, Registry[Any]] = {
-    registry.kind: registry for registry in (strategies, robots, engines, tunables, optimizers, discrepancies, tuners)
+    registry.kind: registry
+    for registry in (strategies, robots, controllers, tasks, engines, tunables, optimizers, discrepancies, tuners)
 }
 """The plug-ins of each kind."""
 
@@ -66,7 +69,7 @@ def unavailable(plugin: str) -> str | None:
 def _named_in(spec: Mapping[str, Any]) -> Iterator[str]:
     yield from (
         f"{kind} {spec[kind]['name']}"
-        for kind in ("strategy", "robot", "optimizer", "engine", "discrepancy", "tuner")
+        for kind in ("strategy", "robot", "controller", "task", "optimizer", "engine", "discrepancy", "tuner")
         if spec.get(kind)
     )
     if spec.get("controller_optimizer"):

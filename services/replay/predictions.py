@@ -8,13 +8,12 @@ import numpy as np
 
 from gaplab.schemas.predictions import Prediction, Predictions
 from gaplab.schemas.resolved import ResolvedSpec
-from gaplab.services.core.robots import robots
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.plugins.external import imported_files
 from gaplab.services.plugins.watching import imported
 from gaplab.services.replay.process import AnswerCache, Key, RolloutProcess
 from gaplab.services.specs.assembly import edits_of, engine_of, refuse_missing
-from gaplab.services.specs.resolution import unit
+from gaplab.services.specs.robots import robot_of, unit
 from gaplab.services.specs.simulation import Simulation
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.queries.replays import TunedSample
@@ -97,7 +96,7 @@ def predict(spec: str, samples: Sequence[TunedSample], seconds: float) -> list[P
     """
     imported.renewed()
     read = ResolvedSpec.model_validate_json(spec)
-    robot = robots.create(read.robot)
+    robot = robot_of(read)
     simulate = Simulation(robot, engine_of(read.engine), edits_of(ref.name for ref in read.tunables))
     found: list[Pair] = []
     until = monotonic() + seconds

@@ -6,7 +6,6 @@ from gaplab.schemas.records import MeasurementKind
 from gaplab.schemas.replays import ControllerKind, Replay
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict, InvalidSpec, NotFound, Violation
-from gaplab.services.core.robots import robots
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.plugins.external import imported_files
 from gaplab.services.replay.process import Key, RolloutProcess
@@ -14,6 +13,7 @@ from gaplab.services.replay.rollout import ReplayChoice, ReplayRequest, compute_
 from gaplab.services.specs.assembly import refuse_missing
 from gaplab.services.specs.hardware import is_computed
 from gaplab.services.specs.resolution import is_direct, takes_samples
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays
 from gaplab.services.store.session import Session, Store
@@ -55,7 +55,7 @@ def replay_json(store: Store, process: RolloutProcess, experiment_id: str, choic
 
 
 def _refuse_impossible(row: ExperimentRow, spec: ResolvedSpec, choice: ReplayChoice) -> None:
-    if not robots.create(spec.robot).world.bodies:
+    if not robot_of(spec).world.bodies:
         message = f"the robot {spec.robot.name!r} has no body, so it has no motion to replay"
         raise InvalidSpec([Violation("id", row.id, message, "an experiment with a robot that has a body")])
     first = 1 if choice.kind is ControllerKind.SAMPLE else 0

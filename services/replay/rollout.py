@@ -9,12 +9,12 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m
 from gaplab.services.core.motions import Recording
-from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot, Sensors
 from gaplab.services.core.world import World
 from gaplab.services.plugins.watching import imported
 from gaplab.services.replay.shapes import feet_of, labels, shapes_of
 from gaplab.services.specs.assembly import edits_of, engine_of, reality_of
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation
 
 FRAMES_PER_S = 50
@@ -80,7 +80,7 @@ def compute_replay(request: ReplayRequest) -> bytes:
     """
     imported.renewed()
     spec, choice = ResolvedSpec.model_validate_json(request.spec), request.choice
-    robot = robots.create(spec.robot)
+    robot = robot_of(spec)
     genome = np.array(request.genome)
     observed = robot.motion(genome).observe_s
     times = np.arange(int(min(LONGEST_S, observed[-1]) * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S

@@ -13,7 +13,6 @@ from gaplab.schemas.traces import AlignedTrace, TracesRead, TracesSpec
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.errors import Conflict, InvalidSpec, Violation
 from gaplab.services.core.motions import Trajectory
-from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.core.trace_tables import read_trace
@@ -21,6 +20,7 @@ from gaplab.services.core.traces import TooShort, Trace, align, from_start
 from gaplab.services.plugins.watching import imported
 from gaplab.services.replay.process import RolloutProcess
 from gaplab.services.specs.assembly import edits_of, engine_of
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation
 from gaplab.services.store.models import AttachmentRow, ExperimentRow
 from gaplab.services.store.queries import replays, requests
@@ -71,7 +71,7 @@ def evaluate_traces(store: Store, process: RolloutProcess, request: str, spec: T
         genome = tuple(row.genome)
     if not simulators:
         raise Conflict(f"request {request} is wanted no more: the simulators that it was asked with are closed")
-    robot, traces = robots.create(resolved.robot, "/robot"), [read_trace(*table) for table in tables]
+    robot, traces = robot_of(resolved), [read_trace(*table) for table in tables]
     until_s = max([float(robot.motion(frozen(genome)).observe_s[-1]), *robot.sensors.times_s.tolist()])
     wanted = Expected(resolved.model_dump_json(), genome, tuple(simulators[0]), until_s)
     expected = _trace_of(*process.call(expected_motion, wanted))
@@ -89,7 +89,7 @@ def expected_motion(wanted: Expected) -> tuple[FloatArray, FloatArray]:
     """Return times `(k,)` and poses `(k, 7)` of a controller in a simulator; nan if the physics failed."""
     imported.renewed()
     spec, genome = ResolvedSpec.model_validate_json(wanted.spec), np.array(wanted.genome)
-    robot = robots.create(spec.robot)
+    robot = robot_of(spec)
     end_s = min(wanted.until_s, float(robot.motion(genome).observe_s[-1]))
     times = np.unique(np.append(np.arange(int(end_s * FRAMES_PER_S + 1e-6) + 1) / FRAMES_PER_S, end_s))
     simulation = Simulation(robot, engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables))

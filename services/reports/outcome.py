@@ -7,10 +7,10 @@ from gaplab.schemas.misfit import MisfitRead, TunableVerdict
 from gaplab.schemas.records import ExperimentRead, SampleRead, SimulatorRead
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.errors import Conflict
-from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.reports.content import Facts, experiment_facts
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, results, tunings
 from gaplab.services.store.session import Session, Store
@@ -79,7 +79,7 @@ def outcome_of(store: Store, experiment_id: str) -> ExperimentOutcome:
     return ExperimentOutcome(
         facts=facts,
         spec=spec,
-        robot=robots.create(spec.robot, "/robot"),
+        robot=robot_of(spec),
         measured=measured,
         best=best,
         simulators=simulators,

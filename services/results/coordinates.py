@@ -12,7 +12,7 @@ from gaplab.services.figures.kinds.coordinates import Coordinate, coordinates_fi
 from gaplab.services.figures.marks import FigureDefinition
 from gaplab.services.figures.words import distinct_names, printable, spoken, with_unit
 from gaplab.services.specs.assembly import parameters_of
-from gaplab.services.specs.resolution import unit
+from gaplab.services.specs.robots import unit
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.session import Store
 

@@ -11,7 +11,8 @@ from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.curves import curve_points
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.results.texts import cell
-from gaplab.services.specs.resolution import is_direct, unit
+from gaplab.services.specs.resolution import is_direct
+from gaplab.services.specs.robots import unit
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, results
 from gaplab.services.store.session import Session, Store

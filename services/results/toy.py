@@ -10,12 +10,12 @@ from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.schemas.toy import ToyIteration, ToySample, ToyTransfer, Values
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.errors import InvalidSpec, NotFound, Violation
-from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.experiments import hiding
 from gaplab.services.specs.assembly import edits_of, engine_of, reality_of
 from gaplab.services.specs.resolution import is_direct
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation
 from gaplab.services.store.models import ExperimentRow
 from gaplab.services.store.queries import experiments, replays, results
@@ -63,7 +63,7 @@ def toy_iterations(
 def _stored(session: Session, experiment_id: str, repetition: int, iterations: Sequence[int]) -> _Stored:
     row = experiments.get_experiment(session, experiment_id)
     spec = spec_of(row.spec)
-    robot = robots.create(spec.robot)
+    robot = robot_of(spec)
     if not robot.is_function:
         message = f"the robot {spec.robot.name!r} is not a function of one gene, so there is no curve to draw"
         raise InvalidSpec([Violation("experiment", row.id, message, "an experiment with the robot 'toy_function'")])

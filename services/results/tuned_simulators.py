@@ -11,7 +11,7 @@ from gaplab.services.experiments import hiding
 from gaplab.services.figures.kinds.simulators import Dimension, SimulatorPoint
 from gaplab.services.figures.kinds.squared_error import ErrorKind
 from gaplab.services.specs.assembly import parameters_of
-from gaplab.services.specs.resolution import unit
+from gaplab.services.specs.robots import unit
 from gaplab.services.store.queries import experiments, tunings
 from gaplab.services.store.session import Store
 

@@ -16,6 +16,7 @@ from gaplab.services.running.leases import Change
 from gaplab.services.running.refusals import refuse
 from gaplab.services.running.repetition_leases import RepetitionLeases
 from gaplab.services.specs.measured import outcome_of, samples_of
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.store.lease import Claim, Requested, TimedStep
 from gaplab.services.store.models import AnswerRow, ExperimentRow, RepetitionRow, RequestRow
 from gaplab.services.store.queries import requests, steps
@@ -59,7 +60,7 @@ def record_answer(session: Session, request: RequestRow, answer: AnswerRow) -> N
 def step_of(session: Session, experiment: ExperimentRow, request: RequestRow, answer: AnswerRow) -> Step:
     """Return the step that an answer is, after the log of its repetition."""
     spec = spec_of(experiment.spec)
-    outcome, repeats = outcome_of(spec.robot, answer.values, answer.readings)
+    outcome, repeats = outcome_of(robot_of(spec).sensors, answer.values, answer.readings)
     if request.kind is MeasurementKind.SAMPLE:
         return Measured(request.iteration, Sample(frozen(request.genome), *outcome, repeats))
     history = History(samples=samples_of(spec))

@@ -16,7 +16,6 @@ from gaplab.services.core.errors import RealityFailed, gather
 from gaplab.services.core.loop import Setting
 from gaplab.services.core.optimizers import optimizers
 from gaplab.services.core.ports import PhysicalReality, Reality, Simulate
-from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.sensitivity import Subject
 from gaplab.services.core.space import Space
@@ -29,6 +28,7 @@ from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.forecasts import forecast_of
 from gaplab.services.specs.measured import samples_of
+from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation
 
 
@@ -80,7 +80,7 @@ def setting(spec: ResolvedSpec, repetition: int) -> Setting:
         spec: spec of the experiment.
         repetition: the number of the repetition, from 0.
     """
-    robot = robots.create(spec.robot)
+    robot = robot_of(spec)
     strategy = strategies.create(spec.strategy)
     edits = edits_of(ref.name for ref in spec.tunables)
     engine = engine_of(spec.engine)
@@ -124,7 +124,7 @@ def _realities(
 
 def subject(checked: Checked) -> Subject:
     """Return what a sensitivity check simulates."""
-    robot = robots.create(checked.robot)
+    robot = robot_of(checked)
     edits = edits_of(ref.name for ref in checked.tunables)
     return Subject(
         simulate=Simulation(robot, engine_of(checked.engine), edits),
@@ -167,7 +167,7 @@ def refuse_missing(spec: ResolvedSpec, *, reality: bool = False) -> None:
         needed.append((spec.reality.engine, "/reality/engine"))
     names = [*(ref.name for ref in spec.tunables), *(spec.reality.parameters if reality else ())]
     gather(
-        lambda: robots.check(spec.robot, "/robot"),
+        lambda: robot_of(spec),
         *(partial(engines.check, ref, pointer) for ref, pointer in needed),
         lambda: edits_of(names),
     )

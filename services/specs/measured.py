@@ -5,22 +5,21 @@ from typing import Any
 
 import numpy as np
 
-from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import NO_READINGS, FloatArray, Readings, frozen
 from gaplab.services.core.repeats import mean
-from gaplab.services.core.robots import robots
-from gaplab.services.core.robots.base import Sensors
+from gaplab.services.core.sensors import Sensors
 from gaplab.services.core.types import Outcome, Sample
+from gaplab.services.specs.robots import robot_of
 
 
 def outcome_of(
-    robot: PluginRef, values: Sequence[float] | None, readings: Sequence[Any] | None
+    sensors: Sensors, values: Sequence[float] | None, readings: Sequence[Any] | None
 ) -> tuple[Outcome, FloatArray]:
     """Return the outcome of measured values, and the repeats `(r,)` if there are several.
 
     Args:
-        robot: the robot, whose sensors have units and noises.
+        sensors: what is read, with units and noises.
         values: fitness of each repeat; None if the measurement failed.
         readings: `(r, times, sensors)`, in the sensors' units; None or null where a sensor failed.
     """
@@ -28,7 +27,7 @@ def outcome_of(
         return Outcome(float("nan")), NO_READINGS
     repeats = frozen(values) if len(values) > 1 else NO_READINGS
     fitness = values[0] if len(values) == 1 else mean(repeats)
-    return Outcome(fitness, _standardised(robots.create(robot).sensors, readings)), repeats
+    return Outcome(fitness, _standardised(sensors, readings)), repeats
 
 
 def _standardised(sensors: Sensors, readings: Sequence[Any] | None) -> Readings:
@@ -50,8 +49,8 @@ def _standardised(sensors: Sensors, readings: Sequence[Any] | None) -> Readings:
 
 def samples_of(spec: ResolvedSpec) -> tuple[Sample, ...]:
     """Return the samples that a spec knows from before the experiment."""
-    found = []
+    found, sensors = [], robot_of(spec).sensors if spec.reality.samples else Sensors()
     for known in spec.reality.samples:
-        outcome, repeats = outcome_of(spec.robot, known.values, known.readings)
+        outcome, repeats = outcome_of(sensors, known.values, known.readings)
         found.append(Sample(frozen(known.genome), *outcome, repeats))
     return tuple(found)

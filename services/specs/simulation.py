@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters, frozen
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.core.motions import Motion, Recording, Trajectory
+from gaplab.services.core.motions import Recording, Trajectory
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.core.world import World
@@ -48,7 +48,7 @@ class Simulation:
         worlds = [self._world(tuple(row)) for row in parameters.tolist()]
         motions = [self._robot.motion(genome) for genome in genomes]
         times = _all_times(motions[0].observe_s.tobytes(), sensors.times_s.tobytes())
-        longer = [Motion(motion.times_s, motion.targets, times.all_s) for motion in motions]
+        longer = [motion.observed_at(times.all_s) for motion in motions]
         seen = self._engine.rollouts(worlds, longer)
         fitnesses = self._fitnesses(_at(seen, times.observed), len(genomes), len(parameters))
         if not sensors.size:

@@ -14,11 +14,17 @@ def checked(spec: Mapping[str, Any]) -> Checked:
 
 def subject(spec: Mapping[str, Any]) -> str:
     """Return, as JSON, what a sensitivity check of this resolved spec is about."""
-    return json.dumps({name: spec[name] for name in ("robot", "engine", "tunables")})
+    own = {name: spec[name] for name in ("controller", "task") if spec.get(name)}
+    return json.dumps({name: spec[name] for name in ("robot", "engine", "tunables")} | own)
 
 
-LATER = {"discrepancy": {"name": "squared_fitness", "options": {}}, "tuner": {"name": "search", "options": {}}}
-"""Fields that specs have had since readings are stored, with what an earlier spec means without them."""
+LATER: Mapping[str, Any] = {
+    "controller": None,
+    "task": None,
+    "discrepancy": {"name": "squared_fitness", "options": {}},
+    "tuner": {"name": "search", "options": {}},
+}
+"""Fields that were added to specs, with what an earlier spec means without them."""
 
 
 LATER_IN_REALITY: Mapping[str, Any] = {

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Motion
+from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.shapes import Box, Sphere
 from gaplab.services.core.world import Body, Joint, Material, Motor, World
@@ -30,15 +30,7 @@ pytest.importorskip("numba")
 
 G, STEP_S = 9.81, 1 / 100
 ROBOT = Quadruped()
-
-
-def motion(genome: FloatArray) -> Motion:
-    found = ROBOT.motion(genome)
-    assert isinstance(found, Motion)
-    return found
-
-
-MOTION = motion(ROBOT.known)
+MOTION = open_loop(ROBOT.motion(ROBOT.known))
 MATERIALS = [Material(1.0, 0.8), Material(0.3, 0.3), Material(0.8, 0.5, 0.5)]
 SLEDGE = World(
     bodies=(Body("board", 1.9, Box((2.0, 2.0, 0.02)), collides=False), Body("foot", 0.1, Sphere(0.02))),
@@ -189,7 +181,7 @@ def test_the_numbers_depend_neither_on_the_threads_nor_on_how_rollouts_are_batch
 ) -> None:
     worlds = [in_material(material) for material in MATERIALS]
     genomes = np.vstack([ROBOT.known, ROBOT.space.draw(count - 1, np.random.default_rng(0))])
-    motions = [replace(motion(genome), observe_s=np.array([0.2, 0.5])) for genome in genomes]
+    motions = [replace(open_loop(ROBOT.motion(genome)), observe_s=np.array([0.2, 0.5])) for genome in genomes]
     apart = np.array([[path(engine, world, motion) for world in worlds] for motion in motions])
     other = MuJoCo(MuJoCo.Options(threads=threads))
 

@@ -10,7 +10,7 @@ import pytest
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import about, body_poses
-from gaplab.services.core.motions import Motion
+from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.shapes import Box, Hull, Part, Sphere
 from gaplab.services.core.world import Body, Inertia, Joint, Material, Motor, World
@@ -21,7 +21,7 @@ from gaplab.services.engines.stepping import WARM_SCENES
 pytest.importorskip("pybullet")
 
 ROBOT = Quadruped()
-MOTION = ROBOT.motion(ROBOT.known)
+MOTION = open_loop(ROBOT.motion(ROBOT.known))
 
 
 @pytest.fixture
@@ -127,6 +127,7 @@ def solid(body: Body) -> list[float]:
     """Principal moments of inertia of even density."""
     if isinstance(body.shape, Sphere):
         return [0.4 * body.mass_kg * body.shape.radius_m**2] * 3
+    assert isinstance(body.shape, Box)
     x, y, z = np.square(body.shape.size_m)
     return [body.mass_kg / 12 * (y + z), body.mass_kg / 12 * (x + z), body.mass_kg / 12 * (x + y)]
 

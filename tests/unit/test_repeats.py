@@ -11,6 +11,7 @@ from gaplab.services.core.answers import Answers
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.loop import repetition
 from gaplab.services.core.repeats import mean, pooled_variance, standard_error, variance, variance_of_mean, weights
+from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies.base import DiverseOptions
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.tuning import Misfit
@@ -113,10 +114,10 @@ def _bare(step: Any) -> Any:
 
 
 def test_readings_of_repeats_are_averaged_where_they_are_known() -> None:
-    robot = PluginRef(name="quadruped", options={"counted_s": 0.25})
+    sensors = robots.create(PluginRef(name="quadruped", options={"counted_s": 0.25})).sensors
     tables = [[[0.1, None, 0.1, 0.2, None]], [[0.1, 0.3, 0.3, 0.2, None]], [[0.1, None, 0.2, 0.2, None]]]
-    outcome, repeats = outcome_of(robot, (0.1, 0.1, 0.1), tables)
-    alone, _ = outcome_of(robot, (0.1,), [[[0.1, 0.3, 0.2, 0.2, None]]])
+    outcome, repeats = outcome_of(sensors, (0.1, 0.1, 0.1), tables)
+    alone, _ = outcome_of(sensors, (0.1,), [[[0.1, 0.3, 0.2, 0.2, None]]])
 
     assert outcome.fitness == 0.1
     assert list(repeats) == [0.1] * 3

@@ -85,6 +85,8 @@ declare namespace Api {
     tunables: Array<PluginRead>;
     optimizers: Array<PluginRead>;
     discrepancies: Array<PluginRead>;
+    controllers: Array<PluginRead>;
+    tasks: Array<PluginRead>;
     tuners: Array<PluginRead>;
     budgets: Array<BudgetRead>;
     ignored: Array<IgnoredFile>;
@@ -104,6 +106,8 @@ declare namespace Api {
   interface Checked {
     robot: PluginRef;
     engine: PluginRef;
+    controller: PluginRef | null;
+    task: PluginRef | null;
     tunables: Array<ResolvedTunable>;
     points: number;
     evaluations: number;
@@ -292,6 +296,8 @@ declare namespace Api {
     iterations: number | null;
     repetitions: number | null;
     robot: PluginRef;
+    controller: PluginRef | null;
+    task: PluginRef | null;
     engine: PluginRef | null;
     optimizer: PluginRef;
     controller_optimizer: PluginRef | null;
@@ -635,6 +641,8 @@ declare namespace Api {
     iterations: number | null;
     repetitions: number | null;
     robot: PluginRef;
+    controller: PluginRef | null;
+    task: PluginRef | null;
     engine: PluginRef | null;
     optimizer: PluginRef;
     controller_optimizer: PluginRef | null;
@@ -711,6 +719,8 @@ declare namespace Api {
     iterations: number | null;
     repetitions: number | null;
     robot: PluginRef;
+    controller: PluginRef | null;
+    task: PluginRef | null;
     engine: PluginRef | null;
     optimizer: PluginRef;
     controller_optimizer: PluginRef | null;

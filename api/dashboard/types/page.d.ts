@@ -145,6 +145,8 @@ declare namespace Page {
     name: string;
     strategies: PluginDraft[];
     robot: PluginDraft;
+    controller: PluginDraft;
+    task: PluginDraft;
     engine: PluginDraft;
     optimizer: PluginDraft;
     controllerOptimizer: PluginDraft;

@@ -79,13 +79,18 @@ class Robot(Plugin):
         return self._task.sense(trajectory)
 
     @property
+    def loops(self) -> bool:
+        """Whether its controller observes while it acts, so that its motions are Loops."""
+        return self.usual_controller is not None and self._controller.loops
+
+    @property
     def is_function(self) -> bool:
         """Whether the robot is a function of one gene: its curve can be drawn, and it has no body to replay."""
         return not self.world.bodies and self.space.size == 1
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return engine, controller, task, unit, number of genes, sensors, and if it is a function, for the catalogue."""
+        """Return engine, controller, task, unit, genes, sensors, and whether it is a function, for the catalogue."""
         robot = cls()
         return {
             "engine": cls.engine,

@@ -44,6 +44,7 @@ class Torques:
 
     def __init__(self, world: World) -> None:
         self.joints = tuple(number for number, joint in enumerate(world.joints) if needs_torque(joint))
+        self._places = {joint: place for place, joint in enumerate(self.joints)}
         inverse = inverse_inertias(_without_armature(world)).tolist() if self.joints else []
         self._resisted = [_resisted(world.joints[number], inverse[number], world.time_step_s) for number in self.joints]
         self.reset()
@@ -56,11 +57,11 @@ class Torques:
 
     def command(self, joint: int, target: float) -> None:
         """Set a new target for the motor of a joint."""
-        self._targets[self.joints.index(joint)] = target
+        self._targets[self._places[joint]] = target
 
     def motor_nm(self, joint: int) -> float:
         """Return the torque of a joint's motor in the last step; 0 without one."""
-        return self._motors_nm[self.joints.index(joint)] if joint in self.joints else 0.0
+        return self._motors_nm[self._places[joint]] if joint in self._places else 0.0
 
     def of(self, states: States) -> list[float]:
         """Return the torques of the joints in a step, and remember those of their motors.

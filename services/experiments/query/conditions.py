@@ -92,6 +92,8 @@ EXPERIMENT_FIELDS: Fields = {
     "study": fields.text(_E.study_id, "id of its study; `none` without one"),
     "strategy": fields.text(_E.strategy, "name of the strategy"),
     "robot": fields.text(_E.spec["robot"]["name"].as_string(), "name of the robot"),
+    "controller": fields.text(_E.spec["controller"]["name"].as_string(), "controller; `none`: the robot's own"),
+    "task": fields.text(_E.spec["task"]["name"].as_string(), "task; `none`: the robot's own"),
     "engine": fields.text(_E.spec["engine"]["name"].as_string(), "engine of the simulators"),
     "reality": fields.text(_E.spec["reality"]["engine"]["name"].as_string(), "engine that is its reality"),
     "optimizer": fields.text(_E.spec["optimizer"]["name"].as_string(), "name of the optimizer"),

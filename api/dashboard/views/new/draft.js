@@ -34,6 +34,8 @@ export function draftOf(spec, catalogue) {
     ...Object.fromEntries(COUNTS.map((name) => [name, spec[name] ?? ""])),
     strategies: strategyDrafts(spec.strategies ?? defaults.strategies, catalogue),
     robot: pluginDraft(spec.robot ?? defaults.robot),
+    controller: pluginDraft(spec.controller ?? ""),
+    task: pluginDraft(spec.task ?? ""),
     engine: pluginDraft(spec.engine),
     optimizer: pluginDraft(spec.optimizer ?? defaults.optimizer),
     controllerOptimizer: pluginDraft(spec.controller_optimizer ?? ""),
@@ -103,11 +105,13 @@ export const ticked = (list) => list.filter(({ on }) => on);
  * @returns {Spec}
  */
 export function specOf(draft) {
-  const { strategies, robot, engine, optimizer, controllerOptimizer, discrepancy, tuner, tunables, budget } = draft;
+  const { strategies, robot, controller, task, engine, optimizer, controllerOptimizer, discrepancy, tuner, tunables, budget } = draft;
   return withoutEmpty({
     name: draft.name.trim(),
     strategies: ticked(strategies).map(pluginName),
     robot: pluginName(robot),
+    controller: controller.name ? pluginName(controller) : "",
+    task: task.name ? pluginName(task) : "",
     engine: engine.name ? pluginName(engine) : "",
     optimizer: pluginName(optimizer),
     controller_optimizer: controllerOptimizer.name ? pluginName(controllerOptimizer) : "",

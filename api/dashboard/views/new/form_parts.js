@@ -101,9 +101,13 @@ export function simulationPart(form) {
   const { draft, catalogue } = form;
   const robot = catalogue.robots.find(({ name }) => name === draft.robot.name);
   const isLean = catalogue.budgets.some(({ name, lean }) => lean && name === draft.budget.preset);
+  const ownOf = (/** @type {any} */ { name }) => `The robot’s own: ${readableName(name)}`;
   const robotEngine = `The robot’s own${robot ? `: ${robot.details.engine}` : ""}`;
   return part("Simulation",
     pluginField(form, "Robot", draft.robot, catalogue.robots, "/robot"),
+    ...(robot?.details.controller ? [
+      pluginField(form, "Controller", draft.controller, catalogue.controllers ?? [], "/controller", ownOf(robot.details.controller)),
+      pluginField(form, "Task", draft.task, catalogue.tasks ?? [], "/task", ownOf(robot.details.task))] : []),
     pluginField(form, "Engine of the simulators", draft.engine, catalogue.engines, "/engine", robotEngine),
     pluginField(form, "Optimizer", draft.optimizer, catalogue.optimizers, "/optimizer"),
     pluginField(form, "Optimizer of controllers", draft.controllerOptimizer, catalogue.optimizers, "/controller_optimizer", isLean ? "That of the lean budget" : "The same"),

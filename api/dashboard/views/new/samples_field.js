@@ -14,13 +14,21 @@ import { errorRoom } from "./fields.js";
 const LINES_SHOWN = 50;
 
 /**
+ * Return the parameters of a query that name the chosen plug-ins.
+ *
+ * @param {Record<string, Page.PluginDraft>} drafts
+ */
+const chosen = (drafts) => Object.fromEntries(Object.entries(drafts).filter(([, { name }]) => name).map(([kind, plugin]) => [kind, stringify(pluginName(plugin))]));
+
+/**
  * Return the field, and what it holds so far.
  *
  * @param {Form} form
  */
 export function samplesField(form) {
-  const { draft: { bench, robot }, catalogue, places } = form;
-  const genes = Number(catalogue.robots.find(({ name }) => name === robot.name)?.details.genes ?? 1);
+  const { draft: { bench, robot, controller, task }, catalogue, places } = form;
+  const ownGenes = catalogue.robots.find(({ name }) => name === robot.name)?.details.genes ?? 1;
+  const genes = controller.name ? 1 : Number(ownGenes);
   const area = h("textarea", { id: "samples", rows: 5, spellcheck: "false", "aria-describedby": "samples-hint", placeholder: exampleOf(genes) });
   const file = h("input", { type: "file", accept: ".csv,.tsv,.txt,text/csv", "aria-label": "Choose a CSV file" });
   const told = h("div", { role: "status" });
@@ -36,7 +44,7 @@ export function samplesField(form) {
     told.replaceChildren(h("p", {}, "Checking…"));
     try {
       const plugin = pluginName(robot);
-      const query = { robot: robot.name, options: stringify(typeof plugin === "string" ? {} : plugin.options) };
+      const query = { robot: robot.name, options: stringify(typeof plugin === "string" ? {} : plugin.options), ...chosen({ controller, task }) };
       /** @type {Api.SamplesRead} */
       const found = await postFile("/samples/check", query, text, "text/csv");
       if (!told.isConnected) return;

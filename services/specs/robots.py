@@ -1,0 +1,77 @@
+"""The robot of a spec, with its controller and its task."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from types import ModuleType
+from typing import Protocol
+
+from gaplab.schemas.plugin import PluginRef
+from gaplab.services.core import external_plugins
+from gaplab.services.core.controllers import controllers
+from gaplab.services.core.errors import InvalidSpec, Violation, gather
+from gaplab.services.core.robots import robots
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.tasks import tasks
+
+
+class NamesARobot(Protocol):
+    """A spec, or the subject of a sensitivity check."""
+
+    @property
+    def robot(self) -> PluginRef:
+        """Return the robot."""
+        ...
+
+    @property
+    def controller(self) -> PluginRef | None:
+        """Return the controller; None for the robot's own."""
+        ...
+
+    @property
+    def task(self) -> PluginRef | None:
+        """Return the task; None for the robot's own."""
+        ...
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A robot with a controller and a task; None for its own."""
+
+    robot: PluginRef
+    controller: PluginRef | None = None
+    task: PluginRef | None = None
+
+
+def robot_of(spec: NamesARobot) -> Robot:
+    """Return a new robot, driven by the controller of a spec and rated by its task.
+
+    Raises:
+        InvalidSpec: with every violation: a plug-in is not installed here or refuses its options, or the robot brings a
+            controller and a task of its own, and the spec names others.
+    """
+    robot = robots.create(spec.robot, "/robot")
+    if spec.controller is None and spec.task is None:
+        return robot
+    if robot.usual_controller is None or robot.usual_task is None:
+        named = [(place, ref) for place, ref in (("/controller", spec.controller), ("/task", spec.task)) if ref]
+        message = f"the {robot.name} brings a controller and a task of its own; leave this out"
+        raise InvalidSpec(Violation(place, ref.name, message, "left out") for place, ref in named)
+    driving, rating = spec.controller or robot.usual_controller, spec.task or robot.usual_task
+    controller, task = gather(lambda: controllers.create(driving, "/controller"), lambda: tasks.create(rating, "/task"))
+    robot.perform(controller, task)
+    return robot
+
+
+def unit(spec: NamesARobot) -> str:
+    """Return the unit of fitness; "" if the robot or the task is not installed."""
+    if spec.task is not None:
+        return tasks[spec.task.name].unit if spec.task.name in tasks else ""
+    return _own_unit(external_plugins.package(), spec.robot.model_dump_json())
+
+
+@lru_cache
+def _own_unit(_package: ModuleType | None, ref: str) -> str:
+    try:
+        return robots.create(PluginRef.model_validate_json(ref)).unit
+    except InvalidSpec:
+        return ""
