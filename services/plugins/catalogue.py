@@ -1,12 +1,15 @@
 """The catalogue: everything that specs can name."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 
 from gaplab.schemas.plugin import BudgetRead, Catalogue, PluginRead
+from gaplab.schemas.robots import RobotRead
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.controllers import controllers
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.optimizers import optimizers
+from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tasks import tasks
@@ -14,15 +17,21 @@ from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
 from gaplab.services.plugins.ignored import ignored_files
+from gaplab.services.plugins.stored_robots import catalogued
 from gaplab.services.specs.default_engines import default_engine
 from gaplab.services.specs.presets import PRESETS
 
 
-def catalogue() -> Catalogue:
-    """Return every plug-in of every kind, by name, and the named budgets."""
+def catalogue(stored: Sequence[RobotRead] = ()) -> Catalogue:
+    """Return every plug-in of every kind, by name, and the named budgets.
+
+    Args:
+        stored: the stored robots, which specs name as they do plug-ins.
+    """
+    own = [robot for robot in robots.describe() if robot.name != IMPORTED]
     return Catalogue(
         strategies=strategies.describe(),
-        robots=tuple(map(_with_engine_of_here, robots.describe())),
+        robots=(*map(_with_engine_of_here, own), *catalogued(stored)),
         engines=engines.describe(),
         tunables=tunables.describe(),
         optimizers=optimizers.describe(),
