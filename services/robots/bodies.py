@@ -148,7 +148,10 @@ class Bodies:
             place = self._data.xpos[at] + turn.apply(model.body_ipos[at])
             center, axes = self._within(head, place, self._data.xquat[at])
             found.append((float(model.body_mass[at]), center, axes * rotation_of(model.body_iquat[at]), at))
-        heavy = [each for each in found if each[0] > 0 or model.body_inertia[each[3]].any()]
+        heavy = [each for each in found if each[0] > 0]
+        if weightless := [each[3] for each in found if each[0] <= 0 and model.body_inertia[each[3]].any()]:
+            names = [body_name(model, at) for at in weightless]
+            self._notes.lose("inertia without mass is left out: {}", *names)
         if len(heavy) == 1:
             _, center, axes, at = heavy[0]
             return center, Inertia(vector(model.body_inertia[at]), quaternion(axes))

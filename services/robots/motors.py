@@ -25,6 +25,9 @@ SWING_RAD, SWING_M = 0.5, 0.02
 BOUNDLESS_RAD = np.pi
 """Error for which a motor without a limit has torque enough, where the joint has no limits either."""
 
+FILTERS = {0, 2, 3}
+"""MuJoCo's types of actuators' dynamics that a World may do without: none, and filters of the control."""
+
 
 def with_motors(joints: list[Joint], source: Source, options: ImportOptions, notes: Notes) -> list[Joint]:
     """Return the joints with their motors: the file's, unless the options say which."""
@@ -150,10 +153,11 @@ def _motor(
     _, stiffness, damping = (-float(value) for value in model.actuator_biasprm[at, :3])
     kind = "position" if stiffness > 0 else "velocity" if damping > 0 else "torque"
     matches = {"position": gain == stiffness, "velocity": gain == damping, "torque": True}
-    if not matches[kind] or gear == 0 or model.actuator_biasprm[at, 0] != 0:
+    dynamics = int(model.actuator_dyntype[at])
+    if not matches[kind] or gear == 0 or model.actuator_biasprm[at, 0] != 0 or dynamics not in FILTERS:
         notes.refuse(f"actuator {name} is no motor, position or velocity actuator")
         return joint
-    if int(model.actuator_dyntype[at]) != 0:
+    if dynamics:
         notes.lose("activation dynamics are lost: {}", name)
     _note_units(model, at, name, gear * gain if kind == "torque" else gear, notes)
     limit = options.max_torque or _limit(model, at, joint, gear, gain)
@@ -162,7 +166,7 @@ def _motor(
         notes.lose(f"actuator {name} has no largest torque: {limit:.4g} N·m, which is more than it needs")
     kp = gear * gear * stiffness if kind == "position" else 0.0
     motor = PDMotor(kind, limit, kp, gear * gear * damping)  # type: ignore[arg-type]
-    return replace(joint, motor=motor, **({"swing": limit / 2} if kind == "torque" else {}))
+    return replace(joint, motor=motor, swing=limit / 2 if kind == "torque" else joint.swing)
 
 
 def _note_units(model: Any, at: int, name: str, factor: float, notes: Notes) -> None:  # noqa: ANN401

@@ -146,12 +146,12 @@ def find_mesh(given: str, folder: Path) -> Path | None:
 
 
 def _converted(path: Path, notes: Notes) -> bytes:
-    """Return a DAE as STL."""
+    """Return a DAE, in the unit that it says, as STL in metres."""
     if find_spec("trimesh") is None:
-        notes.refuse(f"{path.name} is a DAE, which only trimesh reads: pip install trimesh pycollada")
+        notes.refuse(f"{path.name} is a DAE, which trimesh reads: pip install 'gaplab[collada]'")
         return b""
     loaded: Any = import_module("trimesh").load_scene(path)
-    return bytes(loaded.to_mesh().export(file_type="stl"))
+    return bytes(loaded.convert_units("meters").to_mesh().export(file_type="stl"))
 
 
 def _mass_kg(link: Element) -> float | None:
