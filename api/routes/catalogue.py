@@ -6,8 +6,8 @@ from gaplab.api.http import conditional
 from gaplab.api.http.dependencies import StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.plugin import Catalogue
+from gaplab.services.experiments.stored_robots import catalogued, list_robots
 from gaplab.services.plugins.catalogue import catalogue
-from gaplab.services.plugins.stored_robots import list_robots
 
 router = APIRouter(tags=["catalogue"])
 
@@ -20,4 +20,4 @@ router = APIRouter(tags=["catalogue"])
 )
 def read_catalogue(request: Request, store: StoreDep) -> Response:
     """Return every plug-in and every stored robot, with its source and the schema of its options."""
-    return conditional.tagged(request, catalogue(list_robots(store)))
+    return conditional.tagged(request, catalogue(catalogued(list_robots(store))))

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Path, Request, Response
 from gaplab.api.http.dependencies import StoreDep
 from gaplab.api.http.problems import Responses, documented
 from gaplab.schemas.robots import RobotRead
-from gaplab.services.plugins import stored_robots
+from gaplab.services.experiments import stored_robots
 
 router = APIRouter(prefix="/robots", tags=["catalogue"])
 

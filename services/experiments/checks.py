@@ -21,8 +21,8 @@ from gaplab.services.core.sensitivity import VERSION, Effort, warning
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission
 from gaplab.services.experiments.states import move
+from gaplab.services.experiments.stored_robots import with_stored_robot
 from gaplab.services.plugins.external import external_plugins, named_in
-from gaplab.services.plugins.stored_robots import with_stored_robot
 from gaplab.services.specs.resolution import resolve_sensitivity
 from gaplab.services.specs.robots import unit
 from gaplab.services.store.clock import moment

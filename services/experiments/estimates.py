@@ -10,7 +10,7 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.core.stored_specs import spec_of
 from gaplab.services.engines import engines
 from gaplab.services.experiments.limits import check_extent
-from gaplab.services.plugins.stored_robots import with_stored_robot
+from gaplab.services.experiments.stored_robots import with_stored_robot
 from gaplab.services.settings import Limits
 from gaplab.services.specs.resolution import is_direct, resolve_experiment, resolve_study, takes_samples
 from gaplab.services.specs.rollouts import expected_rollouts

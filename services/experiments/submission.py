@@ -9,8 +9,8 @@ from gaplab.schemas.spec import ExperimentSpec, StudySpec
 from gaplab.services.experiments.checks import queue_for
 from gaplab.services.experiments.idempotency import Once, once
 from gaplab.services.experiments.limits import FREELY, Admission, check_extent, check_load
+from gaplab.services.experiments.stored_robots import with_stored_robot
 from gaplab.services.experiments.views import view_experiments, view_studies
-from gaplab.services.plugins.stored_robots import with_stored_robot
 from gaplab.services.specs.hardware import hardware_of
 from gaplab.services.specs.resolution import resolve_experiment, resolve_study, takes_samples
 from gaplab.services.specs.rollouts import expected_rollouts

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from gaplab.schemas.plugin import BudgetRead, Catalogue, PluginRead
-from gaplab.schemas.robots import RobotRead
 from gaplab.schemas.spec import StudySpec
 from gaplab.services.core.controllers import controllers
 from gaplab.services.core.discrepancies import discrepancies
@@ -17,21 +16,20 @@ from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
 from gaplab.services.plugins.ignored import ignored_files
-from gaplab.services.plugins.stored_robots import catalogued
 from gaplab.services.specs.default_engines import default_engine
 from gaplab.services.specs.presets import PRESETS
 
 
-def catalogue(stored: Sequence[RobotRead] = ()) -> Catalogue:
+def catalogue(stored: Sequence[PluginRead] = ()) -> Catalogue:
     """Return every plug-in of every kind, by name, and the named budgets.
 
     Args:
-        stored: the stored robots, which specs name as they do plug-ins.
+        stored: entries of the stored robots, which specs name as they do plug-ins.
     """
     own = [robot for robot in robots.describe() if robot.name != IMPORTED]
     return Catalogue(
         strategies=strategies.describe(),
-        robots=(*map(_with_engine_of_here, own), *catalogued(stored)),
+        robots=(*map(_with_engine_of_here, own), *stored),
         engines=engines.describe(),
         tunables=tunables.describe(),
         optimizers=optimizers.describe(),

@@ -19,9 +19,8 @@ from gaplab.services.core.robot_files import RobotFile, read_robot_file
 from gaplab.services.core.robots.imported import Imported
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.stored_specs import spec_to_run
-from gaplab.services.experiments import submission
+from gaplab.services.experiments import stored_robots, submission
 from gaplab.services.experiments.listing import ListFilter, list_experiments
-from gaplab.services.plugins import stored_robots
 from gaplab.services.specs.assembly import setting
 from gaplab.services.store.models import ExperimentRow, RobotRow
 from gaplab.services.store.session import Store
@@ -161,8 +160,8 @@ def test_queries_and_the_catalogue_know_it_by_its_name(store: Store, http: TestC
 
     assert entry["details"]["controller"]["name"] == "square_pulses"
     assert (entry["details"]["genes"], entry["details"]["unit"]) == (24, "m/s")
-    assert [each.id for each in list_experiments(store, ListFilter(query="robot = walker")).items] == [made.id]
-    assert list_experiments(store, ListFilter(query="robot = imported")).items == ()
+    assert [each.id for each in list_experiments(store, ListFilter(q="robot = walker")).items] == [made.id]
+    assert list_experiments(store, ListFilter(q="robot = imported")).items == ()
 
 
 def test_an_archive_has_its_robots_and_brings_them(store: Store, tmp_path: Path) -> None:

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from typing import TypeVar
 
-from sqlalchemy import update
-
 from gaplab.schemas.plugin import PluginRead, PluginRef
 from gaplab.schemas.robots import RobotRead
 from gaplab.schemas.spec import SharedSettings
@@ -14,11 +12,10 @@ from gaplab.services.core.robot_files import RobotFile, read_robot_file
 from gaplab.services.core.robot_library import IMPORTED
 from gaplab.services.core.robots import robots
 from gaplab.services.specs.default_engines import default_engine
-from gaplab.services.store.clock import now
 from gaplab.services.store.models import RobotRow
 from gaplab.services.store.queries import robots as rows
 from gaplab.services.store.session import Session, Store, snapshot, transaction
-from gaplab.services.store.statements import insert_new, storable
+from gaplab.services.store.texts import storable
 
 S = TypeVar("S", bound=SharedSettings)
 
@@ -41,11 +38,7 @@ def add_robot(store: Store, text: str | bytes) -> RobotRead:
 
 @transaction
 def _insert(session: Session, file: RobotFile) -> RobotRead:
-    values = {"sha256": file.sha256, "name": file.name, "text": file.text}
-    session.execute(insert_new(session, RobotRow).values(**values, created_at=now()))
-    session.execute(update(RobotRow).where(RobotRow.sha256 == file.sha256).values(created_at=now()))
-    row = session.get_one(RobotRow, file.sha256)
-    return _view(row, file)
+    return _view(rows.put(session, file.sha256, file.name, file.text), file)
 
 
 @snapshot
