@@ -9,6 +9,7 @@ Programs import it from `gaplab`.
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Self
 
 import httpx2
@@ -29,6 +30,7 @@ from gaplab.api.clients.submission import Submission
 from gaplab.api.clients.tables import Tables
 from gaplab.api.clients.watcher import Watcher
 from gaplab.schemas.plugin import Catalogue
+from gaplab.schemas.robots import RobotRead
 
 
 class Client:
@@ -104,6 +106,20 @@ class Client:
                 return True
         except (ServiceError, ServiceUnreachable):
             return False
+
+    def add_robot(self, file: str | Path) -> RobotRead:
+        """Store a robot file, which `gaplab robot import` writes; specs name the robot by its name from then on."""
+        return self._connection.change(
+            RobotRead,
+            "POST",
+            "/robots",
+            content=[Path(file).read_bytes()],
+            headers={"Content-Type": "application/json"},
+        )
+
+    def robots(self) -> tuple[RobotRead, ...]:
+        """Return the robots from files, by name, the newest of a name first."""
+        return self._connection.get(tuple[RobotRead, ...], "/robots")
 
     def catalogue(self) -> Catalogue:
         """Return the plug-ins of the service."""

@@ -3,8 +3,10 @@
 from fastapi import APIRouter, Request, Response
 
 from gaplab.api.http import conditional
+from gaplab.api.http.dependencies import StoreDep
 from gaplab.api.http.problems import documented
 from gaplab.schemas.plugin import Catalogue
+from gaplab.services.experiments.stored_robots import catalogued, list_robots
 from gaplab.services.plugins.catalogue import catalogue
 
 router = APIRouter(tags=["catalogue"])
@@ -16,6 +18,6 @@ router = APIRouter(tags=["catalogue"])
     response_model=Catalogue,
     responses=conditional.CACHED | documented(),
 )
-def read_catalogue(request: Request) -> Response:
-    """Return every strategy, robot, engine, tunable and optimizer, with its source and the schema of its options."""
-    return conditional.tagged(request, catalogue())
+def read_catalogue(request: Request, store: StoreDep) -> Response:
+    """Return every plug-in and every stored robot, with its source and the schema of its options."""
+    return conditional.tagged(request, catalogue(catalogued(list_robots(store))))

@@ -5,13 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaplab.schemas.replays import ControllerKind, Interval, Replay, ReplayReadings, ReplayWorld
-from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import TOUCHING_M, body_poses, clearances_m
 from gaplab.services.core.motions import Recording
 from gaplab.services.core.robots.base import Robot, Sensors
 from gaplab.services.core.world import World
-from gaplab.services.plugins.watching import imported
+from gaplab.services.replay.sent_specs import SentSpec, received
 from gaplab.services.replay.shapes import feet_of, labels, shapes_of
 from gaplab.services.specs.assembly import edits_of, engine_of, reality_of
 from gaplab.services.specs.robots import robot_of
@@ -50,7 +49,7 @@ class ReplayRequest:
     Attributes:
         experiment: id of the experiment.
         choice: choice of the controller.
-        spec: resolved spec, as JSON.
+        spec: resolved spec.
         genome: genome of the controller.
         simulator: the iteration of the simulator; None if the controller evolved in reality itself.
         parameters: parameters of the simulator.
@@ -62,7 +61,7 @@ class ReplayRequest:
 
     experiment: str
     choice: ReplayChoice
-    spec: str
+    spec: SentSpec
     genome: tuple[float, ...]
     simulator: int | None
     parameters: tuple[float, ...] | None
@@ -78,8 +77,7 @@ def compute_replay(request: ReplayRequest) -> bytes:
     Raises:
         EngineUnavailable: the library of an engine is not installed.
     """
-    imported.renewed()
-    spec, choice = ResolvedSpec.model_validate_json(request.spec), request.choice
+    spec, choice = received(request.spec), request.choice
     robot = robot_of(spec)
     genome = np.array(request.genome)
     observed = robot.motion(genome).observe_s
@@ -100,7 +98,7 @@ def compute_replay(request: ReplayRequest) -> bytes:
         iteration=choice.iteration,
         kind=choice.kind,
         simulator=request.simulator,
-        robot=robot.name,
+        robot=robot.label,
         unit=robot.unit,
         bodies=tuple(body.name for body in robot.world.bodies),
         feet=labels(robot.world),

@@ -579,6 +579,16 @@ declare namespace Api {
   }
   type RequestState = "open" | "taken" | "measured" | "failed" | "withdrawn" | "stuck";
   type ResolvedTunable = string | Record<string, any>;
+  interface RobotRead {
+    sha256: string;
+    name: string;
+    file: string | null;
+    bodies: number;
+    actuators: number;
+    mass_kg: number;
+    lost: Array<string>;
+    created_at: string;
+  }
   interface Safety {
     simulators: number;
     failed: number;
