@@ -16,11 +16,11 @@ SLENDER = 0.4
 MOST_FEET = 8
 """Largest number of feet of which a replay tells the contacts."""
 
-USUAL_SIZE_M = 0.6
-"""Diagonal of the box round a robot that is seen at its true size: that of the quadruped."""
+USUAL_SIZE_M = 0.75
+"""Diagonal of the box round a robot that the camera sees from its usual distance; the quadruped has 0.6."""
 
 LOOKED_AT_M = 0.12
-"""Least height that the camera looks at, for a robot of that size."""
+"""Least height that the camera looks at from there."""
 
 
 def observed_of(world: World) -> int:
