@@ -63,7 +63,8 @@ ROBOT = '''
 import numpy as np
 
 from gaplab.plugins import (
-    Body, Box, Capsule, Cylinder, Hull, Inertia, Joint, Loop, Material, PDMotor, Part, Robot, Space, Sphere, World, frozen
+    Body, Box, Capsule, Cylinder, Hull, Inertia, Joint, Loop, Material, PDMotor, Part, Robot, Space, Sphere, World,
+    frozen,
 )
 
 EVEN = Inertia((0.01, 0.01, 0.01))
@@ -74,7 +75,8 @@ WEDGE = Hull(tuple(
     (x, y * wide, z) for x, wide, low in ((-0.2, 0.11, -0.05), (0.12, 0.11, -0.05), (0.26, 0.05, 0.0))
     for y in (-1, 1) for z in (low, 0.06)
 ))
-SOLE = Hull(tuple((x, y, z) for x, z in ((-0.04, 0.0), (0.07, 0.0), (0.03, 0.03), (-0.04, 0.03)) for y in (-0.03, 0.03)))
+PROFILE = ((-0.04, 0.0), (0.07, 0.0), (0.03, 0.03), (-0.04, 0.03))
+SOLE = Hull(tuple((x, y, z) for x, z in PROFILE for y in (-0.03, 0.03)))
 
 
 def leg(side, y):

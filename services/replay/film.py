@@ -1,6 +1,6 @@
 """Pictures of a replay: both worlds side by side, seen by one camera that follows the robot, as on the page."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw, ImageFont
 from gaplab.schemas.replays import Framing, Replay, ReplayWorld, Shape
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.kinematics import product, rotated
-from gaplab.services.replay.painting import Camera, Colour, Solid, paint
+from gaplab.services.replay.painting import Camera, Colour, Scenery, Solid, paint
 from gaplab.services.replay.polyhedra import Polyhedron, box, cylinder, polyhedron
 
 TURN_RAD, RISE_RAD, DISTANCE_M = -1.0, 0.35, 1.25
@@ -25,13 +25,34 @@ BAR = 0.12
 """Height of the titles, as a share of the height of a world."""
 
 INK, PAPER = (34, 34, 34), (255, 255, 255)
-COLOURS = {
-    "trunk": (0, 114, 178),
-    "limb": (123, 135, 148),
-    "foot": (240, 196, 138),
-    "foot on the ground": (213, 94, 0),
-}
-"""The light colours of the page."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """Light or dark colours of the page: by role, and those behind the robot."""
+
+    colours: Mapping[str, Colour]
+    scenery: Scenery
+
+
+LIGHT = Look(
+    {
+        "trunk": (0, 114, 178),
+        "limb": (123, 135, 148),
+        "foot": (240, 196, 138),
+        "foot on the ground": (213, 94, 0),
+    },
+    Scenery(),
+)
+DARK = Look(
+    {
+        "trunk": (86, 180, 233),
+        "limb": (152, 164, 179),
+        "foot": (138, 106, 60),
+        "foot on the ground": (255, 154, 61),
+    },
+    Scenery(floor=(29.0, 36.0, 45.0), other=(39.0, 48.0, 59.0), sky=(18.0, 22.0, 28.0), shadow=0.45),
+)
 
 
 @dataclass(frozen=True)
@@ -115,14 +136,15 @@ def _solids(world: _Moving, frame: int, time_s: float) -> list[Solid]:
     }
     positions, orientations = world.positions[frame], world.orientations[frame]
     return [
-        solid(shape, positions, orientations, _colour(shape, down))
+        solid(shape, positions, orientations, colour_of(shape, down))
         for shape in world.world.shapes
         if shape.kind != "plane"
     ]
 
 
-def _colour(shape: Shape, down: set[int | None]) -> Colour:
-    return COLOURS["foot on the ground" if shape.role == "foot" and shape.body in down else shape.role]
+def colour_of(shape: Shape, down: Collection[int | None], look: Look = LIGHT) -> Colour:
+    """Return the colour of a shape, given the feet on the ground."""
+    return look.colours["foot on the ground" if shape.role == "foot" and shape.body in down else shape.role]
 
 
 def solid(shape: Shape, positions: FloatArray, orientations: FloatArray, colour: Colour) -> Solid:

@@ -12,7 +12,7 @@ from gaplab.services.core.motions import Recording
 from gaplab.services.core.robots.base import Robot, Sensors
 from gaplab.services.core.world import World
 from gaplab.services.plugins.watching import imported
-from gaplab.services.replay.shapes import feet_of, framing_of, labels, observed_of, shapes_of
+from gaplab.services.replay.shapes import extent_of, feet_of, framing_of, labels, observed_of, shapes_of
 from gaplab.services.specs.assembly import edits_of, engine_of, reality_of
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.simulation import Simulation
@@ -170,7 +170,7 @@ def _framing(*worlds: ReplayWorld | None) -> Framing:
     for world in worlds:
         if world is not None and world.positions_m:
             positions = np.array(world.positions_m[0]).reshape(-1, 3)
-            return framing_of(world.shapes, positions, np.array(world.orientations[0]).reshape(-1, 4))
+            return framing_of(*extent_of(world.shapes, positions, np.array(world.orientations[0]).reshape(-1, 4)))
     return Framing()
 
 

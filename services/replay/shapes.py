@@ -69,24 +69,30 @@ def shapes_of(world: World) -> tuple[Shape, ...]:
     return tuple(found)
 
 
-def framing_of(shapes: tuple[Shape, ...], positions: FloatArray, orientations: FloatArray) -> Framing:
-    """Return how far away a robot is seen from, and at what height, so that a large one and a small one fill a picture.
+def extent_of(
+    shapes: tuple[Shape, ...], positions: FloatArray, orientations: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the least and the greatest coordinates `(3,)` of a robot; 0 for one without shapes.
 
     Args:
         shapes: shapes of its world.
-        positions: `(bodies, 3)`: positions of the bodies at the start.
+        positions: `(bodies, 3)`: positions of the bodies.
         orientations: `(bodies, 4)`: their orientations.
     """
-    clouds = []
+    clouds = [np.zeros((0, 3))]
     for shape in shapes:
         if shape.body is not None:
-            turn = orientations[shape.body]
             places = rotated(np.array(shape.orientation), _outline(shape)) + shape.position_m
-            clouds.append(positions[shape.body] + rotated(turn, places))
-    if not clouds:
-        return Framing()
+            clouds.append(positions[shape.body] + rotated(orientations[shape.body], places))
     points = np.concatenate(clouds)
-    low, high = points.min(axis=0), points.max(axis=0)
+    return (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.zeros(3))
+
+
+def framing_of(low: FloatArray, high: FloatArray) -> Framing:
+    """Return from how far away a robot with this extent is seen: a large one and a small one fill a picture alike.
+
+    The scale is a power of 2, so that the squares of the ground keep round sizes.
+    """
     size = max(float(np.linalg.norm(high - low)), 1e-3)
     scale = float(2.0 ** np.round(np.log2(size / USUAL_SIZE_M)))
     return Framing(scale=scale, height_m=round(max(LOOKED_AT_M * scale, float(low[2] + high[2]) / 2), 4))
@@ -97,9 +103,9 @@ def _outline(shape: Shape) -> FloatArray:
     if shape.kind == "hull":
         return np.array(shape.vertices_m)
     if shape.kind == "box":
-        return np.array(SIGNS) * np.array(shape.size_m)
+        return np.asarray(np.array(SIGNS) * np.array(shape.size_m))
     radius, length, round_end = shape.size_m[0], (*shape.size_m, 0.0)[1], shape.kind != "cylinder"
-    return np.array(SIGNS) * np.array([2 * radius, 2 * radius, length + 2 * radius * round_end])
+    return np.asarray(np.array(SIGNS) * np.array([2 * radius, 2 * radius, length + 2 * radius * round_end]))
 
 
 def _shape(place: int, part: Part, role: ShapeRole) -> Shape:

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from gaplab.schemas.replays import Replay
-from gaplab.services.replay.film import COLOURS, pictures
+from gaplab.services.replay.film import LIGHT, pictures
 from gaplab.services.replay.painting import Camera, Solid, paint
 from gaplab.services.replay.polyhedra import box
 from gaplab.services.replay.video import VideoFormat, film
@@ -85,7 +85,7 @@ def test_an_mp4_can_be_decoded() -> None:
 def test_what_is_on_the_ground_has_another_colour() -> None:
     def count(picture: Image.Image) -> int:
         rgb = np.asarray(picture).astype(int)
-        near = np.abs(rgb - np.array(COLOURS["foot on the ground"]) * 0.75).sum(axis=2) < 120
+        near = np.abs(rgb - np.array(LIGHT.colours["foot on the ground"]) * 0.75).sum(axis=2) < 120
         return int(near.sum())
 
     first, *_, last = pictures(BOTH, every=1, width_px=480)

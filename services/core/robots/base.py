@@ -85,7 +85,7 @@ class Robot(Plugin):
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return engine, controller, task, unit, genes, sensors, and whether it is a function, for the catalogue."""
+        """Return its engine, controller, task, unit, sensors and numbers of genes and bodies, for the catalogue."""
         robot = cls()
         return {
             "engine": cls.engine,
@@ -94,6 +94,7 @@ class Robot(Plugin):
             "unit": robot.unit,
             "genes": robot.space.size,
             "function": robot.is_function,
+            "bodies": len(robot.world.bodies),
             **robot.sensors.details(),
         }
 

@@ -7,7 +7,8 @@ import { mesh } from "./meshes.js";
 import { solidsOf } from "./motion.js";
 
 const HEIGHT_M = 0.6;
-const TARGET_HEIGHT_M = 0.12;  // of the quadruped, which stands at 0.8 of the height
+const GROUND = 0.8;  // height of the ground in the picture, from the top
+const SMALLER = 5.7;  // how much smaller a robot is drawn for each metre of its middle, so that its top is in the picture
 
 /**
  * Return a painter that draws outlines without depth, from the horizontal direction of the camera.
@@ -20,8 +21,8 @@ export function painter(canvas, shapes) {
   const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   const solids = solidsOf(shapes);
   return (models, grounded, camera, palette) => {
-    const scale = (canvas.height / HEIGHT_M) * (1.6 / camera.distance);
-    const ground = 0.8 * canvas.height + scale * (camera.target[2] - TARGET_HEIGHT_M * camera.scale);
+    const scale = (canvas.height / HEIGHT_M) * (1.6 / camera.distance) / Math.max(1, SMALLER * camera.target[2] / camera.scale);
+    const ground = GROUND * canvas.height;
     const direction = Math.atan2(camera.eye[1] - camera.target[1], camera.eye[0] - camera.target[0]);
     /** @type {(point: Page.Vector) => [x: number, y: number]} */
     const flat = ([x, y, z]) => [
