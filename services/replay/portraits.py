@@ -32,13 +32,14 @@ def robot_picture(drawing: RolloutProcess, name: str, *, dark: bool, width_px: i
     """
     if name not in robots:
         raise NotFound(f"no usable robot is called {name[:64]!r}; permitted: {', '.join(robots)}")
-    return picture_of(drawing, robots[name]().world, dark=dark, width_px=width_px)
-
-
-def picture_of(drawing: RolloutProcess, world: World, *, dark: bool, width_px: int) -> bytes:
-    """Return a picture of the robot in a world as PNG; arguments and errors are those of `robot_picture`."""
+    world = robots[name]().world
     if not world.bodies:
-        raise NotFound("the robot has no body, so there is no picture of it")
+        raise NotFound(f"the robot {name!r} has no body, so there is no picture of it")
+    return world_picture(drawing, world, dark=dark, width_px=width_px)
+
+
+def world_picture(drawing: RolloutProcess, world: World, *, dark: bool, width_px: int) -> bytes:
+    """Return a picture of a world with bodies as PNG; other arguments and errors are those of `robot_picture`."""
     key: Key = ("picture", sha256(repr(world).encode()).hexdigest(), dark, width_px)
     found: bytes | None = drawing.answers.get(key)
     if found is None:
