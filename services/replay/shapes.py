@@ -32,8 +32,8 @@ def observed_of(world: World) -> int:
 def feet_of(world: World) -> tuple[int, ...]:
     """Return the indices of the feet: bodies that collide with the ground and carry no other such body.
 
-    The base is none. If only one body would be left, as in a snake, all bodies that collide are feet; of more than
-    `MOST_FEET`, some are taken at equal distances in the list of bodies.
+    The base is none. If only one body of a robot that moves would be left, as in a snake, all bodies that collide are
+    feet; of more than `MOST_FEET`, some are taken at equal distances in the list of bodies.
     """
     names = [body.name for body in world.bodies]
     parents = {names.index(joint.child): names.index(joint.parent) for joint in world.joints}
@@ -43,7 +43,7 @@ def feet_of(world: World) -> tuple[int, ...]:
         while (place := parents.get(place, 0)) and place not in carrying:
             carrying.add(place)
     outer = [place for place in touching if place not in carrying]
-    feet = outer if len(outer) > 1 else touching
+    feet = outer if len(outer) > 1 or world.fixed else touching
     chosen = np.linspace(0, len(feet) - 1, min(len(feet), MOST_FEET)).round().astype(int)
     return tuple(feet[place] for place in chosen)
 

@@ -90,6 +90,7 @@ def test_feet_are_the_outer_bodies_that_touch() -> None:
 
 def test_all_links_of_a_snake_are_feet_but_not_too_many() -> None:
     assert feet_of(chain(5)) == (1, 2, 3, 4, 5)
+    assert feet_of(replace(chain(5), fixed=True)) == (5,)  # an arm has a hand
     long = feet_of(chain(30))
     assert len(long) == MOST_FEET
     assert (long[0], long[-1]) == (1, 30)
