@@ -7,6 +7,7 @@ Put the file into a folder that GAPLAB_PLUGINS names, and start the service. doc
 
 from gaplab.schemas.base import Frozen as Frozen
 from gaplab.schemas.base import Real as Real
+from gaplab.schemas.plugin import PluginRef as PluginRef
 from gaplab.services.core.arrays import Fitnesses as Fitnesses
 from gaplab.services.core.arrays import FloatArray as FloatArray
 from gaplab.services.core.arrays import Genome as Genome
