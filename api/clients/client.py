@@ -86,6 +86,7 @@ class Client:
         self.report, self.take_home, self.replay = reports.save, reports.take_home, replays.replay
         self.export, self.import_, self.events = archives.export, archives.import_, event_log.events
         self.watch, self.wait, self.video, self.requests = watcher.watch, watcher.wait, replays.video, bench.requests
+        self.robot_picture = replays.robot_picture
 
     def __enter__(self) -> Self:
         return self

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from gaplab.services.running import execution
 from gaplab.services.store.lease import Requested
 from gaplab.services.store.session import Store
 from tests.drawn_robot import FILES, strode
+from tests.integration.test_client import InProcess
 
 
 @pytest.fixture
@@ -145,3 +147,11 @@ def test_what_has_no_picture_says_why(api: TestClient) -> None:
     assert "no usable robot is called 'nobody'; permitted: quadruped" in nobody.json()["detail"]
     assert "'toy_function' has no body" in toy.json()["detail"]
     assert api.get("/catalogue/robots/quadruped/picture?theme=pink").status_code == 422
+
+
+def test_the_client_writes_a_picture_into_a_file(sqlite_store: Store, api: TestClient, tmp_path: Path) -> None:
+    with InProcess(sqlite_store) as client:
+        file = client.robot_picture("strider", tmp_path / "pictures" / "strider.png", width=80)
+
+    with Image.open(file) as picture:
+        assert (picture.format, picture.width) == ("PNG", 80)
