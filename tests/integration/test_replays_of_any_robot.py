@@ -11,6 +11,7 @@ import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
 
+from gaplab import Client
 from gaplab.api.app import create_app
 from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.records import MeasurementKind
@@ -150,8 +151,10 @@ def test_what_has_no_picture_says_why(api: TestClient) -> None:
 
 
 def test_the_client_writes_a_picture_into_a_file(sqlite_store: Store, api: TestClient, tmp_path: Path) -> None:
-    with InProcess(sqlite_store) as client:
+    network = InProcess(sqlite_store)
+    with Client("http://test", transport=network, pauses_s=(0.0, 0.0, 0.0)) as client:
         file = client.robot_picture("strider", tmp_path / "pictures" / "strider.png", width=80)
+    network.close()
 
     with Image.open(file) as picture:
         assert (picture.format, picture.width) == ("PNG", 80)
