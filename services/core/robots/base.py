@@ -114,6 +114,7 @@ class Robot(Plugin):
             "unit": robot.unit,
             "genes": robot.space.size,
             "function": robot.is_function,
+            "bodies": len(robot.world.bodies),
             **robot.sensors.details(),
         }
 
