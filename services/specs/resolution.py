@@ -1,7 +1,7 @@
 """Resolution: from a submitted spec to a resolved one, with every default; all violations are raised together."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef, TunableRef
@@ -20,6 +20,7 @@ from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.tasks import tasks
+from gaplab.services.core.tunables.labels import label_of, tunable_of
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
@@ -59,6 +60,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     """
     spec, preset = with_preset(spec), PRESETS[spec.budget.preset]
     robot, strategy, controllers, simulators, discrepancy, tuner = _created(spec)
+    spec = _with_usual_tunables(spec, robot)
     simulated = spec.engine or PluginRef(name=default_engine(robot))
     physical = spec.reality.kind == "physical"
     real = simulated if physical else spec.reality.engine or simulated
@@ -69,10 +71,10 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     budget = _budget(spec, preset)
     if violations := [
         *engine_violations(robot, {reality_engine: "/reality/engine", engine: "/engine"}),
-        *tunable_violations(spec, engine),
+        *tunable_violations(spec, robot, engine),
         *strategy_violations(spec, strategy, robot),
         *tuning_violations(robot, discrepancy, tuner),
-        *reality_violations(spec, strategy, engine, reality_engine),
+        *reality_violations(spec, strategy, robot, simulated=engine, engine=reality_engine),
         *bench_violations(spec, robot),
         *budget_violations(budget, strategy, len(spec.tunables), controllers=controllers, simulators=simulators),
     ]:
@@ -86,7 +88,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         **{each.kind: (ref := getattr(spec, each.kind)) and completed(each, ref) for each in NEED_NO_OTHERS},
         controller_optimizer=completed(optimizers, spec.controller_optimizer or spec.optimizer),
         engine=completed(engines, simulated),
-        tunables=tuple(_with_bounds(ref) for ref in spec.tunables),
+        tunables=tuple(_with_bounds(ref, robot) for ref in spec.tunables),
         held_out=spec.held_out,
         reality=physical_reality(spec, robot) if physical else simulated_reality(spec, robot, real, reality_engine),
         budget=budget,
@@ -113,7 +115,7 @@ def resolve_study(spec: StudySpec) -> tuple[ResolvedSpec, ...]:
     Raises:
         InvalidSpec: with every violation, each with its pointer into the study's spec, once.
     """
-    shared = {name: getattr(spec, name) for name in StudySpec.model_fields if name in ExperimentSpec.model_fields}
+    shared = _shared(spec, StudySpec.model_fields.keys() & ExperimentSpec.model_fields.keys())
     resolved: list[ResolvedSpec] = []
     violations: dict[tuple[str, str], Violation] = {}
     for index, strategy in enumerate(spec.strategies):
@@ -148,7 +150,7 @@ def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
     Raises:
         InvalidSpec: with every violation, as an experiment with these settings would have.
     """
-    shared = {name: getattr(spec, name) for name in SharedSettings.model_fields}
+    shared = _shared(spec, SharedSettings.model_fields)
     resolved = resolve_experiment(ExperimentSpec(**shared, strategy=PluginRef(name="random")))
     return Checked(
         robot=resolved.robot,
@@ -192,9 +194,23 @@ def _label(strategy: Strategy) -> str:
     return f"{strategy.name} ({', '.join(changed)})"[:200] if changed else strategy.name
 
 
-def _with_bounds(ref: TunableRef) -> ResolvedTunable:
-    lower, upper = bounds_of(ref)
-    return ResolvedTunable(name=ref.name, lower=lower, upper=upper)
+def _with_bounds(ref: TunableRef, robot: Robot) -> ResolvedTunable:
+    tunable = tunable_of(ref.name)
+    lower, upper = bounds_of(ref, tunable, robot)
+    return ResolvedTunable(name=label_of(tunable), lower=lower, upper=upper)
+
+
+def _with_usual_tunables(spec: ExperimentSpec, robot: Robot) -> ExperimentSpec:
+    """Return the spec with the robot's own tunables, if it names none and the robot has some."""
+    if "tunables" in spec.model_fields_set or not robot.usual_tunables:
+        return spec
+    return spec.model_copy(update={"tunables": tuple(TunableRef(name=label) for label in robot.usual_tunables)})
+
+
+def _shared(spec: SharedSettings, names: Iterable[str]) -> dict[str, Any]:
+    """Return fields of a study's spec, or of a check's, for an experiment; tunables that it leaves out stay so."""
+    left_out = set() if "tunables" in spec.model_fields_set else {"tunables"}
+    return {name: getattr(spec, name) for name in names if name not in left_out}
 
 
 def _budget(spec: ExperimentSpec, preset: Preset) -> ResolvedBudget:
