@@ -51,8 +51,8 @@ class Cpg(Controller):
     An oscillator has the phase θ, the amplitude r and the offset x. Its phase advances by
     dθ/dt = 2π f + k · mean over all j of sin((θⱼ - φⱼ) - (θ - φ)), with the genome's phase φ, at which θ starts, and
     the coupling k = 2π `coupling_hz`. The amplitude approaches the genome's R from 0 by
-    d²r/dt² = a (a/4 (R - r) - dr/dt), and the offset likewise. The target is m + A s (x + r cos θ), with the joint's middle m, its swing s and the
-    options' amplitude A. Nothing is fed back, so it is an open-loop motion.
+    d²r/dt² = a (a/4 (R - r) - dr/dt), and the offset likewise. The target is m + A s (x + r cos θ), with the joint's
+    middle m, its swing s and the options' amplitude A. Nothing is fed back, so it is an open-loop motion.
 
     The genes are the frequencies, one or a, then the phases, a or one for each depth of joints, which wrap around,
     then a amplitudes, all in [0, 1], and a offsets in [-1, 1].

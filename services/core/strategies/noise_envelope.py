@@ -27,7 +27,7 @@ class NoiseEnvelopeOptions(Frozen):
 
     base: Annotated[tuple[str, ...], BeforeValidator(_names), Field(max_length=100)] = Field(
         default=BASE,
-        description="tunables that a behaviour should use, separated by commas, by their labels, like mass(trunk): they "
+        description="tunables that a behaviour should use, by labels like mass(trunk), separated by commas: they "
         "vary little; all others vary over all their bounds; gaplab's: dynamic_friction",
     )
     epsilon: Annotated[float, Field(strict=True, ge=0, le=0.5)] = Field(
