@@ -7,10 +7,10 @@ from gaplab.schemas.resolved import ResolvedReality
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.registry import Registry
 from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.core.tunables.labels import label_of, proper, tunable_of
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.specs.tunables import honoured
 
 SIMULATED_PROBES, PHYSICAL_PROBES = "each", "last"
 """Which transferred controllers are measured by default."""
@@ -54,8 +54,3 @@ def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str
         if honoured(tunable, engine)
     }
     return {**nominal, **{proper(label): value for label, value in spec.reality.parameters.items()}}
-
-
-def honoured(tunable: Tunable, engine: type[Engine]) -> bool:
-    """Return whether a tunable changes what an engine simulates; noise is put into motions, so each engine has it."""
-    return tunable.field == "noise" or tunable.field in engine.honours

@@ -19,7 +19,7 @@ from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.default_engines import runs
-from gaplab.services.specs.realities import honoured
+from gaplab.services.specs.tunables import bounds_of, honoured
 
 
 def tunable_violations(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> Iterator[Violation]:
@@ -95,12 +95,6 @@ def engine_violations(robot: Robot, places: Mapping[type[Engine], str]) -> Itera
 def listed(able: Sequence[str]) -> str:
     """Return names of plug-ins for a sentence."""
     return " and ".join(able) or "no engine"
-
-
-def bounds_of(ref: TunableRef, tunable: Tunable, robot: Robot) -> tuple[float, float]:
-    """Return the bounds of a tunable; a missing one is the tunable's own for the robot."""
-    lower, upper = tunable.bounds(robot.world)
-    return lower if ref.lower is None else ref.lower, upper if ref.upper is None else ref.upper
 
 
 def _bound_violations(ref: TunableRef, tunable: Tunable, robot: Robot, pointer: str) -> Iterator[Violation]:

@@ -9,6 +9,7 @@ from gaplab.schemas.plugin import PluginRef
 from gaplab.services.contract import controllers as contract
 from gaplab.services.core.controllers import controllers
 from gaplab.services.core.controllers.actuation import Limbs
+from gaplab.services.core.controllers.layers import weighted
 from gaplab.services.core.controllers.mlp import Mlp
 from gaplab.services.core.controllers.plastic import Plastic
 from gaplab.services.core.controllers.sine import Sine
@@ -208,7 +209,7 @@ def test_an_anticipating_robot_pushes_against_what_it_did_not_expect() -> None:
 
 
 def test_pulses_in_a_loop_are_those_of_square_pulses() -> None:
-    genome = controllers.create(PluginRef(name="square_pulses")).options and Quadruped().known
+    genome = Quadruped().known
     looped, pulses = prepared("anticipating", gain=0.0, heading_gain=0.0), prepared("square_pulses")
     motion = pulses.motion(genome)
 
@@ -260,8 +261,6 @@ def test_the_contract_finds_a_controller_that_breaks_it(plugin: Any, check: Any,
 
 
 def test_weighted_sums_keep_their_bits_however_many_rows_there_are() -> None:
-    from gaplab.services.core.controllers.layers import weighted
-
     rng = np.random.default_rng(0)
     for outputs, inputs in ((1, 1), (1, 9), (5, 8), (12, 27), (3, 300)):
         weights, values = rng.normal(size=(64, outputs, inputs)), rng.normal(size=(64, inputs))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gaplab.schemas.plugin import PluginRef
-from gaplab.services.core.motions import Loop, Motion, Trajectory
+from gaplab.services.core.motions import Loop, Trajectory, open_loop
 from gaplab.services.core.noise import disturbed
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.robots.toy_function import ToyFunction
@@ -18,7 +18,16 @@ from gaplab.services.specs.robots import Driven, robot_of
 from gaplab.services.specs.simulation import Simulation
 
 ROBOT = Quadruped()
+MOTION = open_loop(ROBOT.motion(ROBOT.known))
 NOISY = replace(ROBOT.world, noise=Noise(target=0.1, angle_rad=0.01, tilt=0.2, latency_s=0.03))
+
+
+def disturbed_targets(world: Any, genome: Any = ROBOT.known, trial: int = 0) -> Any:
+    return open_loop(disturbed(world, MOTION, genome, trial)).targets
+
+
+def errors(world: Any, genome: Any = ROBOT.known, trial: int = 0) -> Any:
+    return disturbed_targets(world, genome, trial) - MOTION.targets
 
 
 def looping(**options: Any) -> Any:
@@ -32,29 +41,24 @@ def test_a_quiet_world_leaves_the_motion_as_it_is() -> None:
 
 
 def test_a_target_is_disturbed_when_it_changes_and_stays_so_until_it_changes_again() -> None:
-    plain = ROBOT.motion(ROBOT.known)
-    noisy = disturbed(NOISY, plain, ROBOT.known)
-    assert isinstance(plain, Motion)
-    assert isinstance(noisy, Motion)
+    plain, noisy = MOTION, disturbed_targets(NOISY)
 
     changes = plain.targets[1:] != plain.targets[:-1]
 
-    np.testing.assert_array_equal(noisy.targets[1:] != noisy.targets[:-1], changes)
-    errors = (noisy.targets - plain.targets)[1:][changes]
-    assert errors.std() == pytest.approx(0.1, rel=0.2)
-    assert abs(errors.mean()) < 0.03
+    np.testing.assert_array_equal(noisy[1:] != noisy[:-1], changes)
+    drawn = (noisy - plain.targets)[1:][changes]
+    assert drawn.std() == pytest.approx(0.1, rel=0.2)
+    assert abs(drawn.mean()) < 0.03
 
 
 def test_the_same_genome_has_the_same_draws_scaled_by_each_worlds_noise() -> None:
-    plain = ROBOT.motion(ROBOT.known)
     louder = replace(NOISY, noise=Noise(target=0.2))
-    once, twice = (disturbed(world, plain, ROBOT.known).targets - plain.targets for world in (NOISY, louder))
+    once, twice = (errors(world) for world in (NOISY, louder))
 
     np.testing.assert_allclose(twice, 2 * once, atol=1e-12)
-    again = disturbed(NOISY, plain, ROBOT.known.copy()).targets - plain.targets
+    again = errors(NOISY, ROBOT.known.copy())
     np.testing.assert_array_equal(again, once)
-    other = disturbed(NOISY, plain, ROBOT.known + 1e-15).targets - plain.targets
-    trial = disturbed(NOISY, plain, ROBOT.known, trial=1).targets - plain.targets
+    other, trial = errors(NOISY, ROBOT.known + 1e-15), errors(NOISY, trial=1)
     assert not np.isclose(other, once).any()
     assert not np.isclose(trial, once).any()
 
@@ -74,9 +78,9 @@ def test_a_loop_has_noise_of_observations_and_targets_and_latency() -> None:
 
 def test_a_longer_rollout_has_the_same_noise_and_more_of_it() -> None:
     robot = looping()
-    short = robot.motion(robot.known)
-    longer = disturbed(NOISY, short.observed_at(np.array([0.5, 4.0])), robot.known)
-    short = disturbed(NOISY, short, robot.known)
+    quiet = robot.motion(robot.known)
+    longer: Any = disturbed(NOISY, quiet.observed_at(np.array([0.5, 4.0])), robot.known)
+    short: Any = disturbed(NOISY, quiet, robot.known)
 
     np.testing.assert_array_equal(longer.observation_noise[: short.ticks], short.observation_noise)
     np.testing.assert_array_equal(longer.target_noise[: short.ticks], short.target_noise)

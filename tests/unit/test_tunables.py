@@ -20,6 +20,7 @@ from gaplab.services.core.strategies.noise_envelope import NoiseEnvelope, NoiseE
 from gaplab.services.core.tunables.defaults import usual_tunables
 from gaplab.services.core.tunables.labels import label_of, proper, separated, tunable_of, unit_of
 from gaplab.services.core.world import Inertia, Material, Noise
+from gaplab.services.engines.analytic import Analytic
 from gaplab.services.plugins.external import named_in
 from gaplab.services.specs import resolution
 from gaplab.services.specs.assembly import edits_of
@@ -220,7 +221,8 @@ def test_dimensions_scale_and_the_feet_start_on_the_ground(label: str, shin_m: f
     shin = body(world, "rear_left_shin")
 
     assert shin.center_m[2] == pytest.approx(-0.15 * shin_m)
-    assert shin.shape == Sphere(pytest.approx(0.025 * foot_m))
+    assert isinstance(shin.shape, Sphere)
+    assert shin.shape.radius_m == pytest.approx(0.025 * foot_m)
     assert lowest_m(world) == pytest.approx(lowest_m(WORLD), abs=1e-12)
     assert shin.mass_kg == 0.15
 
@@ -229,13 +231,14 @@ def test_a_longer_link_moves_the_joint_at_its_end() -> None:
     world = edited("length_scale(link_0)", 1.5, arm())
 
     assert [joint.origin_m[2] for joint in world.joints] == pytest.approx([0.2, 0.3, 0.2])
-    assert world.bodies[1].shape == Box(pytest.approx((0.075, 0.075, 0.3)))
+    assert isinstance(world.bodies[1].shape, Box)
+    assert world.bodies[1].shape.size_m == pytest.approx((0.075, 0.075, 0.3))
     assert world.start_height_m == arm().start_height_m  # its base is fixed
 
 
 def test_tunables_that_rebuild_edit_before_those_that_edit_in_place() -> None:
     labels = ["mass(trunk)", "length_scale(*_shin)", "slope"]
-    simulation = Simulation(Quadruped(), None, edits_of(labels))  # type: ignore[arg-type] - no rollout
+    simulation = Simulation(Quadruped(), Analytic(), edits_of(labels))
 
     world = simulation._edited((1.2, 1.1, 0.05))
     heavier = simulation._edited((0.9, 1.1, 0.02))

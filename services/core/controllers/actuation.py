@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray, frozen
 from gaplab.services.core.kinematics import body_poses, rotated
@@ -47,14 +48,14 @@ class Limbs:
     """The limbs of a robot: the chains of joints that begin at its base.
 
     Attributes:
-        limb: `(a,)` of int: number of the limb of each actuator.
-        depth: `(a,)` of int: number of actuators of the same limb between it and the base.
+        limb: `(a,)`: number of the limb of each actuator.
+        depth: `(a,)`: number of actuators of the same limb between it and the base.
         places_m: `(limbs, 3)`: place of the first joint of each limb at the start, in the frame of the base.
         upward: `(a,)`: component along z, in the frame of the base, of the axis of each actuator at the start.
     """
 
-    limb: FloatArray
-    depth: FloatArray
+    limb: NDArray[np.int_]
+    depth: NDArray[np.int_]
     places_m: FloatArray
     upward: FloatArray
 

@@ -3,6 +3,7 @@
 from typing import Annotated, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Real
@@ -69,12 +70,12 @@ class Cpg(Controller):
         frequencies = actuators if options.frequencies == "own" else 1
         if options.gait == "free":
             self._limb_phases = np.zeros(actuators)
-            self._phase_of = np.arange(actuators)
-            phases = (limbs.phases("trot")[limbs.limb] + QUARTER * limbs.depth) % 1
+            self._phase_of: NDArray[np.int_] = np.arange(actuators)
+            phases = frozen((limbs.phases("trot")[limbs.limb] + QUARTER * limbs.depth) % 1)
         else:
             self._limb_phases = limbs.phases(options.gait)[limbs.limb]
             self._phase_of = limbs.depth
-            phases = QUARTER * np.arange(limbs.depth.max() + 1) % 1
+            phases = frozen(QUARTER * np.arange(limbs.depth.max() + 1) % 1)
         self._ends = np.cumsum([frequencies, len(phases), actuators])
         positive = frequencies + len(phases) + actuators
         wraps = [False] * frequencies + [True] * len(phases) + [False] * 2 * actuators

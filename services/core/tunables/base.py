@@ -104,7 +104,7 @@ class MaterialTunable(Tunable):
             return float(getattr(world.material, self._coefficient))
         chosen = matching(self.options.of, [name for name, _ in world.surfaces])
         values = [getattr(material, self._coefficient) for name, material in world.surfaces if name in chosen]
-        return sum(values) / len(values)
+        return float(sum(values) / len(values))
 
     def edit(self, world: World, value: float) -> World:
         """Return the world with the coefficient replaced."""

@@ -144,7 +144,8 @@ class JointTunable(Grouped):
 
     def with_number(self, member: Joint, number: float) -> Joint:
         """Return a joint with another number."""
-        return replace(member, **{self._attribute: number})
+        changes: dict[str, Any] = {self._attribute: number}
+        return replace(member, **changes)
 
     def _in_world(self, world: World, members: tuple[Joint, ...]) -> World:
         return world.edited(self.field, joints=members)
