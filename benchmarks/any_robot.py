@@ -22,6 +22,7 @@ from gaplab.services.core.tasks.walk import Walk
 from gaplab.services.core.tunables import tunables
 from gaplab.services.core.world import Body, Inertia, Joint, Material, PDMotor, World
 from gaplab.services.engines import engines
+from gaplab.services.engines.base import Engine
 from gaplab.services.engines.stepped import SteppedEngine
 from gaplab.services.specs.simulation import Simulation
 
@@ -143,7 +144,7 @@ def overhead(engine: SteppedEngine[Any], material: Material) -> None:
     print(f"{engine.name}, {material}: Simulate {1e3 * whole:.1f} ms, bare {1e3 * alone:.1f} ms, {alone / whole:.2f}")
 
 
-def by_turns(engine: SteppedEngine[Any]) -> None:
+def by_turns(engine: Engine) -> None:
     """Print the time of a rollout in one of many simulators, by turns and one simulator at a time."""
     robot = Dog()
     motion, worlds = robot.motion(robot.known), simulators(robot.world)

@@ -115,7 +115,10 @@ WITH_OR_WITHOUT: dict[str, tuple[Callable[[World], World], Callable[[World], Wor
     "joint.start": (lambda world: world, lambda world: each_joint(world, start=0.2)),
     "joint.turn": (lambda world: world, lambda world: each_joint(world, turn=TURN)),
     "motor.delay_s": (with_pd, lambda world: with_pd(world, delay_s=0.1)),
-    "motor.follows": (with_pd, lambda world: with_pd(world, follows="torque")),
+    "motor.follows": (
+        lambda world: with_pd(world, max_torque_nm=0.02),  # a torque alone turns a limb faster and faster
+        lambda world: with_pd(world, max_torque_nm=0.02, follows="torque"),
+    ),
     "motor.kd": (with_pd, lambda world: with_pd(world, kd=1.0)),
     "motor.kp": (with_pd, lambda world: with_pd(world, kp=10.0)),
     "observed": (lambda world: world, lambda world: replace(world, observed=world.bodies[-1].name)),
