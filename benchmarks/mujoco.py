@@ -8,6 +8,7 @@ from mujoco import rollout as library
 
 from benchmarks.measure import Row, rates, ratio
 from benchmarks.physics import SWITCHING, genomes, simulation, through_simulate
+from gaplab.services.core.motions import open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.engines.base import Engine
 from gaplab.services.engines.mujoco import MuJoCo
@@ -20,7 +21,7 @@ MANY = 96
 
 def call_by_call() -> Callable[[], int]:
     """Return work: rollouts by the engine alone, one precomputed motion a call."""
-    engine, motions = MuJoCo(), [ROBOT.motion(genome) for genome in genomes(MANY)]
+    engine, motions = MuJoCo(), [open_loop(ROBOT.motion(genome)) for genome in genomes(MANY)]
 
     def work() -> int:
         for motion in motions:
@@ -44,7 +45,7 @@ def bare(threads: int) -> Callable[[], int]:
     """Return work: `mujoco.rollout` of the same motions, model and contact law, with precomputed inputs."""
     engine = MuJoCo(MuJoCo.Options(threads=threads))
     scene: MuJoCoScene = engine._scenes[ROBOT.world.kind]
-    motions = [ROBOT.motion(genome) for genome in genomes(MANY)]
+    motions = [open_loop(ROBOT.motion(genome)) for genome in genomes(MANY)]
     steps = int(scene._steps(motions[0].observe_s)[-1])
     controls = scene._controls(motions, steps)
     start = np.tile(scene._start, (MANY, 1))

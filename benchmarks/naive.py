@@ -12,6 +12,7 @@ import pybullet
 from benchmarks.physics import genomes
 from benchmarks.urdf import urdf
 from gaplab.services.core.arrays import Genome
+from gaplab.services.core.motions import open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
 
 STEP_S = 1 / 240
@@ -26,7 +27,7 @@ def evaluate(file: str, genome: Genome) -> float:
     plane = pybullet.createMultiBody(0, pybullet.createCollisionShape(pybullet.GEOM_PLANE))
     pybullet.changeDynamics(plane, -1, lateralFriction=1.0)
     body = pybullet.loadURDF(file, basePosition=[0, 0, robot.world.start_height_m])
-    motion, motors = robot.motion(genome), [joint.motor for joint in robot.world.actuators]
+    motion, motors = open_loop(robot.motion(genome)), [joint.motor for joint in robot.world.actuators]
     forces = [motor.max_torque_nm for motor in motors if motor]
     joints = list(range(pybullet.getNumJoints(body)))
     for step in range(round(motion.observe_s[-1] / STEP_S)):

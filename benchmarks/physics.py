@@ -8,7 +8,7 @@ import pybullet
 
 from benchmarks.measure import Row, rates, ratio
 from gaplab.services.core.arrays import Genome, Genomes, Parameters
-from gaplab.services.core.motions import Motion
+from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.optimizers.steady_state import SteadyState
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.search import maximise
@@ -52,7 +52,7 @@ def bare() -> Callable[[], int]:
     """Return work: `stepSimulation` in a loop, with motor commands at pulse edges only."""
     robot = Quadruped()
     scene = PyBulletScene(pybullet, robot.world)
-    motions = [robot.motion(genome) for genome in genomes()]
+    motions = [open_loop(robot.motion(genome)) for genome in genomes()]
 
     def work() -> int:
         for motion in motions:

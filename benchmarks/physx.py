@@ -9,7 +9,7 @@ from scipy import stats
 from benchmarks.measure import Row, rates, ratio
 from benchmarks.physics import SWITCHING, edges, evolved, genomes, simulation, through_simulate
 from gaplab.services.core.arrays import Fitnesses, Genomes
-from gaplab.services.core.motions import Motion
+from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.streams import stream
 from gaplab.services.engines.base import Engine
@@ -27,7 +27,7 @@ def bare() -> Callable[[], int]:
     scene = PhysX()._scenes[world]
     system, joints, start = scene._system, scene.robot.motors, scene._initial
     scene.start(world.material)
-    plans = [edges(ROBOT.motion(genome), world.time_step_s) for genome in genomes()]
+    plans = [edges(open_loop(ROBOT.motion(genome)), world.time_step_s) for genome in genomes()]
 
     def work() -> int:
         for commands, steps in plans:

@@ -4,11 +4,13 @@ They are used as the engine returns them. scipy's `Rotation` would normalise the
 bodies by 1e-8, and refuses the nan of failed physics.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.shapes import Box
-from gaplab.services.core.world import Body, World
+from gaplab.services.core.shapes import UNTURNED, Box, Capsule, Cylinder, Hull, Part, Shape
+from gaplab.services.core.world import Body, Joint, World
 
 TOUCHING_M = 0.002
 """Height of the lowest point below which a body touches the ground: engines separate surfaces by less."""
@@ -18,40 +20,111 @@ def body_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> tuple
     """Return positions `(k, bodies, 3)` and orientations `(k, bodies, 4)` of the bodies' frames, in the world's order.
 
     Args:
-        world: bodies and hinges.
+        world: bodies and joints.
         poses: `(k, 7)`: poses of the base.
-        angles_rad: `(k, joints)`, in the world's order.
+        angles_rad: `(k, joints)`, in the world's order; m for a joint that slides.
     """
-    names = [body.name for body in world.bodies]
-    positions = np.empty((len(poses), len(names), 3))
-    orientations = np.empty((len(poses), len(names), 4))
+    places = {body.name: place for place, body in enumerate(world.bodies)}
+    positions = np.empty((len(poses), len(places), 3))
+    orientations = np.empty((len(poses), len(places), 4))
     positions[:, 0], orientations[:, 0] = poses[:, :3], poses[:, 3:]
-    placed = {names[0]}
-    while len(placed) < len(names):
-        for joint, angles in zip(world.joints, angles_rad.T, strict=True):
-            if joint.parent in placed and joint.child not in placed:
-                parent, child = names.index(joint.parent), names.index(joint.child)
-                turn = orientations[:, parent]
-                positions[:, child] = positions[:, parent] + rotated(turn, np.array(joint.origin_m))
-                orientations[:, child] = product(turn, about(np.array(joint.axis), angles))
-                placed.add(joint.child)
+    for joint, angles in _outwards(world, angles_rad):
+        parent, child = places[joint.parent], places[joint.child]
+        frame = positions[:, parent], orientations[:, parent]
+        positions[:, child], orientations[:, child] = _carried(joint, *frame, angles)
     return positions, orientations
+
+
+def observed_poses(world: World, poses: FloatArray, angles_rad: FloatArray) -> FloatArray:
+    """Return `(k, 7)`: poses of the body whose motion is the trajectory.
+
+    Args:
+        world: bodies and joints.
+        poses: `(k, 7)`: poses of the base.
+        angles_rad: `(k, joints)`, in the world's order; not read if the base is observed.
+    """
+    if observes_base(world):
+        return poses
+    carriers = {joint.child: place for place, joint in enumerate(world.joints)}
+    chain, name = [], world.observed
+    while name in carriers:
+        chain.append(carriers[name])
+        name = world.joints[chain[-1]].parent
+    position, turn = poses[:, :3], poses[:, 3:]
+    for place in reversed(chain):
+        position, turn = _carried(world.joints[place], position, turn, angles_rad[:, place])
+    return np.hstack([position, turn])
+
+
+def observes_base(world: World) -> bool:
+    """Return whether the trajectory is that of the base."""
+    return not world.observed or world.observed == world.bodies[0].name
+
+
+def _outwards(world: World, angles_rad: FloatArray) -> Iterator[tuple[Joint, FloatArray]]:
+    """Yield joints with their angles `(k,)`, each after the joint of its parent."""
+    placed = {world.bodies[0].name}
+    left = list(zip(world.joints, angles_rad.T, strict=True))
+    while left:
+        for joint, angles in left:
+            if joint.parent in placed:
+                placed.add(joint.child)
+                yield joint, angles
+        left = [pair for pair in left if pair[0].child not in placed]
+
+
+def _carried(joint: Joint, position: FloatArray, turn: FloatArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return position `(k, 3)` and orientation `(k, 4)` of a joint's child, given those of its parent."""
+    position = position + rotated(turn, np.array(joint.origin_m))
+    if joint.turn != UNTURNED:
+        turn = product(turn, np.array(joint.turn))
+    axis = np.array(joint.axis)
+    if joint.slides:
+        return position + angles[:, None] * rotated(turn, axis), turn
+    return position, product(turn, about(axis, angles))
 
 
 def clearances_m(body: Body, positions: FloatArray, orientations: FloatArray) -> FloatArray:
     """Return `(k,)`: the height of the lowest point of a body above the ground, negative inside it.
 
     Args:
-        body: body with its shape.
+        body: body with its shapes; those that collide count, or all if none collides.
         positions: `(k, 3)`: positions of the body's frame.
         orientations: `(k, 4)`: orientations of the body's frame.
     """
-    center = positions[:, 2] + rotated(orientations, np.array(body.center_m))[:, 2]
-    if isinstance(body.shape, Box):
-        edges = np.diag(np.array(body.shape.size_m) / 2)
-        reach = sum(np.abs(rotated(orientations, edge)[:, 2]) for edge in edges)
-        return np.asarray(center - reach)
-    return np.asarray(center - body.shape.radius_m)
+    parts = [part for part in body.parts if part.collides] or body.parts
+    lowest = [_lowest(part, positions, orientations) for part in parts]
+    return lowest[0] if len(lowest) == 1 else np.asarray(np.min(lowest, axis=0))
+
+
+def _lowest(part: Part, positions: FloatArray, orientations: FloatArray) -> FloatArray:
+    """Return `(k,)`: the height of the lowest point of one shape."""
+    center = positions[:, 2] + rotated(orientations, np.array(part.center_m))[:, 2]
+    turn = orientations if part.turn == UNTURNED else product(orientations, np.array(part.turn))
+    return np.asarray(center - _reach(part.shape, turn))
+
+
+def _reach(shape: Shape, turn: FloatArray) -> FloatArray | float:
+    """Return `(k,)`: how far a shape reaches below its frame, in each of its orientations `(k, 4)`."""
+    match shape:
+        case Box():
+            edges = np.diag(np.array(shape.size_m) / 2)
+            return np.asarray(sum(np.abs(rotated(turn, edge)[:, 2]) for edge in edges))
+        case Capsule():
+            return np.asarray(shape.radius_m + shape.length_m / 2 * np.abs(_rise(turn)))
+        case Cylinder():
+            rise = _rise(turn)
+            level = np.sqrt(np.maximum(1 - rise * rise, 0.0))
+            return np.asarray(shape.radius_m * level + shape.length_m / 2 * np.abs(rise))
+        case Hull():
+            return np.asarray(-rotated(turn[:, None], np.array(shape.points_m))[..., 2].min(axis=1))
+        case _:
+            return shape.radius_m
+
+
+def _rise(turn: FloatArray) -> FloatArray:
+    """Return `(k,)`: the height of the end of the z axis, of length 1, in each orientation."""
+    return rotated(turn, np.array([0.0, 0.0, 1.0]))[:, 2]
 
 
 def about(axis: FloatArray, angles_rad: FloatArray) -> FloatArray:
@@ -67,7 +140,12 @@ def product(first: FloatArray, second: FloatArray) -> FloatArray:
 
 
 def rotated(rotations: FloatArray, vector: FloatArray) -> FloatArray:
-    """Return `(..., 3)`: the vector `(3,)` rotated by `(..., 4)`."""
+    """Return `(..., 3)`: vectors `(..., 3)` rotated by `(..., 4)`."""
     v, w = rotations[..., :3], rotations[..., 3:]
     across = 2 * np.cross(v, vector)
     return np.asarray(vector + w * across + np.cross(v, across))
+
+
+def inverse(rotations: FloatArray) -> FloatArray:
+    """Return `(..., 4)`: the rotations back."""
+    return np.asarray(rotations * np.array([-1.0, -1.0, -1.0, 1.0]))

@@ -70,6 +70,17 @@ class Loop:
         return int(np.floor(float(self.observe_s[-1]) / self.period_s + 1e-6)) + 1
 
 
+def open_loop(motion: Motion | Loop) -> Motion:
+    """Return a motion whose targets are known in advance.
+
+    Raises:
+        TypeError: it is a loop, whose targets depend on what it observes.
+    """
+    if isinstance(motion, Loop):
+        raise TypeError("a loop has no targets before it observes")
+    return motion
+
+
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """The observed motion of the base, or of the world's observed body.

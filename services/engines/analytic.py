@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Motion, Trajectory
+from gaplab.services.core.motions import Loop, Motion, Trajectory
 from gaplab.services.core.world import World
 from gaplab.services.engines.base import Engine
 
@@ -29,16 +29,16 @@ class Analytic(Engine):
         """Return whether the world has no bodies."""
         return not world.bodies
 
-    def rollout(self, world: World, motion: Motion) -> Trajectory:
+    def rollout(self, world: World, motion: Motion | Loop) -> Trajectory:
         """Return the glide of one motion in one world."""
         glides = self.rollouts([world], [motion])
         return Trajectory(motion.observe_s, glides.positions_m[0, 0], glides.orientations[0, 0])
 
-    def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion]) -> Trajectory:
+    def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> Trajectory:
         """Return all glides at once."""
         materials = [each.material for each in worlds]
         coefficients = np.array([(each.static_friction, each.dynamic_friction, each.restitution) for each in materials])
-        targets = np.array([motion.targets[0, 0] for motion in motions])
+        targets = np.array([_first_target(motion) for motion in motions])
         times_s = motions[0].observe_s
         positions_m = np.zeros((len(motions), len(worlds), len(times_s), 3))
         positions_m[..., 0] = speed(targets[:, None], *coefficients.T)[..., None] * times_s
@@ -58,3 +58,9 @@ def speed(
 
 def _bump(distance: FloatArray) -> FloatArray:
     return np.asarray(np.exp(-(distance**2)))
+
+
+def _first_target(motion: Motion | Loop) -> float:
+    if isinstance(motion, Loop):
+        raise TypeError("the engine 'analytic' closes no loops: choose a controller that acts in advance")
+    return float(motion.targets[0, 0])

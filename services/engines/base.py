@@ -14,6 +14,7 @@ from gaplab.services.core.errors import EngineUnavailable
 from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
 from gaplab.services.core.registry import Plugin
 from gaplab.services.core.world import World
+from gaplab.services.engines.uses import USES
 
 ALL_FIELDS = frozenset(
     {
@@ -29,6 +30,7 @@ ALL_FIELDS = frozenset(
         "gravity_m_s2",
         "time_step_s",
         "solver_iterations",
+        *USES,
     }
 )
 """All fields of a World that an engine can honour."""
@@ -43,7 +45,9 @@ class Engine(Plugin):
     Attributes:
         library: Python module that the engine needs, imported inside the class; None if there is none.
         install: command that installs the library.
-        honours: World fields that affect the results, like `material.dynamic_friction`.
+        honours: World fields that affect the results, like `material.dynamic_friction`: names of `ALL_FIELDS`.
+        in_place: fields in which worlds may differ and still share what the engine built: names as in `World.edited`.
+        closes_loops: true if it runs Loops, not only Motions.
         batch: preferred number of rollouts in a call; 1 if a call has little overhead.
         usual_rollout_s: usual seconds of a rollout, for estimates before any measurement.
         repeatable: true if a rollout is only computed, so that it may be repeated at any time: for replays, and by
@@ -53,6 +57,8 @@ class Engine(Plugin):
     library: ClassVar[str | None] = None
     install: ClassVar[str] = ""
     honours: ClassVar[frozenset[str]]
+    in_place: ClassVar[frozenset[str]] = frozenset()
+    closes_loops: ClassVar[bool] = False
     batch: ClassVar[int] = 1
     usual_rollout_s: ClassVar[float] = 0.02
     repeatable: ClassVar[bool] = False
@@ -67,11 +73,20 @@ class Engine(Plugin):
     def runs(cls, world: World) -> bool:
         """Return whether the engine can simulate the world."""
 
+    @classmethod
+    def lacks(cls, world: World) -> tuple[str, ...]:
+        """Return the names of the fields that the world uses and the engine does not honour, sorted.
+
+        A world uses a field of `USES` if its value differs from that without a name. Fields that every world has, like
+        its material, are not among them.
+        """
+        return tuple(sorted(name for name, uses in USES.items() if name not in cls.honours and uses(world)))
+
     @abstractmethod
     def rollout(self, world: World, motion: Motion | Loop) -> Trajectory:
-        """Return the trajectory of the base, `(t, 3)`, under the motion from the start of the world."""
+        """Return the trajectory of the observed body, `(t, 3)`, under the motion from the start of the world."""
 
-    def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion] | Sequence[Loop]) -> Trajectory:
+    def rollouts(self, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> Trajectory:
         """Return every motion in every world, `(n motions, m worlds, t, 3)`; observation times are equal.
 
         An engine that is faster in batches overrides this loop.
@@ -113,5 +128,5 @@ class Engine(Plugin):
 
     @classmethod
     def details(cls) -> dict[str, Any]:
-        """Return the World fields that the engine honours, for the catalogue."""
-        return {"honours": sorted(cls.honours)}
+        """Return the World fields that the engine honours, and whether it closes loops, for the catalogue."""
+        return {"honours": sorted(cls.honours), "closes_loops": cls.closes_loops}

@@ -1,4 +1,4 @@
-"""Shared parts of engines that advance step by step: motions in whole time steps, and a cache of scenes."""
+"""Shared parts of engines that advance step by step: rollouts in whole time steps, and a cache of scenes."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import FloatArray, frozen
-from gaplab.services.core.motions import Motion, Recording, Trajectory
+from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
+from gaplab.services.core.observations import Bearing, observations
 from gaplab.services.core.world import World
+from gaplab.services.engines.agenda import Agenda, LoopAgenda, MotionAgenda, steps_at
 
 WARM_SCENES = 4
-"""Largest number of cached scenes. Worlds that differ only in material share a scene."""
+"""Largest number of cached scenes. Worlds that differ only in material, or in what is set in place, share a scene."""
 
 FARTHEST_M = 100.0
 """Largest plausible distance of the base from its start; beyond it, the rollout failed numerically."""
@@ -37,16 +39,22 @@ class SteppedScene(Warm, Protocol):
 
     @property
     def world(self) -> World:
-        """Return the world that the scene was built from."""
+        """Return the world that the scene is now: that of its last start."""
 
     def command(self, actuator: int, target: float) -> None:
-        """Set a new target for an actuator, rad."""
+        """Set a new target for an actuator, in its motor's unit."""
 
     def pose(self) -> FloatArray:
         """Return `(7,)`: position and quaternion x, y, z, w of the base's frame."""
 
     def angles(self) -> FloatArray:
-        """Return the joint angles `(joints,)`, rad, in the world's order."""
+        """Return the joint angles `(joints,)`, rad, or m for a joint that slides, in the world's order."""
+
+    def speeds(self) -> FloatArray:
+        """Return the joint speeds `(joints,)`, rad/s, or m/s, likewise."""
+
+    def turning(self) -> FloatArray:
+        """Return the angular velocity of the base, `(3,)`, rad/s, in its own frame."""
 
     def torques(self) -> FloatArray:
         """Return the torques of the motors in the last step, `(joints,)`, N·m."""
@@ -90,37 +98,55 @@ class WarmScenes(Generic[S]):
 
 
 def recording(
-    motion: Motion, times_s: FloatArray, poses: FloatArray, seen: FloatArray, torques_nm: FloatArray
+    motion: Motion | Loop, times_s: FloatArray, poses: FloatArray, seen: FloatArray, torques_nm: FloatArray
 ) -> Recording:
-    """Return a Recording of poses `(t, 7)`, base and joints `(k, 7 + joints)`, and torques; all nan if implausible."""
-    if not plausible(poses):
-        poses, seen = np.full_like(poses, np.nan), np.full_like(seen, np.nan)
+    """Return a Recording of a rollout; poses, angles and torques are nan if the poses are.
+
+    Args:
+        motion: what was run.
+        times_s: `(k,)`.
+        poses: `(t, 7)`: the trajectory, as `rollout` returns it.
+        seen: `(k, 7 + joints)`: base and joints.
+        torques_nm: `(k, joints)`.
+    """
+    if np.isnan(poses).any():
+        seen = np.full_like(seen, np.nan)
     trajectory = Trajectory(motion.observe_s, poses[:, :3], poses[:, 3:])
     return Recording(trajectory, times_s, seen[:, :7], seen[:, 7:], torques_nm)
 
 
 def watch(
-    scene: SteppedScene, advance: Callable[[int], None], motion: Motion, look: Callable[[], FloatArray]
+    scene: SteppedScene, advance: Callable[[int], None], motion: Motion | Loop, look: Callable[[], FloatArray]
 ) -> FloatArray:
-    """Run a motion; return what `look` returns at each observation, `(t, ...)`, in whole time steps.
+    """Run a motion or a loop; return what `look` returns at each observation, `(t, ...)`, in whole time steps.
 
     Args:
         scene: scene at time 0.
         advance: function that advances the scene by a number of time steps.
-        motion: motion to run; a target is commanded only when it changes.
+        motion: what to run.
         look: function that returns the poses of the scene.
     """
-    commands = _commands(motion, scene.world.time_step_s)
-    observed = _steps(motion.observe_s, scene.world.time_step_s)
+    world = scene.world
+    agenda: Agenda = MotionAgenda(motion, world) if isinstance(motion, Motion) else _loop_agenda(motion, scene)
+    observed = steps_at(motion.observe_s, world.time_step_s)
     poses: dict[int, FloatArray] = {}
-    moments = [step for step in sorted({0, *commands, *observed}) if step <= observed[-1]]
+    moments = [step for step in sorted({0, *agenda.moments, *observed}) if step <= observed[-1]]
     for now, then in pairwise([*moments, moments[-1]]):
-        for actuator, target in commands.get(now, ()):
+        for actuator, target in agenda.commands(now):
             scene.command(actuator, target)
         if now in observed:
             poses[now] = look()
         advance(then - now)
     return np.array([poses[step] for step in observed])
+
+
+def _loop_agenda(loop: Loop, scene: SteppedScene) -> LoopAgenda:
+    def observe() -> FloatArray:
+        pose, turning, angles, speeds = scene.pose(), scene.turning(), scene.angles(), scene.speeds()
+        bearing = Bearing(pose[None], turning[None], angles[None], speeds[None])
+        return np.asarray(observations(scene.world, loop.senses, bearing)[0])
+
+    return LoopAgenda(loop, scene.world, observe)
 
 
 def plausible(poses: FloatArray) -> NDArray[np.bool_]:
@@ -133,19 +159,3 @@ def consecutive(indices: Sequence[int]) -> slice | list[int]:
     """Return ascending indices, as a slice if each follows the one before: a slice copies nothing."""
     first, last = (indices[0], indices[-1]) if indices else (0, -1)
     return slice(first, last + 1) if list(indices) == list(range(first, last + 1)) else list(indices)
-
-
-def _commands(motion: Motion, time_step_s: float) -> dict[int, list[tuple[int, float]]]:
-    """Return the actuators whose targets change, with the new targets, by time step; at step 0, all."""
-    changed = np.vstack([np.ones_like(motion.targets[:1], bool), motion.targets[1:] != motion.targets[:-1]])
-    rows, actuators = np.nonzero(changed)
-    steps, targets = _steps(motion.times_s[rows], time_step_s), motion.targets[rows, actuators].tolist()
-    commands: dict[int, list[tuple[int, float]]] = {}
-    for step, actuator, target in zip(steps, actuators.tolist(), targets, strict=True):
-        commands.setdefault(step, []).append((actuator, target))
-    return commands
-
-
-def _steps(times_s: FloatArray, time_step_s: float) -> list[int]:
-    steps: list[int] = np.rint(times_s / time_step_s).astype(int).tolist()
-    return steps

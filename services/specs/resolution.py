@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from gaplab.schemas.plugin import PluginRef, TunableRef
-from gaplab.schemas.resolved import ResolvedBudget, ResolvedReality, ResolvedSpec, ResolvedTunable
+from gaplab.schemas.resolved import ResolvedBudget, ResolvedSpec, ResolvedTunable
 from gaplab.schemas.sensitivity import Checked, SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, SharedSettings, StudySpec
 from gaplab.services.core.controllers import controllers
@@ -20,7 +20,6 @@ from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.strategies.base import Strategy
 from gaplab.services.core.tasks import tasks
-from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
@@ -28,18 +27,17 @@ from gaplab.services.engines.base import Engine
 from gaplab.services.specs.bench_violations import bench_violations
 from gaplab.services.specs.default_engines import default_engine, runs
 from gaplab.services.specs.presets import PRESETS, Preset, with_preset
+from gaplab.services.specs.realities import completed, physical_reality, simulated_reality
 from gaplab.services.specs.robots import robot_of
 from gaplab.services.specs.violations import (
     bounds_of,
     budget_violations,
+    engine_violations,
     reality_violations,
     strategy_violations,
     tunable_violations,
     tuning_violations,
 )
-
-SIMULATED_PROBES, PHYSICAL_PROBES = "each", "last"
-"""Which transferred controllers are measured by default."""
 
 NEED_NO_OTHERS: tuple[Registry[Any], ...] = (
     robots,
@@ -70,6 +68,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     )
     budget = _budget(spec, preset)
     if violations := [
+        *engine_violations(robot, {reality_engine: "/reality/engine", engine: "/engine"}),
         *tunable_violations(spec, engine),
         *strategy_violations(spec, strategy, robot),
         *tuning_violations(robot, discrepancy, tuner),
@@ -84,12 +83,12 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         name=spec.name or _label(strategy),
         iterations=spec.iterations or preset.iterations,
         repetitions=spec.repetitions or preset.repetitions,
-        **{each.kind: (ref := getattr(spec, each.kind)) and _completed(each, ref) for each in NEED_NO_OTHERS},
-        controller_optimizer=_completed(optimizers, spec.controller_optimizer or spec.optimizer),
-        engine=_completed(engines, simulated),
+        **{each.kind: (ref := getattr(spec, each.kind)) and completed(each, ref) for each in NEED_NO_OTHERS},
+        controller_optimizer=completed(optimizers, spec.controller_optimizer or spec.optimizer),
+        engine=completed(engines, simulated),
         tunables=tuple(_with_bounds(ref) for ref in spec.tunables),
         held_out=spec.held_out,
-        reality=_physical(spec, robot) if physical else _simulated(spec, robot, real, reality_engine),
+        reality=physical_reality(spec, robot) if physical else simulated_reality(spec, robot, real, reality_engine),
         budget=budget,
         seed=spec.seed,
     )
@@ -185,12 +184,6 @@ def _engine(ref: PluginRef, robot: Robot, pointer: str) -> type[Engine]:
     return engine
 
 
-def _completed(registry: Registry[Any], ref: PluginRef) -> PluginRef:
-    """Return the reference with every option."""
-    _, options = registry.check(ref)
-    return PluginRef(name=ref.name, options=options.model_dump(mode="json"))
-
-
 def _label(strategy: Strategy) -> str:
     """Return the name of the strategy with all options that differ from their defaults."""
     defaults = type(strategy).Options().model_dump(mode="json")
@@ -202,40 +195,6 @@ def _label(strategy: Strategy) -> str:
 def _with_bounds(ref: TunableRef) -> ResolvedTunable:
     lower, upper = bounds_of(ref)
     return ResolvedTunable(name=ref.name, lower=lower, upper=upper)
-
-
-def _simulated(spec: ExperimentSpec, robot: Robot, ref: PluginRef, engine: type[Engine]) -> ResolvedReality:
-    """Return a simulated reality with every field."""
-    truth = _truth(spec, robot, engine)
-    return ResolvedReality(
-        engine=_completed(engines, ref), parameters=truth, probes=spec.reality.probes or SIMULATED_PROBES
-    )
-
-
-def _physical(spec: ExperimentSpec, robot: Robot) -> ResolvedReality:
-    """Return a physical reality with every field."""
-    given = spec.reality
-    return ResolvedReality(
-        kind="physical",
-        engine=None,
-        parameters={},
-        bench=given.bench or robot.name,
-        repeats=given.repeats,
-        probes=given.probes or PHYSICAL_PROBES,
-        samples=given.samples,
-        limits=given.limits,
-        beyond=given.beyond,
-    )
-
-
-def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str, float]:
-    """Return the given parameters of reality, and the robot's for other tunables that reality's engine honours."""
-    nominal = {
-        ref.name: tunables[ref.name]().read(robot.world)
-        for ref in spec.tunables
-        if tunables[ref.name].field in engine.honours
-    }
-    return {**nominal, **spec.reality.parameters}
 
 
 def _budget(spec: ExperimentSpec, preset: Preset) -> ResolvedBudget:

@@ -1,7 +1,7 @@
 """The violations of a spec, each with its pointer into the spec and the permitted values."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 from gaplab.schemas.plugin import TunableRef
 from gaplab.schemas.resolved import ResolvedBudget
@@ -18,6 +18,7 @@ from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.specs.default_engines import runs
 
 
 def tunable_violations(spec: ExperimentSpec, engine: type[Engine]) -> Iterator[Violation]:
@@ -62,6 +63,30 @@ def strategy_violations(spec: ExperimentSpec, strategy: Strategy, robot: Robot) 
             yield Violation("/strategy/options", name, message, tuned)
 
 
+def engine_violations(robot: Robot, places: Mapping[type[Engine], str]) -> Iterator[Violation]:
+    """Yield what the robot's world uses and an engine does not honour, and a loop that an engine does not close.
+
+    Args:
+        robot: driven and rated.
+        places: the engines, each with its place in the spec.
+    """
+    able = {name: each for name, each in engines.items() if runs(each, robot.world)}
+    for engine, pointer in places.items():
+        for field in engine.lacks(robot.world):
+            others = [name for name, each in able.items() if field not in each.lacks(robot.world)]
+            message = f"the {robot.name} uses {field}, which {engine.name} does not honour; {listed(others)} does"
+            yield Violation(pointer, engine.name, message, others)
+        if robot.loops and not engine.closes_loops:
+            others = [name for name, each in able.items() if each.closes_loops]
+            message = f"the controller of the {robot.name} observes while it acts, and {engine.name} closes no loop"
+            yield Violation(pointer, engine.name, f"{message}; {listed(others)} does", others)
+
+
+def listed(able: Sequence[str]) -> str:
+    """Return names of plug-ins for a sentence."""
+    return " and ".join(able) or "no engine"
+
+
 def bounds_of(ref: TunableRef) -> tuple[float, float]:
     """Return the bounds of a tunable that is installed; a missing one is the tunable's own."""
     tunable = tunables[ref.name]
@@ -87,7 +112,7 @@ def _honour_violations(name: str, engine: type[Engine], pointer: str) -> Iterato
     field = tunables[name].field
     if field not in engine.honours:
         able = [each.name for each in engines.values() if field in each.honours]
-        message = f"{engine.name} does not honour {name}; {' and '.join(able) or 'no engine'} does"
+        message = f"{engine.name} does not honour {name}; {listed(able)} does"
         yield Violation(pointer, name, message, able)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Motion, Trajectory
+from gaplab.services.core.motions import Motion, Trajectory, open_loop
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.shapes import Box, Sphere
@@ -195,7 +195,7 @@ def test_physics_that_blows_up_is_nan_and_harms_no_later_rollout(embodied: Pair,
 
 def test_targets_that_are_no_numbers_give_nan_and_harm_no_later_rollout(embodied: Pair) -> None:
     expected = embodied.roll()
-    motion = embodied.robot.motion(embodied.robot.known)
+    motion = open_loop(embodied.robot.motion(embodied.robot.known))
 
     lost = embodied.engine.rollout(embodied.robot.world, replace(motion, targets=np.full_like(motion.targets, np.nan)))
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.kinematics import body_poses, clearances_m
+from gaplab.services.core.motions import open_loop
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.engines import engines
@@ -55,7 +56,7 @@ def test_a_recording_passes_through_what_the_rollout_observes(engine: Any) -> No
 
 def test_joints_follow_their_motors_and_feet_stay_out_of_the_ground(engine: Any) -> None:
     robot = Quadruped()
-    motion = robot.motion(robot.known)
+    motion = open_loop(robot.motion(robot.known))
 
     seen = engine.record(robot.world, motion, TIMES_S)
     positions, orientations = body_poses(robot.world, seen.poses, seen.angles_rad)

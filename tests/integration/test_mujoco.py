@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Motion
+from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.shapes import Box, Sphere
 from gaplab.services.core.world import Body, Joint, Material, Motor, World
@@ -27,7 +27,7 @@ pytest.importorskip("numba")
 
 G, STEP_S = 9.81, 1 / 100
 ROBOT = Quadruped()
-MOTION = ROBOT.motion(ROBOT.known)
+MOTION = open_loop(ROBOT.motion(ROBOT.known))
 MATERIALS = [Material(1.0, 0.8), Material(0.3, 0.3), Material(0.8, 0.5, 0.5)]
 SLEDGE = World(
     bodies=(Body("board", 1.9, Box((2.0, 2.0, 0.02)), collides=False), Body("foot", 0.1, Sphere(0.02))),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.motions import Motion
+from gaplab.services.core.motions import Motion, open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.shapes import Box, Sphere
 from gaplab.services.core.world import Body, Joint, Material, Motor, World
@@ -20,7 +20,7 @@ from gaplab.services.engines.stepping import WARM_SCENES
 pytest.importorskip("pybullet")
 
 ROBOT = Quadruped()
-MOTION = ROBOT.motion(ROBOT.known)
+MOTION = open_loop(ROBOT.motion(ROBOT.known))
 
 
 @pytest.fixture

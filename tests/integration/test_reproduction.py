@@ -6,37 +6,17 @@ The studies run the toy function. Their recorded fitnesses are made, so that the
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from shutil import copyfileobj
-from typing import Any, NamedTuple
-from zlib import crc32
 
-import numpy as np
 import pytest
 
 from gaplab import migrations
-from gaplab.schemas.spec import StudySpec
-from gaplab.services.archives import export_study
-from gaplab.services.core.arrays import frozen
-from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
-from gaplab.services.experiments import submission
-from gaplab.services.running import execution
-from gaplab.services.running.execution import TimedStep
 from gaplab.services.store.session import Store
+from tests.made_studies import STEP_S, Made, Study, archive
 
 ROOT = Path(__file__).parents[2]
 CLAIMS = [f"C{number}" for number in range(1, 9)]
-STEP_S = 36.0
-GENOME, SIMULATOR = frozen([0.5]), Simulator(frozen([1.0, 0.8, 0.0]), 0.01)
-
-
-class Made(NamedTuple):
-    """A curve: its means, and the deviations of a repetition and of its single values."""
-
-    means: Sequence[float]
-    deviation: float = 0.01
-    wiggle: float = 0.003
 
 
 def rising(start: float, last: float, samples: int = 10) -> list[float]:
@@ -76,15 +56,6 @@ LUCKY = {name: Made([0.4, 0.646 if name == "simulated_fit_and_informative" else 
 """One strategy leads each other one by a p of 0.03: so small a p is expected by chance in one of five pairs."""
 
 
-class Study(NamedTuple):
-    """A study to make."""
-
-    curves: Mapping[str, Made]
-    repetitions: int = 12
-    samples: int = 10
-    changes: Mapping[str, Any] = {}
-
-
 def only(curves: Mapping[str, Made], *names: str) -> dict[str, Made]:
     return {name: curves[name] for name in names}
 
@@ -104,58 +75,6 @@ STUDIES = {
         {"simulated_fit": Made([0.5] * 4, 0.001, 0.0), "simulated_fit_and_unique": Made([0.7147] * 4, 0.2, 0.0)}, 5, 3
     ),
 }
-
-
-def standard(rng: np.random.Generator, *shape: int) -> np.ndarray:
-    """Random numbers whose mean and deviation over the first axis are exactly 0 and 1."""
-    drawn = rng.normal(size=shape)
-    drawn -= drawn.mean(axis=0)
-    return drawn / drawn.std(axis=0, ddof=1)
-
-
-def values(strategy: str, made: Made, repetitions: int, counts: int) -> np.ndarray:
-    """`(repetitions, counts)`"""
-    rng = np.random.default_rng(crc32(strategy.encode()))
-    each = made.deviation * standard(rng, repetitions, 1) + made.wiggle * standard(rng, repetitions, counts)
-    return np.array(made.means[:counts]) + each
-
-
-def log(recorded: Sequence[float]) -> Iterator[Step]:
-    for iteration, value in enumerate(recorded):
-        if iteration:
-            yield Selected(iteration, GENOME, Cost(30))
-            yield Measured(iteration, Sample(GENOME, 0.1))
-        yield Tuned(iteration, (SIMULATOR,), Cost(60) if iteration else Cost())
-        yield Transferred(iteration, GENOME, 0.5, Cost(60))
-        yield Probed(iteration, float(value), float(value))
-
-
-def archive(store: Store, label: str, study: Study, folder: Path) -> Path:
-    """Run a study, whose fitness is made, and export it."""
-    spec: dict[str, Any] = {"name": f"made: {label}", "strategies": list(study.curves), "robot": "toy_function"}
-    spec |= {
-        "budget": "smoke",
-        "iterations": study.samples,
-        "repetitions": study.repetitions,
-        "seed": 7,
-        **study.changes,
-    }
-    made = submission.submit_study(store, StudySpec.model_validate(spec))
-    recorded = {
-        each.id: values(
-            each.strategy, study.curves[each.strategy], study.repetitions, 1 if each.level else study.samples + 1
-        )
-        for each in made.experiments
-    }
-    claims = execution.claim(store, "test", limit=10_000)
-    steps = [(claim, log(recorded[claim.experiment_id][claim.number])) for claim in claims]
-    execution.record_all(store, [(claim, [TimedStep(step, STEP_S) for step in each]) for claim, each in steps])
-    assert all(execution.complete(store, claim) for claim in claims)
-    exported = export_study(store, made.id)
-    path = folder / f"{label}.zip"
-    with exported.file as source, path.open("wb") as target:
-        copyfileobj(source, target)
-    return path
 
 
 def reproduce(*arguments: object) -> str:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from gaplab.services.core.arrays import FloatArray
 from gaplab.services.core.controllers import square_pulses
-from gaplab.services.core.motions import Motion, Trajectory
+from gaplab.services.core.motions import Motion, Trajectory, open_loop
 from gaplab.services.core.robots import quadruped
 from gaplab.services.core.robots.quadruped import Quadruped
 
@@ -58,7 +58,7 @@ def test_a_pulse_starts_at_its_phase_and_lasts_for_its_width(
     if min(since, abs(since - share), 1.0 - since) < 1e-6:
         return  # on an edge, where rounding decides
 
-    motion = ROBOT.motion(genome)
+    motion = open_loop(ROBOT.motion(genome))
 
     amplitude = quadruped.AMPLITUDES_RAD[actuator % 3]
     expected = amplitude if since < share else -amplitude
@@ -74,7 +74,7 @@ def test_motions_equal_the_plain_formula_to_the_last_bit(counted_s: float) -> No
 
     for genome in (robot.known, *nearly, *tenths, *anywhere):
         times_s, targets = plainly(genome, quadruped.SETTLING_S + counted_s)
-        motion = robot.motion(genome)
+        motion = open_loop(robot.motion(genome))
         assert motion.times_s.tobytes() == times_s.tobytes()
         assert motion.targets.tobytes() == targets.tobytes()
         assert not motion.times_s.flags.writeable
@@ -100,12 +100,12 @@ def test_phases_of_zero_and_one_are_the_same_controller() -> None:
     low, high = np.full(24, 0.3), np.full(24, 0.3)
     low[0::2], high[0::2] = 0.0, 1.0
 
-    assert np.array_equal(ROBOT.motion(low).targets, ROBOT.motion(high).targets)
-    assert ROBOT.motion(low).times_s == pytest.approx(ROBOT.motion(high).times_s)
+    assert np.array_equal(open_loop(ROBOT.motion(low)).targets, open_loop(ROBOT.motion(high)).targets)
+    assert open_loop(ROBOT.motion(low)).times_s == pytest.approx(open_loop(ROBOT.motion(high)).times_s)
 
 
 def test_the_motion_starts_at_zero_and_ascends() -> None:
-    motion = ROBOT.motion(ROBOT.known)
+    motion = open_loop(ROBOT.motion(ROBOT.known))
 
     assert motion.times_s[0] == 0.0
     assert np.all(np.diff(motion.times_s) > 0)

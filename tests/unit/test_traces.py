@@ -8,13 +8,14 @@ from scipy.spatial.transform import Rotation
 
 from gaplab.services.core.arrays import frozen
 from gaplab.services.core.errors import InvalidSpec
+from gaplab.services.core.motions import open_loop
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.trace_tables import COLUMNS, read_trace
 from gaplab.services.core.traces import TooShort, Trace, align, from_start
 from gaplab.services.engines.mujoco.engine import MuJoCo
 
 ROBOT = Quadruped()
-MOTION = ROBOT.motion(ROBOT.known)
+MOTION = open_loop(ROBOT.motion(ROBOT.known))
 END_S = float(MOTION.observe_s[-1])
 
 

@@ -79,6 +79,11 @@ class Robot(Plugin):
         return self._task.sense(trajectory)
 
     @property
+    def loops(self) -> bool:
+        """Whether its controller observes while it acts, so that its motions are Loops."""
+        return self.usual_controller is not None and self._controller.loops
+
+    @property
     def is_function(self) -> bool:
         """Whether the robot is a function of one gene: its curve can be drawn, and it has no body to replay."""
         return not self.world.bodies and self.space.size == 1

@@ -6,7 +6,7 @@ from types import ModuleType
 from warnings import catch_warnings, simplefilter
 
 from gaplab.schemas.base import Frozen
-from gaplab.services.core.world import Material, World
+from gaplab.services.core.world import World
 from gaplab.services.engines.physx.scene import PhysXScene
 from gaplab.services.engines.stepped import SteppedEngine
 
@@ -30,8 +30,8 @@ class PhysX(SteppedEngine[PhysXScene]):
     def _build(self, world: World) -> PhysXScene:
         return PhysXScene(self._library, world)
 
-    def _start(self, scene: PhysXScene, material: Material) -> Callable[[int], None]:
-        scene.start(material)
+    def _start(self, scene: PhysXScene, world: World) -> Callable[[int], None]:
+        scene.start(world)
         return scene.step
 
 

@@ -5,7 +5,8 @@ from types import ModuleType
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
-from gaplab.services.core.world import Material, World
+from gaplab.services.core.kinematics import inverse, rotated
+from gaplab.services.core.world import World
 from gaplab.services.engines.physx.robot import Handle, build_robot, set_offsets
 
 BOUNCE_THRESHOLD_M_S = 0.2
@@ -45,9 +46,10 @@ class PhysXScene:
         self._links = [self.articulation.links.index(self.robot.links[joint.child]) for joint in world.joints]
         self._initial: bytes = self._system.pack()
 
-    def start(self, material: Material) -> None:
-        """Reset to time 0, in a material. PhysX itself drops contacts when bodies are moved."""
-        ours = self._material
+    def start(self, world: World) -> None:
+        """Reset to time 0 of a world. PhysX itself drops contacts when bodies are moved."""
+        self.world = world
+        ours, material = self._material, world.material
         ours.static_friction = max(material.static_friction, material.dynamic_friction)
         ours.dynamic_friction = material.dynamic_friction
         ours.restitution = material.restitution
@@ -72,6 +74,15 @@ class PhysXScene:
     def angles(self) -> FloatArray:
         """Return the joint angles `(joints,)`, rad, in the world's order, which is not PhysX's."""
         return np.asarray(self.articulation.qpos, dtype=float)[self._places]
+
+    def speeds(self) -> FloatArray:
+        """Return the joint speeds `(joints,)`, rad/s, in the world's order."""
+        return np.asarray(self.articulation.qvel, dtype=float)[self._places]
+
+    def turning(self) -> FloatArray:
+        """Return the angular velocity of the base, `(3,)`, rad/s, in its own frame."""
+        turning = np.asarray(self.articulation.root_angular_velocity, dtype=float)
+        return rotated(inverse(self.pose()[3:]), turning)
 
     def torques(self) -> FloatArray:
         """Return the torques of the motors in the last step, `(joints,)`, N·m: all that acts about a hinge's axis."""

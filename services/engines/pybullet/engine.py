@@ -4,7 +4,7 @@ from collections.abc import Callable
 from importlib import import_module
 
 from gaplab.schemas.base import Frozen
-from gaplab.services.core.world import Material, World
+from gaplab.services.core.world import World
 from gaplab.services.engines.pybullet.scene import PyBulletScene
 from gaplab.services.engines.pybullet.stick_slip import StickSlip
 from gaplab.services.engines.stepped import SteppedEngine
@@ -30,7 +30,9 @@ class PyBullet(SteppedEngine[PyBulletScene]):
     def _build(self, world: World) -> PyBulletScene:
         return PyBulletScene(self._bullet, world)
 
-    def _start(self, scene: PyBulletScene, material: Material) -> Callable[[int], None]:
+    def _start(self, scene: PyBulletScene, world: World) -> Callable[[int], None]:
+        material = world.material
+        scene.world = world
         scene.start(material, max(material.static_friction, material.dynamic_friction))
         switches = material.dynamic_friction < material.static_friction
         return StickSlip(scene, material).step if switches else scene.step

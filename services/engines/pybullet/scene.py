@@ -6,6 +6,7 @@ from types import ModuleType
 import numpy as np
 
 from gaplab.services.core.arrays import FloatArray
+from gaplab.services.core.kinematics import inverse, rotated
 from gaplab.services.core.shapes import Box
 from gaplab.services.core.world import Body, Joint, Material, World
 
@@ -92,6 +93,15 @@ class PyBulletScene:
     def angles(self) -> FloatArray:
         """Return the joint angles `(joints,)`, rad."""
         return self._states(0)
+
+    def speeds(self) -> FloatArray:
+        """Return the joint speeds `(joints,)`, rad/s."""
+        return self._states(1)
+
+    def turning(self) -> FloatArray:
+        """Return the angular velocity of the base, `(3,)`, rad/s, in its own frame."""
+        _, turning = self.bullet.getBaseVelocity(self.robot, physicsClientId=self.client)
+        return rotated(inverse(self.pose()[3:]), np.array(turning))
 
     def torques(self) -> FloatArray:
         """Return the torques of the motors in the last step, `(joints,)`, N·m."""

@@ -1,0 +1,55 @@
+"""Reality of a submitted spec, with every default."""
+
+from typing import Any
+
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.resolved import ResolvedReality
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.registry import Registry
+from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.tunables import tunables
+from gaplab.services.engines import engines
+from gaplab.services.engines.base import Engine
+
+SIMULATED_PROBES, PHYSICAL_PROBES = "each", "last"
+"""Which transferred controllers are measured by default."""
+
+
+def completed(registry: Registry[Any], ref: PluginRef) -> PluginRef:
+    """Return the reference with every option."""
+    _, options = registry.check(ref)
+    return PluginRef(name=ref.name, options=options.model_dump(mode="json"))
+
+
+def simulated_reality(spec: ExperimentSpec, robot: Robot, ref: PluginRef, engine: type[Engine]) -> ResolvedReality:
+    """Return a simulated reality with every field."""
+    truth = _truth(spec, robot, engine)
+    return ResolvedReality(
+        engine=completed(engines, ref), parameters=truth, probes=spec.reality.probes or SIMULATED_PROBES
+    )
+
+
+def physical_reality(spec: ExperimentSpec, robot: Robot) -> ResolvedReality:
+    """Return a physical reality with every field."""
+    given = spec.reality
+    return ResolvedReality(
+        kind="physical",
+        engine=None,
+        parameters={},
+        bench=given.bench or robot.name,
+        repeats=given.repeats,
+        probes=given.probes or PHYSICAL_PROBES,
+        samples=given.samples,
+        limits=given.limits,
+        beyond=given.beyond,
+    )
+
+
+def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str, float]:
+    """Return the given parameters of reality, and the robot's for other tunables that reality's engine honours."""
+    nominal = {
+        ref.name: tunables[ref.name]().read(robot.world)
+        for ref in spec.tunables
+        if tunables[ref.name].field in engine.honours
+    }
+    return {**nominal, **spec.reality.parameters}
