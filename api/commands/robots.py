@@ -1,4 +1,4 @@
-"""Commands that import robots from files."""
+"""Commands that import robots from files, and store them in the service."""
 
 import json
 from collections.abc import Iterator
@@ -11,9 +11,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from gaplab.api.clients.progress.text import console
-from gaplab.api.commands.app import PLUGINS, AsJson, app
+from gaplab.api.commands.app import PLUGINS, AsJson, Url, app, connect
 from gaplab.api.commands.exit_codes import Exit
-from gaplab.api.commands.json_output import print_json
+from gaplab.api.commands.json_output import print_json, print_result
 from gaplab.schemas.mistakes import sentence
 from gaplab.services.core.errors import InvalidRobot
 
@@ -27,7 +27,7 @@ OTHERS = (
     "observed, controller or task; repeatable"
 )
 
-robot = typer.Typer(help="Import robots from URDF and MJCF.", no_args_is_help=True)
+robot = typer.Typer(help="Import robots from URDF and MJCF, and store them.", no_args_is_help=True)
 app.add_typer(robot, name="robot", rich_help_panel=PLUGINS)
 
 
@@ -141,3 +141,31 @@ def _mass_table(imported: "ImportedFile") -> Table:
 
 def _both(row: "MassRow") -> tuple[str, str]:
     return f"{row.before_kg:.6g}", f"{row.after_kg:.6g}"
+
+
+@robot.command()
+def add(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="a robot file, as `gaplab robot import` writes it")],
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Store a robot file in the service, so that specs can name its robot."""
+    with connect(url) as client:
+        found = client.add_robot(file)
+    text = f"Stored the robot {found.name}, sha256 {found.sha256}. A spec names it: {json.dumps({'robot': found.name})}"
+    print_result(found, text, as_json=as_json)
+
+
+@robot.command("list")
+def list_(as_json: AsJson = False, url: Url = None) -> None:
+    """List the robots from files that the service has, the newest of a name first."""
+    with connect(url) as client:
+        found = client.robots()
+    if as_json:
+        print_json(found)
+        return
+    table = Table("name", "sha256", "bodies", "actuators", "kg", "file", "stored", box=None)
+    for each in found:
+        size = str(each.bodies), str(each.actuators), f"{each.mass_kg:.4g}"
+        table.add_row(escape(each.name), each.sha256[:12], *size, escape(each.file or "-"), f"{each.created_at:%F %R}")
+    console().print(table if found else "No robot is stored; `gaplab robot add FILE` stores one.")
