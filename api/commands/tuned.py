@@ -15,19 +15,17 @@ from gaplab.services.core.errors import InvalidRobot
 
 if TYPE_CHECKING:
     from gaplab.services.core.robot_files import RobotFile
+    from gaplab.services.core.robots.base import Robot
     from gaplab.services.core.world import World
     from gaplab.services.robots.writing import WrittenFile
 
 
 @app.command(rich_help_panel=RESULTS)
-def simulator(  # noqa: PLR0913, PLR0917 - each is an option of the command
+def simulator(
     id: ExperimentId,
     output: Annotated[Path, typer.Option("--output", "-o", help="file to write: .json, or .urdf or .xml with --from")],
     original: Annotated[
         Path | None, typer.Option("--from", help="URDF or MJCF that the robot was imported from", show_default=False)
-    ] = None,
-    robot: Annotated[
-        Path | None, typer.Option(help="robot file; left out: the robot of the experiment", show_default=False)
     ] = None,
     partial: Annotated[
         bool, typer.Option("--partial", help="leave out values that the format has no place for; they become comments")
@@ -36,14 +34,17 @@ def simulator(  # noqa: PLR0913, PLR0917 - each is an option of the command
     url: Url = None,
 ) -> None:
     """Write the best tuned simulator as a robot file, or into the URDF or MJCF of the robot. It is compared before."""
+    from gaplab.services.core import robot_library
     from gaplab.services.core.stored_specs import spec_of
 
     with connect(url) as client:
-        best, specs = client.results.best_simulator(id), client.spec(id).resolved
+        best, spec = client.results.best_simulator(id), spec_of(client.spec(id).resolved[0])
+        if spec.robot.name == robot_library.IMPORTED:
+            robot_library.learn([client.robot_file(spec.robot.options["sha256"]).decode()])
     if best is None:
         raise CommandError(f"{id} has no tuned simulators yet", Exit.CONFLICT)
     try:
-        written, distance_m = _written(id, spec_of(specs[0]), best, (output, original, robot), partial=partial)
+        written, distance_m = _written(id, spec, best, (output, original), partial=partial)
     except InvalidRobot as error:
         typer.echo(f"gaplab: {output} was not written:", err=True)
         for reason in error.reasons:
@@ -60,29 +61,31 @@ def _written(
     id: str,
     spec: ResolvedSpec,
     best: SimulatorRead,
-    files: tuple[Path, Path | None, Path | None],
+    files: tuple[Path, Path | None],
     *,
     partial: bool,
 ) -> tuple["WrittenFile", float]:
     """Write the file; return what is in it, and the largest distance in rollouts."""
+    from gaplab.services.core.arrays import frozen
     from gaplab.services.robots.comparing import check_rollouts
     from gaplab.services.robots.writing import Tuning, write_json, write_xml
     from gaplab.services.specs.assembly import edits_of, engine_of
+    from gaplab.services.specs.robots import robot_of
+    from gaplab.services.specs.simulation import Simulation
 
-    output, original, robot = files
+    output, original = files
+    robot, engine, edits = robot_of(spec), engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables)
     file, distances = _robot_file(spec, robot), [0.0]
-    tuned, comments = file.world, [_headline(id, best)]
-    for tunable, ref in zip(edits_of(ref.name for ref in spec.tunables), spec.tunables, strict=True):
-        before = tunable.read(tuned)
-        tuned = tunable.edit(tuned, best.parameters[ref.name])
-        comments.append(_comment(ref.name, best, before, tunable.unit))
-    engine = engine_of(spec.engine)
+    tuned = Simulation(robot, engine, edits).world(frozen([best.parameters[ref.name] for ref in spec.tunables]))
+    comments = [
+        _comment(ref.name, best, edit.read(file.world), edit.unit)
+        for ref, edit in zip(spec.tunables, edits, strict=True)
+    ]
 
     def accept(world: "World") -> None:
-        driver, task = spec.controller or file.usual_controller, spec.task or file.usual_task
-        distances.append(check_rollouts(tuned, world, engine, driver, task))
+        distances.append(check_rollouts(tuned, world, engine, file.usual_controller, file.usual_task))
 
-    tuning = Tuning(file, tuned, tuple(comments), partial)
+    tuning = Tuning(file, tuned, (_headline(id, best), *comments), partial)
     if output.suffix.lower() == ".json":
         return write_json(tuning, output, accept), max(distances)
     if original is None:
@@ -90,21 +93,18 @@ def _written(
     return write_xml(tuning, original, output, accept), max(distances)
 
 
-def _robot_file(spec: ResolvedSpec, given: Path | None) -> "RobotFile":
-    """Return the robot of an experiment as a file; one that is given must be that robot."""
-    from gaplab.services.core.robot_files import RobotFile, read_robot_file
-    from gaplab.services.core.robots import robots
+def _robot_file(spec: ResolvedSpec, robot: "Robot") -> "RobotFile":
+    """Return the robot of an experiment as a file, with the experiment's controller and task."""
+    from gaplab.services.core.robot_files import RobotFile
+    from gaplab.services.core.robot_library import robot_file
 
-    if given is not None:
-        file, expected = read_robot_file(given.read_bytes()), spec.robot.options.get("sha256", "")
-        if expected and file.sha256 != expected:
-            raise InvalidRobot([f"{given} has the hash {file.sha256}, but the experiment's robot has {expected}"])
-        return file
-    robot = robots.create(spec.robot, "/robot")
     driver, task = spec.controller or robot.usual_controller, spec.task or robot.usual_task
     if driver is None or task is None or not robot.world.bodies:
         raise InvalidRobot([f"the robot {spec.robot.name} has no bodies, or brings a controller of its own"])
-    return RobotFile(name=spec.robot.name, usual_controller=driver, usual_task=task, world=robot.world)
+    known = robot_file(spec.robot.options.get("sha256", ""))
+    if known is None:
+        return RobotFile(name=spec.robot.name, usual_controller=driver, usual_task=task, world=robot.world)
+    return known.model_copy(update={"usual_controller": driver, "usual_task": task})
 
 
 def _headline(id: str, best: SimulatorRead) -> str:

@@ -33,8 +33,8 @@ class ImportOptions(Frozen):
         static_friction: None: the file's, or gaplab's.
         dynamic_friction: None: the same.
         observed: name of the body whose motion is the trajectory; None: the base, and the last link of a fixed robot.
-        controller: usual controller.
-        task: usual task.
+        controller: usual controller; None: `cpg`, and `sine` for a fixed base.
+        task: usual task; None: `walk`, and `reach` for a fixed base.
     """
 
     name: str | None = None
@@ -55,5 +55,5 @@ class ImportOptions(Frozen):
     static_friction: Annotated[float, Field(ge=0)] | None = None
     dynamic_friction: Annotated[float, Field(ge=0)] | None = None
     observed: str | None = None
-    controller: PluginRef = PluginRef(name="square_pulses")
-    task: PluginRef = PluginRef(name="walk")
+    controller: PluginRef | None = None
+    task: PluginRef | None = None

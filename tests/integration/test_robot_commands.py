@@ -100,10 +100,7 @@ def log(genome: np.ndarray) -> Iterator[Step]:
         if iteration:
             yield Selected(iteration, genome, Cost(1, 1))
             yield Measured(iteration, Sample(genome, 0.3))
-        simulators = (
-            Simulator(frozen(BEST if iteration == 2 else (0.5, 0.4, 0.0)), 0.01),
-            Simulator(frozen(BEST), 0.5),
-        )
+        simulators = (best_of(iteration), Simulator(frozen(BEST), 0.5))
         yield Tuned(iteration, simulators, Cost(1, 1) if iteration else Cost())
         yield Transferred(iteration, genome, 0.3, Cost(1, 1))
         yield Probed(iteration, 0.3, 0.3)
