@@ -15,6 +15,8 @@ from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
 from gaplab.services.core.world import Material
 from gaplab.services.experiments.submission import submit_experiment
+from gaplab.services.robots.importing import import_robot
+from gaplab.services.robots.options import ImportOptions
 from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
@@ -159,3 +161,43 @@ def test_an_experiment_without_tuned_simulators_says_so(gaplab: Gaplab, sqlite_s
 
     assert said.code == 6
     assert "no tuned simulators yet" in said.err
+
+
+@pytest.fixture
+def tuned_a1(sqlite_store: Store, gaplab: Gaplab, tmp_path: Path) -> str:
+    """The id of a tuned experiment of a1, whose file was imported and stored."""
+    pytest.importorskip("pybullet")
+    file, knees = str(tmp_path / "a1.json"), ("--start", "*_lower_joint=-1.8", "--start", "*_upper_joint=0.9")
+    assert gaplab("robot", "import", str(path_of("a1/a1.urdf")), "--name", "a1", "-o", file, *knees).code == 0
+    assert gaplab("robot", "add", file).code == 0
+    tunables = ["mass(trunk)", "joint_damping(*_hip_joint)", "max_torque"]
+    wanted = {"strategy": "random", "robot": "a1", "engine": "pybullet", "budget": "smoke", "tunables": tunables}
+    submitted = submit_experiment(
+        sqlite_store, ExperimentSpec.model_validate(wanted | {"iterations": 2, "repetitions": 1})
+    )
+    (claim,) = execution.claim(sqlite_store, "test", limit=1)
+    run(sqlite_store, claim, log(frozen(np.zeros(3))))
+    return submitted.id
+
+
+def test_tuned_values_of_an_imported_robot_are_in_its_urdf(gaplab: Gaplab, tuned_a1: str, tmp_path: Path) -> None:
+    """With real rollouts in PyBullet. The trunk is at 0.9 of its mass, hips have 0.7 N·m·s/rad, torques a tenth."""
+    original, output = path_of("a1/a1.urdf"), tmp_path / "tuned.urdf"
+
+    said = gaplab("simulator", tuned_a1, "-o", str(output), "--from", str(original))
+    robot = import_robot(output, ImportOptions()).robot.world
+
+    assert said.code == 0, said.err
+    assert "trunk: mass_kg 4.714 → 4.2426" in said.out
+    assert "an import computes it: FR_hip_joint: motor.kp" in said.out
+    assert robot.bodies[0].mass_kg == pytest.approx(0.9 * 4.714, rel=1e-12)
+    assert [joint.damping for joint in robot.joints[:3]] == [0.7, 0, 0]
+    assert robot.joints[0].motor.max_torque_nm == pytest.approx(2.0)
+    assert "mass(trunk) = 0.9, 95 % interval 0.8 to 1; before 1" in output.read_text()
+
+
+def test_another_urdf_than_that_of_the_robot_is_refused(gaplab: Gaplab, tuned_a1: str, tmp_path: Path) -> None:
+    said = gaplab("simulator", tuned_a1, "-o", str(tmp_path / "t.urdf"), "--from", str(path_of("aliengo/aliengo.urdf")))
+
+    assert said.code == 5
+    assert "aliengo.urdf is not the file that a1 was imported from, or has changed since" in said.err
