@@ -371,6 +371,16 @@ def test_options_set_what_the_file_leaves_open(tmp_path: Path) -> None:
         small(tmp_path, keyframe="home")
 
 
+def test_a_base_that_is_turned_stands_on_the_ground(tmp_path: Path) -> None:
+    """The file of laikago has y upwards. The box here is 0.4 m wide: its half is more than the leg below."""
+    world = small(tmp_path, turn="1.5707963267948966,0,0")
+
+    assert world.start_turn == pytest.approx((np.sqrt(0.5), 0, 0, np.sqrt(0.5)))
+    assert world.start_height_m == pytest.approx(0.2, abs=0.03)
+    laikago = import_robot(path_of(FILES["laikago"][0]), ImportOptions(mend=True, turn=(np.pi / 2, 0, 0))).robot.world
+    assert laikago.start_height_m > 0.4
+
+
 def test_a_locked_joint_is_fixed(tmp_path: Path) -> None:
     world = small(tmp_path, lock=("ja",))
 
