@@ -21,7 +21,8 @@ from gaplab.services.running import execution
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 from tests.experiments import run
-from tests.unit.test_robot_import import MJCF, path_of
+from tests.robot_texts import MJCF
+from tests.unit.test_robot_import import path_of
 
 pytest.importorskip("mujoco")
 BEST = (0.9, 0.7, 0.1)

@@ -19,7 +19,8 @@ from gaplab.services.robots.comparing import check_rollouts
 from gaplab.services.robots.importing import import_robot
 from gaplab.services.robots.options import ImportOptions
 from gaplab.services.robots.writing import Tuning, WrittenFile, write_json, write_xml
-from tests.unit.test_robot_import import FILES, MJCF, path_of
+from tests.robot_texts import MJCF
+from tests.unit.test_robot_import import FILES, path_of
 
 mujoco = pytest.importorskip("mujoco")
 COMMENTS = ("Tuned by gaplab: experiment abc.", "mass = 5 kg, 95 % interval 4 to 6 -- roughly")
