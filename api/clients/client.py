@@ -16,7 +16,7 @@ import httpx2
 
 from gaplab.api.clients.archives import Archives
 from gaplab.api.clients.bench import Bench
-from gaplab.api.clients.connection import PAUSES_S, Connection
+from gaplab.api.clients.connection import PAUSES_S, Connection, segment
 from gaplab.api.clients.errors import ServiceError, ServiceUnreachable
 from gaplab.api.clients.events import EventLog
 from gaplab.api.clients.figures import Figures
@@ -116,6 +116,10 @@ class Client:
             content=[Path(file).read_bytes()],
             headers={"Content-Type": "application/json"},
         )
+
+    def robot_file(self, robot: str) -> bytes:
+        """Return the robot file with this hash, or the newest one with this name."""
+        return self._connection.get_bytes(f"/robots/{segment(robot)}")
 
     def robots(self) -> tuple[RobotRead, ...]:
         """Return the robots from files, by name, the newest of a name first."""

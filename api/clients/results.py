@@ -9,7 +9,11 @@ from gaplab.schemas.comparisons import Comparison
 from gaplab.schemas.curves import Curve
 from gaplab.schemas.differences import SpecDiff
 from gaplab.schemas.misfit import MisfitRead
-from gaplab.schemas.records import common_count
+from gaplab.schemas.records import Page, common_count
+from gaplab.schemas.results import SimulatorRead
+
+PAGE = 5_000
+"""Simulators of one request."""
 
 MOST_CURVES = 100
 """Experiments of one request: the most that the service permits."""
@@ -21,6 +25,21 @@ class Results:
     def __init__(self, connection: Connection, records: Records) -> None:
         self._connection = connection
         self._records = records
+
+    def best_simulator(self, id: str) -> SimulatorRead | None:
+        """Return the tuned simulator of the latest iteration with the smallest error; None if there is none yet.
+
+        Args:
+            id: id of the experiment.
+        """
+        simulators = self._connection.items(Page[SimulatorRead], f"/experiments/{segment(id)}/simulators", limit=PAGE)
+        best = [each for each in simulators if each.rank == 0 and each.iteration > 0 and each.error is not None]
+        latest = max((each.iteration for each in best), default=0)
+        return min(
+            (each for each in best if each.iteration == latest),
+            key=lambda each: (each.error, each.repetition),
+            default=None,
+        )
 
     def curves(self, ids: Sequence[str]) -> tuple[Curve, ...]:
         """Return the curves of experiments, and of all experiments of studies, in this order."""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 MOTORS = "servo, position, velocity or torque"
 OTHERS = (
-    "kp, kd, max_torque, position_gain, motored, keyframe, vertices, visuals, static_friction, dynamic_friction, "
+    "kp, kd, max_torque, position_gain, motored, turn, keyframe, vertices, visuals, static_friction, dynamic_friction, "
     "observed, controller or task; repeatable"
 )
 

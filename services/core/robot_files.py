@@ -46,6 +46,7 @@ class RobotFile(Frozen):
         usual_controller: controller of a spec that names none.
         usual_task: task of a spec that names none.
         lost: what its import lost or changed, line by line.
+        comments: notes for people, like the intervals of tuned values.
         world: the robot in reality.
     """
 
@@ -57,6 +58,7 @@ class RobotFile(Frozen):
     usual_controller: PluginRef
     usual_task: PluginRef
     lost: Annotated[tuple[Annotated[str, Field(max_length=1_000)], ...], Field(max_length=MOST_LOSSES)] = ()
+    comments: Annotated[tuple[Annotated[str, Field(max_length=1_000)], ...], Field(max_length=MOST_LOSSES)] = ()
     world: World
 
     @cached_property
@@ -70,6 +72,7 @@ class RobotFile(Frozen):
             **source,
             **refs,
             "lost": list(self.lost),
+            **({"comments": list(self.comments)} if self.comments else {}),
             "world": _plain(self.world),
         }
 

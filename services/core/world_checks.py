@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from gaplab.services.core.errors import Violation
 from gaplab.services.core.shapes import MOST_VERTICES, Box, Hull, Shape
@@ -23,6 +22,9 @@ UNIT = 1e-6
 
 TRIANGLE = 1e-9
 """Share by which a moment of inertia may exceed the sum of the other two: rounding."""
+
+FLAT = 1e-9
+"""Thickness of a hull, as a share of its length, at which it has no volume."""
 
 _Check = tuple[str, Any, bool, str]
 """The end of a pointer, the value, whether it is permitted, and what is permitted."""
@@ -100,10 +102,9 @@ def _shape_checks(shape: Shape, place: str) -> Iterator[_Check]:
 
 
 def _has_volume(hull: Hull) -> bool:
-    try:
-        return bool(ConvexHull(np.array(hull.points_m)).volume > 0)
-    except QhullError:
-        return False
+    points = np.array(hull.points_m)
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(spread[-1] > FLAT * spread[0])
 
 
 def _joint_checks(joint: Joint) -> Iterator[_Check]:

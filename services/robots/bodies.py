@@ -75,6 +75,10 @@ class Bodies:
         """Return the numbers of the bodies that one of the World consists of."""
         return [at for at in range(self.model.nbody) if self.model.body_weldid[at] == head]
 
+    def turn(self, member: int, head: int) -> Rotation:
+        """Return the rotation of a member in the frame of its body of the World."""
+        return self._within(head, np.zeros(3), self._data.xquat[member])[1]
+
     def mass_kg(self, head: int) -> float:
         """Return the mass of a body of the World."""
         return float(sum(self.model.body_mass[at] for at in self.members(head))) if head else HELD_KG

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from gaplab.schemas.plugin import PluginRef
 from gaplab.schemas.robots import RobotSource
 from gaplab.services.core.errors import InvalidRobot, InvalidSpec
 from gaplab.services.core.robot_files import RobotFile, read_robot_file
@@ -88,8 +89,8 @@ def import_robot(file: Path, options: ImportOptions) -> ImportedFile:
             sha256=sha256(content).hexdigest(),
             options=options.model_dump(mode="json", exclude_defaults=True),
         ),
-        usual_controller=options.controller,
-        usual_task=options.task,
+        usual_controller=options.controller or PluginRef(name="sine" if world.fixed else "cpg"),
+        usual_task=options.task or PluginRef(name="reach" if world.fixed else "walk"),
         lost=tuple(notes.lost),
         world=world,
     )

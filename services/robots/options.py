@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from gaplab.schemas.base import Frozen
 from gaplab.schemas.plugin import PluginRef
@@ -28,13 +28,14 @@ class ImportOptions(Frozen):
         max_torque: largest torque of the motors; None: the file's, or computed.
         time_step_s: time step; None: MJCF's own, and 1/240 s for a URDF.
         start: angle at time 0 by pattern of joint names; a later pattern wins.
+        turn: roll, pitch and yaw of the base at time 0, rad, as in a URDF; None: the file's.
         keyframe: name of the MJCF's keyframe that is the start; None for the first.
         vertices: largest number of vertices of a hull.
         static_friction: None: the file's, or gaplab's.
         dynamic_friction: None: the same.
         observed: name of the body whose motion is the trajectory; None: the base, and the last link of a fixed robot.
-        controller: usual controller.
-        task: usual task.
+        controller: usual controller; None: `cpg`, and `sine` for a fixed base.
+        task: usual task; None: `walk`, and `reach` for a fixed base.
     """
 
     name: str | None = None
@@ -50,10 +51,16 @@ class ImportOptions(Frozen):
     max_torque: Positive | None = None
     time_step_s: Annotated[float, Field(gt=0, le=0.1)] | None = None
     start: dict[str, float] = Field(default_factory=dict)
+    turn: tuple[float, float, float] | None = None
     keyframe: str | None = None
     vertices: Annotated[int, Field(ge=8, le=MOST_VERTICES)] = 32
     static_friction: Annotated[float, Field(ge=0)] | None = None
     dynamic_friction: Annotated[float, Field(ge=0)] | None = None
     observed: str | None = None
-    controller: PluginRef = PluginRef(name="square_pulses")
-    task: PluginRef = PluginRef(name="walk")
+    controller: PluginRef | None = None
+    task: PluginRef | None = None
+
+    @field_validator("turn", mode="before")
+    @classmethod
+    def _split_a_text(cls, value: object) -> object:
+        return value.split(",") if isinstance(value, str) else value

@@ -19,8 +19,17 @@ from gaplab.services.robots.reading import Source, mujoco_library
 
 
 def start_angles(source: Source, options: ImportOptions, notes: Notes) -> FloatArray:
-    """Return MuJoCo's `qpos` at the start: of a keyframe, or the reference angles."""
-    model = source.model
+    """Return MuJoCo's `qpos` at the start: of a keyframe, or the reference angles; the user may turn the base."""
+    qpos = _angles_of_the_file(source.model, options, notes)
+    if options.turn is not None:
+        if source.model.jnt_type[0] != FREE:
+            notes.refuse("the base is the scene, which cannot be turned")
+        else:
+            qpos[3:7] = np.roll(quaternion(Rotation.from_euler("xyz", options.turn)), 1)
+    return qpos
+
+
+def _angles_of_the_file(model: Any, options: ImportOptions, notes: Notes) -> FloatArray:  # noqa: ANN401
     if options.keyframe is not None:
         names = [str(model.key(at).name) for at in range(model.nkey)]
         if options.keyframe not in names:

@@ -12,7 +12,8 @@ from gaplab.services.core.errors import EngineUnavailable, InvalidRobot
 from gaplab.services.robots.mending import hold, mend
 from gaplab.services.robots.notes import Notes, listed
 from gaplab.services.robots.options import ImportOptions
-from gaplab.services.robots.urdf import read_urdf, tree_of
+from gaplab.services.robots.urdf import read_urdf
+from gaplab.services.robots.xml import tree
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def read_source(file: Path, text: str, options: ImportOptions, notes: Notes) -> 
     """
     mujoco = mujoco_library()
     try:
-        is_urdf = tree_of(text).tag == "robot"
+        is_urdf = tree(text).tag == "robot"
         if is_urdf:
             urdf = read_urdf(file, text, options, notes)
             spec = mujoco.MjSpec.from_string(urdf.text, assets=urdf.assets or None)

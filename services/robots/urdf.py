@@ -3,7 +3,6 @@
 Source: https://wiki.ros.org/urdf/XML, https://mujoco.readthedocs.io/en/stable/modeling.html#urdf-extensions
 """
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -15,8 +14,7 @@ from xml.etree import ElementTree
 
 from gaplab.services.robots.notes import Notes
 from gaplab.services.robots.options import ImportOptions
-
-Element = ElementTree.Element
+from gaplab.services.robots.xml import Element, tree
 
 _LOST = {
     "transmission": "transmissions are lost, a motor moves its joint directly; of {}",
@@ -46,18 +44,13 @@ class Urdf:
     name: str
 
 
-def tree_of(text: str) -> Element:
-    """Return the root of an XML text; some files declare a version of XML that does not exist."""
-    return ElementTree.fromstring(re.sub(r"^\s*<\?xml[^>]*\?>", "", text))  # noqa: S314
-
-
 def read_urdf(file: Path, text: str, options: ImportOptions, notes: Notes) -> Urdf:
     """Return a URDF that MuJoCo can read, and note what it would lose.
 
     Raises:
         InvalidRobot: a mesh is missing.
     """
-    root = tree_of(text)
+    root = tree(text)
     _lock(root, options.lock)
     _refuse(root, notes)
     _note_losses(root, notes)

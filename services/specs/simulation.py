@@ -76,9 +76,13 @@ class Simulation:
 
     def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:
         """Return the world of a simulator `(p,)`, and the rollout of a genome in it, recorded at times `(k,)` too."""
-        world = self._world(tuple(parameters.tolist()))
+        world = self.world(parameters)
         motion = disturbed(world, self._robot.motion(genome), genome)
         return world, self._engine.record(world, motion, times_s)
+
+    def world(self, parameters: FloatArray) -> World:
+        """Return the world of a simulator `(p,)`."""
+        return self._world(tuple(parameters.tolist()))
 
     def _edited(self, values: tuple[float, ...]) -> World:
         world = self._robot.world

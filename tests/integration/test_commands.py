@@ -30,6 +30,7 @@ from gaplab.services.store.lease import Failure
 from gaplab.services.store.session import Store
 from tests.commands import Gaplab
 from tests.integration.test_bench import compute
+from tests.robot_texts import MJCF
 
 STUDY = {
     "name": "all [of] it",
@@ -105,6 +106,7 @@ def test_every_command_prints_one_document_and_nothing_else(  # noqa: PLR0917
     keep(ask, said["list"][-1]["id"], tmp_path)
     tidy(ask, said["list"][-1]["id"])
     measure_on_a_bench(ask, sqlite_store, tmp_path)
+    bring_a_robot(ask, tmp_path)
     with monkeypatch.context() as patch:
         patch.setenv("GAPLAB_DATABASE_URL", f"sqlite:///{tmp_path / 'restored.db'}")
         assert ask("restore", str(tmp_path / "copy.db"))["file"] == str(tmp_path / "restored.db")
@@ -115,8 +117,15 @@ def test_every_command_prints_one_document_and_nothing_else(  # noqa: PLR0917
     assert set(ask("help")) == {str(each.value) for each in Exit}
 
     # want a body, a worker, an experiment under way, a failed one, recordings, and a request that is stuck
-    elsewhere = {"replay", "sensitivity", "accept-versions", "retry", "traces", "reopen"}
+    elsewhere = {"simulator", "replay", "sensitivity", "accept-versions", "retry", "traces", "reopen"}
     assert set(said) | elsewhere == set(NAMES) - UNTIL_STOPPED
+
+
+def bring_a_robot(ask: Callable[..., Any], folder: Path) -> None:
+    (folder / "m.xml").write_text(MJCF.format(""))
+    imported = ask("robot import", str(folder / "m.xml"), "-o", str(folder / "m.json"))
+    assert ask("robot add", imported["file"])["sha256"] == imported["sha256"]
+    assert [each["name"] for each in ask("robot list")] == ["m"]
 
 
 def measure_on_a_bench(ask: Callable[..., Any], store: Store, folder: Path) -> None:

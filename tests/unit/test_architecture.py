@@ -25,8 +25,8 @@ WEB = {"fastapi", "starlette", "pydantic", "anyio", "prometheus_client"}
 
 ROOMS = {
     "core": ((), {"numpy", "scipy", "pydantic", "cma"}),
-    "robots": (("core",), {"numpy", "scipy", "pydantic"}),
     "engines": (("core",), {"numpy", "pydantic"}),
+    "robots": (("core", "engines"), {"numpy", "scipy", "pydantic"}),
     "store": (("core",), {"sqlalchemy", "psycopg"}),
     "figures": ((), {"plotly", "matplotlib"}),
     "specs": (("core", "engines"), {"numpy"}),

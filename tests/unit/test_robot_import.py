@@ -18,6 +18,7 @@ from gaplab.services.core.world import Joint, Motor, PDMotor, World
 from gaplab.services.robots.hulls import simplify
 from gaplab.services.robots.importing import ImportedFile, import_robot
 from gaplab.services.robots.options import ImportOptions
+from tests.robot_texts import MJCF
 
 mujoco = pytest.importorskip("mujoco")
 pybullet = pytest.mark.skipif(find_spec("pybullet_data") is None, reason="PyBullet is not installed")
@@ -286,19 +287,6 @@ def test_motors_of_a_urdf_have_its_effort_and_gains_from_it() -> None:
     assert 0.5 < motor.kd < 5
 
 
-MJCF = """<mujoco model="m"><compiler angle="radian"/><option timestep="0.004"/><worldbody>
-<geom type="plane" size="1 1 1" friction="0.5 0 0"/>
-<body name="base" pos="0 0 1"><freejoint/><geom type="box" size=".1 .2 .05" mass="2" friction="0.7 0 0"/>
-<body name="a" pos=".1 0 0" euler=".1 .2 .3"><joint name="ja" axis="0 2 0" pos=".01 .02 0" ref=".3" range="-1 1"
- frictionloss=".1" armature=".01" damping=".2"/><geom type="capsule" size=".02" fromto="0 0 0 0 0 -.2" mass=".3"/>
-<body name="b" pos="0 0 -.2"><joint name="jb" type="slide" axis="1 0 0" ref=".05"/>
-<geom type="ellipsoid" size=".02 .03 .04" mass=".2" friction="1.5 0 0"/>
-<body name="c"><joint name="jc" axis="0 0 1"/><geom type="sphere" size=".01" mass=".1"/></body></body></body></body>
-</worldbody>
-<actuator><position name="pa" joint="ja" kp="50" kv="2" gear="3" forcerange="-4 4"/>
-<velocity name="vb" joint="jb" kv="7" ctrlrange="-1 1"/>{}</actuator></mujoco>"""
-
-
 def small(tmp_path: Path, more: str = "", **options: Any) -> World:
     file = tmp_path / "m.xml"
     file.write_text(MJCF.format(more))
@@ -369,6 +357,16 @@ def test_options_set_what_the_file_leaves_open(tmp_path: Path) -> None:
         small(tmp_path, start={"knee": 2.0})
     with pytest.raises(InvalidRobot, match="no keyframe 'home'"):
         small(tmp_path, keyframe="home")
+
+
+def test_a_base_that_is_turned_stands_on_the_ground(tmp_path: Path) -> None:
+    """The file of laikago has y upwards. The box here is 0.4 m wide: its half is more than the leg below."""
+    world = small(tmp_path, turn="1.5707963267948966,0,0")
+
+    assert world.start_turn == pytest.approx((np.sqrt(0.5), 0, 0, np.sqrt(0.5)))
+    assert world.start_height_m == pytest.approx(0.2, abs=0.03)
+    laikago = import_robot(path_of(FILES["laikago"][0]), ImportOptions(mend=True, turn=(np.pi / 2, 0, 0))).robot.world
+    assert laikago.start_height_m > 0.4
 
 
 def test_a_locked_joint_is_fixed(tmp_path: Path) -> None:

@@ -1,0 +1,137 @@
+"""The command that writes tuned values back into the file of a robot."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gaplab.api.commands.app import RESULTS, AsJson, ExperimentId, Url, app, connect
+from gaplab.api.commands.exit_codes import CommandError, Exit
+from gaplab.api.commands.json_output import print_json
+from gaplab.schemas.resolved import ResolvedSpec
+from gaplab.schemas.results import SimulatorRead
+from gaplab.services.core.errors import InvalidRobot
+
+if TYPE_CHECKING:
+    from gaplab.services.core.robot_files import RobotFile
+    from gaplab.services.core.robots.base import Robot
+    from gaplab.services.core.world import World
+    from gaplab.services.robots.writing import WrittenFile
+
+
+@app.command(rich_help_panel=RESULTS)
+def simulator(
+    id: ExperimentId,
+    output: Annotated[Path, typer.Option("--output", "-o", help="file to write: .json, or .urdf or .xml with --from")],
+    original: Annotated[
+        Path | None, typer.Option("--from", help="URDF or MJCF that the robot was imported from", show_default=False)
+    ] = None,
+    partial: Annotated[
+        bool, typer.Option("--partial", help="leave out values that the format has no place for; they become comments")
+    ] = False,
+    as_json: AsJson = False,
+    url: Url = None,
+) -> None:
+    """Write the best tuned simulator as a robot file, or into the URDF or MJCF of the robot. It is compared before."""
+    from gaplab.services.core import robot_library
+    from gaplab.services.core.stored_specs import spec_of
+
+    with connect(url) as client:
+        best, spec = client.results.best_simulator(id), spec_of(client.spec(id).resolved[0])
+        if spec.robot.name == robot_library.IMPORTED:
+            robot_library.learn([client.robot_file(spec.robot.options["sha256"]).decode()])
+    if best is None:
+        raise CommandError(f"{id} has no tuned simulators yet", Exit.CONFLICT)
+    try:
+        written, distance_m = _written(id, spec, best, (output, original), partial=partial)
+    except InvalidRobot as error:
+        typer.echo(f"gaplab: {output} was not written:", err=True)
+        for reason in error.reasons:
+            typer.echo(f"  - {reason}", err=True)
+        raise typer.Exit(Exit.INVALID) from error
+    if as_json:
+        print_json(_facts(output, best, written, distance_m))
+    else:
+        for line in _lines(output, best, written, distance_m):
+            typer.echo(line)
+
+
+def _written(
+    id: str,
+    spec: ResolvedSpec,
+    best: SimulatorRead,
+    files: tuple[Path, Path | None],
+    *,
+    partial: bool,
+) -> tuple["WrittenFile", float]:
+    """Write the file; return what is in it, and the largest distance in rollouts."""
+    from gaplab.services.core.arrays import frozen
+    from gaplab.services.robots.comparing import check_rollouts
+    from gaplab.services.robots.writing import Tuning, write_json, write_xml
+    from gaplab.services.specs.assembly import edits_of, engine_of
+    from gaplab.services.specs.robots import robot_of
+    from gaplab.services.specs.simulation import Simulation
+
+    output, original = files
+    robot, engine, edits = robot_of(spec), engine_of(spec.engine), edits_of(ref.name for ref in spec.tunables)
+    file, distances = _robot_file(spec, robot), [0.0]
+    tuned = Simulation(robot, engine, edits).world(frozen([best.parameters[ref.name] for ref in spec.tunables]))
+    comments = [
+        _comment(ref.name, best, edit.read(file.world), edit.unit)
+        for ref, edit in zip(spec.tunables, edits, strict=True)
+    ]
+
+    def accept(world: "World") -> None:
+        distances.append(check_rollouts(tuned, world, engine, file.usual_controller, file.usual_task))
+
+    tuning = Tuning(file, tuned, (_headline(id, best), *comments), partial)
+    if output.suffix.lower() == ".json":
+        return write_json(tuning, output, accept), max(distances)
+    if original is None:
+        raise InvalidRobot([f"{output.name} is a copy of the robot's file: give that with --from, or write a .json"])
+    return write_xml(tuning, original, output, accept), max(distances)
+
+
+def _robot_file(spec: ResolvedSpec, robot: "Robot") -> "RobotFile":
+    """Return the robot of an experiment as a file, with the experiment's controller and task."""
+    from gaplab.services.core.robot_files import RobotFile
+    from gaplab.services.core.robot_library import robot_file
+
+    driver, task = spec.controller or robot.usual_controller, spec.task or robot.usual_task
+    if driver is None or task is None or not robot.world.bodies:
+        raise InvalidRobot([f"the robot {spec.robot.name} has no bodies, or brings a controller of its own"])
+    known = robot_file(spec.robot.options.get("sha256", ""))
+    if known is None:
+        return RobotFile(name=spec.robot.name, usual_controller=driver, usual_task=task, world=robot.world)
+    return known.model_copy(update={"usual_controller": driver, "usual_task": task})
+
+
+def _headline(id: str, best: SimulatorRead) -> str:
+    return f"Tuned by gaplab: experiment {id}, repetition {best.repetition}, iteration {best.iteration}."
+
+
+def _comment(name: str, best: SimulatorRead, before: float, unit: str) -> str:
+    unit = "" if unit == "1" else f" {unit}"
+    ends = (best.intervals or {}).get(name)
+    interval = f"95 % interval {ends[0]:.6g} to {ends[1]:.6g}" if ends else "the tuner gives no interval"
+    return f"{name} = {best.parameters[name]:.6g}{unit}, {interval}; before {before:.6g}{unit}"
+
+
+def _facts(output: Path, best: SimulatorRead, written: "WrittenFile", distance_m: float) -> dict[str, Any]:
+    return {
+        "file": str(output),
+        "simulator": best,
+        "written": list(map(str, written.changes)),
+        "left_out": list(map(str, written.left_out)),
+        "computed": list(map(str, written.computed)),
+        "largest_distance_m": distance_m,
+    }
+
+
+def _lines(output: Path, best: SimulatorRead, written: "WrittenFile", distance_m: float) -> Iterator[str]:
+    yield f"repetition {best.repetition}, iteration {best.iteration}, error {best.error:.4g} per sample"
+    yield from (f"  {change}" for change in written.changes)
+    yield from (f"  not in the file: {change}" for change in written.left_out)
+    yield from (f"  an import computes it: {change}" for change in written.computed)
+    yield f"Wrote {output}: rollouts are within {distance_m:.2g} m of the tuned simulator's."

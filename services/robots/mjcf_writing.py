@@ -1,0 +1,165 @@
+"""Tuned values in an MJCF: those of a URDF, and armatures, gains, friction, time step and gravity."""
+
+import os
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gaplab.services.core.errors import InvalidRobot
+from gaplab.services.core.world import World
+from gaplab.services.robots.bodies import Bodies, joint_name
+from gaplab.services.robots.changes import Change
+from gaplab.services.robots.inertials import Inertial, inertials
+from gaplab.services.robots.xml import Document, Element, child, numbers, tree
+
+_OF_JOINTS = {"damping": "damping", "dry_friction": "frictionloss", "armature": "armature"}
+_FILES = {"mesh": "meshdir", "hfield": "meshdir", "texture": "texturedir", "skin": "meshdir"}
+
+
+class MjcfDocument(Document):
+    """An MJCF whose values change; files that it includes become part of it."""
+
+    def __init__(self, text: str, folder: Path, model: Any, locked: Sequence[str]) -> None:  # noqa: ANN401 - MjModel
+        super().__init__(text)
+        _include(self.root, folder)
+        self._model = model
+        elements = [each for world in self.root.findall("worldbody") for each in world.iter()]
+        self._bodies = [each for each in elements if each.tag == "body"]
+        joints = [each for body in self._bodies for each in body if each.tag in {"joint", "freejoint"}]
+        self._joints = [each for each in joints if not _fits(each.get("name", ""), locked)]
+        if len(self._joints) == model.njnt - 1:  # the import made the base free
+            self._joints.insert(0, Element("freejoint"))
+        drives = [each for group in self.root.findall("actuator") for each in group if isinstance(each.tag, str)]
+        self._actuators = [each for each in drives if not _fits(each.get("joint", ""), locked)]
+        self._check()
+
+    def write(self, change: Change) -> bool:
+        """Write a value; return whether the format has a place for it."""
+        kind, name, value = change.place
+        if change.after is None:
+            return False
+        if kind == "world":
+            return self._write_of_the_world(value, change.after)
+        if kind != "joints":
+            return False
+        joint = self._joint(name)
+        if value in _OF_JOINTS:
+            joint.set(_OF_JOINTS[value], numbers(change.after))
+            return True
+        if value == "limits":
+            is_angle = joint.get("type", "hinge") != "slide" and self._compiler("angle", "degree") == "degree"
+            joint.set("range", numbers(*(np.degrees(change.after) if is_angle else change.after)))
+            joint.set("limited", "true")
+            return True
+        return value.startswith("motor.") and self._write_motor(name, value, change.after)
+
+    def write_body(self, bodies: Bodies, head: int, before: World, after: World) -> bool:
+        """Write mass, centre and inertia of a body; return whether the bodies that it consists of can share them."""
+        at = bodies.heads.index(head)
+        found = inertials(bodies, head, before.bodies[at], after.bodies[at])
+        if found is None or self._compiler("settotalmass", ""):
+            return False
+        if self._compiler("inertiafromgeom", "auto") == "true":
+            self._state_all()
+        for each in found:
+            self._state(each.number, each.mass_kg, each)
+        return True
+
+    def move(self, before: Path, after: Path) -> None:
+        """Change the names of files for an MJCF in another folder."""
+        for element in self.root.iter():
+            given = element.get("file", "")
+            if element.tag in _FILES and given and not Path(given).is_absolute():
+                folder = before / (self._compiler("assetdir", "") or self._compiler(_FILES[str(element.tag)], ""))
+                element.set("file", Path(os.path.relpath(folder / given, after)).as_posix())
+        for compiler in self.root.findall("compiler"):
+            for name in ("meshdir", "texturedir", "assetdir"):
+                compiler.attrib.pop(name, None)
+
+    def _check(self) -> None:
+        """Raise an error unless the elements are the bodies and joints of the model, in its order."""
+        model = self._model
+        names = [each.get("name", "") for each in self._bodies]
+        if names != [str(model.body(at).name) for at in range(1, model.nbody)] or len(self._joints) != model.njnt:
+            raise InvalidRobot(["the bodies of the MJCF are made by frames or copies: write robot.json instead"])
+
+    def _joint(self, name: str) -> Element:
+        model = self._model
+        return next(self._joints[at] for at in range(model.njnt) if joint_name(model, at) == name)
+
+    def _compiler(self, name: str, default: str) -> str:
+        return next((each.get(name, default) for each in self.root.findall("compiler") if each.get(name)), default)
+
+    def _state_all(self) -> None:
+        """State the inertias that MuJoCo computes of shapes, so that it can use stated ones."""
+        for compiler in self.root.findall("compiler"):
+            compiler.attrib.pop("inertiafromgeom", None)
+        for at in range(1, self._model.nbody):
+            if self._model.body_mass[at] > 0:
+                self._state(at, float(self._model.body_mass[at]), None)
+
+    def _state(self, number: int, mass_kg: float, found: Inertial | None) -> None:
+        model, inertial = self._model, child(self._bodies[number - 1], "inertial")
+        turn = model.body_iquat[number] if found is None else np.roll(found.axes.as_quat(), 1)
+        inertial.attrib.clear()
+        inertial.set("mass", numbers(mass_kg))
+        inertial.set("pos", numbers(*(model.body_ipos[number] if found is None else found.center_m)))
+        inertial.set("quat", numbers(*turn))
+        moments = model.body_inertia[number] if found is None else found.moments_kg_m2
+        inertial.set("diaginertia", numbers(*moments))
+
+    def _write_of_the_world(self, value: str, number: Any) -> bool:  # noqa: ANN401 - any value of a world
+        if value == "time_step_s":
+            child(self.root, "option").set("timestep", numbers(number))
+        elif value == "gravity_m_s2":
+            child(self.root, "option").set("gravity", numbers(0, 0, -number))
+        else:
+            return False
+        return True
+
+    def write_friction(self, coefficient: float) -> None:
+        """Write the coefficient of all contacts: MuJoCo's static and dynamic one are the same."""
+        for geom in [each for world in self.root.findall("worldbody") for each in world.iter("geom")]:
+            others = geom.get("friction", "1").split()[1:]
+            geom.set("friction", " ".join([numbers(coefficient), *others]))
+
+    def _write_motor(self, name: str, value: str, number: float) -> bool:
+        model = self._model
+        at = next(
+            (a for a in range(model.nu) if joint_name(model, int(np.ravel(model.actuator_trnid[a])[0])) == name), -1
+        )
+        if at < 0 or self._actuators[at].tag not in {"motor", "position", "velocity"}:
+            return False
+        element, gear = self._actuators[at], float(model.actuator_gear[at, 0])
+        if value == "motor.max_torque_nm":
+            is_control = element.tag == "motor" and bool(model.actuator_ctrllimited[at])
+            largest = number / abs(gear)
+            element.set("ctrlrange" if is_control else "forcerange", numbers(-largest, largest))
+            element.set("ctrllimited" if is_control else "forcelimited", "true")
+        elif value == "motor.kp" and element.tag == "position":
+            element.set("kp", numbers(number / gear**2))
+        elif value == "motor.kd" and element.tag in {"position", "velocity"}:
+            element.set("kv", numbers(number / gear**2))
+            element.attrib.pop("dampratio", None)
+        else:
+            return False
+        return True
+
+
+def _fits(name: str, patterns: Sequence[str]) -> bool:
+    return any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def _include(root: Element, folder: Path) -> None:
+    """Replace `<include>` by what the file has, as MuJoCo does."""
+    for parent in list(root.iter()):
+        for place, element in reversed(list(enumerate(parent))):
+            if element.tag == "include":
+                included = tree((folder / element.get("file", "")).read_text(encoding="utf-8-sig"))
+                _include(included, folder)
+                parent.remove(element)
+                for each in reversed(list(included)):
+                    parent.insert(place, each)

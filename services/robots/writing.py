@@ -1,0 +1,198 @@
+"""Tuned values back in the file that a robot came from; the new file is imported again and compared before."""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, TypeAlias, TypeVar, cast
+
+from gaplab.services.core.errors import InvalidRobot
+from gaplab.services.core.robot_files import RobotFile, read_robot_file
+from gaplab.services.core.world import World
+from gaplab.services.robots.bodies import Bodies
+from gaplab.services.robots.changes import Change, Place, changes
+from gaplab.services.robots.importing import import_robot
+from gaplab.services.robots.mjcf_writing import MjcfDocument
+from gaplab.services.robots.notes import Notes
+from gaplab.services.robots.options import ImportOptions
+from gaplab.services.robots.reading import read_source
+from gaplab.services.robots.urdf_writing import UrdfDocument
+
+T = TypeVar("T")
+
+_OF_BODIES = {"mass_kg", "center_m", "inertia"}
+_COMPUTED = {"start_height_m", "swing", "motor.kp", "motor.kd", "motor.max_torque_nm"}
+"""Values that an import may compute of others, so that they differ after it although they were not tuned."""
+
+_FRICTION = ("material.static_friction", "material.dynamic_friction")
+
+
+@dataclass(frozen=True)
+class WrittenFile:
+    """A file with tuned values.
+
+    Attributes:
+        changes: values that are in it.
+        left_out: values that its format has no place for; they are comments.
+        computed: values that another import of it computes differently.
+        world: world of the file, with the values that are not of the format as they were tuned.
+    """
+
+    changes: tuple[Change, ...]
+    left_out: tuple[Change, ...]
+    computed: tuple[Change, ...]
+    world: World
+
+
+Accept: TypeAlias = Callable[[World], None]
+"""What raises an error if the world of a new file is not the tuned one, before the file is written."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What is written into a file.
+
+    Attributes:
+        robot: the robot as it was imported.
+        world: its world with the tuned values.
+        comments: lines for the start of the file.
+        partial: whether values that the format has no place for are left out, instead of refused.
+    """
+
+    robot: RobotFile
+    world: World
+    comments: tuple[str, ...]
+    partial: bool = False
+
+
+def write_json(tuning: Tuning, output: Path, accept: Accept) -> WrittenFile:
+    """Write a robot file whose world is the tuned one.
+
+    Args:
+        tuning: the tuned values.
+        output: the file to write.
+        accept: check of the new file's world.
+
+    Raises:
+        InvalidRobot: the world is not the same after it is read again.
+        InvalidSpec: the tuned world is not possible.
+    """
+    world = replace(tuning.world, origin=None, edits=frozenset())
+    file = tuning.robot.model_copy(update={"world": world, "comments": tuning.comments})
+    text = json.dumps(file.content, ensure_ascii=False, indent=1) + "\n"
+    again = read_robot_file(text).world
+    if again != world:
+        raise InvalidRobot(["the robot file does not give the tuned world again"])
+    accept(again)
+    output.write_text(text, encoding="utf-8")
+    return WrittenFile(tuple(changes(tuning.robot.world, tuning.world)), (), (), again)
+
+
+def write_xml(tuning: Tuning, original: Path, output: Path, accept: Accept) -> WrittenFile:
+    """Write a copy of the file that a robot was imported from, with tuned values.
+
+    Args:
+        tuning: the tuned values.
+        original: the file that the robot was imported from.
+        output: the file to write.
+        accept: check of the new file's world, with the values that are not of the format as they were tuned.
+
+    Raises:
+        InvalidRobot: the original is another file, the format has no place for a value, or the new file gives another
+            world.
+    """
+    robot, tuned = tuning.robot, tuning.world
+    options = _options(robot, original, output)
+    text, notes = original.read_text(encoding="utf-8-sig"), Notes()
+    source = read_source(original, text, options, notes)
+    document: UrdfDocument | MjcfDocument = (
+        UrdfDocument(text) if source.is_urdf else MjcfDocument(text, original.parent, source.model, options.lock)
+    )
+    wanted = changes(robot.world, tuned)
+    written = _write(document, Bodies(source, options, notes), wanted, (robot.world, tuned))
+    left_out = tuple(change for change in wanted if change.place not in written)
+    if left_out and not tuning.partial:
+        form = "URDF" if source.is_urdf else "MJCF"
+        reasons = [f"{change}: the {form} has no place for it" for change in left_out]
+        raise InvalidRobot([*reasons, "--partial leaves these out; robot.json has a place for all"])
+    if output.absolute().parent != original.absolute().parent:
+        document.move(original.absolute().parent, output.absolute().parent)
+    lines = [*tuning.comments, *(f"not in this file: {change}" for change in left_out)]
+    beside = output.with_name(f".{output.stem}.unchecked{output.suffix}")
+    beside.write_text(document.text(lines), encoding="utf-8")
+    try:
+        again = import_robot(beside, options).robot.world
+        computed = _computed(again, tuning, left_out)
+        world = _completed(tuned, again, [change.place for change in wanted if change.place in written])
+        accept(world)
+        beside.replace(output)
+    finally:
+        beside.unlink(missing_ok=True)
+    return WrittenFile(tuple(change for change in wanted if change.place in written), left_out, computed, world)
+
+
+def _options(robot: RobotFile, original: Path, output: Path) -> ImportOptions:
+    if robot.source is None:
+        raise InvalidRobot([f"{robot.name} was not imported from a file: write robot.json instead"])
+    digest = sha256(original.read_bytes()).hexdigest()
+    if digest != robot.source.sha256:
+        raise InvalidRobot([f"{original} is not the file that {robot.name} was imported from, or has changed since"])
+    if original.suffix.lower() != output.suffix.lower():
+        raise InvalidRobot([f"{output.name} must end in {original.suffix}, as {original.name} does, or in .json"])
+    return ImportOptions.model_validate(robot.source.options)
+
+
+def _write(
+    document: UrdfDocument | MjcfDocument, bodies: Bodies, wanted: Sequence[Change], worlds: tuple[World, World]
+) -> set[Place]:
+    """Write what the document has a place for; return the places of these values."""
+    written = {change.place for change in wanted if document.write(change)}
+    for head, body in zip(bodies.heads, worlds[0].bodies, strict=True):
+        places = {c.place for c in wanted if c.place[:2] == ("bodies", body.name) and c.place[2] in _OF_BODIES}
+        if places and head and document.write_body(bodies, head, *worlds):
+            written |= places
+    material = worlds[1].material
+    frictions = {("world", "", name) for name in _FRICTION} & {change.place for change in wanted}
+    is_one = material.static_friction == material.dynamic_friction and not worlds[1].surfaces
+    if frictions and is_one and isinstance(document, MjcfDocument):
+        document.write_friction(material.static_friction)
+        written |= frictions
+    return written
+
+
+def _computed(again: World, tuning: Tuning, left_out: Sequence[Change]) -> tuple[Change, ...]:
+    """Return the values that an import computes of tuned ones, though they were not tuned.
+
+    Raises:
+        InvalidRobot: another value differs from that of the tuned world.
+    """
+    missing = {change.place for change in left_out}
+    tuned = {change.place for change in changes(tuning.robot.world, tuning.world)}
+    differing = [change for change in changes(tuning.world, again) if change.place not in missing]
+    if wrong := [each for each in differing if each.place[2] not in _COMPUTED or each.place in tuned]:
+        raise InvalidRobot(f"{change}: not the same after the new file is imported again" for change in wrong)
+    return tuple(differing)
+
+
+def _completed(tuned: World, again: World, written: Sequence[Place]) -> World:
+    """Return the tuned world with the values that the new file gives."""
+    world = replace(tuned, origin=None, edits=frozenset())
+    for kind, name, value in written:
+        if kind == "world":
+            world = _taken(world, again, value)
+            continue
+        theirs = {member.name: member for member in getattr(again, kind)}
+        members = [_taken(each, theirs[name], value) if each.name == name else each for each in getattr(world, kind)]
+        changed: dict[str, Any] = {kind: tuple(members)}
+        world = replace(world, **changed)
+    return world
+
+
+def _taken(owner: T, other: Any, value: str) -> T:  # noqa: ANN401 - both are a World, a Body or a Joint
+    outer, _, inner = value.partition(".")
+    found = getattr(other, outer)
+    if inner:
+        found = replace(getattr(owner, outer), **{inner: getattr(found, inner)})
+    changed: Any = replace(owner, **{outer: found})  # type: ignore[type-var]
+    return cast(T, changed)

@@ -1,0 +1,50 @@
+"""Robots from files stand, or hold still, in each engine that honours what they need."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gaplab.schemas.plugin import PluginRef
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.motions import Motion
+from gaplab.services.engines import engines
+from gaplab.services.robots.importing import import_robot
+from gaplab.services.robots.options import ImportOptions
+from gaplab.services.specs.assembly import engine_of
+from tests.unit.test_robot_import import FILES, path_of
+
+pytest.importorskip("mujoco")
+STANCES: dict[str, dict[str, Any]] = {
+    "a1": {"start": {"*_upper_joint": 0.9, "*_lower_joint": -1.8}},
+    "laikago": {"turn": (np.pi / 2, 0, 0), "start": {"*_upper_leg_2*": 0.6, "*_lower_leg_2*": -1.2}},
+    "aliengo": {"start": {"*_upper_joint": 0.8, "*_lower_joint": -1.6}},
+    "mini_cheetah": {"start": {"abduct*": -0.8, "thigh*": 1.6}},
+    "vision60": {"start": {"[0246]": 0.8, "[1357]": 1.5}},
+    "minitaur": {},
+    "kuka_iiwa": {"start": {"*_2": 0.5, "*_4": -1.0}},
+    "franka_panda": {},
+}
+
+
+@pytest.mark.parametrize("engine", ["pybullet", "mujoco", "physx"])
+@pytest.mark.parametrize("name", STANCES)
+def test_a_robot_with_its_motors_at_rest_stays_as_it_starts(name: str, engine: str) -> None:
+    """For three seconds. Gains are those that the import computes, and the largest torques those of the file."""
+    if engine not in engines or not engines[engine].available():
+        pytest.skip(f"{engine} is not installed")
+    file, options = FILES[name]
+    world = import_robot(path_of(file), ImportOptions(**options, **STANCES[name])).robot.world
+    if lacks := engines[engine].lacks(world):
+        pytest.skip(f"{engine} does not honour {lacks}")
+    starts = np.array([joint.start for joint in world.joints])
+    motion = Motion(frozen([0.0]), frozen([starts]), frozen([0.1, 3.0]))
+
+    seen = engine_of(PluginRef(name=engine)).record(world, motion, frozen([1.0, 3.0]))
+
+    first, last = seen.trajectory.positions_m
+    assert np.linalg.norm(last - first) < 0.03
+    assert abs(float(np.sum(seen.poses[-1, 3:] * world.start_turn))) > np.cos(
+        np.radians(3) / 2
+    )  # turned by less than 3°
+    assert seen.angles_rad[-1] == pytest.approx(starts, abs=0.25)

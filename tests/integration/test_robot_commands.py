@@ -1,0 +1,204 @@
+"""`gaplab robot import`, and `gaplab simulator` on a service in a thread."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gaplab.schemas.spec import ExperimentSpec
+from gaplab.services.core.arrays import frozen
+from gaplab.services.core.robot_files import read_robot_file
+from gaplab.services.core.robots.quadruped import Quadruped
+from gaplab.services.core.types import Cost, Measured, Probed, Sample, Selected, Simulator, Step, Transferred, Tuned
+from gaplab.services.core.world import Material
+from gaplab.services.experiments.submission import submit_experiment
+from gaplab.services.robots.importing import import_robot
+from gaplab.services.robots.options import ImportOptions
+from gaplab.services.running import execution
+from gaplab.services.store.session import Store
+from tests.commands import Gaplab
+from tests.experiments import run
+from tests.robot_texts import MJCF
+from tests.unit.test_robot_import import path_of
+
+pytest.importorskip("mujoco")
+BEST = (0.9, 0.7, 0.1)
+
+
+def test_an_import_writes_a_robot_file_and_says_what_is_lost(gaplab: Gaplab, tmp_path: Path) -> None:
+    output = tmp_path / "a1.json"
+    knees = ("--start", "*_lower_joint=-1.8", "--start", "*_upper_joint=0.9")
+
+    said = gaplab("robot", "import", str(path_of("a1/a1.urdf")), "--name", "a1", "-o", str(output), *knees)
+    robot = read_robot_file(output.read_bytes())
+
+    assert said.code == 0
+    assert robot.sha256 in said.out
+    assert all(line in said.out for line in robot.lost)
+    assert "fixed to FR_lower, and part of it: FR_toe" in said.out
+    assert "12.458" in said.out
+    assert robot.name == "a1"
+    assert [joint.start for joint in robot.world.joints][:3] == [0.0, 0.9, -1.8]
+
+
+def test_an_import_takes_all_options_and_prints_json(
+    gaplab: Gaplab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("m.xml").write_text(MJCF.format(""))
+    options = (
+        "--motor",
+        "servo",
+        "--fixed",
+        "--time-step",
+        "0.01",
+        "--lock",
+        "jc",
+        "-s",
+        "max_torque=3",
+        "-s",
+        "task=walk",
+    )
+
+    said = gaplab("robot", "import", "m.xml", *options, "--json")
+    found, robot = json.loads(said.out), read_robot_file(Path("m.json").read_bytes())
+
+    assert (found["file"], found["sha256"], found["lost"]) == ("m.json", robot.sha256, list(robot.lost))
+    assert found["mass_before_kg"] == pytest.approx(2.6)
+    assert [row["members"] for row in found["masses"]] == [["base"], ["a"], ["b", "c"]]
+    assert robot.world.joints[0].motor.max_torque_nm == 3
+    assert robot.world.fixed
+    assert robot.source.options["lock"] == ["jc"]
+
+
+def test_a_refusal_names_every_reason_and_writes_nothing(gaplab: Gaplab, tmp_path: Path) -> None:
+    output = tmp_path / "no.json"
+
+    said = gaplab("robot", "import", str(path_of("mini_cheetah/mini_cheetah.urdf")), "-o", str(output))
+
+    assert said.code == 5
+    assert said.err.count("break the triangle inequality; --mend replaces it") == 4
+    assert not output.exists()
+    assert "one of servo, position, velocity, torque" in gaplab("robot", "import", "x", "--motor", "x").err.replace(
+        "\n", " "
+    ).replace("│", "").replace("  ", " ")
+    assert gaplab("robot", "import", "x", "-s", "colour=red").code == 2
+    assert gaplab("robot", "import", "x", "--start", "knee").code == 2
+    assert gaplab("robot", "import", str(tmp_path / "missing.urdf")).code == 7
+
+
+def best_of(iteration: int) -> Simulator:
+    """Return the best simulator, which has intervals in the last iteration."""
+    if iteration < 2:
+        return Simulator(frozen((0.5, 0.4, 0.0)), 0.01)
+    return Simulator(frozen(BEST), 0.01, interval=frozen([(0.8, 1.0), (0.6, 0.75), (0.0, 0.2)]))
+
+
+def log(genome: np.ndarray) -> Iterator[Step]:
+    """Two iterations, of which the second has the better simulators first."""
+    for iteration in range(3):
+        if iteration:
+            yield Selected(iteration, genome, Cost(1, 1))
+            yield Measured(iteration, Sample(genome, 0.3))
+        simulators = (best_of(iteration), Simulator(frozen(BEST), 0.5))
+        yield Tuned(iteration, simulators, Cost(1, 1) if iteration else Cost())
+        yield Transferred(iteration, genome, 0.3, Cost(1, 1))
+        yield Probed(iteration, 0.3, 0.3)
+
+
+@pytest.fixture
+def tuned(sqlite_store: Store) -> str:
+    """The id of a tuned experiment of the quadruped in PyBullet."""
+    pytest.importorskip("pybullet")
+    tunables = ["static_friction", "dynamic_friction", "restitution"]
+    wanted = {"strategy": "random", "robot": "quadruped", "engine": "pybullet", "budget": "smoke", "tunables": tunables}
+    submitted = submit_experiment(
+        sqlite_store, ExperimentSpec.model_validate(wanted | {"iterations": 2, "repetitions": 1})
+    )
+    (claim,) = execution.claim(sqlite_store, "test", limit=1)
+    run(sqlite_store, claim, log(Quadruped().known))
+    return submitted.id
+
+
+def test_the_best_simulator_is_written_as_a_robot_file(gaplab: Gaplab, tuned: str, tmp_path: Path) -> None:
+    output = tmp_path / "tuned.json"
+
+    said = gaplab("simulator", tuned, "-o", str(output))
+    robot = read_robot_file(output.read_bytes())
+
+    assert said.code == 0
+    assert "material.static_friction 1 → 0.9" in said.out
+    assert "rollouts are within 0 m of the tuned simulator's" in said.out
+    assert robot.world == replace(Quadruped().world, material=Material(*BEST))
+    assert (robot.usual_controller.name, robot.usual_task.name) == ("square_pulses", "walk")
+    assert robot.comments[0] == f"Tuned by gaplab: experiment {tuned}, repetition 0, iteration 2."
+    assert robot.comments[1] == "static_friction = 0.9, 95 % interval 0.8 to 1; before 1"
+    facts = json.loads(gaplab("simulator", tuned, "-o", str(output), "--json").out)
+    assert facts["simulator"]["parameters"]["restitution"] == 0.1
+    assert len(facts["written"]) == 3
+
+
+def test_a_file_that_cannot_be_written_is_refused_with_every_reason(
+    gaplab: Gaplab, tuned: str, sqlite_store: Store, tmp_path: Path
+) -> None:
+    urdf = str(path_of("a1/a1.urdf"))
+    alone = gaplab("simulator", tuned, "-o", str(tmp_path / "tuned.urdf"))
+    foreign = gaplab("simulator", tuned, "-o", str(tmp_path / "tuned.urdf"), "--from", urdf)
+
+    assert (alone.code, foreign.code) == (5, 5)
+    assert "give that with --from, or write a .json" in alone.err
+    assert "quadruped was not imported from a file: write robot.json instead" in foreign.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_experiment_without_tuned_simulators_says_so(gaplab: Gaplab, sqlite_store: Store, tmp_path: Path) -> None:
+    spec = ExperimentSpec.model_validate({"strategy": "random", "robot": "quadruped", "budget": "smoke"})
+    waiting = submit_experiment(sqlite_store, spec)
+
+    said = gaplab("simulator", waiting.id, "-o", str(tmp_path / "tuned.json"))
+
+    assert said.code == 6
+    assert "no tuned simulators yet" in said.err
+
+
+@pytest.fixture
+def tuned_a1(sqlite_store: Store, gaplab: Gaplab, tmp_path: Path) -> str:
+    """The id of a tuned experiment of a1, whose file was imported and stored."""
+    pytest.importorskip("pybullet")
+    file, knees = str(tmp_path / "a1.json"), ("--start", "*_lower_joint=-1.8", "--start", "*_upper_joint=0.9")
+    assert gaplab("robot", "import", str(path_of("a1/a1.urdf")), "--name", "a1", "-o", file, *knees).code == 0
+    assert gaplab("robot", "add", file).code == 0
+    tunables = ["mass(trunk)", "joint_damping(*_hip_joint)", "max_torque"]
+    wanted = {"strategy": "random", "robot": "a1", "engine": "pybullet", "budget": "smoke", "tunables": tunables}
+    submitted = submit_experiment(
+        sqlite_store, ExperimentSpec.model_validate(wanted | {"iterations": 2, "repetitions": 1})
+    )
+    (claim,) = execution.claim(sqlite_store, "test", limit=1)
+    run(sqlite_store, claim, log(frozen(np.zeros(3))))
+    return submitted.id
+
+
+def test_tuned_values_of_an_imported_robot_are_in_its_urdf(gaplab: Gaplab, tuned_a1: str, tmp_path: Path) -> None:
+    """With real rollouts in PyBullet. The trunk is at 0.9 of its mass, hips have 0.7 N·m·s/rad, torques a tenth."""
+    original, output = path_of("a1/a1.urdf"), tmp_path / "tuned.urdf"
+
+    said = gaplab("simulator", tuned_a1, "-o", str(output), "--from", str(original))
+    robot = import_robot(output, ImportOptions()).robot.world
+
+    assert said.code == 0, said.err
+    assert "trunk: mass_kg 4.714 → 4.2426" in said.out
+    assert "an import computes it: FR_hip_joint: motor.kp" in said.out
+    assert robot.bodies[0].mass_kg == pytest.approx(0.9 * 4.714, rel=1e-12)
+    assert [joint.damping for joint in robot.joints[:3]] == [0.7, 0, 0]
+    assert robot.joints[0].motor.max_torque_nm == pytest.approx(2.0)
+    assert "mass(trunk) = 0.9, 95 % interval 0.8 to 1; before 1" in output.read_text()
+
+
+def test_another_urdf_than_that_of_the_robot_is_refused(gaplab: Gaplab, tuned_a1: str, tmp_path: Path) -> None:
+    said = gaplab("simulator", tuned_a1, "-o", str(tmp_path / "t.urdf"), "--from", str(path_of("aliengo/aliengo.urdf")))
+
+    assert said.code == 5
+    assert "aliengo.urdf is not the file that a1 was imported from, or has changed since" in said.err
