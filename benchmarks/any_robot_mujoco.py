@@ -1,8 +1,8 @@
 """A robot with PD motors in MuJoCo: Simulate against bare stepping, 20 simulators by turns, and feedback.
 
-`python -m benchmarks.any_robot_mujoco` prints all three. Bare stepping is one call of `mujoco.rollout` with the same model and
-law, and targets that were computed before. Feedback is the controller `mlp`, 64 genomes a call, against as many of
-`square_pulses`, which needs no sensors.
+`python -m benchmarks.any_robot_mujoco` prints all three. Bare stepping is one call of `mujoco.rollout` with the same
+model and law, and targets that were computed before. Feedback is the controller `mlp`, 64 genomes a call, against as
+many of `square_pulses`, which needs no sensors.
 """
 
 from collections.abc import Callable
