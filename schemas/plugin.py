@@ -1,5 +1,6 @@
 """Plug-ins: references in a spec, and entries of the catalogue."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import Field, GetJsonSchemaHandler, model_validator
@@ -7,6 +8,18 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from gaplab.schemas.base import Frozen, Real
+
+
+def tunable_label(name: str, options: Mapping[str, Any]) -> str:
+    """Return the label of a tunable with options, like `mass(trunk)` or `kp(*_knee, as=value)`.
+
+    Args:
+        name: name of the plug-in.
+        options: its options; `of` has no name in a label, and is first.
+    """
+    parts = [str(options["of"])] if "of" in options else []
+    parts += [f"{key}={value}" for key, value in sorted(options.items()) if key != "of"]
+    return f"{name}({', '.join(parts)})" if parts else name
 
 
 class Named(Frozen):
@@ -32,10 +45,38 @@ class PluginRef(Named):
 
 
 class TunableRef(Named):
-    """A simulator parameter to tune, with its bounds; a missing bound is the tunable's default."""
+    """A simulator parameter to tune, with its bounds; a missing bound is the tunable's default.
+
+    Its name is a label with the options in parentheses: `{"name": "mass", "options": {"of": "trunk"}}` is
+    `{"name": "mass(trunk)"}`.
+    """
 
     lower: Real | None = None
     upper: Real | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _put_options_into_the_name(cls, value: object) -> object:
+        if (
+            isinstance(value, Mapping)
+            and isinstance(value.get("name"), str)
+            and isinstance(value.get("options"), Mapping)
+        ):
+            others = {key: given for key, given in value.items() if key != "options"}
+            return {**others, "name": tunable_label(value["name"], value["options"])}
+        return value
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Return a JSON Schema with both spellings; the object may have options."""
+        schema = super().__get_pydantic_json_schema__(core, handler)
+        options = {
+            "type": "object",
+            "description": "options, which become part of the name",
+            "additionalProperties": True,
+        }
+        schema["anyOf"][-1]["properties"]["options"] = {"title": "Options", **options}
+        return schema
 
 
 class PluginRead(Frozen):

@@ -19,6 +19,7 @@ from gaplab.services.core.robots import robots
 from gaplab.services.core.stored_specs import spec_as_stored
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tunables.labels import plain_name
 from gaplab.services.specs.resolution import takes_samples
 from gaplab.services.store.models import SPEC_VERSION
 from gaplab.services.store.queries import provenance
@@ -119,7 +120,7 @@ def _checked_spec(row: Row) -> Row:
     except (KeyError, TypeError, AttributeError) as error:
         raise InvalidArchive(f"{place} is not a spec") from error
     names = [each.name for each in spec.tunables]
-    wrong = [name for name in (*truth, *names) if name not in tunables]
+    wrong = [name for name in (*truth, *names) if plain_name(name) not in tunables]
     wrong += [] if _is_known(spec.robot) else [label_of(spec.robot)]
     if wrong or len(set(names)) < len(names) or spec.strategy.name != row["strategy"]:
         msg = f"{place} is not resolved, or names plug-ins that are not installed here: {', '.join(wrong)[:200]}"

@@ -6,13 +6,25 @@ from inspect import getdoc
 from traceback import extract_tb
 from typing import Any
 
-from gaplab.services.contract import discrepancies, engines, optimizers, robots, strategies, tunables, tuners
+from gaplab.services.contract import (
+    controllers,
+    discrepancies,
+    engines,
+    optimizers,
+    robots,
+    strategies,
+    tasks,
+    tunables,
+    tuners,
+)
 
 Check = Callable[[type[Any]], None]
 
 CHECKS: dict[str, tuple[Check, ...]] = {
     "strategy": strategies.CHECKS,
     "robot": robots.CHECKS,
+    "controller": controllers.CHECKS,
+    "task": tasks.CHECKS,
     "engine": engines.CHECKS,
     "tunable": tunables.CHECKS,
     "optimizer": optimizers.CHECKS,

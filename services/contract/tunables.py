@@ -1,45 +1,79 @@
-"""The contract of a tunable."""
+"""The contract of a tunable, without options, in a robot that has what it edits."""
 
 from dataclasses import asdict
+from math import isclose
 from typing import Any
 
+from gaplab.services.contract.controllers import arm
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.core.world import World
 
 Plugin = type[Tunable]
 DETAILS = {"field", "unit", "lower", "upper", "least", "greatest"}
+OF_NO_FIELD = ("origin", "edits")
+"""Places of a world in which `World.edited` remembers what was edited."""
+
+
+def subject(tunable: Tunable) -> World:
+    """Return a robot that has what a tunable edits."""
+    worlds = [world for world in (Quadruped().world, arm()) if tunable.lack(world) is None]
+    assert worlds, f"neither the quadruped nor an arm has what it edits: {tunable.lack(Quadruped().world)}"
+    return worlds[0]
 
 
 def reads_back_what_it_wrote(plugin: Plugin) -> None:
-    """Reads back the value that it wrote."""
+    """Reads back the value that it wrote; if it is relative, the value that changes nothing."""
     tunable = plugin()
-    value = (tunable.lower + tunable.upper) / 2
-    read = tunable.read(tunable.edit(Quadruped().world, value))
-    assert read == value, f"it wrote {value} and reads {read}"
+    world = subject(tunable)
+    value = tunable.lower + 0.6 * (tunable.upper - tunable.lower)
+    expected = tunable.read(world) if tunable.relative else value
+    read = tunable.read(tunable.edit(world, value))
+    assert isclose(read, expected, rel_tol=1e-12), f"it wrote {value} and reads {read}, not {expected}"
+
+
+def changes_nothing_by_the_value_that_it_reads(plugin: Plugin) -> None:
+    """Changes nothing if it writes the value that it reads."""
+    tunable = plugin()
+    world = subject(tunable)
+    assert tunable.edit(world, tunable.read(world)) == world, (
+        f"it reads {tunable.read(world)}, and writing that changes it"
+    )
 
 
 def edits_its_field_alone(plugin: Plugin) -> None:
-    """Edits the field of the world that it declares, and no other."""
-    tunable, world = plugin(), Quadruped().world
+    """Edits the field of the world that it declares, and no other but those of `also`."""
+    tunable = plugin()
+    world = subject(tunable)
     before = flattened(asdict(world))
     after = flattened(asdict(tunable.edit(world, _another(tunable, tunable.read(world)))))
-    changed = sorted({_field(place) for place in before if before[place] != after.get(place)})
-    ends = tunable.field.rpartition(".")[2]
-    same = bool(changed) and all(field.endswith(ends) for field in changed)
+    places = [place for place in before if place.split(".")[0] not in OF_NO_FIELD]
+    changed = sorted({_field(place) for place in places if before[place] != after.get(place)})
+    permitted = {tunable.field.rpartition(".")[2], *tunable.also}
+    same = bool(changed) and all(permitted & set(field.split(".")) for field in changed)
     assert same, f"it declares the field {tunable.field!r}, and changes {', '.join(changed) or 'nothing'}"
 
 
 def leaves_the_given_world(plugin: Plugin) -> None:
     """Leaves the world that it was given unchanged."""
-    tunable, world = plugin(), Quadruped().world
-    before = tunable.read(world)
-    tunable.edit(world, _another(tunable, before))
-    assert tunable.read(world) == before, "it changes the given world; return a copy by dataclasses.replace"
+    tunable = plugin()
+    world, same = subject(tunable), subject(tunable)
+    tunable.edit(world, _another(tunable, tunable.read(world)))
+    assert world == same, "it changes the given world; return a copy by dataclasses.replace"
+
+
+def is_built_as_it_says(plugin: Plugin) -> None:
+    """Edits a world that engines would build as it is, if they set nothing in place."""
+    tunable = plugin()
+    world = subject(tunable)
+    edited = tunable.edit(world, _another(tunable, tunable.read(world)))
+    assert edited.built(frozenset()) == edited.kind, "an engine would build another world; use World.edited, or replace"
 
 
 def has_bounds_that_mean_something(plugin: Plugin) -> None:
     """Has bounds that ascend, within the limits of meaningful values."""
-    bounds = (plugin.least, plugin.lower, plugin.upper, plugin.greatest)
+    tunable = plugin()
+    bounds = (tunable.least, tunable.lower, tunable.upper, tunable.greatest)
     ascend = bounds[0] <= bounds[1] < bounds[2] <= bounds[3]
     assert ascend, f"least, lower, upper and greatest must ascend, and are {bounds}"
 
@@ -73,8 +107,10 @@ def _another(tunable: Tunable, value: float) -> float:
 
 CHECKS = (
     reads_back_what_it_wrote,
+    changes_nothing_by_the_value_that_it_reads,
     edits_its_field_alone,
     leaves_the_given_world,
+    is_built_as_it_says,
     has_bounds_that_mean_something,
     is_described,
 )

@@ -209,9 +209,14 @@ def _source(plugin: type[Plugin]) -> str:
     return f"{file} of GAPLAB_PLUGINS" if file and plugin.source == Plugin.source else plugin.source
 
 
+def _option_names(plugin: type[Plugin]) -> list[str]:
+    """Return the names of the options, as specs have them."""
+    return [field.alias or name for name, field in plugin.Options.model_fields.items()]
+
+
 def _option_violation(plugin: type[Plugin], error: dict[str, Any], pointer: str) -> Violation:
     place = "".join(f"/{part}" for part in error["loc"])
     if error["type"] == "extra_forbidden":
         kind = f"option of {plugin.name!r}"
-        return unknown_name(pointer + place, kind, str(error["loc"][-1]), list(plugin.Options.model_fields) or ["none"])
+        return unknown_name(pointer + place, kind, str(error["loc"][-1]), _option_names(plugin) or ["none"])
     return Violation(pointer + place, error["input"], sentence(error), permitted_by(error))

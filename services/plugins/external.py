@@ -12,6 +12,7 @@ from gaplab.services.core.robots import robots
 from gaplab.services.core.strategies import strategies
 from gaplab.services.core.tasks import tasks
 from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tunables.labels import plain_name
 from gaplab.services.core.tuners import tuners
 from gaplab.services.engines import engines
 from gaplab.services.plugins.contents import Contents
@@ -77,5 +78,5 @@ def _named_in(spec: Mapping[str, Any]) -> Iterator[str]:
     reality = spec.get("reality") or {}
     if reality.get("engine"):
         yield f"engine {reality['engine']['name']}"
-    yield from (f"tunable {ref['name']}" for ref in spec["tunables"])
-    yield from (f"tunable {name}" for name in reality.get("parameters", ()))
+    yield from (f"tunable {plain_name(ref['name'])}" for ref in spec["tunables"])
+    yield from (f"tunable {plain_name(name)}" for name in reality.get("parameters", ()))

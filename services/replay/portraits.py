@@ -32,7 +32,7 @@ def robot_picture(drawing: RolloutProcess, name: str, *, dark: bool, width_px: i
     """
     if name not in robots:
         raise NotFound(f"no usable robot is called {name[:64]!r}; permitted: {', '.join(robots)}")
-    world = robots[name]().world
+    world = robots[name].example().world
     if not world.bodies:
         raise NotFound(f"the robot {name!r} has no body, so there is no picture of it")
     return world_picture(drawing, world, dark=dark, width_px=width_px)

@@ -1,6 +1,6 @@
 """The page of an outcome: what a person prints and pins beside the robot."""
 
-from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.figures.kinds.curves import curves_figure
 from gaplab.services.figures.words import number, number_of, spoken, with_unit
 from gaplab.services.reports import tables
@@ -67,7 +67,7 @@ def _simulator(outcome: ExperimentOutcome) -> tuple[Block, ...]:
     simulator, misfit = outcome.simulators[0], outcome.misfit
     rows = tuple(
         (
-            with_unit(spoken(ref.name), [tunables[ref.name].unit if ref.name in tunables else ""]),
+            with_unit(spoken(ref.name), [unit_of(ref.name)]),
             f"{simulator.parameters[ref.name]:.6g}",
             _interval((simulator.intervals or {}).get(ref.name)),
             f"{ref.lower:g} to {ref.upper:g}",

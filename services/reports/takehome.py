@@ -11,7 +11,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 from gaplab.schemas.records import SampleRead
 from gaplab.services.bench import motions
 from gaplab.services.core.arrays import frozen
-from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.reports.html import render_html
 from gaplab.services.reports.outcome import ExperimentOutcome, outcome_of
 from gaplab.services.reports.outcome_page import outcome_report, verdict_sentences
@@ -140,7 +140,7 @@ def _simulator(outcome: ExperimentOutcome) -> dict[str, Any]:
         "tunables": [
             {
                 "name": ref.name,
-                "unit": tunables[ref.name].unit if ref.name in tunables else "",
+                "unit": unit_of(ref.name),
                 "value": best.parameters[ref.name],
                 "interval": (best.intervals or {}).get(ref.name),
                 "bounds": [ref.lower, ref.upper],

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from gaplab.schemas.differences import SettingRead
 from gaplab.schemas.records import ExperimentRead
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
-from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.experiments import reading
 from gaplab.services.experiments.differences import read_differences
 from gaplab.services.figures.kinds.coordinates import Coordinate, coordinates_figure
@@ -42,7 +42,7 @@ def simulator_coordinates(store: Store, experiment_id: str, *, title: str = "") 
         Coordinate("Iteration", tuple(float(each.iteration) for each in found)),
         *(
             Coordinate(
-                with_unit(spoken(tunable.name), [tunables[tunable.name].unit if tunable.name in tunables else ""]),
+                with_unit(spoken(tunable.name), [unit_of(tunable.name)]),
                 tuple(each.parameters[at] for each in found),
                 float(space.lower[at]),
                 float(space.upper[at]),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from gaplab.schemas.resolved import ResolvedSpec
 from gaplab.services.core.stored_specs import discrepancy_of, spec_of
-from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tunables.labels import unit_of
 from gaplab.services.experiments import hiding
 from gaplab.services.figures.kinds.simulators import Dimension, SimulatorPoint
 from gaplab.services.figures.kinds.squared_error import ErrorKind
@@ -80,5 +80,4 @@ def tuned_simulators(store: Store, experiment_id: str) -> TunedSimulators:
 def _dimensions(spec: ResolvedSpec) -> tuple[Dimension, ...]:
     space = parameters_of(spec.tunables)
     names = [each.name for each in spec.tunables]
-    units = [tunables[name].unit if name in tunables else "" for name in names]  # unknown if not installed here
-    return tuple(map(Dimension, names, units, space.lower.tolist(), space.upper.tolist()))
+    return tuple(map(Dimension, names, map(unit_of, names), space.lower.tolist(), space.upper.tolist()))

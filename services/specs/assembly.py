@@ -20,8 +20,8 @@ from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.sensitivity import Subject
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies import strategies
-from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.core.tunables.labels import tunable_of
 from gaplab.services.core.tuners import tuners
 from gaplab.services.core.types import Budget, Outcome
 from gaplab.services.engines import engines
@@ -144,12 +144,12 @@ def reality_of(spec: ResolvedSpec, robot: Robot) -> tuple[FloatArray, Simulation
 
 
 def edits_of(names: Iterable[str]) -> list[Tunable]:
-    """Return the tunables of these names.
+    """Return the tunables of these labels.
 
     Raises:
         InvalidSpec: a tunable is not installed here.
     """
-    return [tunables.create(PluginRef(name=name), "/tunables") for name in names]
+    return [tunable_of(name, "/tunables") for name in names]
 
 
 def refuse_missing(spec: ResolvedSpec, *, reality: bool = False) -> None:

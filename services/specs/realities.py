@@ -7,9 +7,10 @@ from gaplab.schemas.resolved import ResolvedReality
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.registry import Registry
 from gaplab.services.core.robots.base import Robot
-from gaplab.services.core.tunables import tunables
+from gaplab.services.core.tunables.labels import label_of, proper, tunable_of
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
+from gaplab.services.specs.tunables import honoured
 
 SIMULATED_PROBES, PHYSICAL_PROBES = "each", "last"
 """Which transferred controllers are measured by default."""
@@ -48,8 +49,8 @@ def physical_reality(spec: ExperimentSpec, robot: Robot) -> ResolvedReality:
 def _truth(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> dict[str, float]:
     """Return the given parameters of reality, and the robot's for other tunables that reality's engine honours."""
     nominal = {
-        ref.name: tunables[ref.name]().read(robot.world)
-        for ref in spec.tunables
-        if tunables[ref.name].field in engine.honours
+        label_of(tunable): tunable.read(robot.world)
+        for tunable in (tunable_of(ref.name) for ref in spec.tunables)
+        if honoured(tunable, engine)
     }
-    return {**nominal, **spec.reality.parameters}
+    return {**nominal, **{proper(label): value for label, value in spec.reality.parameters.items()}}

@@ -4,8 +4,8 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from gaplab.schemas.plugin import PluginRef, TunableRef
-from gaplab.schemas.resolved import ResolvedBudget, ResolvedSpec, ResolvedTunable
+from gaplab.schemas.plugin import PluginRef
+from gaplab.schemas.resolved import ResolvedBudget, ResolvedSpec
 from gaplab.schemas.sensitivity import Checked, SensitivitySpec
 from gaplab.schemas.spec import ExperimentSpec, SharedSettings, StudySpec
 from gaplab.services.core.controllers import controllers
@@ -29,8 +29,8 @@ from gaplab.services.specs.default_engines import default_engine, runs
 from gaplab.services.specs.presets import PRESETS, Preset, with_preset
 from gaplab.services.specs.realities import completed, physical_reality, simulated_reality
 from gaplab.services.specs.robots import robot_of
+from gaplab.services.specs.tunables import shared_fields, with_bounds, with_usual_tunables
 from gaplab.services.specs.violations import (
-    bounds_of,
     budget_violations,
     engine_violations,
     reality_violations,
@@ -59,20 +59,19 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
     """
     spec, preset = with_preset(spec), PRESETS[spec.budget.preset]
     robot, strategy, controllers, simulators, discrepancy, tuner = _created(spec)
+    spec = with_usual_tunables(spec, robot)
     simulated = spec.engine or PluginRef(name=default_engine(robot))
     physical = spec.reality.kind == "physical"
     real = simulated if physical else spec.reality.engine or simulated
-    engine, reality_engine = gather(
-        lambda: _engine(simulated, robot, "/engine"),
-        lambda: _engine(real, robot, "/reality/engine" if spec.reality.engine and not physical else "/engine"),
-    )
+    place = "/reality/engine" if spec.reality.engine and not physical else "/engine"
+    engine, reality_engine = gather(lambda: _engine(simulated, robot, "/engine"), lambda: _engine(real, robot, place))
     budget = _budget(spec, preset)
     if violations := [
         *engine_violations(robot, {reality_engine: "/reality/engine", engine: "/engine"}),
-        *tunable_violations(spec, engine),
+        *tunable_violations(spec, robot, engine),
         *strategy_violations(spec, strategy, robot),
         *tuning_violations(robot, discrepancy, tuner),
-        *reality_violations(spec, strategy, engine, reality_engine),
+        *reality_violations(spec, strategy, robot, simulated=engine, engine=reality_engine),
         *bench_violations(spec, robot),
         *budget_violations(budget, strategy, len(spec.tunables), controllers=controllers, simulators=simulators),
     ]:
@@ -86,7 +85,7 @@ def resolve_experiment(spec: ExperimentSpec) -> ResolvedSpec:
         **{each.kind: (ref := getattr(spec, each.kind)) and completed(each, ref) for each in NEED_NO_OTHERS},
         controller_optimizer=completed(optimizers, spec.controller_optimizer or spec.optimizer),
         engine=completed(engines, simulated),
-        tunables=tuple(_with_bounds(ref) for ref in spec.tunables),
+        tunables=tuple(with_bounds(ref, robot) for ref in spec.tunables),
         held_out=spec.held_out,
         reality=physical_reality(spec, robot) if physical else simulated_reality(spec, robot, real, reality_engine),
         budget=budget,
@@ -113,7 +112,7 @@ def resolve_study(spec: StudySpec) -> tuple[ResolvedSpec, ...]:
     Raises:
         InvalidSpec: with every violation, each with its pointer into the study's spec, once.
     """
-    shared = {name: getattr(spec, name) for name in StudySpec.model_fields if name in ExperimentSpec.model_fields}
+    shared = shared_fields(spec, StudySpec.model_fields.keys() & ExperimentSpec.model_fields.keys())
     resolved: list[ResolvedSpec] = []
     violations: dict[tuple[str, str], Violation] = {}
     for index, strategy in enumerate(spec.strategies):
@@ -148,7 +147,7 @@ def resolve_sensitivity(spec: SensitivitySpec) -> Checked:
     Raises:
         InvalidSpec: with every violation, as an experiment with these settings would have.
     """
-    shared = {name: getattr(spec, name) for name in SharedSettings.model_fields}
+    shared = shared_fields(spec, SharedSettings.model_fields)
     resolved = resolve_experiment(ExperimentSpec(**shared, strategy=PluginRef(name="random")))
     return Checked(
         robot=resolved.robot,
@@ -190,11 +189,6 @@ def _label(strategy: Strategy) -> str:
     chosen = strategy.options.model_dump(mode="json")
     changed = [f"{name} {value}" for name, value in chosen.items() if value != defaults[name]]
     return f"{strategy.name} ({', '.join(changed)})"[:200] if changed else strategy.name
-
-
-def _with_bounds(ref: TunableRef) -> ResolvedTunable:
-    lower, upper = bounds_of(ref)
-    return ResolvedTunable(name=ref.name, lower=lower, upper=upper)
 
 
 def _budget(spec: ExperimentSpec, preset: Preset) -> ResolvedBudget:

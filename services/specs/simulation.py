@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Outcomes, Parameters, frozen
 from gaplab.services.core.errors import PluginBroken
-from gaplab.services.core.motions import Recording, Trajectory
+from gaplab.services.core.motions import Loop, Motion, Recording, Trajectory
+from gaplab.services.core.noise import QUIET, disturbed
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.tunables.base import Tunable
 from gaplab.services.core.world import World
@@ -28,6 +29,7 @@ class Simulation:
         self._robot = robot
         self._engine = engine
         self._edits = tuple(edits)
+        self._order = sorted(range(len(self._edits)), key=lambda place: not self._edits[place].rebuilds)
         self._world = lru_cache(maxsize=WORLDS_KEPT)(self._edited)
 
     def __call__(self, genomes: Genomes, parameters: Parameters) -> Fitnesses:
@@ -37,7 +39,7 @@ class Simulation:
         """
         worlds = [self._world(tuple(row)) for row in parameters.tolist()]
         motions = [self._robot.motion(genome) for genome in genomes]
-        return self._fitnesses(self._engine.rollouts(worlds, motions), len(genomes), len(parameters))
+        return self._fitnesses(self._rollouts(genomes, worlds, motions), len(genomes), len(parameters))
 
     def sense(self, genomes: Genomes, parameters: Parameters) -> Outcomes:
         """Return fitness and readings `(n, m, 1 + q)`: the fitness of a call, then each reading over its noise.
@@ -49,7 +51,7 @@ class Simulation:
         motions = [self._robot.motion(genome) for genome in genomes]
         times = _all_times(motions[0].observe_s.tobytes(), sensors.times_s.tobytes())
         longer = [motion.observed_at(times.all_s) for motion in motions]
-        seen = self._engine.rollouts(worlds, longer)
+        seen = self._rollouts(genomes, worlds, longer)
         fitnesses = self._fitnesses(_at(seen, times.observed), len(genomes), len(parameters))
         if not sensors.size:
             return fitnesses[..., None]
@@ -75,13 +77,40 @@ class Simulation:
     def record(self, genome: Genome, parameters: FloatArray, times_s: FloatArray) -> tuple[World, Recording]:
         """Return the world of a simulator `(p,)`, and the rollout of a genome in it, recorded at times `(k,)` too."""
         world = self._world(tuple(parameters.tolist()))
-        return world, self._engine.record(world, self._robot.motion(genome), times_s)
+        motion = disturbed(world, self._robot.motion(genome), genome)
+        return world, self._engine.record(world, motion, times_s)
 
     def _edited(self, values: tuple[float, ...]) -> World:
         world = self._robot.world
-        for tunable, value in zip(self._edits, values, strict=True):
-            world = tunable.edit(world, value)
+        for place in self._order:
+            world = self._edits[place].edit(world, values[place])
         return world
+
+    def _rollouts(self, genomes: Genomes, worlds: Sequence[World], motions: Sequence[Motion | Loop]) -> Trajectory:
+        """Return the trajectories `(n, m, ...)`; the worlds of one noise are simulated together."""
+        noises = {world.noise: None for world in worlds}
+        if len(noises) == 1:
+            return self._engine.rollouts(worlds, _disturbed(worlds[0], motions, genomes))
+        found: list[Trajectory | None] = [None] * len(worlds)
+        for noise in noises:
+            alike = [column for column, world in enumerate(worlds) if world.noise == noise]
+            chosen = [worlds[column] for column in alike]
+            seen = self._engine.rollouts(chosen, _disturbed(chosen[0], motions, genomes))
+            for place, column in enumerate(alike):
+                found[column] = Trajectory(seen.times_s, seen.positions_m[:, place], seen.orientations[:, place])
+        columns = [each for each in found if each is not None]
+        return Trajectory(
+            columns[0].times_s,
+            np.stack([each.positions_m for each in columns], axis=1),
+            np.stack([each.orientations for each in columns], axis=1),
+        )
+
+
+def _disturbed(world: World, motions: Sequence[Motion | Loop], genomes: Genomes) -> Sequence[Motion | Loop]:
+    """Return the motions of genomes with the noise of a world."""
+    if world.noise == QUIET:
+        return motions
+    return [disturbed(world, motion, genome) for motion, genome in zip(motions, genomes, strict=True)]
 
 
 class _Times(NamedTuple):

@@ -8,31 +8,41 @@ from gaplab.schemas.resolved import ResolvedBudget
 from gaplab.schemas.spec import ExperimentSpec
 from gaplab.services.core.discrepancies import discrepancies
 from gaplab.services.core.discrepancies.base import Discrepancy
-from gaplab.services.core.errors import Violation, unknown_name
+from gaplab.services.core.errors import InvalidSpec, Violation
 from gaplab.services.core.optimizers.base import Optimizer
 from gaplab.services.core.robots import robots
 from gaplab.services.core.robots.base import Robot
 from gaplab.services.core.strategies.base import Strategy
-from gaplab.services.core.tunables import tunables
 from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.core.tunables.labels import label_of, proper, tunable_of
 from gaplab.services.core.tuners.base import Tuner
 from gaplab.services.engines import engines
 from gaplab.services.engines.base import Engine
 from gaplab.services.specs.default_engines import runs
+from gaplab.services.specs.tunables import bounds_of, honoured
 
 
-def tunable_violations(spec: ExperimentSpec, engine: type[Engine]) -> Iterator[Violation]:
-    """Yield unknown and repeated tunables, those that the engine ignores, and bounds that are out of range."""
-    counts = Counter(ref.name for ref in spec.tunables)
+def tunable_violations(spec: ExperimentSpec, robot: Robot, engine: type[Engine]) -> Iterator[Violation]:
+    """Yield tunables that are unknown, repeated, or of what the robot lacks or the engine ignores; bounds out of range.
+
+    Args:
+        spec: as submitted.
+        robot: that it names.
+        engine: of the simulators.
+    """
+    counts = Counter(proper(ref.name) for ref in spec.tunables)
     for index, ref in enumerate(spec.tunables):
         pointer = f"/tunables/{index}"
-        if ref.name not in tunables:
-            yield unknown_name(pointer, "tunable", ref.name, list(tunables))
+        try:
+            tunable = tunable_of(ref.name, pointer)
+        except InvalidSpec as error:
+            yield from error.violations
             continue
-        yield from _honour_violations(ref.name, engine, pointer)
-        yield from _bound_violations(ref, pointer)
-        if counts[ref.name] > 1:
-            yield Violation(pointer, ref.name, f"{ref.name} is named {counts[ref.name]} times; once is permitted")
+        yield from _place_violations(tunable, robot, engine, pointer)
+        if tunable.lack(robot.world) is None:
+            yield from _bound_violations(ref, tunable, robot, pointer)
+        if (count := counts[label_of(tunable)]) > 1:
+            yield Violation(pointer, ref.name, f"{ref.name} is named {count} times; once is permitted")
 
 
 def tuning_violations(robot: Robot, discrepancy: Discrepancy, tuner: Tuner) -> Iterator[Violation]:
@@ -56,9 +66,9 @@ def strategy_violations(spec: ExperimentSpec, strategy: Strategy, robot: Robot) 
             f"{' and '.join(able) or 'no robot'} has sensors"
         )
         yield Violation("/strategy", strategy.name, message, able)
-    tuned = [ref.name for ref in spec.tunables]
+    tuned = [proper(ref.name) for ref in spec.tunables]
     for name in strategy.named_tunables:
-        if name not in tuned:
+        if proper(name) not in tuned:
             message = f"{strategy.name} names {name}, which the spec does not tune; it tunes {' and '.join(tuned)}"
             yield Violation("/strategy/options", name, message, tuned)
 
@@ -87,14 +97,8 @@ def listed(able: Sequence[str]) -> str:
     return " and ".join(able) or "no engine"
 
 
-def bounds_of(ref: TunableRef) -> tuple[float, float]:
-    """Return the bounds of a tunable that is installed; a missing one is the tunable's own."""
-    tunable = tunables[ref.name]
-    return tunable.lower if ref.lower is None else ref.lower, tunable.upper if ref.upper is None else ref.upper
-
-
-def _bound_violations(ref: TunableRef, pointer: str) -> Iterator[Violation]:
-    (lower, upper), tunable = bounds_of(ref), tunables[ref.name]
+def _bound_violations(ref: TunableRef, tunable: Tunable, robot: Robot, pointer: str) -> Iterator[Violation]:
+    lower, upper = bounds_of(ref, tunable, robot)
     for side in ("lower", "upper"):
         if (given := getattr(ref, side)) is not None:
             yield from _range_violations(tunable, given, f"{pointer}/{side}")
@@ -102,28 +106,33 @@ def _bound_violations(ref: TunableRef, pointer: str) -> Iterator[Violation]:
         yield Violation(pointer, [lower, upper], f"lower must be below upper, not {lower:g} and {upper:g}")
 
 
-def _range_violations(tunable: type[Tunable], value: float, pointer: str) -> Iterator[Violation]:
+def _range_violations(tunable: Tunable, value: float, pointer: str) -> Iterator[Violation]:
     if not tunable.least <= value <= tunable.greatest:
         permitted = f"{tunable.least:g} to {tunable.greatest:g}"
-        yield Violation(pointer, value, f"{tunable.name} must be from {permitted}, not {value:g}", permitted)
+        yield Violation(pointer, value, f"{label_of(tunable)} must be from {permitted}, not {value:g}", permitted)
 
 
-def _honour_violations(name: str, engine: type[Engine], pointer: str) -> Iterator[Violation]:
-    field = tunables[name].field
-    if field not in engine.honours:
-        able = [each.name for each in engines.values() if field in each.honours]
+def _place_violations(tunable: Tunable, robot: Robot, engine: type[Engine], pointer: str) -> Iterator[Violation]:
+    """Yield that the robot lacks what a tunable edits, or that the engine ignores it."""
+    name = label_of(tunable)
+    if (lack := tunable.lack(robot.world)) is not None:
+        why, permitted = lack
+        yield Violation(pointer, name, f"{name}: {why}", permitted)
+    if not honoured(tunable, engine):
+        able = [each.name for each in engines.values() if honoured(tunable, each)]
         message = f"{engine.name} does not honour {name}; {listed(able)} does"
         yield Violation(pointer, name, message, able)
 
 
 def reality_violations(
-    spec: ExperimentSpec, strategy: Strategy, simulated: type[Engine], engine: type[Engine]
+    spec: ExperimentSpec, strategy: Strategy, robot: Robot, *, simulated: type[Engine], engine: type[Engine]
 ) -> Iterator[Violation]:
     """Yield parameters of reality that are unknown, out of range, or ignored by its engine; direct use of hardware.
 
     Args:
         spec: as submitted.
         strategy: that it names.
+        robot: likewise.
         simulated: engine of the simulators.
         engine: of reality.
     """
@@ -140,11 +149,13 @@ def reality_violations(
         yield Violation("/strategy", strategy.name, message, "another strategy, or an engine with `repeatable = True`")
     for name, value in spec.reality.parameters.items():
         pointer = f"/reality/parameters/{name}"
-        if name not in tunables:
-            yield unknown_name(pointer, "tunable", name, list(tunables))
+        try:
+            tunable = tunable_of(name, pointer)
+        except InvalidSpec as error:
+            yield from error.violations
             continue
-        yield from _honour_violations(name, engine, pointer)
-        yield from _range_violations(tunables[name], value, pointer)
+        yield from _place_violations(tunable, robot, engine, pointer)
+        yield from _range_violations(tunable, value, pointer)
 
 
 def _physical_violations(spec: ExperimentSpec, strategy: Strategy) -> Iterator[Violation]:

@@ -152,7 +152,7 @@ def test_a_misspelt_name_is_refused_with_the_nearest_one() -> None:
 def test_everything_that_is_wrong_is_said_at_once() -> None:
     violations = refused(
         tunables=["frction", {"name": "restitution", "lower": 0.5, "upper": 0.1}],
-        reality={"parameters": {"static_friction": -1, "mass": 1}},
+        reality={"parameters": {"static_friction": -1, "weight": 1}},
         budget={"controller_evaluations": 3},
     )
 
@@ -160,7 +160,7 @@ def test_everything_that_is_wrong_is_said_at_once() -> None:
         "/tunables/0",
         "/tunables/1",
         "/reality/parameters/static_friction",
-        "/reality/parameters/mass",
+        "/reality/parameters/weight",
         "/budget/controller_evaluations",
     }
 

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from gaplab.schemas.base import Frozen, Real
 from gaplab.services.core.arrays import FloatArray, Genome, frozen
+from gaplab.services.core.controllers.actuation import middles, swings
 from gaplab.services.core.controllers.base import Controller
 from gaplab.services.core.motions import Motion
 from gaplab.services.core.space import Space
@@ -29,7 +30,8 @@ class SquarePulses(Controller):
     """A periodic pulse of phase and width for each actuator.
 
     Gene 2i is the phase of actuator i, and gene 2i + 1 the width of its pulse, both in [0, 1]; phases wrap around.
-    During its pulse an actuator is at its start plus its amplitude, else at its start minus its amplitude.
+    During its pulse an actuator is at its middle plus its amplitude, else at its middle minus its amplitude. The middle
+    is the start of the joint, or 0 for a motor that follows a speed or a torque.
     """
 
     name = "square_pulses"
@@ -45,11 +47,10 @@ class SquarePulses(Controller):
         self._observe_s, self._period_s = observe_s, self.options.period_s
         self._cycles = frozen(np.arange(np.ceil(observe_s[-1] / self._period_s))[:, None])
         self._narrowest, self._range = frozen([NARROWEST] * actuators), frozen([WIDEST - NARROWEST] * actuators)
-        swings = np.array([joint.swing for joint in world.actuators])[:, None] * self.options.amplitude
-        starts = np.array([joint.start for joint in world.actuators])[:, None]
+        swing, rest = swings(world, self.options.amplitude)[:, None], middles(world)[:, None]
         times = 1 + 2 * actuators * self._cycles.size
-        self._inside = frozen(np.repeat(starts + swings, times, axis=1))
-        self._outside = frozen(np.repeat(starts - swings, times, axis=1))
+        self._inside = frozen(np.repeat(rest + swing, times, axis=1))
+        self._outside = frozen(np.repeat(rest - swing, times, axis=1))
 
     def motion(self, genome: Genome) -> Motion:
         """Return the motion: each actuator is at plus its amplitude during its pulse, else at minus."""

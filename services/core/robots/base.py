@@ -30,6 +30,7 @@ class Robot(Plugin):
         world: the robot in reality: its nominal world, whose coefficients are the default hidden truth.
         usual_controller: controller of a spec that names none; None if it brings its own.
         usual_task: task of a spec that names none; None if it brings its own.
+        usual_tunables: labels of the tunables of a spec that names none; empty for those of every spec.
         designed: hand-designed genomes of middling fitness, by the name of their controller.
         unit: unit of its fitness.
         space: space of its genomes.
@@ -43,6 +44,7 @@ class Robot(Plugin):
     world: World
     usual_controller: PluginRef | None = None
     usual_task: PluginRef | None = None
+    usual_tunables: tuple[str, ...] = ()
     designed: Mapping[str, Genome] = MappingProxyType({})
     space: Space
     known: Genome

@@ -11,6 +11,7 @@ from gaplab.schemas.base import Frozen
 from gaplab.services.core.arrays import Fitnesses, FloatArray, Genome, Genomes, Parameters
 from gaplab.services.core.space import Space
 from gaplab.services.core.strategies.base import Search, Untuned
+from gaplab.services.core.tunables.labels import proper, separated
 from gaplab.services.core.types import Belief
 
 BASE = ("dynamic_friction",)
@@ -18,7 +19,7 @@ BASE = ("dynamic_friction",)
 
 def _names(value: object) -> object:
     """Return the names of a text, which commas separate."""
-    return [name.strip() for name in value.split(",") if name.strip()] if isinstance(value, str) else value
+    return separated(value) if isinstance(value, str) else value
 
 
 class NoiseEnvelopeOptions(Frozen):
@@ -26,8 +27,8 @@ class NoiseEnvelopeOptions(Frozen):
 
     base: Annotated[tuple[str, ...], BeforeValidator(_names), Field(max_length=100)] = Field(
         default=BASE,
-        description="tunables that a behaviour should use, separated by commas: they vary little; all others vary over "
-        "all their bounds; gaplab's default: dynamic_friction",
+        description="tunables that a behaviour should use, by labels like mass(trunk), separated by commas: they "
+        "vary little; all others vary over all their bounds; gaplab's: dynamic_friction",
     )
     epsilon: Annotated[float, Field(strict=True, ge=0, le=0.5)] = Field(
         default=0.1,
@@ -83,7 +84,7 @@ class NoiseEnvelope(Untuned):
         drawn = tunables.draw(self.ensemble, rng)
         middle = (tunables.lower + tunables.upper) / 2
         little = tunables.contain(middle + 2 * self.options.epsilon * (drawn - middle))
-        return np.where(np.isin(names, self.options.base), little, drawn)
+        return np.where(np.isin(names, [proper(name) for name in self.options.base]), little, drawn)
 
     def transfer(self, belief: Belief, search: Search, rng: Generator) -> Genome:  # noqa: ARG002 - the port's signature
         """Return the controller found that is fittest in its worst draw, or in its mean less deviations."""

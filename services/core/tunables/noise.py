@@ -1,0 +1,46 @@
+"""Noise of commands and of observations."""
+
+from dataclasses import replace
+from typing import Literal
+
+from pydantic import Field
+
+from gaplab.schemas.base import Frozen
+from gaplab.services.core.tunables.base import Tunable
+from gaplab.services.core.world import World
+
+UNITS = {"target": "", "angle_rad": "rad", "speed_rad_s": "rad/s", "tilt": "1", "turning_rad_s": "rad/s"}
+"""What is noisy, with its unit; that of targets is the motor's."""
+
+
+class NoiseOptions(Frozen):
+    """Options of `noise`."""
+
+    of: Literal["target", "angle_rad", "speed_rad_s", "tilt", "turning_rad_s"] = Field(
+        default="target", description="the noisy quantity: targets, or what a controller in a loop observes"
+    )
+
+
+class NoiseDeviation(Tunable):
+    """Standard deviation of the noise of targets, or of what a controller in a loop observes."""
+
+    name = "noise"
+    source = "Jakobi, Husbands and Harvey 1995; the bounds are gaplab's"
+    field = "noise"
+    lower, upper = 0.0, 0.1
+    least, greatest = 0.0, 100.0
+    Options = NoiseOptions
+    options: NoiseOptions
+
+    def __init__(self, options: Frozen | None = None) -> None:
+        super().__init__(options)
+        self.unit = UNITS[self.options.of]
+
+    def read(self, world: World) -> float:
+        """Return the standard deviation."""
+        return float(getattr(world.noise, self.options.of))
+
+    def edit(self, world: World, value: float) -> World:
+        """Return the world with another standard deviation."""
+        changes: dict[str, float] = {self.options.of: float(value)}
+        return world.edited(self.field, noise=replace(world.noise, **changes))
