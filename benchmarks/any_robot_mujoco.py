@@ -1,25 +1,31 @@
 """A robot with PD motors in MuJoCo: Simulate against bare stepping, 20 simulators by turns, and feedback.
 
-`python -m benchmarks.any_robot_mujoco` prints all three. Bare stepping is one call of `mujoco.rollout` with the same
-model and law, and targets that were computed before. Feedback is the controller `mlp`, 64 genomes a call, against as
-many of `square_pulses`, which needs no sensors.
+`python -m benchmarks.any_robot_mujoco` prints all three; with the name of a URDF or an MJCF, the first of that robot.
+Bare stepping is one call of `mujoco.rollout` with the same model and law, and targets that were computed before.
+Feedback is the controller `mlp`, 64 genomes a call, against as many of `square_pulses`, which needs no sensors.
 """
 
+from argparse import ArgumentParser
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from mujoco import mjtState
 from mujoco import rollout as library
 
 from benchmarks.any_robot import Dog, best, by_turns
+from gaplab.services.core import robot_library
 from gaplab.services.core.arrays import Genomes
 from gaplab.services.core.controllers import controllers
 from gaplab.services.core.motions import open_loop
 from gaplab.services.core.robots.base import Robot
+from gaplab.services.core.robots.imported import Imported, ImportedOptions
 from gaplab.services.core.robots.quadruped import Quadruped
 from gaplab.services.core.tasks.walk import Walk
 from gaplab.services.core.tunables import tunables
 from gaplab.services.engines.mujoco import MuJoCo
+from gaplab.services.robots.importing import import_robot
+from gaplab.services.robots.options import ImportOptions
 from gaplab.services.specs.simulation import Simulation
 
 TOGETHER = 64
@@ -69,7 +75,7 @@ def overhead(robot: Robot) -> None:
     )
     for name, its in ((f"{TOGETHER} a call", together), ("one a call", one_by_one)):
         figures = f"Simulate {1e3 * its / TOGETHER:.2f} ms a rollout, bare {1e3 * alone / TOGETHER:.2f} ms"
-        print(f"{robot.name}, {name}: {figures}, {alone / its:.2f}")
+        print(f"{robot.label}, {name}: {figures}, {alone / its:.2f}")
 
 
 def feedback(robot: Robot, senses: str) -> None:
@@ -85,8 +91,20 @@ def feedback(robot: Robot, senses: str) -> None:
     print(f"{robot.name}, {senses}, {TOGETHER} a call: {figures}, {unfed / fed:.2f}")
 
 
+def imported(file: Path) -> Robot:
+    """Return the robot of a file."""
+    robot = import_robot(file, ImportOptions()).robot
+    robot_library.learn([robot.text])
+    return Imported(ImportedOptions(sha256=robot.sha256, name=robot.name))
+
+
 def main() -> None:
-    """Print all figures."""
+    """Print all figures, or that of a file."""
+    parser = ArgumentParser(prog="python -m benchmarks.any_robot_mujoco", description=__doc__)
+    parser.add_argument("file", nargs="?", type=Path)
+    if file := parser.parse_args().file:
+        overhead(imported(file))
+        return
     overhead(Dog())
     by_turns(MuJoCo(), Dog())
     for robot in (Dog(), Quadruped()):

@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gaplab.services.core.motor_law import PDLaw
 from gaplab.services.core.robots.quadruped import Quadruped
-from gaplab.services.engines.mujoco.law import apply_impulses, coast, drive, press, touch
-from gaplab.services.engines.mujoco.settings import Servo, Settings, settings
+from gaplab.services.engines.mujoco.law import apply_impulses, coast, damp, drive, press, stop, touch
+from gaplab.services.engines.mujoco.settings import PD, Servo, Settings, settings
 
 WORLD = Quadruped().world
 STEP_S = WORLD.time_step_s
@@ -115,3 +116,65 @@ def test_impulses_act_on_the_degrees_of_freedom_as_these_move_the_contacts() -> 
     assert excess == pytest.approx(before + STEP_S * jacobian @ accelerations)
     assert np.array_equal(cleared, np.zeros(3))
     assert forces == pytest.approx(jacobian.T @ impulses / STEP_S)
+
+
+def test_a_limit_lets_a_joint_close_its_gap_and_pushes_it_back_from_beyond() -> None:
+    assert stop(KNOWN, 0.1) * STEP_S == pytest.approx(-0.1)
+    assert stop(KNOWN, -0.1) * STEP_S == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(("speed", "left"), [(0.05, 0.0), (0.3, 0.2), (-0.3, -0.2)])
+def test_dry_friction_brakes_at_most_with_its_torque(speed: Any, left: Any) -> None:
+    excess, impulses = np.array([speed]), np.zeros(1)
+
+    press(1, (1, 1), np.eye(1), excess, np.array([0.1]), impulses)
+
+    assert excess[0] == pytest.approx(left)
+    assert abs(impulses[0]) <= 0.1
+
+
+@pytest.mark.parametrize(("speed", "left"), [(-0.3, 0.0), (0.3, 0.3)])
+def test_a_limit_pushes_and_never_pulls(speed: Any, left: Any) -> None:
+    excess, impulses = np.array([speed]), np.zeros(1)
+
+    press(1, (0, 1), np.eye(1), excess, np.array([np.inf]), impulses)
+
+    assert excess[0] == pytest.approx(left)
+    assert impulses[0] >= 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_friction_limits_and_contacts_obey_their_laws_all_at_once(seed: Any) -> None:
+    inverse, free = mass(8, seed), np.random.default_rng(seed).normal(size=8)
+    after, impulses = free.copy(), np.zeros(8)
+
+    press(2000, (1, 2), inverse, after, np.array([0.2, np.inf, 0.7, 0, 0, 0.7, 0, 0]), impulses)
+
+    assert after == pytest.approx(free + inverse @ impulses)
+    assert abs(impulses[0]) <= 0.2
+    assert abs(impulses[0]) == pytest.approx(0.2) or after[0] == pytest.approx(0, abs=1e-6)
+    assert np.sign(impulses[0]) != np.sign(after[0]) or abs(after[0]) < 1e-6
+    for row in (1, 2, 5):
+        assert impulses[row] == pytest.approx(0, abs=1e-6) or after[row] == pytest.approx(0, abs=1e-6)
+        assert impulses[row] >= 0
+
+
+def test_damping_slows_the_joints_that_have_it() -> None:
+    motor = PD(6, PDLaw(1.0, 0.0, 0.0, 9.0), 0.0)
+    known, forces = settings(WORLD, 7, 1, Settings([], [motor], [(5, 0.5)])), np.ones(7)
+
+    damp(known, forces, np.full(7, 4.0))
+
+    assert np.array_equal(forces, [1.0, 1.0, 1.0, 1.0, 1.0, -1.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("target", "took", "torque"), [(0.3, 0.0, 1.2), (9.0, 0.0, 2.0), (9.0, 5.0, 2.5), (-9.0, 5.0, -2.0)]
+)
+def test_a_pd_motor_adds_what_its_rotor_took_to_its_limit(target: Any, took: Any, torque: Any) -> None:
+    known = settings(WORLD, 7, 1, Settings([], [PD(6, PDLaw(10.0, 1.0, 0.0, 2.0), 0.1)]))
+    forces, angles = np.array([*np.zeros(6), target]), np.array([*np.zeros(7), 0.1])
+
+    drive(known, forces, angles, np.full(7, 0.8), np.full(7, took))
+
+    assert forces[6] == pytest.approx(torque)

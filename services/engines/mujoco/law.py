@@ -194,7 +194,7 @@ def press(sweeps: int, singles: Any, inverse: Any, excess: Any, frictions: Any, 
             least, most = -frictions[row] if row < singles[0] else 0.0, frictions[row]
             wanted = min(max(least, impulses[row] - excess[row] / inverse[row, row]), most)
             change, impulses[row] = wanted - impulses[row], wanted
-            for other in range(rows):
+            for other in range(rows if change else 0):  # most limits bear nothing; what slides has all friction
                 excess[other] += inverse[row, other] * change
         for row in range(singles[1], rows, ROWS):
             first, second = row + 1, row + 2

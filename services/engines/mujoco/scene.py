@@ -71,7 +71,8 @@ class MuJoCoScene:
                 controls = self.controls.of([motion], steps, [prepared.delays])
                 after = self.pool.rolled([prepared.model], self._starts[:1], controls)
             else:
-                after, controls = self._looping.run([prepared], [motion], np.arange(1, steps + 1))
+                controls = np.zeros((1, steps, self.controls.width))
+                after = self._looping.run([prepared], [motion], np.arange(1, steps + 1), controls)
         states = np.vstack([self.states.start, after[0]])
         looked = states[chosen]
         seen = np.hstack([self.states.base(looked), self.states.angles(looked)])
@@ -93,7 +94,7 @@ class MuJoCoScene:
         last = max(1, int(steps[-1]))
         loops = [motion for motion in motions if isinstance(motion, Loop)]
         if loops:
-            states, _ = self._looping.run(prepared, loops, np.append(steps, last))
+            states = self._looping.run(prepared, loops, np.append(steps, last))
             return self._checked(states[:, :-1], states[:, -1], last)
         controls = self.controls.of(
             [motion for motion in motions if isinstance(motion, Motion)], last, [each.delays for each in prepared]
